@@ -1,0 +1,1 @@
+//! Shape functions N and ∇N: one file a family, one list ([`Approximation`]).

@@ -1,0 +1,91 @@
+//! The Cartesian background grid: node positions and numbering. It stores nothing per node.
+
+use crate::tensor::Vector;
+
+/// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid<const D: usize> {
+    /// The lower corner of the box.
+    pub origin: Vector<f64, D>,
+    /// The distance h between neighbouring nodes, the same along every axis.
+    pub spacing: f64,
+    /// Cells along each axis.
+    pub cells: [u32; D],
+}
+
+/// One axis of the grid, in which a product shape function is evaluated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// Position of node 0.
+    pub origin: f64,
+    /// The spacing h.
+    pub spacing: f64,
+    /// Number of cells; nodes are `0..=cells`.
+    pub cells: u32,
+}
+
+impl Axis {
+    /// `x` in units of the spacing, from node 0; `None` outside the axis (or if `x` is not a number).
+    #[inline]
+    pub fn local(&self, x: f64) -> Option<f64> {
+        let s = (x - self.origin) / self.spacing;
+        (s >= 0.0 && s <= f64::from(self.cells)).then_some(s)
+    }
+
+    /// Last node of the axis.
+    #[inline]
+    pub fn last(&self) -> i64 {
+        i64::from(self.cells)
+    }
+}
+
+impl<const D: usize> Grid<D> {
+    /// Axis `k`.
+    #[inline]
+    pub fn axis(&self, k: usize) -> Axis {
+        Axis { origin: self.origin[k], spacing: self.spacing, cells: self.cells[k] }
+    }
+
+    /// Number of nodes of the whole box, active or not.
+    pub fn node_count(&self) -> u64 {
+        self.cells.iter().map(|&n| u64::from(n) + 1).product()
+    }
+
+    /// Number of a node from its index along each axis; the first axis runs fastest.
+    #[inline]
+    pub fn id(&self, index: [u32; D]) -> u64 {
+        (0..D).rev().fold(0, |id, k| id * (u64::from(self.cells[k]) + 1) + u64::from(index[k]))
+    }
+
+    /// Index along each axis of the node numbered `id`.
+    #[inline]
+    pub fn index(&self, id: u64) -> [u32; D] {
+        let mut rest = id;
+        std::array::from_fn(|k| {
+            let nodes = u64::from(self.cells[k]) + 1;
+            let index = rest % nodes;
+            rest /= nodes;
+            index as u32
+        })
+    }
+
+    /// Position of the node with the given index.
+    #[inline]
+    pub fn position(&self, index: [u32; D]) -> Vector<f64, D> {
+        Vector::from_fn(|k, _| self.origin[k] + f64::from(index[k]) * self.spacing)
+    }
+
+    /// Whether `x` lies in the box, its faces included.
+    pub fn contains(&self, x: &Vector<f64, D>) -> bool {
+        (0..D).all(|k| self.axis(k).local(x[k]).is_some())
+    }
+
+    /// The cell that holds `x`; a point on the upper face belongs to the last cell. `None` outside the box.
+    pub fn cell(&self, x: &Vector<f64, D>) -> Option<[u32; D]> {
+        let mut cell = [0; D];
+        for k in 0..D {
+            cell[k] = (self.axis(k).local(x[k])? as u32).min(self.cells[k] - 1);
+        }
+        Some(cell)
+    }
+}

@@ -1,0 +1,8 @@
+//! Implicit finite-strain material point method with a matrix-free, Voigt-free tangent.
+
+pub mod approximation;
+pub mod grid;
+pub mod material;
+pub mod scalar;
+pub mod solver;
+pub mod tensor;

@@ -1,0 +1,141 @@
+//! A law given by its energy alone; stress and tangent come from dual numbers.
+
+use super::{FrozenTangent, Law, embed};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, Vector, identity, outer, scaled, symmetric};
+use num_dual::Dual;
+
+/// What a user writes to run a new law: one function.
+///
+/// `E` is the 3×3 Green–Lagrange strain ½(FᵀF − I), also in plane and uniaxial strain (the missing components are zero).
+/// Treat `E` as symmetric. Beware of spectral functions (eigenvalues) and of `sqrt`, `powf` at zero: their dual parts
+/// are wrong or NaN at E = 0; use invariants.
+///
+/// ```
+/// use bfree::material::{Energy, FromEnergy};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{contract, trace, Tensor};
+///
+/// struct Hooke { lambda: f64, shear: f64 }
+///
+/// impl Energy for Hooke {
+///     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+///         T::lit(0.5 * self.lambda) * trace(e) * trace(e) + T::lit(self.shear) * contract(e, e)
+///     }
+/// }
+///
+/// let law = FromEnergy(Hooke { lambda: 1.0, shear: 1.0 });
+/// # let _ = law;
+/// ```
+pub trait Energy: Send + Sync {
+    /// Strain energy per unit reference volume.
+    fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T;
+}
+
+/// The law whose energy is `W`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FromEnergy<W>(pub W);
+
+/// The symmetric unit direction (e_i ⊗ e_k + e_k ⊗ e_i)/2.
+fn direction<T: Real>(i: usize, k: usize) -> Tensor<T, 3> {
+    let mut direction = Tensor::zeros();
+    direction[(i, k)] += T::lit(0.5);
+    direction[(k, i)] += T::lit(0.5);
+    direction
+}
+
+/// E + ε X as dual numbers.
+fn seeded<T: Real>(e: &Tensor<T, 3>, x: &Tensor<T, 3>) -> Tensor<Dual<T>, 3> {
+    e.zip_map(x, Dual::new)
+}
+
+impl<W: Energy> FromEnergy<W> {
+    /// S_ik = dW(E + ε direction_ik)/dε
+    fn stress_at<T: Real, const D: usize>(&self, e: &Tensor<T, 3>) -> Tensor<T, D> {
+        let mut stress = Tensor::zeros();
+        for i in 0..D {
+            for k in i..D {
+                stress[(i, k)] = self.0.energy(&seeded(e, &direction(i, k))).eps;
+                stress[(k, i)] = stress[(i, k)];
+            }
+        }
+        stress
+    }
+
+    /// ℂ:X = dS(E + ε X)/dε
+    fn elasticity_at<T: Real, const D: usize>(&self, e: &Tensor<T, 3>, x: &Tensor<T, 3>) -> Tensor<T, D> {
+        self.stress_at::<Dual<T>, D>(&seeded(e, x)).map(|s| s.eps)
+    }
+}
+
+impl<W: Energy> Law for FromEnergy<W> {
+    type Frozen<T: Real, const D: usize> = FrozenGeneral<T, D>;
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.0.energy(&embed(&at.green_lagrange()))
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.stress_at(&embed(&at.green_lagrange()))
+    }
+
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        self.elasticity_at(&embed(&at.green_lagrange()), &embed(&symmetric(x)))
+    }
+
+    fn freeze<T: Real, const D: usize>(
+        &self,
+        f_n: &Tensor<T, D>,
+        at: &Deformation<T, D>,
+        volume: T,
+    ) -> FrozenGeneral<T, D> {
+        let e = embed(&at.green_lagrange());
+        let elasticity =
+            std::array::from_fn(|i| std::array::from_fn(|k| scaled(&self.elasticity_at(&e, &direction(i, k)), volume)));
+        FrozenGeneral { f_n: *f_n, f: at.f, stress: scaled(&self.stress_at(&e), volume), elasticity }
+    }
+}
+
+/// F_n, F and V₀ times S and the full ℂ: for laws that have nothing better.
+#[derive(Clone, Debug)]
+pub struct FrozenGeneral<T: Real, const D: usize> {
+    f_n: Tensor<T, D>,
+    f: Tensor<T, D>,
+    stress: Tensor<T, D>,
+    /// `elasticity[i][k]` = V₀ ℂ:(e_i ⊗ e_k)
+    elasticity: [[Tensor<T, D>; D]; D],
+}
+
+impl<T: Real, const D: usize> FrozenGeneral<T, D> {
+    /// V₀ ℂ:X
+    #[inline(always)]
+    fn elasticity(&self, x: &Tensor<T, D>) -> Tensor<T, D> {
+        let mut sum = Tensor::zeros();
+        for i in 0..D {
+            for k in 0..D {
+                sum += scaled(&self.elasticity[i][k], x[(i, k)]);
+            }
+        }
+        sum
+    }
+}
+
+impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenGeneral<T, D> {
+    #[inline(always)]
+    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
+        let delta_f = l * self.f_n;
+        let delta_s = self.elasticity(&(self.f.transpose() * delta_f));
+        (delta_f * self.stress + self.f * delta_s) * self.f_n.transpose()
+    }
+
+    /// F ℂmat{v,b} Fᵀ, column by column: ℂmat{v,b} e_k = [ℂ:(e_k ⊗ b)] v
+    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
+        let (v, b) = (self.f_n.transpose() * grad_i, self.f_n.transpose() * grad_j);
+        let mut density: Tensor<T, D> = Tensor::zeros();
+        for k in 0..D {
+            let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
+            density.set_column(k, &(self.elasticity(&outer(&e_k, &b)) * v));
+        }
+        self.f * density * self.f.transpose() + scaled(&identity(), v.dot(&(self.stress * b)))
+    }
+}

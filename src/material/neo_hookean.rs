@@ -1,0 +1,150 @@
+//! Compressible neo-Hookean solids: one shear response, two volumetric ones.
+
+use super::{FrozenTangent, Lame, Law};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled};
+
+/// How the volume resists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Volumetric {
+    /// Ciarlet: Λ/4 (J²−1) − Λ/2 ln J, the paper's law (appendix B.1).
+    Ciarlet,
+    /// Λ/2 (ln J)², the law most other programs ship.
+    Logarithmic,
+}
+
+/// Compressible neo-Hookean solid, W = U(J) − G ln J + G tr E.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeoHookean {
+    /// Λ and G.
+    pub lame: Lame,
+    /// U(J).
+    pub volumetric: Volumetric,
+}
+
+impl NeoHookean {
+    /// Ciarlet's law, the one of the paper.
+    pub fn ciarlet(lame: Lame) -> Self {
+        Self { lame, volumetric: Volumetric::Ciarlet }
+    }
+
+    /// The law with a logarithmic volumetric energy.
+    pub fn logarithmic(lame: Lame) -> Self {
+        Self { lame, volumetric: Volumetric::Logarithmic }
+    }
+
+    /// J U'(J): Λ/2 (J²−1), or Λ ln J
+    #[inline(always)]
+    fn volumetric_stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        match self.volumetric {
+            Volumetric::Ciarlet => T::lit(0.5 * self.lame.lambda) * at.jacobian_squared_minus_one(),
+            Volumetric::Logarithmic => T::lit(self.lame.lambda) * at.log_jacobian(),
+        }
+    }
+
+    /// J (J U')': ΛJ², or Λ
+    #[inline(always)]
+    fn volumetric_stiffness<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        match self.volumetric {
+            Volumetric::Ciarlet => T::lit(self.lame.lambda) * at.jacobian * at.jacobian,
+            Volumetric::Logarithmic => T::lit(self.lame.lambda),
+        }
+    }
+}
+
+impl Law for NeoHookean {
+    type Frozen<T: Real, const D: usize> = FrozenNeoHookean<T, D>;
+
+    /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        let half_lambda = T::lit(0.5 * self.lame.lambda);
+        let j_minus_log = at.j_minus_log_jacobian();
+        let volumetric = match self.volumetric {
+            Volumetric::Ciarlet => T::lit(0.5) * at.j * at.j + j_minus_log,
+            Volumetric::Logarithmic => at.log_jacobian() * at.log_jacobian(),
+        };
+        half_lambda * volumetric + T::lit(self.lame.shear) * (at.trace_e_minus_j() + j_minus_log)
+    }
+
+    /// S = C⁻¹ [J U'(J) I + 2G E]
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        let f_inv_t = at.inverse_transpose();
+        let c_inv = f_inv_t.transpose() * f_inv_t;
+        let two_g_e = scaled(&at.green_lagrange(), T::lit(2.0 * self.lame.shear));
+        c_inv * (scaled(&identity(), self.volumetric_stress(at)) + two_g_e)
+    }
+
+    /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹, with q = J U'(J) − G
+    #[inline(always)]
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        let f_inv_t = at.inverse_transpose();
+        let c_inv = f_inv_t.transpose() * f_inv_t;
+        let q = self.volumetric_stress(at) - T::lit(self.lame.shear);
+        scaled(&c_inv, self.volumetric_stiffness(at) * contract(&c_inv, x))
+            - scaled(&(c_inv * (x + x.transpose()) * c_inv), q)
+    }
+
+    /// ℂmat{v,b} = ΛJ² (C⁻¹v ⊗ C⁻¹b) − q (C⁻¹b·v) C⁻¹ − q (C⁻¹b ⊗ C⁻¹v)   (eq. 39)
+    #[inline(always)]
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        let f_inv_t = at.inverse_transpose();
+        let c_inv = f_inv_t.transpose() * f_inv_t;
+        let q = self.volumetric_stress(at) - T::lit(self.lame.shear);
+        let (cv, cb) = (c_inv * v, c_inv * b);
+        scaled(&outer(&cv, &cb), self.volumetric_stiffness(at))
+            - scaled(&c_inv, q * cb.dot(v))
+            - scaled(&outer(&cb, &cv), q)
+    }
+
+    fn freeze<T: Real, const D: usize>(
+        &self,
+        f_n: &Tensor<T, D>,
+        at: &Deformation<T, D>,
+        volume: T,
+    ) -> FrozenNeoHookean<T, D> {
+        let shear = T::lit(self.lame.shear);
+        FrozenNeoHookean {
+            df_inv_t: at.inverse_transpose() * f_n.transpose(),
+            shear_b_n: scaled(&(f_n * f_n.transpose()), shear * volume),
+            bulk: self.volumetric_stiffness(at) * volume,
+            q: (self.volumetric_stress(at) - shear) * volume,
+        }
+    }
+}
+
+/// δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ, pushed forward to the configuration n and times V₀.
+#[derive(Clone, Copy, Debug)]
+pub struct FrozenNeoHookean<T: Real, const D: usize> {
+    /// ΔF⁻ᵀ = F⁻ᵀ F_nᵀ
+    df_inv_t: Tensor<T, D>,
+    /// V₀ G F_n F_nᵀ
+    shear_b_n: Tensor<T, D>,
+    /// V₀ ΛJ²
+    bulk: T,
+    /// V₀ q
+    q: T,
+}
+
+impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenNeoHookean<T, D> {
+    /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ
+    #[inline(always)]
+    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
+        let a = &self.df_inv_t;
+        l * self.shear_b_n + scaled(a, self.bulk * contract(a, l)) - scaled(&(a * l.transpose() * a), self.q)
+    }
+
+    /// V₀ [ ΛJ² g_I ⊗ g_J − q g_J ⊗ g_I + G (∇N_I·∇N_J) I ],  g = F⁻ᵀ∇N = A ∇_n N
+    #[inline(always)]
+    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
+        let (g_i, g_j) = (self.df_inv_t * grad_i, self.df_inv_t * grad_j);
+        scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
+            + scaled(&identity(), grad_i.dot(&(self.shear_b_n * grad_j)))
+    }
+}

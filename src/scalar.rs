@@ -1,0 +1,38 @@
+//! The number type of the kernels: one trait for `f64`, `f32` and the (nested) dual numbers of `num-dual`.
+
+use num_dual::{DualNumCopy, DualStruct};
+use num_traits::{NumCast, ToPrimitive};
+
+/// A number the residual can be evaluated with.
+///
+/// `f64` and `f32` for computing, `Dual64`, `HyperDual64`, `Dual<Dual64>`, … for derivatives. Dual numbers compare by
+/// their real part, so a branch takes the path `f64` would take; both sides of a branch must therefore be the same
+/// analytic function.
+///
+/// ```
+/// use bfree::scalar::Real;
+/// use num_dual::Dual64;
+///
+/// let x = Dual64::lit(2.0).derivative();
+/// assert_eq!((x * x).value(), 4.0);
+/// assert_eq!((x * x).eps, 4.0);
+/// ```
+pub trait Real: DualNumCopy {
+    /// The constant `x`, with zero derivatives.
+    fn lit(x: f64) -> Self;
+    /// The real part, as `f64`.
+    fn value(self) -> f64;
+}
+
+impl<T: DualNumCopy> Real for T {
+    #[inline(always)]
+    fn lit(x: f64) -> Self {
+        // A cast between floats always succeeds (f32 rounds); the fallback is never taken.
+        <T::Primitive as NumCast>::from(x).map_or_else(T::zero, T::from)
+    }
+
+    #[inline(always)]
+    fn value(self) -> f64 {
+        DualStruct::re(&self).to_f64().unwrap_or(f64::NAN)
+    }
+}

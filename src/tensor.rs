@@ -1,0 +1,201 @@
+//! D×D tensors over nalgebra, and the strain measures computed from H = F − I without cancellation.
+//!
+//! Shakeri, Ghaffari, Thompson, Stengel, Brown, "Stable numerics for finite-strain elasticity", 2024.
+//! nalgebra's own `determinant` and `try_inverse` need a field with ordering by magnitude and do not accept nested
+//! dual numbers, so the determinant and the cofactor are written out here, once.
+
+use crate::scalar::Real;
+use nalgebra::{SMatrix, SVector};
+
+/// A vector of `D` components.
+pub type Vector<T, const D: usize> = SVector<T, D>;
+/// A second-order tensor of `D`×`D` components.
+pub type Tensor<T, const D: usize> = SMatrix<T, D, D>;
+
+/// The identity tensor.
+#[inline(always)]
+pub fn identity<T: Real, const D: usize>() -> Tensor<T, D> {
+    Tensor::from_fn(|i, k| if i == k { T::one() } else { T::zero() })
+}
+
+/// tr A
+#[inline(always)]
+pub fn trace<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
+    let mut sum = T::zero();
+    for i in 0..D {
+        sum += a[(i, i)];
+    }
+    sum
+}
+
+/// A : B = Σ Aᵢⱼ Bᵢⱼ
+#[inline(always)]
+pub fn contract<T: Real, const D: usize>(a: &Tensor<T, D>, b: &Tensor<T, D>) -> T {
+    let mut sum = T::zero();
+    for k in 0..D {
+        for i in 0..D {
+            sum += a[(i, k)] * b[(i, k)];
+        }
+    }
+    sum
+}
+
+/// a ⊗ b
+#[inline(always)]
+pub fn outer<T: Real, const D: usize>(a: &Vector<T, D>, b: &Vector<T, D>) -> Tensor<T, D> {
+    Tensor::from_fn(|i, k| a[i] * b[k])
+}
+
+/// ½ (A + Aᵀ)
+#[inline(always)]
+pub fn symmetric<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
+    let half = T::lit(0.5);
+    Tensor::from_fn(|i, k| (a[(i, k)] + a[(k, i)]) * half)
+}
+
+/// s A
+#[inline(always)]
+pub fn scaled<T: Real, const D: usize>(a: &Tensor<T, D>, s: T) -> Tensor<T, D> {
+    a.map(|x| x * s)
+}
+
+/// The cofactor, cof A = det(A) A⁻ᵀ, for D = 1, 2, 3; defined for singular A too.
+#[inline(always)]
+pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
+    match D {
+        1 => identity(),
+        2 => Tensor::from_fn(|i, k| {
+            let minor = a[(1 - i, 1 - k)];
+            if i == k { minor } else { -minor }
+        }),
+        3 => Tensor::from_fn(|i, k| {
+            let (i1, i2, k1, k2) = ((i + 1) % 3, (i + 2) % 3, (k + 1) % 3, (k + 2) % 3);
+            a[(i1, k1)] * a[(i2, k2)] - a[(i1, k2)] * a[(i2, k1)]
+        }),
+        _ => unreachable!("D is 1, 2 or 3"),
+    }
+}
+
+/// det A for D = 1, 2, 3.
+#[inline(always)]
+pub fn determinant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
+    match D {
+        1 => a[(0, 0)],
+        2 => a[(0, 0)] * a[(1, 1)] - a[(0, 1)] * a[(1, 0)],
+        3 => {
+            a[(0, 0)] * (a[(1, 1)] * a[(2, 2)] - a[(1, 2)] * a[(2, 1)])
+                + a[(0, 1)] * (a[(1, 2)] * a[(2, 0)] - a[(1, 0)] * a[(2, 2)])
+                + a[(0, 2)] * (a[(1, 0)] * a[(2, 1)] - a[(1, 1)] * a[(2, 0)])
+        }
+        _ => unreachable!("D is 1, 2 or 3"),
+    }
+}
+
+/// A⁻¹ = cof(A)ᵀ / det A. The caller makes sure that det A ≠ 0.
+#[inline(always)]
+pub fn inverse<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
+    scaled(&cofactor(a).transpose(), determinant(a).recip())
+}
+
+/// I₂(A), the sum of the principal 2×2 minors (0 in 1D, det A in 2D).
+#[inline(always)]
+fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
+    let mut sum = T::zero();
+    for i in 0..D {
+        for k in i + 1..D {
+            sum += a[(i, i)] * a[(k, k)] - a[(i, k)] * a[(k, i)];
+        }
+    }
+    sum
+}
+
+/// The deformation at a point, kept as H = F − I, with the measures the laws need.
+///
+/// Every measure is accurate to a few rounding errors *relative to its own size*, at strains of 1e-15 as at 10.
+/// D = 1 is uniaxial strain, D = 2 plane strain: the missing stretches are 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Deformation<T: Real, const D: usize> {
+    /// H = F − I
+    pub h: Tensor<T, D>,
+    /// F = I + H
+    pub f: Tensor<T, D>,
+    /// j = J − 1
+    pub j: T,
+    /// J = det F
+    pub jacobian: T,
+}
+
+impl<T: Real, const D: usize> Deformation<T, D> {
+    /// From H = F − I.
+    ///
+    /// j = H (1D), tr H + det H (2D), tr H + I₂(H) + det H (3D) while |j| < ½, and det(I+H) − 1 beyond, where the
+    /// sum would cancel.
+    #[inline(always)]
+    pub fn new(h: Tensor<T, D>) -> Self {
+        let f = identity::<T, D>() + h;
+        let j = match D {
+            1 => h[(0, 0)],
+            2 => trace(&h) + determinant(&h),
+            _ => trace(&h) + second_invariant(&h) + determinant(&h),
+        };
+        let (j, jacobian) = if D == 1 || j.value().abs() < 0.5 {
+            (j, T::one() + j)
+        } else {
+            let jacobian = determinant(&f);
+            (jacobian - T::one(), jacobian)
+        };
+        Self { h, f, j, jacobian }
+    }
+
+    /// Green–Lagrange strain, E = sym H + ½ HᵀH
+    #[inline(always)]
+    pub fn green_lagrange(&self) -> Tensor<T, D> {
+        symmetric(&self.h) + scaled(&(self.h.transpose() * self.h), T::lit(0.5))
+    }
+
+    /// F⁻ᵀ = cof(F)/J
+    #[inline(always)]
+    pub fn inverse_transpose(&self) -> Tensor<T, D> {
+        scaled(&cofactor(&self.f), self.jacobian.recip())
+    }
+
+    /// J² − 1 = j (2 + j)
+    #[inline(always)]
+    pub fn jacobian_squared_minus_one(&self) -> T {
+        self.j * (T::lit(2.0) + self.j)
+    }
+
+    /// ln J
+    #[inline(always)]
+    pub fn log_jacobian(&self) -> T {
+        if self.j.value().abs() < 0.5 { self.j.ln_1p() } else { self.jacobian.ln() }
+    }
+
+    /// tr E − j, of second order with nothing to cancel:
+    /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D)
+    #[inline(always)]
+    pub fn trace_e_minus_j(&self) -> T {
+        let half_hh = contract(&self.h, &self.h) * T::lit(0.5);
+        match D {
+            1 => half_hh,
+            2 => half_hh - determinant(&self.h),
+            _ => half_hh - second_invariant(&self.h) - determinant(&self.h),
+        }
+    }
+
+    /// j − ln(1 + j), of second order. With s = j/(2+j), ln(1+j) = 2 artanh s, and
+    /// j − ln(1+j) = j s − 2 s³ (1/3 + s²/5 + s⁴/7 + …) has nothing to cancel.
+    #[inline(always)]
+    pub fn j_minus_log_jacobian(&self) -> T {
+        let s = self.j / (T::lit(2.0) + self.j);
+        if s.value().abs() >= 0.2 {
+            return self.j - self.log_jacobian();
+        }
+        let s2 = s * s;
+        let mut series = T::zero();
+        for k in (1..=12).rev() {
+            series = series * s2 + T::lit(1.0 / (2 * k + 1) as f64);
+        }
+        self.j * s - T::lit(2.0) * s2 * s * series
+    }
+}
