@@ -1,8 +1,15 @@
 //! Implicit finite-strain material point method with a matrix-free, Voigt-free tangent.
 
 pub mod approximation;
+pub mod clock;
 pub mod grid;
 pub mod material;
+pub mod mechanics;
+pub mod nodes;
+pub mod particles;
+pub mod phases;
 pub mod scalar;
+pub mod shape;
+pub mod simulation;
 pub mod solver;
 pub mod tensor;

@@ -1,0 +1,103 @@
+//! Time as a count of nominal steps and binary fractions of them: no drift, and halved steps land where whole ones do.
+
+/// The most a step can be halved.
+pub const MAX_HALVINGS: u32 = 20;
+
+/// Ticks per nominal step.
+const TICKS: u64 = 1 << MAX_HALVINGS;
+
+/// Where a run is in time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    nominal: f64,
+    max_halvings: u32,
+    /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
+    ticks: u64,
+    /// The current step is Δt / 2^level.
+    level: u32,
+    /// Steps taken.
+    steps: u64,
+}
+
+impl Clock {
+    /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most [`MAX_HALVINGS`]).
+    pub fn new(dt: f64, max_halvings: u32) -> Self {
+        Self { nominal: dt, max_halvings: max_halvings.min(MAX_HALVINGS), ticks: 0, level: 0, steps: 0 }
+    }
+
+    /// t_n
+    pub fn time(&self) -> f64 {
+        // Exact while the number of steps is: whole steps and the fraction are multiplied once.
+        (self.ticks / TICKS) as f64 * self.nominal + (self.ticks % TICKS) as f64 / TICKS as f64 * self.nominal
+    }
+
+    /// Δt of the coming step.
+    pub fn step(&self) -> f64 {
+        self.nominal / (1_u64 << self.level) as f64
+    }
+
+    /// The nominal Δt.
+    pub fn nominal(&self) -> f64 {
+        self.nominal
+    }
+
+    /// Steps taken so far.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Nominal steps completed.
+    pub fn nominal_steps(&self) -> u64 {
+        self.ticks / TICKS
+    }
+
+    /// Whether t_n is a multiple of the nominal step.
+    pub fn on_nominal(&self) -> bool {
+        self.ticks.is_multiple_of(TICKS)
+    }
+
+    /// Moves to t_{n+1}; a halved step grows back by one level as soon as it fits the grid of longer steps.
+    pub fn advance(&mut self) {
+        self.ticks += TICKS >> self.level;
+        self.steps += 1;
+        if self.level > 0 && self.ticks.is_multiple_of(TICKS >> (self.level - 1)) {
+            self.level -= 1;
+        }
+    }
+
+    /// Halves the step; `false` if the limit is reached.
+    pub fn halve(&mut self) -> bool {
+        let possible = self.level < self.max_halvings;
+        if possible {
+            self.level += 1;
+        }
+        possible
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halved_steps_end_where_whole_ones_do_and_grow_back() {
+        let mut clock = Clock::new(0.1, 3);
+        clock.advance();
+        assert!(clock.halve() && clock.halve());
+        let mut lengths = Vec::new();
+        while !(clock.on_nominal() && clock.nominal_steps() == 2) {
+            lengths.push(clock.step());
+            clock.advance();
+        }
+        // ¼ ¼ then ½: the step grows when it fits, and the time is that of two whole steps
+        assert_eq!(lengths, [0.025, 0.025, 0.05]);
+        assert_eq!((clock.time(), clock.step(), clock.steps()), (0.2, 0.1, 4));
+    }
+
+    #[test]
+    fn the_limit_on_halvings_holds() {
+        let mut clock = Clock::new(1.0, 2);
+        assert_eq!([clock.halve(), clock.halve(), clock.halve()], [true, true, false]);
+        assert_eq!(clock.step(), 0.25);
+    }
+}

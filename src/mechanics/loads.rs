@@ -1,0 +1,355 @@
+//! Loads and prescribed motion: gravity and its curve, tractions, follower pressure, moving walls.
+
+use crate::grid::Grid;
+use crate::mechanics::sweep::Supports;
+use crate::nodes::Nodes;
+use crate::shape::Shape;
+use crate::tensor::Vector;
+
+/// A piecewise-linear function of time, constant before its first and after its last point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    points: Vec<[f64; 2]>,
+}
+
+/// Why a list of points is no curve.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CurveError {
+    /// No points.
+    #[error("a curve needs at least one point [time, value]")]
+    Empty,
+    /// Time must grow strictly.
+    #[error("point {index}: time {time} does not come after {previous}; times must increase")]
+    Order {
+        /// The offending point.
+        index: usize,
+        /// Its time.
+        time: f64,
+        /// The time before it.
+        previous: f64,
+    },
+    /// NaN or infinite.
+    #[error("point {index} is not finite")]
+    NotFinite {
+        /// The offending point.
+        index: usize,
+    },
+}
+
+impl Curve {
+    /// From points `[time, value]` with strictly increasing times.
+    ///
+    /// # Errors
+    /// No points, times out of order, or numbers that are not finite.
+    pub fn new(points: Vec<[f64; 2]>) -> Result<Self, CurveError> {
+        if points.is_empty() {
+            return Err(CurveError::Empty);
+        }
+        for (index, point) in points.iter().enumerate() {
+            if !point.iter().all(|x| x.is_finite()) {
+                return Err(CurveError::NotFinite { index });
+            }
+            if index > 0 && point[0] <= points[index - 1][0] {
+                return Err(CurveError::Order { index, time: point[0], previous: points[index - 1][0] });
+            }
+        }
+        Ok(Self { points })
+    }
+
+    /// The constant function.
+    pub fn constant(value: f64) -> Self {
+        Self { points: vec![[0.0, value]] }
+    }
+
+    /// The piece `[a, b]` that holds `t`, if `t` lies between the first and the last point.
+    fn piece(&self, t: f64) -> Option<([f64; 2], [f64; 2])> {
+        let after = self.points.partition_point(|point| point[0] <= t);
+        (after > 0 && after < self.points.len()).then(|| (self.points[after - 1], self.points[after]))
+    }
+
+    /// The value at time `t`.
+    pub fn value(&self, t: f64) -> f64 {
+        match self.piece(t) {
+            Some((a, b)) => a[1] + (b[1] - a[1]) * ((t - a[0]) / (b[0] - a[0])),
+            None if t < self.points[0][0] => self.points[0][1],
+            None => self.points[self.points.len() - 1][1],
+        }
+    }
+
+    /// The slope at time `t`; at a kink, that of the piece after it.
+    pub fn slope(&self, t: f64) -> f64 {
+        self.piece(t).map_or(0.0, |(a, b)| (b[1] - a[1]) / (b[0] - a[0]))
+    }
+
+    /// ∫ value dt from `from` to `to`, exactly, kinks included.
+    pub fn integral(&self, from: f64, to: f64) -> f64 {
+        let kinks = self.points.iter().map(|point| point[0]).filter(|&t| t > from && t < to);
+        let mut sum = 0.0;
+        let mut start = from;
+        for end in kinks.chain(std::iter::once(to)) {
+            sum += 0.5 * (self.value(start) + self.value(end)) * (end - start);
+            start = end;
+        }
+        sum
+    }
+}
+
+/// The prescribed motion g(t) of one component.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Motion {
+    /// At rest.
+    Rest,
+    /// g(t) given.
+    Displacement(Curve),
+    /// ġ(t) given.
+    Velocity(Curve),
+}
+
+/// What a step needs to know of a prescribed component.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionStep {
+    /// g(t_{n+1}) − g(t_n)
+    pub increment: f64,
+    /// ġ, g̈ at the start of the step (from the right, where the curve has a kink).
+    pub velocity_start: f64,
+    /// See [`Self::velocity_start`].
+    pub acceleration_start: f64,
+    /// ġ, g̈ at the end of the step (from the left, where the curve has a kink).
+    pub velocity_end: f64,
+    /// See [`Self::velocity_end`].
+    pub acceleration_end: f64,
+}
+
+impl Motion {
+    /// The motion over the step from `t` to `t + dt`.
+    pub fn over(&self, t: f64, dt: f64) -> MotionStep {
+        // One-sided derivatives: looked up a little inside the step, so that a kink that round-off puts a hair
+        // beyond t_n or before t_{n+1} does not bring in the neighbouring piece.
+        let (inside_start, inside_end) = (t + 1e-6 * dt, t + (1.0 - 1e-6) * dt);
+        match self {
+            Self::Rest => MotionStep::default(),
+            Self::Displacement(g) => MotionStep {
+                increment: g.value(t + dt) - g.value(t),
+                velocity_start: g.slope(inside_start),
+                velocity_end: g.slope(inside_end),
+                ..MotionStep::default()
+            },
+            Self::Velocity(g) => MotionStep {
+                increment: g.integral(t, t + dt),
+                velocity_start: g.value(t),
+                acceleration_start: g.slope(inside_start),
+                velocity_end: g.value(t + dt),
+                acceleration_end: g.slope(inside_end),
+            },
+        }
+    }
+}
+
+/// Which nodes a prescribed motion holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Selection<const D: usize> {
+    /// A face of the box: the lower or the upper one along an axis.
+    Face {
+        /// The axis.
+        axis: usize,
+        /// The face at the upper end.
+        upper: bool,
+    },
+    /// The nodes inside a region.
+    Region(Shape<D>),
+}
+
+impl<const D: usize> Selection<D> {
+    fn holds(&self, grid: &Grid<D>, index: [u32; D], position: &Vector<f64, D>) -> bool {
+        match self {
+            Self::Face { axis, upper } => index[*axis] == if *upper { grid.cells[*axis] } else { 0 },
+            Self::Region(shape) => shape.contains(position),
+        }
+    }
+}
+
+/// Motion prescribed on some nodes; a component without motion stays free.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prescribed<const D: usize> {
+    /// Name, for output.
+    pub name: String,
+    /// The nodes.
+    pub on: Selection<D>,
+    /// The motion of each component.
+    pub motion: [Option<Motion>; D],
+}
+
+/// Gravity, b(t) = curve(t) · acceleration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gravity<const D: usize> {
+    /// The acceleration at a factor of 1.
+    pub acceleration: Vector<f64, D>,
+    /// The factor in time.
+    pub curve: Curve,
+}
+
+/// A particle that stands for a piece of surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint<const D: usize> {
+    /// The particle.
+    pub particle: usize,
+    /// Outward unit normal N in the reference configuration.
+    pub normal: Vector<f64, D>,
+    /// Reference area A it stands for.
+    pub area: f64,
+    /// Distance of the particle from the true surface.
+    pub offset: f64,
+}
+
+/// What acts on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pressing<const D: usize> {
+    /// Nominal traction T (force per reference area), a dead load.
+    Traction(Vector<f64, D>),
+    /// Follower pressure p: T = −p J F⁻ᵀ N.
+    Pressure(f64),
+}
+
+/// A load on surface particles, times a curve in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceLoad<const D: usize> {
+    /// Traction or pressure.
+    pub pressing: Pressing<D>,
+    /// The factor in time.
+    pub curve: Curve,
+    /// The loaded particles.
+    pub points: Vec<SurfacePoint<D>>,
+}
+
+/// All loads of a simulation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loads<const D: usize> {
+    /// Gravity, if any.
+    pub gravity: Option<Gravity<D>>,
+    /// Loads on surface particles.
+    pub surface: Vec<SurfaceLoad<D>>,
+    /// Prescribed motion; where two hold the same component of a node, the later one wins.
+    pub prescribed: Vec<Prescribed<D>>,
+}
+
+/// p A N of a particle under follower pressure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressurePoint<const D: usize> {
+    /// The particle.
+    pub particle: usize,
+    /// p A N
+    pub force: Vector<f64, D>,
+}
+
+impl<const D: usize> Loads<D> {
+    /// Nodal dead loads at time `t`: Σ_p m b N_I + Σ_Γ T N_I A, one vector per active node; `mass` is the lumped nodal mass.
+    pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Vec<Vector<f64, D>> {
+        let body = self.gravity.as_ref().map_or_else(Vector::zeros, |g| g.acceleration * g.curve.value(t));
+        // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
+        let mut force: Vec<_> = mass.iter().map(|&m| body * m).collect();
+        for load in &self.surface {
+            if let Pressing::Traction(traction) = load.pressing {
+                let traction = traction * load.curve.value(t);
+                for point in &load.points {
+                    for (node, n, _) in supports.of(point.particle) {
+                        force[node] += traction * (point.area * n);
+                    }
+                }
+            }
+        }
+        force
+    }
+
+    /// p A N of every particle under follower pressure at time `t`.
+    pub fn pressures(&self, t: f64) -> Vec<PressurePoint<D>> {
+        let mut points = Vec::new();
+        for load in &self.surface {
+            if let Pressing::Pressure(pressure) = load.pressing {
+                let pressure = pressure * load.curve.value(t);
+                points.extend(load.points.iter().map(|point| PressurePoint {
+                    particle: point.particle,
+                    force: point.normal * (pressure * point.area),
+                }));
+            }
+        }
+        points
+    }
+}
+
+/// A prescribed degree of freedom of this step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrescribedDof {
+    /// Active node.
+    pub node: usize,
+    /// Component.
+    pub component: usize,
+    /// Which of [`Loads::prescribed`] holds it.
+    pub owner: usize,
+    /// Whether the owner moves (a curve) or rests.
+    pub moving: bool,
+    /// Its motion over the step.
+    pub step: MotionStep,
+}
+
+/// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component.
+pub fn prescribed_dofs<const D: usize>(
+    prescribed: &[Prescribed<D>],
+    grid: &Grid<D>,
+    nodes: &Nodes,
+    t: f64,
+    dt: f64,
+) -> Vec<PrescribedDof> {
+    let steps: Vec<[Option<MotionStep>; D]> = prescribed
+        .iter()
+        .map(|one| std::array::from_fn(|i| one.motion[i].as_ref().map(|motion| motion.over(t, dt))))
+        .collect();
+    let mut dofs = Vec::new();
+    for (node, (index, position)) in nodes.positions(grid).enumerate() {
+        let mut holders = [None; D];
+        for (owner, one) in prescribed.iter().enumerate() {
+            if one.on.holds(grid, index, &position) {
+                for i in 0..D {
+                    if let Some(step) = steps[owner][i] {
+                        let moving = one.motion[i] != Some(Motion::Rest);
+                        holders[i] = Some(PrescribedDof { node, component: i, owner, moving, step });
+                    }
+                }
+            }
+        }
+        dofs.extend(holders.into_iter().flatten());
+    }
+    dofs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_velocity_curve_is_integrated_through_its_kinks() -> Result<(), CurveError> {
+        let ramp = Curve::new(vec![[0.0, 0.0], [1.0, 2.0], [3.0, 2.0]])?;
+        // triangle ½·1·2 up to t = 1, then the constant 2
+        assert_eq!(ramp.integral(0.0, 2.5), 1.0 + 3.0);
+        let step = Motion::Velocity(ramp).over(0.5, 1.0);
+        assert_eq!(step.increment, 0.5 * (1.0 + 2.0) * 0.5 + 1.0);
+        assert_eq!((step.velocity_start, step.velocity_end), (1.0, 2.0));
+        assert_eq!((step.acceleration_start, step.acceleration_end), (2.0, 0.0));
+        Ok(())
+    }
+
+    #[test]
+    fn a_curve_that_goes_back_in_time_is_refused() {
+        let back = Curve::new(vec![[0.0, 0.0], [1.0, 2.0], [0.5, 2.0]]);
+        assert_eq!(back, Err(CurveError::Order { index: 2, time: 0.5, previous: 1.0 }));
+        assert_eq!(Curve::new(vec![]), Err(CurveError::Empty));
+        assert_eq!(Curve::new(vec![[0.0, f64::NAN]]), Err(CurveError::NotFinite { index: 0 }));
+    }
+
+    #[test]
+    fn a_kink_at_the_end_of_a_step_belongs_to_the_step_before_it() -> Result<(), CurveError> {
+        let step = Motion::Displacement(Curve::new(vec![[0.0, 0.0], [1.0, 3.0], [2.0, 3.0]])?).over(0.9, 0.1);
+        assert!((step.increment - 0.3).abs() < 1e-15);
+        assert_eq!((step.velocity_start, step.velocity_end), (3.0, 3.0));
+        Ok(())
+    }
+}

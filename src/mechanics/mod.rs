@@ -1,0 +1,8 @@
+//! The weak form: transfer, loads, residual, and the matrix-free tangent.
+
+pub mod loads;
+pub mod residual;
+pub mod sweep;
+pub mod tangent;
+pub mod time;
+pub mod transfer;

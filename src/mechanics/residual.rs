@@ -1,0 +1,264 @@
+//! The residual R(Δφ) of one step, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
+
+use crate::material::{Law, NonPositiveJacobian, admissible, first_piola};
+use crate::mechanics::loads::{PressurePoint, PrescribedDof};
+use crate::mechanics::sweep::Supports;
+use crate::mechanics::time::Alphas;
+use crate::mechanics::transfer::Nodal;
+use crate::particles::{Body, Particles};
+use crate::scalar::Real;
+use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+
+/// A particle whose deformation is impossible.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("particle {particle}: {source}")]
+pub struct Inadmissible {
+    /// Number of the particle.
+    pub particle: usize,
+    /// The determinant found.
+    pub source: NonPositiveJacobian,
+}
+
+/// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
+///
+/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ Δφ − α₂ v_n − α₃ a_n
+pub struct Equilibrium<'a, const D: usize, L> {
+    /// The particles at t_n.
+    pub particles: &'a Particles<D>,
+    /// Their laws.
+    pub bodies: &'a [Body<L>],
+    /// Shape functions at x_n.
+    pub supports: &'a Supports<D>,
+    /// Newmark's parameters of this step.
+    pub alphas: Alphas,
+    /// ε of M̃ = (1−ε) M + ε lumped(M).
+    pub lumping: f64,
+    /// Lumped mass, v_n and a_n at the nodes, prescribed values in place.
+    pub nodal: &'a Nodal<D>,
+    /// Nodal dead loads at t_{n+1}.
+    pub dead_load: Vec<Vector<f64, D>>,
+    /// Follower pressure at t_{n+1}.
+    pub pressures: Vec<PressurePoint<D>>,
+    /// Prescribed degrees of freedom.
+    pub prescribed: &'a [PrescribedDof],
+    /// Σ_J N_J (α₂ v_n + α₃ a_n)_J at the particles; empty when ε = 1.
+    history: Vec<Vector<f64, D>>,
+}
+
+/// Which occurrences of Δφ carry derivatives. In the code that computes `F S`, letting only the left F carry the dual part gives the
+/// geometric term of the tangent, only the F inside S the material term, and so on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Carry {
+    /// Δφ in the acceleration.
+    pub inertia: bool,
+    /// F on the left of P = F S.
+    pub left: bool,
+    /// F inside S.
+    pub inside: bool,
+    /// F in the follower pressure.
+    pub pressure: bool,
+}
+
+impl Carry {
+    /// All of them: the residual itself.
+    pub const ALL: Self = Self { inertia: true, left: true, inside: true, pressure: true };
+    /// None of them.
+    pub const NONE: Self = Self { inertia: false, left: false, inside: false, pressure: false };
+}
+
+/// `x`, or its real part alone.
+#[inline(always)]
+fn carried<T: Real>(x: T, carries: bool) -> T {
+    if carries { x } else { T::lit(x.value()) }
+}
+
+/// H_{n+1} of F = ΔF F_n with ΔF = I + G: H = G + H_n + G H_n, which loses no digits (eq. 45).
+#[inline(always)]
+pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) -> Tensor<T, D> {
+    let h_n = h_n.map(T::lit);
+    g + h_n + g * h_n
+}
+
+impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
+    /// Gathers what the residual needs at the particles.
+    #[allow(clippy::too_many_arguments)] // the ingredients of one equation
+    pub fn new(
+        particles: &'a Particles<D>,
+        bodies: &'a [Body<L>],
+        supports: &'a Supports<D>,
+        alphas: Alphas,
+        lumping: f64,
+        nodal: &'a Nodal<D>,
+        dead_load: Vec<Vector<f64, D>>,
+        pressures: Vec<PressurePoint<D>>,
+        prescribed: &'a [PrescribedDof],
+    ) -> Self {
+        let history = if lumping < 1.0 {
+            let nodal_history: Vec<_> = (nodal.velocity.iter().zip(&nodal.acceleration))
+                .map(|(v, a)| v * alphas.a2 + a * alphas.a3)
+                .collect();
+            supports.values(&nodal_history)
+        } else {
+            Vec::new()
+        };
+        Self { particles, bodies, supports, alphas, lumping, nodal, dead_load, pressures, prescribed, history }
+    }
+
+    /// The law of particle `p`.
+    #[inline(always)]
+    pub fn law(&self, p: usize) -> &L {
+        &self.bodies[self.particles.body[p] as usize].law
+    }
+
+    /// Weight of the consistent inertia at particle `p`, (1−ε) m; `None` when the mass is lumped.
+    #[inline(always)]
+    pub(crate) fn consistent_mass(&self, p: usize) -> Option<f64> {
+        (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
+    }
+
+    /// a_I = α₁ Δφ − α₂ v_n − α₃ a_n
+    #[inline(always)]
+    fn acceleration<T: Real>(&self, node: usize, dphi: &Vector<T, D>) -> Vector<T, D> {
+        let (v, a) = (&self.nodal.velocity[node], &self.nodal.acceleration[node]);
+        Vector::from_fn(|i, _| {
+            T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i])
+        })
+    }
+
+    /// (1−ε) m a at particle `p`, from Δφ there.
+    #[inline(always)]
+    fn consistent_inertia<T: Real>(&self, p: usize, dphi: &Vector<T, D>) -> Vector<T, D> {
+        self.consistent_mass(p).map_or_else(Vector::zeros, |m| {
+            Vector::from_fn(|i, _| T::lit(m) * (T::lit(self.alphas.a1) * dphi[i] - T::lit(self.history[p][i])))
+        })
+    }
+
+    /// V₀ F S F_nᵀ of particle `p`: times ∇_n N_I it is the internal force on node I.
+    #[inline(always)]
+    fn internal<T: Real>(&self, p: usize, g: &Tensor<T, D>, carry: Carry) -> Result<Tensor<T, D>, Inadmissible> {
+        let h_n = &self.particles.displacement_gradient[p];
+        let h = compose(g, h_n);
+        let f_left = identity::<T, D>() + h.map(|x| carried(x, carry.left));
+        let piola = first_piola(self.law(p), &f_left, h.map(|x| carried(x, carry.inside)))
+            .map_err(|source| Inadmissible { particle: p, source })?;
+        let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
+        Ok(scaled(&(piola * f_n_t), T::lit(self.particles.volume[p])))
+    }
+
+    /// Σ N p A cof(F) N: adds minus the force of the follower pressure, T = −p J F⁻ᵀ N (reference normal N).
+    fn add_pressure<T: Real>(&self, dphi: &[Vector<T, D>], carry: Carry, out: &mut [Vector<T, D>]) {
+        for point in &self.pressures {
+            let g = self.supports.gradient_at(point.particle, dphi);
+            let h = compose(&g, &self.particles.displacement_gradient[point.particle]);
+            let f = identity::<T, D>() + h.map(|x| carried(x, carry.pressure));
+            let force = cofactor(&f) * point.force.map(T::lit);
+            for (node, n, _) in self.supports.of(point.particle) {
+                out[node] += force * T::lit(n);
+            }
+        }
+    }
+
+    /// R(Δφ) on every active node, prescribed ones included (there it is the reaction).
+    ///
+    /// `carry` chooses which occurrences of Δφ keep their derivatives; with a plain number it changes nothing.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn residual<T: Real>(&self, dphi: &[Vector<T, D>], carry: Carry) -> Result<Vec<Vector<T, D>>, Inadmissible> {
+        let mut out: Vec<Vector<T, D>> = dphi
+            .iter()
+            .enumerate()
+            .map(|(node, dphi)| {
+                let a = self.acceleration(node, &dphi.map(|x| carried(x, carry.inertia)));
+                a * T::lit(self.lumping * self.nodal.mass[node]) - self.dead_load[node].map(T::lit)
+            })
+            .collect();
+        self.supports.assemble(
+            dphi,
+            &mut out,
+            |p, u, g| Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?)),
+            |(q, stress), n, grad_n| stress * grad_n.map(T::lit) + q * T::lit(n),
+        )?;
+        self.add_pressure(dphi, carry, &mut out);
+        Ok(out)
+    }
+
+    /// f_ext: gravity, tractions and follower pressure at Δφ.
+    pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+        let mut pressure = vec![Vector::zeros(); dphi.len()];
+        self.add_pressure(dphi, Carry::ALL, &mut pressure);
+        self.dead_load.iter().zip(pressure).map(|(dead, pressure)| dead - pressure).collect()
+    }
+
+    /// The norm, over the free degrees of freedom, of the sum of the magnitudes of all contributions to R: what
+    /// round-off is relative to.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn magnitude(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        let Alphas { a1, a2, a3, .. } = self.alphas;
+        let mut out: Vec<Vector<f64, D>> = dphi
+            .iter()
+            .enumerate()
+            .map(|(node, dphi)| {
+                let (v, a) = (self.nodal.velocity[node].abs(), self.nodal.acceleration[node].abs());
+                // The whole mass, also for ε < 1: the consistent part is of the same size.
+                (dphi.abs() * a1 + v * a2 + a * a3.abs()) * self.nodal.mass[node] + self.dead_load[node].abs()
+            })
+            .collect();
+        self.supports.assemble(
+            dphi,
+            &mut out,
+            |p, _, g| self.internal(p, &g, Carry::ALL),
+            |stress, _, grad_n| stress.abs() * grad_n.abs(),
+        )?;
+        for point in &self.pressures {
+            for (node, n, _) in self.supports.of(point.particle) {
+                out[node] += point.force.abs() * n.abs();
+            }
+        }
+        self.clear_prescribed(&mut out);
+        Ok(out.iter().map(Vector::norm_squared).sum::<f64>().sqrt())
+    }
+
+    /// Π(Δφ) and the sum of the magnitudes of its contributions:
+    /// Π = ½/α₁ a·M̃a + Σ_p V₀ W(F) − f_ext·Δφ, whose gradient is the residual. `None` under follower pressure.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0: there Π = +∞.
+    pub fn potential<T: Real>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
+        self.pressures.is_empty().then(|| {
+            let half_over_a1 = T::lit(0.5 / self.alphas.a1);
+            let per_particle = self.supports.interpolate(dphi, |p, u, g| {
+                let at = admissible(compose(&g, &self.particles.displacement_gradient[p]))
+                    .map_err(|source| Inadmissible { particle: p, source })?;
+                let strain = T::lit(self.particles.volume[p]) * self.law(p).energy(&at);
+                let inertia = self.consistent_mass(p).map_or_else(T::zero, |m| {
+                    let momentum = self.consistent_inertia(p, &u);
+                    half_over_a1 * momentum.dot(&momentum) / T::lit(m)
+                });
+                Ok(strain + inertia)
+            })?;
+            let (mut sum, mut magnitude) = (T::zero(), 0.0);
+            for contribution in per_particle {
+                sum += contribution;
+                magnitude += contribution.value().abs();
+            }
+            for (node, dphi) in dphi.iter().enumerate() {
+                let a = self.acceleration(node, dphi);
+                let inertia = half_over_a1 * T::lit(self.lumping * self.nodal.mass[node]) * a.dot(&a);
+                let work = self.dead_load[node].map(T::lit).dot(dphi);
+                sum += inertia - work;
+                magnitude += inertia.value().abs() + work.value().abs();
+            }
+            Ok((sum, magnitude))
+        })
+    }
+
+    /// Zero at every prescribed degree of freedom.
+    pub fn clear_prescribed<T: Real>(&self, field: &mut [Vector<T, D>]) {
+        for dof in self.prescribed {
+            field[dof.node][dof.component] = T::zero();
+        }
+    }
+}

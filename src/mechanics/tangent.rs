@@ -1,0 +1,305 @@
+//! The consistent tangent K(Δφ)·u, matrix-free: frozen at Δφ, applied, never stored (eqs. 30, 34, 38).
+
+use crate::material::{FrozenTangent, Law, admissible};
+use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
+use crate::scalar::Real;
+use crate::solver::{LinearOperator, NonlinearProblem, Preconditioner};
+use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
+use num_dual::Dual64;
+
+/// The terms of the tangent, one for each way Δφ enters the residual.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Term {
+    /// α₁ M̃ u
+    Inertia,
+    /// Σ_p V₀ (δF S) ∇N_I
+    Geometric,
+    /// Σ_p V₀ F [ℂ : Fᵀ δF] ∇N_I
+    Material,
+    /// Σ p A δ(cof F) N N_I
+    Pressure,
+}
+
+impl Term {
+    /// All terms.
+    pub const ALL: [Self; 4] = [Self::Inertia, Self::Geometric, Self::Material, Self::Pressure];
+
+    /// The occurrences of Δφ that make this term.
+    pub fn carry(self) -> Carry {
+        match self {
+            Self::Inertia => Carry { inertia: true, ..Carry::NONE },
+            Self::Geometric => Carry { left: true, ..Carry::NONE },
+            Self::Material => Carry { inside: true, ..Carry::NONE },
+            Self::Pressure => Carry { pressure: true, ..Carry::NONE },
+        }
+    }
+}
+
+impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
+    /// One term of K(Δφ)·u by its formula, on every active node.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn product(
+        &self,
+        term: Term,
+        dphi: &[Vector<f64, D>],
+        u: &[Vector<f64, D>],
+    ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
+        let mut out = vec![Vector::zeros(); u.len()];
+        let states = self.states(dphi)?;
+        match term {
+            Term::Inertia => {
+                self.add_lumped_inertia(u, &mut out);
+                self.supports.assemble(
+                    u,
+                    &mut out,
+                    |p, u, _| Ok(u * (self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0))),
+                    |q, n, _| q * n,
+                )?;
+            }
+            Term::Geometric | Term::Material => {
+                let delta_piola = |p: usize, delta_f: &Tensor<f64, D>| {
+                    let (law, at) = (self.law(p), &states[p]);
+                    match term {
+                        // δF S
+                        Term::Geometric => delta_f * law.stress(at),
+                        // F [ℂ : Fᵀ δF]
+                        _ => at.f * law.elasticity(at, &(at.f.transpose() * delta_f)),
+                    }
+                };
+                self.supports.assemble(
+                    u,
+                    &mut out,
+                    |p, _, l| {
+                        let f_n = self.f_n(p);
+                        Ok(scaled(&(delta_piola(p, &(l * f_n)) * f_n.transpose()), self.particles.volume[p]))
+                    },
+                    |stress, _, grad_n| stress * grad_n,
+                )?;
+            }
+            Term::Pressure => {
+                for point in self.frozen_pressures(dphi) {
+                    point.add_product(self, u, &mut out);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// The same term by dual numbers through the residual: the derivative of R in the direction u.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn dual_product(
+        &self,
+        term: Term,
+        dphi: &[Vector<f64, D>],
+        u: &[Vector<f64, D>],
+    ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
+        let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
+        Ok(self.residual(&seeded, term.carry())?.iter().map(|r| r.map(|x| x.eps)).collect())
+    }
+
+    /// F_n of particle `p`.
+    #[inline(always)]
+    fn f_n(&self, p: usize) -> Tensor<f64, D> {
+        identity::<f64, D>() + self.particles.displacement_gradient[p]
+    }
+
+    /// The deformation of every particle at Δφ.
+    fn states(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
+        self.supports.interpolate(dphi, |p, _, g| {
+            admissible(compose(&g, &self.particles.displacement_gradient[p]))
+                .map_err(|source| Inadmissible { particle: p, source })
+        })
+    }
+
+    /// out += α₁ ε m_I u_I
+    fn add_lumped_inertia(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let weight = self.alphas.a1 * self.lumping;
+        for ((out, u), &m) in out.iter_mut().zip(u).zip(&self.nodal.mass) {
+            *out += u * (weight * m);
+        }
+    }
+
+    fn frozen_pressures(&self, dphi: &[Vector<f64, D>]) -> Vec<FrozenPressure<D>> {
+        self.pressures
+            .iter()
+            .map(|point| {
+                let p = point.particle;
+                let at = Deformation::new(compose(
+                    &self.supports.gradient_at(p, dphi),
+                    &self.particles.displacement_gradient[p],
+                ));
+                let f_inv_t = at.inverse_transpose();
+                FrozenPressure {
+                    particle: p,
+                    df_inv_t: f_inv_t * self.f_n(p).transpose(),
+                    force: f_inv_t * point.force * at.jacobian,
+                }
+            })
+            .collect()
+    }
+
+    /// Freezes the tangent at Δφ.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D, L>, Inadmissible> {
+        let frozen = self.supports.interpolate(dphi, |p, _, g| {
+            let at = admissible(compose(&g, &self.particles.displacement_gradient[p]))
+                .map_err(|source| Inadmissible { particle: p, source })?;
+            Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
+        })?;
+        let mut tangent =
+            Tangent { equilibrium: self, frozen, pressures: self.frozen_pressures(dphi), inverse_blocks: Vec::new() };
+        tangent.inverse_blocks = tangent.diagonal_blocks().iter().map(invert_block).collect();
+        Ok(tangent)
+    }
+}
+
+/// Follower pressure frozen at one state: δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
+#[derive(Clone, Copy, Debug)]
+struct FrozenPressure<const D: usize> {
+    particle: usize,
+    df_inv_t: Tensor<f64, D>,
+    force: Vector<f64, D>,
+}
+
+impl<const D: usize> FrozenPressure<D> {
+    fn add_product<L: Law>(&self, eq: &Equilibrium<'_, D, L>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let (a, w) = (&self.df_inv_t, &self.force);
+        let l = eq.supports.gradient_at(self.particle, u);
+        let delta = w * contract(a, &l) - a * (l.transpose() * w);
+        for (node, n, _) in eq.supports.of(self.particle) {
+            out[node] += delta * n;
+        }
+    }
+
+    /// The diagonal block N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
+    fn add_blocks<L: Law>(&self, eq: &Equilibrium<'_, D, L>, blocks: &mut [Tensor<f64, D>]) {
+        for (node, n, grad_n) in eq.supports.of(self.particle) {
+            let g = self.df_inv_t * grad_n;
+            blocks[node] += scaled(&(outer(&self.force, &g) - outer(&g, &self.force)), n);
+        }
+    }
+}
+
+/// K(Δφ), frozen: an operator, with its d×d diagonal blocks as preconditioner.
+pub struct Tangent<'a, const D: usize, L: Law> {
+    equilibrium: &'a Equilibrium<'a, D, L>,
+    frozen: Vec<L::Frozen<f64, D>>,
+    pressures: Vec<FrozenPressure<D>>,
+    inverse_blocks: Vec<Tensor<f64, D>>,
+}
+
+impl<const D: usize, L: Law> Tangent<'_, D, L> {
+    /// K u on the free degrees of freedom (u is taken as zero on the prescribed ones).
+    pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let eq = self.equilibrium;
+        out.fill(Vector::zeros());
+        eq.add_lumped_inertia(u, out);
+        let never_fails = eq.supports.assemble(
+            u,
+            out,
+            |p, u, l| {
+                let inertia = eq.consistent_mass(p).map_or_else(Vector::zeros, |m| u * (eq.alphas.a1 * m));
+                Ok::<_, std::convert::Infallible>((inertia, self.frozen[p].apply(&l)))
+            },
+            |(q, stress), n, grad_n| stress * grad_n + q * n,
+        );
+        match never_fails {
+            Ok(()) => {}
+            Err(never) => match never {},
+        }
+        for point in &self.pressures {
+            point.add_product(eq, u, out);
+        }
+        eq.clear_prescribed(out);
+    }
+
+    /// K_II of every active node; a prescribed degree of freedom has the identity's row and column.
+    pub fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
+        let eq = self.equilibrium;
+        let mut blocks: Vec<Tensor<f64, D>> =
+            eq.nodal.mass.iter().map(|&m| scaled(&identity(), eq.alphas.a1 * eq.lumping * m)).collect();
+        eq.supports.scatter(&mut blocks, |p, n, grad_n| {
+            let inertia = eq.consistent_mass(p).map_or(0.0, |m| eq.alphas.a1 * m * n * n);
+            self.frozen[p].block(grad_n, grad_n) + scaled(&identity(), inertia)
+        });
+        for point in &self.pressures {
+            point.add_blocks(eq, &mut blocks);
+        }
+        for dof in eq.prescribed {
+            let (block, i) = (&mut blocks[dof.node], dof.component);
+            for k in 0..D {
+                block[(i, k)] = 0.0;
+                block[(k, i)] = 0.0;
+            }
+            block[(i, i)] = 1.0;
+        }
+        blocks
+    }
+}
+
+/// The inverse of a diagonal block. A block that is singular to round-off (a node no stiffness and no mass reaches)
+/// is replaced by the inverse of its diagonal, or by the identity where that is zero too.
+fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
+    // Scale rows to the diagonal first: entries range over many orders of magnitude, and det may underflow.
+    let diagonal = Vector::<f64, D>::from_fn(|i, _| {
+        let d = block[(i, i)].abs();
+        if d > 0.0 && d.is_finite() { d } else { 1.0 }
+    });
+    let unit = Tensor::<f64, D>::from_fn(|i, k| block[(i, k)] / diagonal[i]);
+    let invertible = determinant(&unit).abs() > 1e-12;
+    if invertible {
+        let inverse = inverse(&unit);
+        Tensor::from_fn(|i, k| inverse[(i, k)] / diagonal[k])
+    } else {
+        Tensor::from_fn(|i, k| if i == k { 1.0 / diagonal[i] } else { 0.0 })
+    }
+}
+
+impl<const D: usize, L: Law> LinearOperator for Tangent<'_, D, L> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        self.product(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+    }
+}
+
+impl<const D: usize, L: Law> Preconditioner for Tangent<'_, D, L> {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+        let (r, z): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
+        for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverse_blocks) {
+            *z = inverse * r;
+        }
+    }
+}
+
+impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
+    type Inadmissible = Inadmissible;
+    type Tangent<'a>
+        = Tangent<'a, D, L>
+    where
+        Self: 'a;
+
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
+        let mut residual = Self::residual::<f64>(self, bytemuck::cast_slice(x), Carry::ALL)?;
+        self.clear_prescribed(&mut residual);
+        r.copy_from_slice(bytemuck::cast_slice(&residual));
+        Ok(())
+    }
+
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Inadmissible> {
+        Self::magnitude(self, bytemuck::cast_slice(x))
+    }
+
+    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Inadmissible>> {
+        Self::potential::<f64>(self, bytemuck::cast_slice(x))
+    }
+
+    fn linearize(&self, x: &[f64]) -> Result<Tangent<'_, D, L>, Inadmissible> {
+        self.tangent(bytemuck::cast_slice(x))
+    }
+}
+

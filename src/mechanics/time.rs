@@ -1,0 +1,49 @@
+//! Incremental Newmark-β (the paper's Table 1).
+
+/// Newmark's parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Newmark {
+    /// β > 0; ¼ is the trapezoidal rule.
+    pub beta: f64,
+    /// γ; ½ is undamped and of second order. Unconditionally stable for 2β ≥ γ ≥ ½.
+    pub gamma: f64,
+}
+
+impl Default for Newmark {
+    /// The trapezoidal rule.
+    fn default() -> Self {
+        Self { beta: 0.25, gamma: 0.5 }
+    }
+}
+
+/// a = α₁ Δφ − α₂ v_n − α₃ a_n,  v = α₄ Δφ + α₅ v_n + α₆ a_n   (eq. 19)
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)] // named in the formula above
+pub struct Alphas {
+    pub a1: f64,
+    pub a2: f64,
+    pub a3: f64,
+    pub a4: f64,
+    pub a5: f64,
+    pub a6: f64,
+}
+
+impl Alphas {
+    /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
+    pub const START: Self = Self { a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a5: 1.0, a6: 0.0 };
+}
+
+impl Newmark {
+    /// The α-parameters of a step of length `dt`.
+    pub fn alphas(&self, dt: f64) -> Alphas {
+        let Self { beta, gamma } = *self;
+        Alphas {
+            a1: 1.0 / (beta * dt * dt),
+            a2: 1.0 / (beta * dt),
+            a3: (1.0 - 2.0 * beta) / (2.0 * beta),
+            a4: gamma / (beta * dt),
+            a5: 1.0 - gamma / beta,
+            a6: (1.0 - gamma / (2.0 * beta)) * dt,
+        }
+    }
+}

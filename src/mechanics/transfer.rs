@@ -1,0 +1,205 @@
+//! Particles → nodes (eqs. 40–42) and nodes → particles (eqs. 45, 50–52).
+
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::residual::compose;
+use crate::mechanics::sweep::Supports;
+use crate::mechanics::time::Alphas;
+use crate::particles::Particles;
+use crate::solver::conjugate_gradient::{CgSettings, conjugate_gradient};
+use crate::solver::{LinearOperator, Preconditioner};
+use crate::tensor::{Tensor, Vector};
+
+/// A node lighter than this fraction of the heaviest particle gets no projected velocity: its Δφ comes from the stiffness.
+const LIGHT: f64 = 1e-14;
+
+/// Tolerance of the projection (42) when ε < 1.
+const PROJECTION_TOLERANCE: f64 = 1e-12;
+
+/// Lumped mass, velocity and acceleration at the active nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nodal<const D: usize> {
+    /// Σ_p m N_I
+    pub mass: Vec<f64>,
+    /// v_n
+    pub velocity: Vec<Vector<f64, D>>,
+    /// a_n
+    pub acceleration: Vec<Vector<f64, D>>,
+    /// Iterations the projection took (0 for a lumped mass).
+    pub iterations: usize,
+}
+
+impl<const D: usize> Nodal<D> {
+    /// Projects the particles' velocity and acceleration with M̃ = (1−ε) M + ε lumped(M) onto `count` active nodes:
+    /// M̃ v = Σ_p N m v_p and M̃ a = Σ_p N m a_p (eq. 42).
+    pub fn project(particles: &Particles<D>, supports: &Supports<D>, count: usize, lumping: f64) -> Self {
+        let mut mass = vec![0.0; count];
+        supports.scatter(&mut mass, |p, n, _| particles.mass[p] * n);
+        let right = |field: &[Vector<f64, D>]| {
+            let mut out = vec![Vector::zeros(); count];
+            supports.scatter(&mut out, |p, n, _| field[p] * (particles.mass[p] * n));
+            out
+        };
+        let (mut velocity, mut acceleration) = (right(&particles.velocity), right(&particles.acceleration));
+        let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+        let mut iterations = 0;
+        if lumping < 1.0 {
+            let effective = EffectiveMass::new(particles, supports, &mass, lumping);
+            iterations += effective.solve(&mut velocity) + effective.solve(&mut acceleration);
+        } else {
+            for (field, m) in velocity.iter_mut().zip(&mut acceleration).zip(&mass) {
+                *field.0 /= *m;
+                *field.1 /= *m;
+            }
+        }
+        for (node, &m) in mass.iter().enumerate() {
+            if m < light {
+                velocity[node] = Vector::zeros();
+                acceleration[node] = Vector::zeros();
+            }
+        }
+        Self { mass, velocity, acceleration, iterations }
+    }
+
+    /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
+    pub fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
+        let mut overwritten = self.clone();
+        for dof in prescribed {
+            overwritten.velocity[dof.node][dof.component] = dof.step.velocity_start;
+            overwritten.acceleration[dof.node][dof.component] = dof.step.acceleration_start;
+        }
+        overwritten
+    }
+}
+
+/// M̃ u = Σ_p (1−ε) m N_I (Σ_J N_J u_J) + ε m_I u_I, with its diagonal as preconditioner.
+struct EffectiveMass<'a, const D: usize> {
+    particles: &'a Particles<D>,
+    supports: &'a Supports<D>,
+    mass: &'a [f64],
+    lumping: f64,
+    inverse_diagonal: Vec<f64>,
+}
+
+impl<'a, const D: usize> EffectiveMass<'a, D> {
+    fn new(particles: &'a Particles<D>, supports: &'a Supports<D>, mass: &'a [f64], lumping: f64) -> Self {
+        let mut diagonal: Vec<f64> = mass.iter().map(|m| lumping * m).collect();
+        supports.scatter(&mut diagonal, |p, n, _| (1.0 - lumping) * particles.mass[p] * n * n);
+        let inverse_diagonal = diagonal.iter().map(|&d| if d > 0.0 { d.recip() } else { 0.0 }).collect();
+        Self { particles, supports, mass, lumping, inverse_diagonal }
+    }
+
+    /// Overwrites the right-hand side by the solution; from zero, so that a singular M gives the answer of least norm.
+    fn solve(&self, field: &mut [Vector<f64, D>]) -> usize {
+        let right = field.to_vec();
+        field.fill(Vector::zeros());
+        let settings = CgSettings { relative_tolerance: PROJECTION_TOLERANCE, max_iterations: 10 * right.len() + 100 };
+        let report = conjugate_gradient(self, self, bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field), &settings);
+        report.iterations
+    }
+}
+
+impl<const D: usize> LinearOperator for EffectiveMass<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        let (x, y): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+        for ((y, x), m) in y.iter_mut().zip(x).zip(self.mass) {
+            *y = x * (self.lumping * m);
+        }
+        let at_particles = self.supports.values(x);
+        self.supports.scatter(y, |p, n, _| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p] * n));
+    }
+}
+
+impl<const D: usize> Preconditioner for EffectiveMass<'_, D> {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+        for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
+            *z = r * self.inverse_diagonal[k / D];
+        }
+    }
+}
+
+/// What resting walls do to the velocity of the particles near them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WallUpdate {
+    /// Δv = Δa = 0 at a resting wall: Algorithm 1 read literally, as the paper's authors ran it.
+    #[default]
+    Literal,
+    /// Δv = −v_projected, Δa = −a_projected at a resting wall, as at a moving one.
+    Consistent,
+}
+
+/// Where the particles are after the step: computed first, checked, and only then committed.
+pub struct Moved<const D: usize> {
+    position: Vec<Vector<f64, D>>,
+    delta_velocity: Vec<Vector<f64, D>>,
+    delta_acceleration: Vec<Vector<f64, D>>,
+    displacement_gradient: Vec<Tensor<f64, D>>,
+}
+
+impl<const D: usize> Moved<D> {
+    /// The particle updates, with `projected` the nodal state before, `nodal` after the prescribed values were put in.
+    ///
+    /// a_p += Σ N Δa,  Δa = α₁Δφ − α₂v_n − (α₃+1)a_n        (50)
+    /// v_p += Σ N Δv,  Δv = α₄Δφ + (α₅−1)v_n + α₆a_n         (51)
+    /// x_p += Σ N Δφ                                           (52)
+    /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
+    #[allow(clippy::too_many_arguments)] // the ingredients of four formulas
+    pub fn new(
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        alphas: &Alphas,
+        projected: &Nodal<D>,
+        nodal: &Nodal<D>,
+        prescribed: &[PrescribedDof],
+        walls: WallUpdate,
+        dphi: &[Vector<f64, D>],
+    ) -> Self {
+        let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration).map(|((d, v), a)| (d, v, a));
+        let mut delta_a: Vec<_> =
+            state().map(|(d, v, a)| d * alphas.a1 - v * alphas.a2 - a * (alphas.a3 + 1.0)).collect();
+        let mut delta_v: Vec<_> =
+            state().map(|(d, v, a)| d * alphas.a4 + v * (alphas.a5 - 1.0) + a * alphas.a6).collect();
+        for dof in prescribed {
+            let (node, i) = (dof.node, dof.component);
+            let literal = !dof.moving && walls == WallUpdate::Literal;
+            (delta_v[node][i], delta_a[node][i]) = if literal {
+                (0.0, 0.0)
+            } else {
+                (
+                    dof.step.velocity_end - projected.velocity[node][i],
+                    dof.step.acceleration_end - projected.acceleration[node][i],
+                )
+            };
+        }
+        let moved = supports.interpolate(dphi, |p, delta_x, g| {
+            let h = compose(&g, &particles.displacement_gradient[p]);
+            Ok::<_, std::convert::Infallible>((particles.position[p] + delta_x, h))
+        });
+        let (position, displacement_gradient) = match moved {
+            Ok(moved) => moved.into_iter().unzip(),
+            Err(never) => match never {},
+        };
+        Self {
+            position,
+            delta_velocity: supports.values(&delta_v),
+            delta_acceleration: supports.values(&delta_a),
+            displacement_gradient,
+        }
+    }
+
+    /// The new positions.
+    pub fn positions(&self) -> &[Vector<f64, D>] {
+        &self.position
+    }
+
+    /// Writes to the particles: the only place that does, once per step.
+    pub fn commit(self, particles: &mut Particles<D>) {
+        for (v, delta) in particles.velocity.iter_mut().zip(&self.delta_velocity) {
+            *v += delta;
+        }
+        for (a, delta) in particles.acceleration.iter_mut().zip(&self.delta_acceleration) {
+            *a += delta;
+        }
+        particles.position = self.position;
+        particles.displacement_gradient = self.displacement_gradient;
+    }
+}

@@ -1,0 +1,55 @@
+//! Active nodes: those some particle lists with N ≠ 0 or ∇N ≠ 0, numbered in the order of the grid.
+
+use crate::grid::Grid;
+use crate::tensor::Vector;
+
+/// The active nodes of one step. Memory goes with the body, not with the box.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Nodes {
+    /// Grid numbers of the active nodes, ascending.
+    ids: Vec<u64>,
+}
+
+impl Nodes {
+    /// From lists of grid numbers, in any order and with repetitions.
+    pub fn new<'a>(lists: impl Iterator<Item = &'a [u64]>) -> Self {
+        let mut ids = Vec::new();
+        for list in lists {
+            ids.extend_from_slice(list);
+        }
+        ids.sort_unstable();
+        ids.dedup();
+        Self { ids }
+    }
+
+    /// Number of active nodes.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether no node is active.
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Grid numbers of the active nodes, ascending.
+    pub fn ids(&self) -> &[u64] {
+        &self.ids
+    }
+
+    /// Active number of the node with the grid number `id`.
+    pub fn number(&self, id: u64) -> Option<usize> {
+        self.ids.binary_search(&id).ok()
+    }
+
+    /// Index along each axis and position of every active node.
+    pub fn positions<'a, const D: usize>(
+        &'a self,
+        grid: &'a Grid<D>,
+    ) -> impl Iterator<Item = ([u32; D], Vector<f64, D>)> + 'a {
+        self.ids.iter().map(move |&id| {
+            let index = grid.index(id);
+            (index, grid.position(index))
+        })
+    }
+}

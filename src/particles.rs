@@ -1,0 +1,80 @@
+//! The particles: structure of arrays, and the bodies they belong to.
+
+use crate::tensor::{Tensor, Vector};
+
+/// A body: a law and a density shared by its particles.
+#[derive(Clone, Debug)]
+pub struct Body<L> {
+    /// Name, for messages and output.
+    pub name: String,
+    /// The constitutive law.
+    pub law: L,
+    /// Mass per reference volume, ρ₀.
+    pub density: f64,
+}
+
+/// State of all particles at the last converged step; one entry per particle in each array.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Particles<const D: usize> {
+    /// Position x.
+    pub position: Vec<Vector<f64, D>>,
+    /// Velocity v.
+    pub velocity: Vec<Vector<f64, D>>,
+    /// Acceleration a.
+    pub acceleration: Vec<Vector<f64, D>>,
+    /// H = F − I, so that small strains lose no digits.
+    pub displacement_gradient: Vec<Tensor<f64, D>>,
+    /// Reference volume V₀ (length in 1D, area in 2D: per unit of the missing dimensions).
+    pub volume: Vec<f64>,
+    /// Mass m = ρ₀ V₀.
+    pub mass: Vec<f64>,
+    /// Index of the body in the simulation's list.
+    pub body: Vec<u32>,
+}
+
+impl<const D: usize> Default for Particles<D> {
+    fn default() -> Self {
+        Self {
+            position: Vec::new(),
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+            displacement_gradient: Vec::new(),
+            volume: Vec::new(),
+            mass: Vec::new(),
+            body: Vec::new(),
+        }
+    }
+}
+
+impl<const D: usize> Particles<D> {
+    /// Number of particles.
+    pub fn len(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty()
+    }
+
+    /// Adds an undeformed particle at rest acceleration.
+    pub fn push(&mut self, position: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
+        self.position.push(position);
+        self.velocity.push(velocity);
+        self.acceleration.push(Vector::zeros());
+        self.displacement_gradient.push(Tensor::zeros());
+        self.volume.push(volume);
+        self.mass.push(mass);
+        self.body.push(body);
+    }
+
+    /// Σ m v
+    pub fn momentum(&self) -> Vector<f64, D> {
+        self.mass.iter().zip(&self.velocity).map(|(&m, v)| v * m).sum()
+    }
+
+    /// Σ ½ m v·v
+    pub fn kinetic_energy(&self) -> f64 {
+        self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared()).sum()
+    }
+}

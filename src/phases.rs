@@ -1,0 +1,52 @@
+//! Seconds by phase of a step.
+
+use std::time::Instant;
+
+/// The phases of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Shape functions and active nodes.
+    ShapeFunctions,
+    /// Particles → nodes.
+    Projection,
+    /// Newton, with its residuals, tangents and Krylov iterations.
+    Newton,
+    /// Reactions, work, nodes → particles.
+    Update,
+}
+
+impl Phase {
+    /// All phases with the names used in reports.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::ShapeFunctions, "shape_functions"),
+        (Self::Projection, "projection"),
+        (Self::Newton, "newton"),
+        (Self::Update, "update"),
+    ];
+}
+
+/// Measures phases one after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    last: Instant,
+    seconds: [f64; Phase::ALL.len()],
+}
+
+impl Stopwatch {
+    /// Starts now.
+    pub fn start() -> Self {
+        Self { last: Instant::now(), seconds: [0.0; Phase::ALL.len()] }
+    }
+
+    /// Books the time since the last lap to `phase`.
+    pub fn lap(&mut self, phase: Phase) {
+        let now = Instant::now();
+        self.seconds[phase as usize] += (now - self.last).as_secs_f64();
+        self.last = now;
+    }
+
+    /// Seconds booked to each of [`Phase::ALL`].
+    pub fn seconds(&self) -> [f64; Phase::ALL.len()] {
+        self.seconds
+    }
+}

@@ -1,0 +1,249 @@
+//! The step on one page: the paper's Algorithm 1.
+
+use crate::approximation::{Approximation, ShapeFunction};
+use crate::clock::Clock;
+use crate::grid::Grid;
+use crate::material::{Law, Material};
+use crate::mechanics::loads::{Loads, prescribed_dofs};
+use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
+use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::time::{Alphas, Newmark};
+use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
+use crate::particles::{Body, Particles};
+use crate::phases::{Phase, Stopwatch};
+use crate::solver::newton::{NewtonError, NewtonReport, NewtonSettings, newton};
+use crate::tensor::Vector;
+
+/// Where Newton starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum InitialGuess {
+    /// Δφ = 0, as in the paper's Table 3.
+    #[default]
+    Zero,
+    /// Δφ = Δt v_n.
+    Velocity,
+}
+
+/// How a step is taken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// β and γ.
+    pub newmark: Newmark,
+    /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
+    pub lumping: f64,
+    /// Where Newton starts.
+    pub initial_guess: InitialGuess,
+    /// What resting walls do to particle velocities.
+    pub wall_update: WallUpdate,
+    /// Newton and Krylov.
+    pub newton: NewtonSettings,
+}
+
+/// An implicit material point simulation in `D` dimensions.
+///
+/// The fields are the state at the last converged step; [`Simulation::step`] advances it or leaves it untouched.
+#[derive(Clone, Debug)]
+pub struct Simulation<const D: usize, L = Material, A = Approximation> {
+    /// The background grid.
+    pub grid: Grid<D>,
+    /// The shape functions.
+    pub approximation: A,
+    /// The bodies.
+    pub bodies: Vec<Body<L>>,
+    /// The particles.
+    pub particles: Particles<D>,
+    /// Gravity, surface loads, prescribed motion.
+    pub loads: Loads<D>,
+    /// How a step is taken.
+    pub settings: Settings,
+    /// Where in time.
+    pub clock: Clock,
+    /// Work of gravity, tractions, pressure and moving walls since the start.
+    pub external_work: f64,
+}
+
+/// What a step did.
+#[derive(Clone, Debug)]
+pub struct StepReport<const D: usize> {
+    /// Its length.
+    pub dt: f64,
+    /// Active nodes.
+    pub active_nodes: usize,
+    /// Newton's iterations and residuals.
+    pub newton: NewtonReport,
+    /// Iterations of the projection (42), 0 for a lumped mass.
+    pub projection_iterations: usize,
+    /// Force of each of [`Loads::prescribed`] on the bodies at t_{n+1}.
+    pub reactions: Vec<Vector<f64, D>>,
+    /// Seconds by phase.
+    pub seconds: Stopwatch,
+    /// How often the step was halved before it succeeded.
+    pub halvings: u32,
+}
+
+/// Why a step failed. The particles are untouched.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum StepError {
+    /// Shape functions could not be evaluated.
+    #[error("shape functions: {0}")]
+    Support(#[from] SupportError),
+    /// Newton found no equilibrium.
+    #[error("Newton: {0}")]
+    Newton(#[from] NewtonError<Inadmissible>),
+    /// A particle would leave the grid.
+    #[error("particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition")]
+    LeftGrid {
+        /// Number of the particle.
+        particle: usize,
+        /// Where it would be.
+        position: Vec<f64>,
+    },
+}
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
+    ///
+    /// # Errors
+    /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
+    pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
+        let (t, dt) = (self.clock.time(), self.clock.step());
+        let alphas = self.settings.newmark.alphas(dt);
+        let mut watch = Stopwatch::start();
+
+        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
+        let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &nodes, t, dt);
+        watch.lap(Phase::ShapeFunctions);
+
+        let projected = Nodal::project(&self.particles, &supports, nodes.len(), self.settings.lumping);
+        let nodal = projected.with_prescribed(&prescribed);
+        watch.lap(Phase::Projection);
+
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
+        let mut dphi = self.initial_guess(&nodal, dt);
+        for dof in &prescribed {
+            dphi[dof.node][dof.component] = dof.step.increment;
+        }
+        let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &self.settings.newton)?;
+        watch.lap(Phase::Newton);
+
+        let (reactions, work) = self.reactions_and_work(&equilibrium, t, &dphi)?;
+        let moved = Moved::new(
+            &self.particles, &supports, &alphas, &projected, &nodal, &prescribed, self.settings.wall_update, &dphi,
+        );
+        self.check_inside(moved.positions())?;
+        watch.lap(Phase::Update);
+
+        let projection_iterations = projected.iterations;
+        moved.commit(&mut self.particles);
+        self.external_work += work;
+        self.clock.advance();
+        let active_nodes = nodes.len();
+        Ok(StepReport { dt, active_nodes, newton, projection_iterations, reactions, seconds: watch, halvings: 0 })
+    }
+
+    /// As [`Self::step`], halving Δt while Newton fails, down to the clock's limit; Δt grows back afterwards.
+    ///
+    /// # Errors
+    /// The last failure, once Δt cannot be halved further, or a failure that a shorter step does not mend.
+    pub fn advance(&mut self) -> Result<StepReport<D>, StepError> {
+        let mut halvings = 0;
+        loop {
+            match self.step() {
+                Ok(report) => return Ok(StepReport { halvings, ..report }),
+                Err(StepError::Newton(_)) if self.clock.halve() => halvings += 1,
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// The equilibrium at time `t` on given supports.
+    pub fn equilibrium<'a>(
+        &'a self,
+        supports: &'a Supports<D>,
+        nodal: &'a Nodal<D>,
+        prescribed: &'a [crate::mechanics::loads::PrescribedDof],
+        alphas: Alphas,
+        t: f64,
+    ) -> Equilibrium<'a, D, L> {
+        let dead_load = self.loads.dead(t, &nodal.mass, supports);
+        let pressures = self.loads.pressures(t);
+        let (particles, bodies, lumping) = (&self.particles, self.bodies.as_slice(), self.settings.lumping);
+        Equilibrium::new(particles, bodies, supports, alphas, lumping, nodal, dead_load, pressures, prescribed)
+    }
+
+    fn initial_guess(&self, nodal: &Nodal<D>, dt: f64) -> Vec<Vector<f64, D>> {
+        match self.settings.initial_guess {
+            InitialGuess::Zero => vec![Vector::zeros(); nodal.velocity.len()],
+            InitialGuess::Velocity => nodal.velocity.iter().map(|v| v * dt).collect(),
+        }
+    }
+
+    /// Reactions at t_{n+1}, summed over each prescribed condition, and the work of the step,
+    /// Σ ½ (f_n + f_{n+1})·Δφ over all external forces, the reactions of moving walls among them.
+    fn reactions_and_work(
+        &self,
+        end: &Equilibrium<'_, D, L>,
+        t: f64,
+        dphi: &[Vector<f64, D>],
+    ) -> Result<(Vec<Vector<f64, D>>, f64), StepError> {
+        let inadmissible = |source| StepError::Newton(NewtonError::Inadmissible { source });
+        let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
+        let mut work = 0.0;
+        if !end.prescribed.is_empty() {
+            let residual = end.residual::<f64>(dphi, Carry::ALL).map_err(inadmissible)?;
+            for dof in end.prescribed {
+                let reaction = residual[dof.node][dof.component];
+                reactions[dof.owner][dof.component] += reaction;
+                work += 0.5 * reaction * dof.step.increment;
+            }
+        }
+        // At t_n: a = a_n and Δφ = 0.
+        let at_rest = vec![Vector::zeros(); dphi.len()];
+        let start = self.equilibrium(end.supports, end.nodal, end.prescribed, Alphas::START, t);
+        if end.prescribed.iter().any(|dof| dof.moving) {
+            let residual = start.residual::<f64>(&at_rest, Carry::ALL).map_err(inadmissible)?;
+            for dof in end.prescribed {
+                work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
+            }
+        }
+        let forces = end.external_force(dphi).into_iter().zip(start.external_force(&at_rest));
+        for ((f_end, f_start), dphi) in forces.zip(dphi) {
+            work += 0.5 * (f_end + f_start).dot(dphi);
+        }
+        Ok((reactions, work))
+    }
+
+    fn check_inside(&self, positions: &[Vector<f64, D>]) -> Result<(), StepError> {
+        match positions.iter().position(|x| !self.grid.contains(x)) {
+            Some(particle) => {
+                Err(StepError::LeftGrid { particle, position: positions[particle].iter().copied().collect() })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Σ V₀ W, the strain energy of all particles.
+    pub fn strain_energy(&self) -> f64 {
+        let particles = &self.particles;
+        (0..particles.len())
+            .map(|p| {
+                let at = crate::tensor::Deformation::new(particles.displacement_gradient[p]);
+                particles.volume[p] * self.bodies[particles.body[p] as usize].law.energy(&at)
+            })
+            .sum()
+    }
+
+    /// Gives `velocity(x_I)` to the nodes and interpolates it once to the particles, v_p = Σ N v_I (section 4.1).
+    ///
+    /// # Errors
+    /// A particle without shape functions.
+    pub fn set_velocity_on_nodes(
+        &mut self,
+        velocity: impl Fn(&Vector<f64, D>) -> Vector<f64, D>,
+    ) -> Result<(), StepError> {
+        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
+        let nodal: Vec<_> = nodes.positions(&self.grid).map(|(_, x)| velocity(&x)).collect();
+        self.particles.velocity = supports.values(&nodal);
+        Ok(())
+    }
+}
