@@ -175,8 +175,9 @@ impl<const D: usize> Dual<'_, D> {
             .chain((0..D).map(|k| start + Vector::<f64, D>::from(identity::<f64, D>().column(k))))
             .map(|vertex| vertex.as_slice().to_vec())
             .collect();
-        let result =
-            Executor::new(*self, NelderMead::new(simplex)).configure(|state| state.max_iters(SEARCH_STEPS)).timer(false);
+        let result = Executor::new(*self, NelderMead::new(simplex))
+            .configure(|state| state.max_iters(SEARCH_STEPS))
+            .timer(false);
         let result = result.run().ok()?;
         let best = result.state().get_best_param()?;
         (best.len() == D).then(|| Vector::from_column_slice(best))
@@ -275,5 +276,42 @@ impl ShapeFunction for LmeCircle {
 
     fn separable(&self) -> Option<&dyn Separable> {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// D of the nodes −2 … 3 along both axes within R of `x`, the wall at −`below` cutting the first axis.
+    fn distances(x: [f64; 2], below: i32, radius: f64) -> Vec<[f64; 2]> {
+        (-2..=3)
+            .flat_map(|k| (-below..=3).map(move |i| [x[0] - f64::from(i), x[1] - f64::from(k)]))
+            .filter(|d| d[0].hypot(d[1]) < radius)
+            .collect()
+    }
+
+    #[test]
+    fn without_newton_the_search_finds_the_same_multipliers() {
+        for (x, below, gamma) in
+            [([0.3, 0.45], 2, 3.0), ([0.5, 0.5], 2, 0.8), ([0.001, 0.2], 0, 4.0), ([0.01, 0.98], 2, 9.0)]
+        {
+            let nodes = distances(x, below, radius(gamma, 1e-6));
+            let dual = Dual { gamma, distances: &nodes };
+            let newton = dual.newton(Vector::zeros(), NEWTON_STEPS).expect("inside the hull");
+            assert!(dual.moments(&newton).r.amax() < 1e-14);
+            assert!(dual.newton(Vector::zeros(), 0).is_none());
+            let search = dual.search(Vector::zeros()).expect("the search always answers");
+            assert!(dual.moments(&search).r.amax() < 1e-5, "{x:?}: {}", dual.moments(&search).r.amax());
+            let fallback = dual.minimize(Vector::zeros(), 0).expect("inside the hull");
+            assert!((fallback - newton).amax() < 1e-10, "{x:?}: {fallback} and {newton}");
+        }
+    }
+
+    #[test]
+    fn outside_the_hull_nothing_is_found() {
+        // All nodes on one side: log Z falls for ever.
+        let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
+        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
     }
 }

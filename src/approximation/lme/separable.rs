@@ -70,10 +70,7 @@ impl Lme {
     pub(super) fn reach(&self, axis: &Axis, place: &Place) -> Reach {
         // j < R − d; a cast saturates, and takes NaN to 0.
         let count = |distance: f64| ((self.radius - distance).ceil() - 1.0).max(0.0) as u32;
-        Reach {
-            lower: count(place.below).min(place.cell),
-            upper: count(place.above).min(axis.cells - 1 - place.cell),
-        }
+        Reach { lower: count(place.below).min(place.cell), upper: count(place.above).min(axis.cells - 1 - place.cell) }
     }
 
     /// Σⱼ (d + j) gⱼ qʲ and Σⱼ j (d + j) gⱼ qʲ for j = 0 … `reach`.
