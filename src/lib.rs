@@ -4,5 +4,6 @@ pub mod approximation;
 pub mod grid;
 pub mod material;
 pub mod scalar;
+pub mod shape;
 pub mod solver;
 pub mod tensor;
