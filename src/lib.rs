@@ -4,6 +4,7 @@ pub mod approximation;
 pub mod grid;
 pub mod material;
 pub mod scalar;
+pub mod scene;
 pub mod shape;
 pub mod solver;
 pub mod tensor;
