@@ -9,6 +9,7 @@ pub mod nodes;
 pub mod particles;
 pub mod phases;
 pub mod scalar;
+pub mod scene;
 pub mod shape;
 pub mod simulation;
 pub mod solver;
