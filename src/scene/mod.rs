@@ -17,10 +17,12 @@ pub mod shape;
 pub mod solver;
 pub mod time;
 
+mod build;
 mod overrides;
 mod read;
 mod suggest;
 
+pub use build::BuildError;
 pub use check::{Problem, Problems};
 pub use overrides::{Override, OverrideError};
 pub use place::Place;
