@@ -8,6 +8,7 @@ pub mod mechanics;
 pub mod nodes;
 pub mod particles;
 pub mod phases;
+pub mod plan;
 pub mod scalar;
 pub mod scene;
 pub mod shape;
