@@ -1,6 +1,6 @@
 //! The box and its background grid.
 
-use super::check::{Number, Problems};
+use super::check::{Number, Problems, sensible};
 use crate::grid::Grid;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -42,7 +42,7 @@ impl GridBox {
     /// The grid itself; `None` unless the section is valid and of dimension `D`.
     pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
         let origin = self.origin();
-        if self.size.len() != D || origin.len() != D {
+        if self.size.len() != D || origin.len() != D || !origin.iter().all(|&x| sensible(x)) {
             return None;
         }
         let mut cells = [0; D];

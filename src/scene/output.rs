@@ -92,8 +92,8 @@ impl Output {
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),
-                format_args!("{field:?} again"),
-                "one mention is enough",
+                format_args!("{field:?}, given before,"),
+                "must be listed once",
             );
         }
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
