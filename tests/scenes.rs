@@ -95,6 +95,9 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
         .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "wall_update": "literal", "max_halvings": 10"#)
         .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "particles""#);
     assert_eq!(scene, scene::read(&all, &[]).unwrap_or_else(|error| panic!("{error}")));
+    // what is written back is the same scene
+    let written = serde_json::to_string(&scene).unwrap();
+    assert_eq!(scene, scene::read(&written, &[]).unwrap_or_else(|error| panic!("{error}")));
 }
 
 /// (what stands in the good scene, what replaces it, the key to be named, words of the message)
@@ -261,6 +264,8 @@ const WRONG_TEXT: &[(&str, &str, &str, &[&str])] = &[
     (r#""max_halvings": 3"#, r#""max_halvings": -3"#, "time.max_halvings", &["-3", "whole number"]),
     (r#""max_halvings": 3"#, r#""max_halvings": 2.5"#, "time.max_halvings", &["2.5", "whole number"]),
     ("[0, -9.81]", "9.81", "gravity.acceleration", &["a list"]),
+    (r#"{ "normal": [0, 1], "area": 0.1 }"#, "[[0, 1], 0.1]", "pressures[0].surface", &["a list, expected an object"]),
+    (r#""sliding""#, r#"{ "sliding": null }"#, "boundary.left", &["an object, expected a word"]),
     ("[[0, 0], [1, 1]]", "[[0, 0], [1]]", "gravity.curve[1]", &["length 1"]),
     (r#""title": "two blocks","#, "// two blocks", "", &["JSON has no comments"]),
     (

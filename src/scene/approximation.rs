@@ -2,10 +2,10 @@
 
 use super::check::{Number, Problems};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The family of shape functions that joins particles and nodes.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Approximation {
     /// Products of hat functions. Simple and rough: forces jump when a particle crosses a cell face.
@@ -26,7 +26,7 @@ impl Default for Approximation {
 }
 
 /// B-splines.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bspline {
     /// The polynomial degree, 2 or 3.
@@ -42,7 +42,7 @@ impl Bspline {
 }
 
 /// Local maximum entropy functions, N = exp(−γ̂ |D|²/h² + λ·D)/Z.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Lme {
     /// γ̂, how local the functions are (no unit), 0.1 to 1000; near 0.8 they are smooth and wide, near 4 almost hats. With the
@@ -62,7 +62,7 @@ pub struct Lme {
 }
 
 /// The region of the nodes that support a particle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Support {
     /// A box: the functions are then products of one-dimensional ones.
