@@ -10,6 +10,7 @@ pub mod output;
 pub mod particles;
 pub mod phases;
 pub mod scalar;
+pub mod scene;
 pub mod shape;
 pub mod simulation;
 pub mod solver;

@@ -11,7 +11,7 @@ use crate::mechanics::time::{Alphas, Newmark};
 use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
-use crate::solver::newton::{NewtonError, NewtonReport, NewtonSettings, newton};
+use crate::solver::{LinearError, NewtonError, NewtonReport, NewtonSettings, newton};
 use crate::tensor::Vector;
 
 /// Where Newton starts.
@@ -82,16 +82,24 @@ pub struct StepReport<const D: usize> {
 }
 
 /// Why a step failed. The particles are untouched.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum StepError {
     /// Shape functions could not be evaluated.
-    #[error("shape functions: {0}")]
+    #[error("the shape functions cannot be evaluated")]
     Support(#[from] SupportError),
+    /// Velocities so large that their projection overflows.
+    #[error("the projection to the nodes failed")]
+    Projection(#[from] LinearError),
     /// Newton found no equilibrium.
-    #[error("Newton: {0}")]
+    #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
+    /// The state at the start of the step is impossible.
+    #[error(transparent)]
+    Inadmissible(#[from] Inadmissible),
     /// A particle would leave the grid.
-    #[error("particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition")]
+    #[error(
+        "particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition"
+    )]
     LeftGrid {
         /// Number of the particle.
         particle: usize,
@@ -114,7 +122,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &nodes, t, dt);
         watch.lap(Phase::ShapeFunctions);
 
-        let projected = Nodal::project(&self.particles, &supports, nodes.len(), self.settings.lumping);
+        let projected = Nodal::project(&self.particles, &supports, nodes.len(), self.settings.lumping)?;
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection);
 
@@ -128,7 +136,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         let (reactions, work) = self.reactions_and_work(&equilibrium, t, &dphi)?;
         let moved = Moved::new(
-            &self.particles, &supports, &alphas, &projected, &nodal, &prescribed, self.settings.wall_update, &dphi,
+            &self.particles,
+            &supports,
+            &alphas,
+            &projected,
+            &nodal,
+            &prescribed,
+            self.settings.wall_update,
+            &dphi,
         );
         self.check_inside(moved.positions())?;
         watch.lap(Phase::Update);
@@ -186,11 +201,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         t: f64,
         dphi: &[Vector<f64, D>],
     ) -> Result<(Vec<Vector<f64, D>>, f64), StepError> {
-        let inadmissible = |source| StepError::Newton(NewtonError::Inadmissible { source });
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let residual = end.residual::<f64>(dphi, Carry::ALL).map_err(inadmissible)?;
+            let residual = end.residual::<f64>(dphi, Carry::ALL)?;
             for dof in end.prescribed {
                 let reaction = residual[dof.node][dof.component];
                 reactions[dof.owner][dof.component] += reaction;
@@ -201,7 +215,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let at_rest = vec![Vector::zeros(); dphi.len()];
         let start = self.equilibrium(end.supports, end.nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let residual = start.residual::<f64>(&at_rest, Carry::ALL).map_err(inadmissible)?;
+            let residual = start.residual::<f64>(&at_rest, Carry::ALL)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }

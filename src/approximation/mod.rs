@@ -1,1 +1,159 @@
 //! Shape functions N and ∇N: one file a family, one list ([`Approximation`]).
+//!
+//! Linear, GIMP, B-splines and the separable local max-ent functions (LME) are products of functions of one coordinate
+//! ([`Separable`]) and share one tensor product; LME on the paper's circle of nodes is not. Positions and spacing are in
+//! the user's unit of length, values have none, gradients are per length.
+//!
+//! ```
+//! use bfree::approximation::{Approximation, Lme, Scratch, ShapeFunction, Support, Validate};
+//! use bfree::grid::Grid;
+//! use bfree::tensor::Vector;
+//!
+//! let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [12, 10] };
+//! let shape = Approximation::from(Lme::new(3.0, 1e-6));
+//! shape.validate(2)?;
+//! let (mut scratch, mut support) = (Scratch::default(), Support::default());
+//! shape.evaluate(&grid, &Vector::from([2.61, 2.27]), &mut scratch, &mut support)?;
+//! assert_eq!(support.nodes.len(), 16);
+//! # Ok::<(), bfree::approximation::ApproximationError>(())
+//! ```
+
+mod bspline;
+mod error;
+mod gimp;
+mod kernel;
+mod linear;
+mod lme;
+mod product;
+
+pub use bspline::Bspline;
+pub use error::ApproximationError;
+pub use gimp::Gimp;
+pub use linear::Linear;
+pub use lme::{Lme, LmeCircle, SMALLEST_TOLERANCE};
+pub use product::{AxisWeights, Separable};
+
+use crate::grid::Grid;
+use crate::tensor::Vector;
+
+/// Parameters that can be judged before any particle is there.
+pub trait Validate {
+    /// Whether the family works with its parameters in `dimension` = 1, 2 or 3 dimensions.
+    ///
+    /// # Errors
+    /// The parameter that means nothing, and its range.
+    fn validate(&self, dimension: usize) -> Result<(), ApproximationError>;
+}
+
+/// The nodes a particle sees: all with N ≠ 0 or ∇N ≠ 0. A buffer to be reused.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Support<const D: usize> {
+    /// Index along each axis, the first axis running fastest.
+    pub nodes: Vec<[u32; D]>,
+    /// N of each node.
+    pub values: Vec<f64>,
+    /// ∇N of each node, in 1/length.
+    pub gradients: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Support<D> {
+    /// Empties the list, keeping its memory.
+    #[inline]
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.values.clear();
+        self.gradients.clear();
+    }
+
+    /// Appends a node.
+    #[inline]
+    pub fn push(&mut self, node: [u32; D], value: f64, gradient: [f64; D]) {
+        self.nodes.push(node);
+        self.values.push(value);
+        self.gradients.push(gradient);
+    }
+}
+
+/// Memory a shape function works in; one for each thread.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    axes: [AxisWeights; 3],
+}
+
+/// N and ∇N at a point, in `D` = 1, 2 or 3 dimensions.
+pub trait ShapeFunction: Validate + Send + Sync {
+    /// Fills `out` with the nodes seen from `x`; on an error its content means nothing.
+    ///
+    /// # Errors
+    /// `x` outside the box or not a number; parameters that [`Validate::validate`] refuses, where they would matter.
+    fn evaluate<const D: usize>(
+        &self,
+        grid: &Grid<D>,
+        x: &Vector<f64, D>,
+        scratch: &mut Scratch,
+        out: &mut Support<D>,
+    ) -> Result<(), ApproximationError>;
+
+    /// The functions of one coordinate whose product this is, if it is one.
+    fn separable(&self) -> Option<&dyn Separable>;
+}
+
+impl<S: Separable> ShapeFunction for S {
+    #[inline]
+    fn evaluate<const D: usize>(
+        &self,
+        grid: &Grid<D>,
+        x: &Vector<f64, D>,
+        scratch: &mut Scratch,
+        out: &mut Support<D>,
+    ) -> Result<(), ApproximationError> {
+        product::inside(grid, x)?;
+        for k in 0..D {
+            self.axis(&grid.axis(k), x[k], &mut scratch.axes[k])?;
+        }
+        product::product(&scratch.axes, out);
+        Ok(())
+    }
+
+    fn separable(&self) -> Option<&dyn Separable> {
+        Some(self)
+    }
+}
+
+/// The list of families. A word here makes a family known to scenes and to every check.
+macro_rules! approximations {
+    ($($family:ident),*) => {
+        /// Any of the shipped shape functions.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Approximation {
+            $(#[doc = concat!("See [`", stringify!($family), "`].")] $family($family)),*
+        }
+
+        impl Validate for Approximation {
+            fn validate(&self, dimension: usize) -> Result<(), ApproximationError> {
+                match self { $(Self::$family(family) => family.validate(dimension)),* }
+            }
+        }
+
+        impl ShapeFunction for Approximation {
+            #[inline]
+            fn evaluate<const D: usize>(
+                &self, grid: &Grid<D>, x: &Vector<f64, D>, scratch: &mut Scratch, out: &mut Support<D>,
+            ) -> Result<(), ApproximationError> {
+                match self { $(Self::$family(family) => family.evaluate(grid, x, scratch, out)),* }
+            }
+
+            fn separable(&self) -> Option<&dyn Separable> {
+                match self { $(Self::$family(family) => family.separable()),* }
+            }
+        }
+
+        $(impl From<$family> for Approximation {
+            fn from(family: $family) -> Self {
+                Self::$family(family)
+            }
+        })*
+    };
+}
+
+approximations!(Linear, Gimp, Bspline, Lme, LmeCircle);

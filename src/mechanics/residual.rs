@@ -1,7 +1,7 @@
 //! The residual R(Δφ) of one step, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 
 use crate::material::{Law, NonPositiveJacobian, admissible, first_piola};
-use crate::mechanics::loads::{PressurePoint, PrescribedDof};
+use crate::mechanics::loads::{PrescribedDof, PressurePoint};
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
@@ -11,7 +11,7 @@ use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
 
 /// A particle whose deformation is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("particle {particle}: {source}")]
+#[error("particle {particle} cannot be deformed so")]
 pub struct Inadmissible {
     /// Number of the particle.
     pub particle: usize,
@@ -94,9 +94,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         prescribed: &'a [PrescribedDof],
     ) -> Self {
         let history = if lumping < 1.0 {
-            let nodal_history: Vec<_> = (nodal.velocity.iter().zip(&nodal.acceleration))
-                .map(|(v, a)| v * alphas.a2 + a * alphas.a3)
-                .collect();
+            let nodal_history: Vec<_> =
+                (nodal.velocity.iter().zip(&nodal.acceleration)).map(|(v, a)| v * alphas.a2 + a * alphas.a3).collect();
             supports.values(&nodal_history)
         } else {
             Vec::new()
@@ -120,9 +119,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     #[inline(always)]
     fn acceleration<T: Real>(&self, node: usize, dphi: &Vector<T, D>) -> Vector<T, D> {
         let (v, a) = (&self.nodal.velocity[node], &self.nodal.acceleration[node]);
-        Vector::from_fn(|i, _| {
-            T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i])
-        })
+        Vector::from_fn(|i, _| T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i]))
     }
 
     /// (1−ε) m a at particle `p`, from Δφ there.
@@ -176,7 +173,9 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self.supports.assemble(
             dphi,
             &mut out,
-            |p, u, g| Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?)),
+            |p, u, g| {
+                Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
+            },
             |(q, stress), n, grad_n| stress * grad_n.map(T::lit) + q * T::lit(n),
         )?;
         self.add_pressure(dphi, carry, &mut out);

@@ -42,7 +42,7 @@ struct Block<const D: usize> {
 
 /// The shape functions of a particle could not be evaluated.
 #[derive(Clone, Debug, thiserror::Error)]
-#[error("particle {particle}: {source}")]
+#[error("particle {particle} has no shape functions")]
 pub struct SupportError {
     /// Number of the particle.
     pub particle: usize,
@@ -254,7 +254,7 @@ fn ordered<R: Send, E: Send>(count: usize, f: impl Fn(usize) -> Result<R, E> + S
         return (0..count).map(f).collect();
     }
     // Collect first: rayon's own short-circuit would return whichever error came first in time.
-    let results: Vec<Result<R, E>> = (0..count).into_par_iter().map(f).collect();
+    let results: Vec<Result<R, E>> = (0..count).into_par_iter().map(&f).collect();
     results.into_iter().collect()
 }
 

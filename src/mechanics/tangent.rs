@@ -2,7 +2,6 @@
 
 use crate::material::{FrozenTangent, Law, admissible};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
-use crate::scalar::Real;
 use crate::solver::{LinearOperator, NonlinearProblem, Preconditioner};
 use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
 use num_dual::Dual64;
@@ -302,4 +301,3 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         self.tangent(bytemuck::cast_slice(x))
     }
 }
-

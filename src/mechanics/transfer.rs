@@ -5,8 +5,7 @@ use crate::mechanics::residual::compose;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
 use crate::particles::Particles;
-use crate::solver::conjugate_gradient::{CgSettings, conjugate_gradient};
-use crate::solver::{LinearOperator, Preconditioner};
+use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
 use crate::tensor::{Tensor, Vector};
 
 /// A node lighter than this fraction of the heaviest particle gets no projected velocity: its Δφ comes from the stiffness.
@@ -31,7 +30,15 @@ pub struct Nodal<const D: usize> {
 impl<const D: usize> Nodal<D> {
     /// Projects the particles' velocity and acceleration with M̃ = (1−ε) M + ε lumped(M) onto `count` active nodes:
     /// M̃ v = Σ_p N m v_p and M̃ a = Σ_p N m a_p (eq. 42).
-    pub fn project(particles: &Particles<D>, supports: &Supports<D>, count: usize, lumping: f64) -> Self {
+    ///
+    /// # Errors
+    /// Particle velocities so large that the projection overflows.
+    pub fn project(
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        count: usize,
+        lumping: f64,
+    ) -> Result<Self, LinearError> {
         let mut mass = vec![0.0; count];
         supports.scatter(&mut mass, |p, n, _| particles.mass[p] * n);
         let right = |field: &[Vector<f64, D>]| {
@@ -44,7 +51,7 @@ impl<const D: usize> Nodal<D> {
         let mut iterations = 0;
         if lumping < 1.0 {
             let effective = EffectiveMass::new(particles, supports, &mass, lumping);
-            iterations += effective.solve(&mut velocity) + effective.solve(&mut acceleration);
+            iterations += effective.solve(&mut velocity)? + effective.solve(&mut acceleration)?;
         } else {
             for (field, m) in velocity.iter_mut().zip(&mut acceleration).zip(&mass) {
                 *field.0 /= *m;
@@ -57,7 +64,7 @@ impl<const D: usize> Nodal<D> {
                 acceleration[node] = Vector::zeros();
             }
         }
-        Self { mass, velocity, acceleration, iterations }
+        Ok(Self { mass, velocity, acceleration, iterations })
     }
 
     /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
@@ -89,12 +96,15 @@ impl<'a, const D: usize> EffectiveMass<'a, D> {
     }
 
     /// Overwrites the right-hand side by the solution; from zero, so that a singular M gives the answer of least norm.
-    fn solve(&self, field: &mut [Vector<f64, D>]) -> usize {
+    fn solve(&self, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
         let right = field.to_vec();
         field.fill(Vector::zeros());
-        let settings = CgSettings { relative_tolerance: PROJECTION_TOLERANCE, max_iterations: 10 * right.len() + 100 };
-        let report = conjugate_gradient(self, self, bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field), &settings);
-        report.iterations
+        let settings = ConjugateGradientSettings {
+            relative_tolerance: PROJECTION_TOLERANCE,
+            max_iterations: 10 * right.len() + 100,
+        };
+        let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
+        Ok(conjugate_gradient(self, self, right, solution, &settings)?.iterations)
     }
 }
 

@@ -1,3 +1,231 @@
 //! Krylov and Newton methods on plain vectors: operators and vectors, no mechanics.
 //!
-//! A nodal field of `D` components per node is one flat `&[f64]`, node after node.
+//! A nodal field of `D` components per node is one flat `&[f64]`, node after node. No constant in here has a unit: a
+//! problem whose unknowns and residual are multiplied by powers of two takes the same iterations with the same bits.
+
+mod conjugate_gradient;
+mod forcing;
+mod gmres;
+mod newton;
+pub mod vector;
+
+pub use conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
+pub use forcing::Forcing;
+pub use gmres::{GmresSettings, gmres};
+pub use newton::{
+    Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
+    NewtonIteration, NewtonReport, NewtonSettings, newton,
+};
+
+/// A square matrix known by its product.
+pub trait LinearOperator {
+    /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
+    fn apply(&self, x: &[f64], y: &mut [f64]);
+}
+
+/// An approximate inverse M⁻¹, the same linear map at every call.
+pub trait Preconditioner {
+    /// `z = M⁻¹ r`; `r` and `z` have the order of the operator, and `z` is overwritten.
+    fn precondition(&self, r: &[f64], z: &mut [f64]);
+}
+
+/// No preconditioning: M = I.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity;
+
+impl Preconditioner for Identity {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+        z.copy_from_slice(r);
+    }
+}
+
+/// A square system R(x) = 0 that is defined for admissible x only. The state is the argument: nothing is remembered
+/// between calls.
+pub trait NonlinearProblem {
+    /// Why R has no value somewhere, such as det F ≤ 0 at a particle.
+    type Inadmissible: std::error::Error + 'static;
+    /// The derivative frozen at one x, with a preconditioner for it.
+    type Tangent<'a>: LinearOperator + Preconditioner
+    where
+        Self: 'a;
+
+    /// `r = R(x)`; `r` is overwritten, and unspecified on error.
+    ///
+    /// # Errors
+    /// x is not admissible.
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible>;
+
+    /// Norm of the vector of the sums of the magnitudes of all contributions to R(x): what its round-off is relative to.
+    ///
+    /// # Errors
+    /// x is not admissible.
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible>;
+
+    /// The potential Π whose gradient is R, and the sum of the magnitudes of its contributions; `None` if there is no
+    /// potential (follower loads).
+    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>>;
+
+    /// The tangent at x.
+    ///
+    /// # Errors
+    /// x is not admissible.
+    fn linearize(&self, x: &[f64]) -> Result<Self::Tangent<'_>, Self::Inadmissible>;
+}
+
+/// What a Krylov method did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearReport {
+    /// How it ended.
+    pub outcome: LinearOutcome,
+    /// Krylov iterations taken, over all restarts.
+    pub iterations: usize,
+    /// Products with the operator, those for true residuals included.
+    pub products: usize,
+    /// The true ‖b − A x‖ / ‖b‖ of the solution handed back, computed anew from that solution (0 if b = 0).
+    pub relative_residual: f64,
+}
+
+impl LinearReport {
+    /// Whether the tolerance was met.
+    pub fn converged(&self) -> bool {
+        self.outcome == LinearOutcome::Converged
+    }
+}
+
+/// How a Krylov method ended. Whatever the outcome, the solution is the best one it has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinearOutcome {
+    /// The true residual meets the tolerance.
+    Converged,
+    /// The allowed iterations are used up.
+    IterationLimit,
+    /// The residual no longer falls: round-off, a singular operator, or a restart that is too short.
+    Stagnated,
+    /// Conjugate gradients only: the operator (pᵀAp < 0) or the preconditioner (rᵀM⁻¹r ≤ 0) is not positive definite.
+    NegativeCurvature,
+}
+
+/// Why a Krylov method has no solution to hand back; the contents of the solution vector are then unspecified.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LinearError {
+    /// A setting outside its range.
+    #[error(transparent)]
+    Setting(#[from] InvalidSetting),
+    /// Right-hand side and solution differ in length.
+    #[error("the right-hand side has {rhs} entries and the solution {solution}; they must agree")]
+    Length {
+        /// Entries of the right-hand side.
+        rhs: usize,
+        /// Entries of the solution.
+        solution: usize,
+    },
+    /// NaN or infinity.
+    #[error("{what} is not finite at Krylov iteration {iteration}")]
+    NotFinite {
+        /// The quantity.
+        what: &'static str,
+        /// Krylov iterations completed before.
+        iteration: usize,
+    },
+}
+
+impl LinearError {
+    /// The same error with `earlier` iterations counted before it.
+    fn after(self, earlier: usize) -> Self {
+        match self {
+            Self::NotFinite { what, iteration } => Self::NotFinite { what, iteration: iteration + earlier },
+            other => other,
+        }
+    }
+}
+
+/// A setting outside its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{name} is {value:e}; it must be {allowed}")]
+pub struct InvalidSetting {
+    /// Name of the setting.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What is allowed, in words.
+    pub allowed: &'static str,
+}
+
+impl InvalidSetting {
+    fn check(valid: bool, name: &'static str, value: f64, allowed: &'static str) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self { name, value, allowed }) }
+    }
+
+    fn check_tolerance(name: &'static str, value: f64) -> Result<(), Self> {
+        Self::check((0.0..1.0).contains(&value), name, value, "at least 0 and less than 1")
+    }
+
+    fn check_restart(restart: usize) -> Result<(), Self> {
+        Self::check(restart >= 1, "restart", restart as f64, "at least 1")
+    }
+}
+
+/// Common start of the Krylov methods: agreeing lengths and a finite ‖b‖, which is returned.
+fn checked_norm(rhs: &[f64], solution: &[f64]) -> Result<f64, LinearError> {
+    if rhs.len() != solution.len() {
+        return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
+    }
+    finite(vector::norm(rhs), "the norm of the right-hand side", 0)
+}
+
+/// Lets only finite numbers pass.
+fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, LinearError> {
+    if value.is_finite() { Ok(value) } else { Err(LinearError::NotFinite { what, iteration }) }
+}
+
+/// `r = b − A x`, and its norm.
+fn true_residual<A: LinearOperator + ?Sized>(operator: &A, rhs: &[f64], x: &[f64], r: &mut [f64]) -> f64 {
+    operator.apply(x, r);
+    vector::xpby(rhs, -1.0, r);
+    vector::norm(r)
+}
+
+#[cfg(test)]
+mod testing {
+    //! Dense matrices for the tests of this folder.
+
+    use super::{LinearOperator, Preconditioner};
+
+    /// A dense matrix by rows, preconditioned by its diagonal.
+    pub struct Dense(pub Vec<Vec<f64>>);
+
+    impl Dense {
+        pub fn from_fn(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+            Self((0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect())
+        }
+
+        pub fn times(&self, x: &[f64]) -> Vec<f64> {
+            self.0.iter().map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum()).collect()
+        }
+    }
+
+    impl LinearOperator for Dense {
+        fn apply(&self, x: &[f64], y: &mut [f64]) {
+            y.copy_from_slice(&self.times(x));
+        }
+    }
+
+    impl Preconditioner for Dense {
+        fn precondition(&self, r: &[f64], z: &mut [f64]) {
+            for i in 0..z.len() {
+                z[i] = r[i] / self.0[i][i];
+            }
+        }
+    }
+
+    /// ‖a − b‖∞
+    pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// A fixed vector without pattern, entries in (−1, 1): the golden-ratio sequence.
+    pub fn irregular(n: usize) -> Vec<f64> {
+        (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect()
+    }
+}

@@ -1,0 +1,67 @@
+//! What can go wrong with a shape function, and what is allowed instead.
+
+/// A particle no shape function can serve, or parameters of a family that mean nothing.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ApproximationError {
+    /// The particle left the box of the grid, or its position is not a number.
+    #[error("position {position:?} is outside the box from {lower:?} to {upper:?}")]
+    Outside {
+        /// The position asked for.
+        position: Vec<f64>,
+        /// Lower corner of the box.
+        lower: Vec<f64>,
+        /// Upper corner of the box.
+        upper: Vec<f64>,
+    },
+    /// An axis without cells, or without a length.
+    #[error("an axis has {cells} cells of {spacing:e}; it needs at least one, of finite and positive length")]
+    Grid {
+        /// The spacing h.
+        spacing: f64,
+        /// Cells along the axis.
+        cells: u32,
+    },
+    /// γ̂ must be finite and positive.
+    #[error("the locality γ of max-ent is {gamma}; it must be finite and > 0")]
+    Gamma {
+        /// γ̂ = β̂ h²
+        gamma: f64,
+    },
+    /// TOL₀ must lie in [`SMALLEST_TOLERANCE`](super::SMALLEST_TOLERANCE) … 1.
+    #[error("the support tolerance of max-ent is {tolerance:e}; it must be >= {smallest:e} and < 1", smallest = super::SMALLEST_TOLERANCE)]
+    Tolerance {
+        /// TOL₀
+        tolerance: f64,
+    },
+    /// The half-width of a GIMP particle must lie in (0, ½] of the spacing.
+    #[error("the half-width of a GIMP particle is {half_width} of the spacing; it must be > 0 and <= 0.5")]
+    HalfWidth {
+        /// l_p / h
+        half_width: f64,
+    },
+    /// The circle of max-ent holds too few nodes to have every particle in their convex hull.
+    #[error(
+        "max-ent on a circle with γ = {gamma} and tolerance {tolerance:e} leaves particles outside the hull of their \
+         nodes in {dimension} dimensions; γ must be < {limit}, or take the separable family, which has no limit"
+    )]
+    SupportTooSmall {
+        /// γ̂
+        gamma: f64,
+        /// TOL₀
+        tolerance: f64,
+        /// D
+        dimension: usize,
+        /// γ̂ must stay below this.
+        limit: f64,
+    },
+    /// Neither Newton nor the derivative-free search found the multipliers of max-ent.
+    #[error("max-ent with γ = {gamma} found no multipliers at {position:?}: Σ N (x - x_I) = {residual:e} h is left")]
+    NoMultipliers {
+        /// γ̂
+        gamma: f64,
+        /// The position of the particle.
+        position: Vec<f64>,
+        /// The largest component of Σ N (x − x_I)/h reached.
+        residual: f64,
+    },
+}

@@ -1,0 +1,49 @@
+//! Kernels centred on the nodes, with the ghosts beyond a wall folded back.
+
+use super::{ApproximationError, AxisWeights, product::Place};
+use crate::grid::Axis;
+
+/// N_k = φ((x − x_k)/h) for a `kernel` D ↦ (φ, φ') of half-width `radius` ≤ 2, both in units of h.
+///
+/// A ghost beyond a wall continues the field linearly, u₋ₖ = 2u₀ − uₖ: N₀ += 2N₋ₖ, Nₖ −= N₋ₖ. That keeps partition of
+/// unity and linear consistency, and makes N₀ = 1 at the wall. The mirror node of a ghost always exists: a point of the
+/// box reaches one ghost at most, also on an axis of one cell.
+#[inline(always)]
+pub(super) fn folded(
+    axis: &Axis,
+    x: f64,
+    radius: f64,
+    kernel: impl Fn(f64) -> (f64, f64),
+    out: &mut AxisWeights,
+) -> Result<(), ApproximationError> {
+    let place = Place::new(axis, x)?;
+    // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
+    let lower = (radius - place.below).ceil() as i64 - 1;
+    let upper = (radius - place.above).ceil() as i64;
+    let (cell, last) = (i64::from(place.cell), axis.last());
+    let (first, end) = ((cell - lower).max(0), (cell + upper).min(last));
+    out.start(first as u32);
+    for _ in first..=end {
+        out.push(0.0, 0.0);
+    }
+    let mut add = |node: i64, factor: f64, (value, slope): (f64, f64)| {
+        let slot = (node - first) as usize;
+        out.values[slot] += factor * value;
+        out.derivatives[slot] += factor * slope / axis.spacing;
+    };
+    for node in cell - lower..=cell + upper {
+        let offset = node - cell;
+        let distance = if offset <= 0 { place.below - offset as f64 } else { -(place.above + (offset - 1) as f64) };
+        let at = kernel(distance);
+        if node < 0 {
+            add(0, 2.0, at);
+            add(-node, -1.0, at);
+        } else if node > last {
+            add(last, 2.0, at);
+            add(2 * last - node, -1.0, at);
+        } else {
+            add(node, 1.0, at);
+        }
+    }
+    Ok(())
+}

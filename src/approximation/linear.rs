@@ -1,0 +1,26 @@
+//! Linear functions (Q4 in the plane).
+
+use super::{ApproximationError, AxisWeights, Separable, Validate, product::Place};
+use crate::grid::Axis;
+
+/// The product of hats. On a cell face the gradient is the one of the upper cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Linear;
+
+impl Validate for Linear {
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
+}
+
+impl Separable for Linear {
+    #[inline]
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
+        out.hats(&Place::new(axis, x)?, axis.spacing);
+        Ok(())
+    }
+
+    fn width(&self) -> usize {
+        2
+    }
+}

@@ -1,0 +1,317 @@
+//! LME on a circle of nodes, as in the paper: one D-dimensional Newton method for the multipliers of a particle.
+
+use super::{Lme, radius, validate};
+use crate::approximation::product::{Place, inside};
+use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
+use crate::grid::Grid;
+use crate::tensor::{Tensor, Vector, determinant, identity, inverse, outer};
+use argmin::core::{CostFunction, Error, Executor, State};
+use argmin::solver::neldermead::NelderMead;
+
+/// LME on the nodes with |D| < R_a = h sqrt(−ln TOL₀ / γ̂), the circle (sphere) of the paper, cut at the walls.
+///
+/// 1. Support (Algorithm 3): the closest node, which on a grid is a matter of rounding, and of its rings of neighbours
+///    those within the circle.
+/// 2. λ = argmin log Z (eq. 25), by Newton from the λ of the separable functions, shortened until log Z falls enough
+///    (Armijo), until the step is at rounding. Where that fails, by Nelder and Mead without derivatives, then polished.
+/// 3. N, and ∇N = −N J⁻¹ D with J centred (eq. 27).
+///
+/// A particle on a wall, where λ is infinite, is moved inside by [`LmeCircle::INSET`] h: an error of that size in the
+/// position, and none in Σ ∇N = 0 and Σ x ⊗ ∇N = I. For large γ̂ the circle holds too few nodes; see
+/// [`LmeCircle::largest_gamma`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LmeCircle {
+    gamma: f64,
+    tolerance: f64,
+    /// R_a/h
+    radius: f64,
+    /// The same parameters on a box, for the first guess.
+    product: Lme,
+}
+
+/// Newton steps allowed: next to a wall about ln(h/distance) are needed from a poor start.
+const NEWTON_STEPS: usize = 100;
+/// A Newton step |Δλ|h below this leaves an error of its square.
+const LAST_STEP: f64 = 1e-9;
+/// Nelder–Mead iterations allowed.
+const SEARCH_STEPS: u64 = 2000;
+
+impl LmeCircle {
+    /// How far inside a wall, in units of h, a particle is treated that is closer to it or on it.
+    pub const INSET: f64 = 1e-14;
+
+    /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
+    pub fn new(gamma: f64, tolerance: f64) -> Self {
+        Self { gamma, tolerance, radius: radius(gamma, tolerance), product: Lme::new(gamma, tolerance) }
+    }
+
+    /// γ̂
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// TOL₀
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// γ̂ must stay below −ln TOL₀ / (1 + (D−1)/4): then R_a² > (1 + (D−1)/4) h², the distance from the middle of a
+    /// cell's side to the next nodes on either hand, and every particle lies in the hull of its nodes.
+    pub fn largest_gamma(tolerance: f64, dimension: usize) -> f64 {
+        -tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
+    }
+
+    /// The nodes in the circle and their D in units of h, the latter in place of the gradients.
+    fn support<const D: usize>(&self, grid: &Grid<D>, places: &[Place; D], out: &mut Support<D>) {
+        // Ring n holds |k − k₀| ≤ n, and |x − k₀| ≤ ½: those with n < R + ½ reach into the circle.
+        let rings = (self.radius + 0.5).min(f64::from(u32::MAX)) as i64;
+        let mut first = [0; D];
+        let mut last = [0; D];
+        for k in 0..D {
+            let closest = i64::from(places[k].cell) + i64::from(places[k].below > 0.5);
+            first[k] = (closest - rings).max(0);
+            last[k] = (closest + rings).min(grid.axis(k).last());
+        }
+        out.clear();
+        let mut node = first;
+        loop {
+            let distance: [f64; D] = std::array::from_fn(|k| {
+                let offset = (node[k] - i64::from(places[k].cell)) as f64;
+                if offset <= 0.0 { places[k].below - offset } else { -(places[k].above + (offset - 1.0)) }
+            });
+            if distance.iter().map(|d| d * d).sum::<f64>() < self.radius * self.radius {
+                out.push(node.map(|index| index as u32), 0.0, distance);
+            }
+            let mut k = 0;
+            loop {
+                if k == D {
+                    return;
+                }
+                node[k] += 1;
+                if node[k] <= last[k] {
+                    break;
+                }
+                node[k] = first[k];
+                k += 1;
+            }
+        }
+    }
+}
+
+/// The dual function log Z(λ) of one particle.
+#[derive(Clone, Copy)]
+struct Dual<'a, const D: usize> {
+    gamma: f64,
+    /// D of each node, in units of h.
+    distances: &'a [[f64; D]],
+}
+
+/// log Z and its derivatives, r = Σ N D and J = Σ N (D − r) ⊗ (D − r).
+struct Moments<const D: usize> {
+    log_z: f64,
+    r: Vector<f64, D>,
+    j: Tensor<f64, D>,
+}
+
+impl<const D: usize> Dual<'_, D> {
+    /// −γ̂|D|² + λ·D
+    fn exponent(&self, lambda: &Vector<f64, D>, distance: &[f64; D]) -> f64 {
+        (0..D).map(|k| (lambda[k] - self.gamma * distance[k]) * distance[k]).sum()
+    }
+
+    /// log Z = log Σ exp(−γ̂|D|² + λ·D), the largest exponent taken out.
+    fn log_z(&self, lambda: &Vector<f64, D>) -> f64 {
+        let exponents = || self.distances.iter().map(|distance| self.exponent(lambda, distance));
+        let largest = exponents().fold(f64::NEG_INFINITY, f64::max);
+        largest + exponents().map(|e| (e - largest).exp()).sum::<f64>().ln()
+    }
+
+    fn moments(&self, lambda: &Vector<f64, D>) -> Moments<D> {
+        let log_z = self.log_z(lambda);
+        let values = || {
+            self.distances.iter().map(|distance| {
+                ((self.exponent(lambda, distance) - log_z).exp(), Vector::<f64, D>::from_column_slice(distance))
+            })
+        };
+        let mut r: Vector<f64, D> = Vector::zeros();
+        for (n, distance) in values() {
+            r += distance * n;
+        }
+        let mut j: Tensor<f64, D> = Tensor::zeros();
+        for (n, distance) in values() {
+            let d = distance - r;
+            j += outer(&d, &d) * n;
+        }
+        Moments { log_z, r, j }
+    }
+
+    /// λ by damped Newton in at most `steps` steps; `None` where it fails.
+    fn newton(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
+        let mut lambda = start;
+        for _ in 0..steps {
+            let Moments { log_z, r, j } = self.moments(&lambda);
+            let step = -solve(&j, &r)?;
+            if step.amax() <= LAST_STEP {
+                return Some(lambda + step);
+            }
+            let slope = r.dot(&step);
+            // Where log Z changes by less than its own rounding, the full step is right.
+            let rounding = 8.0 * f64::EPSILON * (1.0 + log_z.abs());
+            let mut t = 1.0;
+            while self.log_z(&(lambda + step * t)) > log_z + 1e-4 * t * slope + rounding {
+                t *= 0.5;
+                if t < 1e-10 {
+                    return None;
+                }
+            }
+            lambda += step * t;
+        }
+        None
+    }
+
+    /// λ by the simplex search of Nelder and Mead, good to about the root of rounding.
+    fn search(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
+        let simplex = std::iter::once(start)
+            .chain((0..D).map(|k| start + Vector::<f64, D>::from(identity::<f64, D>().column(k))))
+            .map(|vertex| vertex.as_slice().to_vec())
+            .collect();
+        let result = Executor::new(*self, NelderMead::new(simplex))
+            .configure(|state| state.max_iters(SEARCH_STEPS))
+            .timer(false);
+        let result = result.run().ok()?;
+        let best = result.state().get_best_param()?;
+        (best.len() == D).then(|| Vector::from_column_slice(best))
+    }
+
+    /// λ = argmin log Z: Newton in at most `steps` steps, and where that fails the search, polished by Newton.
+    fn minimize(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
+        self.newton(start, steps).or_else(|| self.newton(self.search(start)?, NEWTON_STEPS))
+    }
+}
+
+impl<const D: usize> CostFunction for Dual<'_, D> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, lambda: &Vec<f64>) -> Result<f64, Error> {
+        // The search compares costs: not-a-number would compare as anything.
+        let log_z = self.log_z(&Vector::from_column_slice(lambda));
+        Ok(if log_z.is_finite() { log_z } else { f64::MAX })
+    }
+}
+
+/// J⁻¹ b, the determinant of J being positive; the cofactors make it insensitive to J's scale along each axis.
+fn solve<const D: usize>(j: &Tensor<f64, D>, b: &Vector<f64, D>) -> Option<Vector<f64, D>> {
+    let x = inverse(j) * b;
+    (determinant(j) > 0.0 && x.iter().all(|x| x.is_finite())).then_some(x)
+}
+
+/// A particle closer to a wall than the inset, moved inside; the distance to the wall's node stays accurate.
+fn inset(place: Place, cells: u32) -> Place {
+    let Place { cell, mut below, mut above } = place;
+    if cell == 0 && below < LmeCircle::INSET {
+        (below, above) = (LmeCircle::INSET, 1.0 - LmeCircle::INSET);
+    }
+    if cell + 1 == cells && above < LmeCircle::INSET {
+        (below, above) = (1.0 - LmeCircle::INSET, LmeCircle::INSET);
+    }
+    Place { cell, below, above }
+}
+
+impl Validate for LmeCircle {
+    fn validate(&self, dimension: usize) -> Result<(), ApproximationError> {
+        let Self { gamma, tolerance, .. } = *self;
+        validate(gamma, tolerance)?;
+        let limit = Self::largest_gamma(tolerance, dimension);
+        if gamma < limit {
+            Ok(())
+        } else {
+            Err(ApproximationError::SupportTooSmall { gamma, tolerance, dimension, limit })
+        }
+    }
+}
+
+impl ShapeFunction for LmeCircle {
+    fn evaluate<const D: usize>(
+        &self,
+        grid: &Grid<D>,
+        x: &Vector<f64, D>,
+        _scratch: &mut Scratch,
+        out: &mut Support<D>,
+    ) -> Result<(), ApproximationError> {
+        self.validate(D)?;
+        inside(grid, x)?;
+        let mut places = [Place { cell: 0, below: 0.0, above: 1.0 }; D];
+        let mut start: Vector<f64, D> = Vector::zeros();
+        for k in 0..D {
+            let axis = grid.axis(k);
+            places[k] = inset(Place::new(&axis, x[k])?, axis.cells);
+            start[k] = self.product.multiplier(&places[k], self.product.reach(&axis, &places[k]));
+        }
+        self.support(grid, &places, out);
+
+        let dual = Dual { gamma: self.gamma, distances: &out.gradients };
+        let failed = |lambda: &Vector<f64, D>| ApproximationError::NoMultipliers {
+            gamma: self.gamma,
+            position: x.as_slice().to_vec(),
+            residual: dual.moments(lambda).r.amax(),
+        };
+        let lambda = dual.minimize(start, NEWTON_STEPS).ok_or_else(|| failed(&start))?;
+        let Moments { log_z, r, j } = dual.moments(&lambda);
+        if solve(&j, &r).is_none() {
+            return Err(failed(&lambda));
+        }
+
+        // N = exp(−γ̂|D|² + λ·D)/Z,   ∇N = −N J⁻¹ (D − r)/h
+        let scaled_inverse = inverse(&j) / -grid.spacing;
+        for (value, distance) in out.values.iter_mut().zip(&out.gradients) {
+            *value = (dual.exponent(&lambda, distance) - log_z).exp();
+        }
+        for (value, gradient) in out.values.iter().zip(&mut out.gradients) {
+            let d = Vector::<f64, D>::from_column_slice(gradient) - r;
+            *gradient = (scaled_inverse * d * *value).into();
+        }
+        Ok(())
+    }
+
+    fn separable(&self) -> Option<&dyn Separable> {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// D of the nodes −2 … 3 along both axes within R of `x`, the wall at −`below` cutting the first axis.
+    fn distances(x: [f64; 2], below: i32, radius: f64) -> Vec<[f64; 2]> {
+        (-2..=3)
+            .flat_map(|k| (-below..=3).map(move |i| [x[0] - f64::from(i), x[1] - f64::from(k)]))
+            .filter(|d| d[0].hypot(d[1]) < radius)
+            .collect()
+    }
+
+    #[test]
+    fn without_newton_the_search_finds_the_same_multipliers() {
+        for (x, below, gamma) in
+            [([0.3, 0.45], 2, 3.0), ([0.5, 0.5], 2, 0.8), ([0.001, 0.2], 0, 4.0), ([0.01, 0.98], 2, 9.0)]
+        {
+            let nodes = distances(x, below, radius(gamma, 1e-6));
+            let dual = Dual { gamma, distances: &nodes };
+            let newton = dual.newton(Vector::zeros(), NEWTON_STEPS).expect("inside the hull");
+            assert!(dual.moments(&newton).r.amax() < 1e-14);
+            assert!(dual.newton(Vector::zeros(), 0).is_none());
+            let search = dual.search(Vector::zeros()).expect("the search always answers");
+            assert!(dual.moments(&search).r.amax() < 1e-5, "{x:?}: {}", dual.moments(&search).r.amax());
+            let fallback = dual.minimize(Vector::zeros(), 0).expect("inside the hull");
+            assert!((fallback - newton).amax() < 1e-10, "{x:?}: {fallback} and {newton}");
+        }
+    }
+
+    #[test]
+    fn outside_the_hull_nothing_is_found() {
+        // All nodes on one side: log Z falls for ever.
+        let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
+        assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
+    }
+}

@@ -1,0 +1,217 @@
+//! LME on a box of nodes: a product of one-dimensional LME functions, each one scalar root away.
+
+use super::{radius, validate};
+use crate::approximation::product::Place;
+use crate::approximation::{ApproximationError, AxisWeights, Separable, Validate};
+use crate::grid::Axis;
+
+/// LME on the nodes of the box |D_k| < R_a, R_a = h sqrt(−ln TOL₀ / γ̂).
+///
+/// On a box log Z is a sum over the axes, and N factorises. The box is cut at the walls and always holds the nodes of
+/// the particle's cell: for large γ̂ the functions become the linear ones. Works for every γ̂ and every point of the box.
+///
+/// ## One axis
+/// Let a and b = 1 − a be the distances from the two nodes of the cell. Seen from there the other nodes are j = 1, 2, …
+/// further: D = a + j on the lower side, −(b + j) on the upper. With μ = λ − γ̂(a − b) and q = exp μ the weights are, up to
+/// a common factor,
+///
+/// ```text
+/// q gⱼ qʲ  below,    gⱼ q⁻ʲ  above,    gⱼ = exp(−γ̂ j(j+1))
+/// ```
+///
+/// so the position enters through a and b only. Σ N D = 0 says that both sides have the same moment:
+///
+/// ```text
+/// f(μ) = μ + ln Σⱼ (a + j) gⱼ qʲ − ln Σⱼ (b + j) gⱼ q⁻ʲ = 0
+/// ```
+///
+/// f increases with a slope of at least 1, so that |μ* − μ| ≤ |f(μ)|: one evaluation gives a bracket, and Newton kept in
+/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: one to three evaluations of f inside a body of
+/// nodes, at most five near a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lme {
+    gamma: f64,
+    tolerance: f64,
+    /// R_a/h
+    radius: f64,
+    /// exp(−2γ̂) = gⱼ gⱼ₋₂ / gⱼ₋₁²
+    decay: f64,
+}
+
+/// Nodes further away than those of the cell: how many of them on the lower and on the upper side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    pub lower: u32,
+    pub upper: u32,
+}
+
+/// Iterations of the bracketed Newton method; bisection alone would need fewer than this.
+const ITERATIONS: usize = 200;
+/// A Newton step below this leaves an error of its square.
+const LAST_STEP: f64 = 1e-9;
+
+impl Lme {
+    /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
+    pub fn new(gamma: f64, tolerance: f64) -> Self {
+        Self { gamma, tolerance, radius: radius(gamma, tolerance), decay: (-2.0 * gamma).exp() }
+    }
+
+    /// γ̂
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// TOL₀
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// The nodes with |D| < R_a beyond those of the cell, as far as the axis goes.
+    #[inline]
+    pub(super) fn reach(&self, axis: &Axis, place: &Place) -> Reach {
+        // j < R − d; a cast saturates, and takes NaN to 0.
+        let count = |distance: f64| ((self.radius - distance).ceil() - 1.0).max(0.0) as u32;
+        Reach { lower: count(place.below).min(place.cell), upper: count(place.above).min(axis.cells - 1 - place.cell) }
+    }
+
+    /// Σⱼ (d + j) gⱼ qʲ and Σⱼ j (d + j) gⱼ qʲ for j = 0 … `reach`.
+    #[inline]
+    fn moments(&self, distance: f64, reach: u32, q: f64) -> (f64, f64) {
+        let (mut sum, mut slope) = (distance, 0.0);
+        self.weights(reach, q, |j, weight| {
+            let moment = (distance + j) * weight;
+            sum += moment;
+            slope += j * moment;
+        });
+        (sum, slope)
+    }
+
+    /// Calls `visit(j, gⱼ qʲ)` for j = 1 … `reach`, by the recurrence gⱼ₊₁/gⱼ = exp(−2γ̂)ʲ⁺¹.
+    #[inline]
+    fn weights(&self, reach: u32, q: f64, mut visit: impl FnMut(f64, f64)) {
+        let (mut weight, mut ratio) = (1.0, q);
+        for j in 1..=reach {
+            ratio *= self.decay;
+            weight *= ratio;
+            visit(f64::from(j), weight);
+        }
+    }
+
+    /// f and f' at μ.
+    #[inline]
+    fn balance(&self, place: &Place, reach: Reach, mu: f64) -> (f64, f64) {
+        let q = mu.exp();
+        let (lower, lower_slope) = self.moments(place.below, reach.lower, q);
+        let (upper, upper_slope) = self.moments(place.above, reach.upper, q.recip());
+        (mu + (lower / upper).ln(), 1.0 + lower_slope / lower + upper_slope / upper)
+    }
+
+    /// Where to start: λ = 0 if nodes all around are close together, the root for three nodes if they are not.
+    #[inline]
+    fn guess(&self, place: &Place, reach: Reach) -> f64 {
+        let (a, b) = (place.below, place.above);
+        if self.gamma < 1.5 && reach.lower > 0 && reach.upper > 0 {
+            return self.gamma * (b - a);
+        }
+        // q (a + g₁(1+a) q) = b, the nearer of the two nodes having another one behind it.
+        let root = |a: f64, b: f64, reach: u32| {
+            let behind = if reach > 0 { self.decay } else { 0.0 };
+            2.0 * b / (a + (a * a + 4.0 * b * (1.0 + a) * behind).sqrt())
+        };
+        if a <= b { root(a, b, reach.lower).ln() } else { -root(b, a, reach.upper).ln() }
+    }
+
+    /// μ, the root of f. There must be a node with D > 0 and one with D < 0.
+    #[inline]
+    fn solve(&self, place: &Place, reach: Reach) -> f64 {
+        let start = self.guess(place, reach);
+        let mut mu = start;
+        let (mut f, mut slope) = self.balance(place, reach, mu);
+        let (mut low, mut high) = (mu - f.max(0.0), mu - f.min(0.0));
+        for _ in 0..ITERATIONS {
+            let newton = mu - f / slope;
+            let inside = newton >= low && newton <= high;
+            let next = if inside { newton } else { 0.5 * (low + high) };
+            let step = (next - mu).abs();
+            mu = next;
+            if step <= LAST_STEP && inside || step == 0.0 {
+                break;
+            }
+            (f, slope) = self.balance(place, reach, mu);
+            // Far from the root a sum may overflow (for γ̂ << 1); as f increases, the side tells its sign.
+            let above = if f.is_finite() { f > 0.0 } else { mu > start };
+            if above {
+                high = mu;
+                low = low.max(mu - f);
+            } else {
+                low = mu;
+                high = high.min(mu - f);
+            }
+        }
+        mu
+    }
+
+    /// λ in units of 1/h; infinite on a wall.
+    pub(super) fn multiplier(&self, place: &Place, reach: Reach) -> f64 {
+        self.solve(place, reach) + self.gamma * (place.below - place.above)
+    }
+}
+
+impl Validate for Lme {
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        validate(self.gamma, self.tolerance)
+    }
+}
+
+impl Separable for Lme {
+    /// ∇N = −N J⁻¹ D, J = Σ N D². D and J are taken about r = Σ N D, zero but for rounding, which makes Σ ∇N = 0 and
+    /// Σ x ∇N = 1 independent of the accuracy of λ.
+    #[inline]
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
+        validate(self.gamma, self.tolerance)?;
+        let place = Place::new(axis, x)?;
+        let reach = self.reach(axis, &place);
+        // With all nodes on one side, the limit λ → ±∞: N = 1 at the wall, the slopes of the linear functions.
+        let on_lower_wall = place.below < f64::MIN_POSITIVE && reach.lower == 0;
+        let on_upper_wall = place.above < f64::MIN_POSITIVE && reach.upper == 0;
+        if on_lower_wall || on_upper_wall {
+            out.hats(&place, axis.spacing);
+            return Ok(());
+        }
+
+        let mu = self.solve(&place, reach);
+        let (q, p) = (mu.exp(), (-mu).exp());
+        // The common factor that keeps the larger of the two weights in the cell at 1.
+        let (lower, upper) = if mu >= 0.0 { (1.0, p) } else { (q, 1.0) };
+        out.start(place.cell - reach.lower);
+        self.weights(reach.lower, q, |j, weight| out.push(lower * weight, place.below + j));
+        out.values.reverse();
+        out.derivatives.reverse();
+        out.push(lower, place.below);
+        out.push(upper, -place.above);
+        self.weights(reach.upper, p, |j, weight| out.push(upper * weight, -(place.above + j)));
+
+        // Until the last loop `derivatives` holds D.
+        let z: f64 = out.values.iter().sum();
+        let mut r = 0.0;
+        for (value, distance) in out.values.iter_mut().zip(&out.derivatives) {
+            *value /= z;
+            r += *value * distance;
+        }
+        let mut j = 0.0;
+        for (value, distance) in out.values.iter().zip(&mut out.derivatives) {
+            *distance -= r;
+            j += value * *distance * *distance;
+        }
+        let scale = -1.0 / (j * axis.spacing);
+        for (value, distance) in out.values.iter().zip(&mut out.derivatives) {
+            *distance *= value * scale;
+        }
+        Ok(())
+    }
+
+    fn width(&self) -> usize {
+        // |D| < R holds for ceil(2R) nodes at most, and the two of the cell are always there.
+        ((2.0 * self.radius).ceil() as usize).max(2)
+    }
+}

@@ -1,0 +1,130 @@
+//! Functions of one coordinate and their tensor product: the one path of all separable families.
+
+use super::{ApproximationError, Support, Validate};
+use crate::grid::{Axis, Grid};
+use crate::tensor::Vector;
+
+/// The functions of one axis at one coordinate, nodes `first .. first + values.len()`. A buffer to be reused.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AxisWeights {
+    /// The first node of the list.
+    pub first: u32,
+    /// N of each node.
+    pub values: Vec<f64>,
+    /// dN/dx of each node, in 1/length.
+    pub derivatives: Vec<f64>,
+}
+
+impl AxisWeights {
+    /// Empties the list and starts it anew at node `first`.
+    #[inline]
+    pub fn start(&mut self, first: u32) {
+        self.first = first;
+        self.values.clear();
+        self.derivatives.clear();
+    }
+
+    /// Appends the function of the next node.
+    #[inline]
+    pub fn push(&mut self, value: f64, derivative: f64) {
+        self.values.push(value);
+        self.derivatives.push(derivative);
+    }
+
+    /// The hats of the two nodes of a cell, at the distance `below`·h from its lower node, `above`·h from its upper one.
+    #[inline]
+    pub(super) fn hats(&mut self, place: &Place, spacing: f64) {
+        self.start(place.cell);
+        self.push(place.above, -1.0 / spacing);
+        self.push(place.below, 1.0 / spacing);
+    }
+}
+
+/// A shape function that is a product of functions of one coordinate, N(x) = Π_k N_k(x_k).
+pub trait Separable: Validate + Send + Sync {
+    /// The functions of `axis` that do not vanish at `x`.
+    ///
+    /// # Errors
+    /// `x` outside the axis or not a number; an axis without cells.
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError>;
+
+    /// The most nodes an axis can list, were it long enough.
+    fn width(&self) -> usize;
+}
+
+/// A coordinate in its cell, in units of the spacing; both distances are accurate at the walls.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// The cell, and its lower node. A point on the upper wall belongs to the last cell.
+    pub cell: u32,
+    /// Distance from the lower node, 0 … 1.
+    pub below: f64,
+    /// Distance from the upper node, 1 − `below`.
+    pub above: f64,
+}
+
+impl Place {
+    #[inline]
+    pub fn new(axis: &Axis, x: f64) -> Result<Self, ApproximationError> {
+        if axis.cells == 0 || !(axis.spacing > 0.0 && axis.spacing.is_finite()) {
+            return Err(ApproximationError::Grid { spacing: axis.spacing, cells: axis.cells });
+        }
+        let Some(s) = axis.local(x) else { return Err(outside(&[*axis], &[x])) };
+        let cell = (s as u32).min(axis.cells - 1);
+        // Exact: s and the cell agree in their leading digits.
+        let below = s - f64::from(cell);
+        Ok(Self { cell, below, above: 1.0 - below })
+    }
+}
+
+/// The error of a point outside the box spanned by `axes`.
+#[cold]
+pub(super) fn outside(axes: &[Axis], x: &[f64]) -> ApproximationError {
+    ApproximationError::Outside {
+        position: x.to_vec(),
+        lower: axes.iter().map(|axis| axis.origin).collect(),
+        upper: axes.iter().map(|axis| axis.origin + f64::from(axis.cells) * axis.spacing).collect(),
+    }
+}
+
+/// The point must lie in the box; the error names all coordinates.
+#[inline]
+pub(super) fn inside<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> Result<(), ApproximationError> {
+    if grid.contains(x) {
+        return Ok(());
+    }
+    let axes: [Axis; D] = std::array::from_fn(|k| grid.axis(k));
+    Err(outside(&axes, x.as_slice()))
+}
+
+/// N_I = Π_k N_k,   ∂N_I/∂x_k = N_k' Π_{m≠k} N_m,   the first axis running fastest.
+///
+/// A node is left out only if its value and every component of its gradient are exactly zero: on a cell face the far
+/// node of the linear functions has N = 0 and a finite gradient, and F goes wrong without it.
+#[inline]
+pub(super) fn product<const D: usize>(axes: &[AxisWeights; 3], out: &mut Support<D>) {
+    out.clear();
+    let mut at = [0; D];
+    loop {
+        let value: f64 = (0..D).map(|k| axes[k].values[at[k]]).product();
+        let gradient: [f64; D] = std::array::from_fn(|k| {
+            (0..D).map(|m| if m == k { axes[m].derivatives[at[m]] } else { axes[m].values[at[m]] }).product()
+        });
+        if value != 0.0 || gradient.iter().any(|&g| g != 0.0) {
+            out.push(std::array::from_fn(|k| axes[k].first + at[k] as u32), value, gradient);
+        }
+        // The next node: an odometer whose first digit is the first axis.
+        let mut k = 0;
+        loop {
+            if k == D {
+                return;
+            }
+            at[k] += 1;
+            if at[k] < axes[k].values.len() {
+                break;
+            }
+            at[k] = 0;
+            k += 1;
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
+
+use super::vector::{axpy, dot, norm, xpby};
+use super::{
+    InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
+    true_residual,
+};
+
+/// A curvature below this part of the largest one seen is round-off: neither its size nor its sign means anything.
+const UNRESOLVED: f64 = 16.0 * f64::EPSILON;
+
+/// Iterations beyond n without a better residual after which nothing more is expected: exact arithmetic ends at n.
+const PATIENCE: usize = 50;
+
+/// Settings of [`conjugate_gradient`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConjugateGradientSettings {
+    /// Wanted ‖b − A x‖ / ‖b‖, in [0, 1).
+    pub relative_tolerance: f64,
+    /// Iterations allowed.
+    pub max_iterations: usize,
+}
+
+impl Default for ConjugateGradientSettings {
+    fn default() -> Self {
+        Self { relative_tolerance: 1e-8, max_iterations: 1000 }
+    }
+}
+
+/// Solves A x = b from x = 0 for symmetric positive A and M.
+///
+/// 1. r = b − A x, z = M⁻¹ r, p = z.
+/// 2. α = r·z / p·Ap; x ← x + α p, r ← r − α Ap.
+/// 3. z = M⁻¹ r; p ← z + β p with β the ratio of the new r·z to the old.
+/// 4. Curvature is measured as p·Ap / p·Mp, a Rayleigh quotient of M⁻¹A, against the largest one met: clearly negative ends the
+///    iteration as [`LinearOutcome::NegativeCurvature`], zero up to round-off as [`LinearOutcome::Stagnated`].
+/// 5. When the recurrence meets the tolerance the residual is computed anew; if that one does not meet it, back to 1 as
+///    long as this halves the true residual.
+///
+/// Returned is the iterate with the least residual. `solution` is overwritten; b = 0 gives x = 0 without iterating.
+/// If A is singular and b in its range, x is the solution of least norm x·Mx (least length for M = I), for the iteration never
+/// leaves M⁻¹ range(A).
+///
+/// # Errors
+/// A setting out of range, lengths that differ, NaN or infinity.
+pub fn conjugate_gradient<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+    operator: &A,
+    preconditioner: &M,
+    rhs: &[f64],
+    solution: &mut [f64],
+    settings: &ConjugateGradientSettings,
+) -> Result<LinearReport, LinearError> {
+    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
+    let b_norm = checked_norm(rhs, solution)?;
+    solution.fill(0.0);
+    let mut report =
+        LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 };
+    if b_norm == 0.0 {
+        return Ok(report);
+    }
+    let target = settings.relative_tolerance * b_norm;
+    let mut r = rhs.to_vec();
+    let mut r_norm = b_norm;
+    loop {
+        let allowed = settings.max_iterations - report.iterations.min(settings.max_iterations);
+        let run = descend(operator, preconditioner, &mut r, r_norm, target, solution, allowed)
+            .map_err(|error| error.after(report.iterations))?;
+        report.iterations += run.iterations;
+        report.products += run.products + 1;
+        finite(norm(solution), "the norm of the solution", report.iterations)?;
+        let reached =
+            finite(true_residual(operator, rhs, solution, &mut r), "the norm of the residual", report.iterations)?;
+        report.relative_residual = reached / b_norm;
+        report.outcome = if reached <= target {
+            LinearOutcome::Converged
+        } else if run.outcome != LinearOutcome::Converged {
+            run.outcome
+        } else if reached < 0.5 * r_norm {
+            // The recurrence has drifted from the truth, which still improves.
+            r_norm = reached;
+            continue;
+        } else {
+            LinearOutcome::Stagnated
+        };
+        return Ok(report);
+    }
+}
+
+/// What one run of the recurrence did.
+struct Run {
+    outcome: LinearOutcome,
+    iterations: usize,
+    products: usize,
+}
+
+/// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`.
+fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+    operator: &A,
+    preconditioner: &M,
+    r: &mut [f64],
+    r_norm: f64,
+    target: f64,
+    solution: &mut [f64],
+    allowed: usize,
+) -> Result<Run, LinearError> {
+    let n = r.len();
+    let mut x = solution.to_vec();
+    let (mut z, mut q) = (vec![0.0; n], vec![0.0; n]);
+    preconditioner.precondition(r, &mut z);
+    let mut p = z.clone();
+    let mut rz = dot(r, &z);
+    // p·Mp, by recurrence: Mp = r + β Mp_old and z·Mp_old = r·p_old = 0.
+    let mut p_m_p = rz;
+    let mut largest: f64 = 0.0;
+    let (mut best, mut best_at) = (r_norm, 0);
+    let mut run = Run { outcome: LinearOutcome::Converged, iterations: 0, products: 0 };
+    let stop = |outcome, run: Run| Ok(Run { outcome, ..run });
+    loop {
+        let at = run.iterations;
+        if run.iterations >= allowed {
+            return stop(LinearOutcome::IterationLimit, run);
+        }
+        if run.iterations - best_at > n + PATIENCE {
+            return stop(LinearOutcome::Stagnated, run);
+        }
+        if finite(rz, "r·z", at)? <= 0.0 {
+            return stop(LinearOutcome::NegativeCurvature, run);
+        }
+        operator.apply(&p, &mut q);
+        run.products += 1;
+        let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
+        let curvature = p_a_p / p_m_p;
+        largest = largest.max(curvature);
+        if curvature <= UNRESOLVED * largest {
+            let negative = curvature < -UNRESOLVED * largest;
+            return stop(if negative { LinearOutcome::NegativeCurvature } else { LinearOutcome::Stagnated }, run);
+        }
+        // α = r·z / p·Ap
+        let length = rz / p_a_p;
+        axpy(length, &p, &mut x);
+        axpy(-length, &q, r);
+        run.iterations += 1;
+        let r_norm = finite(norm(r), "the norm of the residual", at)?;
+        if r_norm < best {
+            (best, best_at) = (r_norm, run.iterations);
+            solution.copy_from_slice(&x);
+            if r_norm <= target {
+                return Ok(run);
+            }
+        }
+        preconditioner.precondition(r, &mut z);
+        let rz_new = dot(r, &z);
+        let β = rz_new / rz;
+        xpby(&z, β, &mut p);
+        rz = rz_new;
+        p_m_p = rz + β * β * p_m_p;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Identity;
+    use super::super::testing::{Dense, distance, irregular};
+    use super::*;
+
+    const TIGHT: ConjugateGradientSettings =
+        ConjugateGradientSettings { relative_tolerance: 1e-12, max_iterations: 1000 };
+
+    /// The second difference with a varying diagonal added: symmetric, positive definite.
+    fn chain(n: usize) -> Dense {
+        Dense::from_fn(n, |i, j| match i.abs_diff(j) {
+            0 => 2.0 + (i % 5) as f64,
+            1 => -1.0,
+            _ => 0.0,
+        })
+    }
+
+    #[test]
+    fn ends_within_n_iterations() {
+        for n in [1, 2, 8, 30] {
+            let a = chain(n);
+            let exact = irregular(n);
+            let b = a.times(&exact);
+            let mut x = vec![f64::NAN; n];
+            let report = conjugate_gradient(&a, &Identity, &b, &mut x, &TIGHT).unwrap();
+            assert!(report.converged() && report.iterations <= n, "{report:?}");
+            assert!(distance(&x, &exact) < 1e-11);
+            let report = conjugate_gradient(&a, &a, &b, &mut x, &TIGHT).unwrap();
+            assert!(report.converged() && distance(&x, &exact) < 1e-11, "{report:?}");
+        }
+    }
+
+    #[test]
+    fn reports_the_true_residual() {
+        // Condition 1e10: the recurrence drifts, the reported residual must not.
+        let n = 60;
+        let a = Dense::from_fn(n, |i, j| if i == j { 10.0_f64.powf(i as f64 / 5.9) } else { 0.0 });
+        let b = irregular(n);
+        for relative_tolerance in [1e-3, 1e-8, 1e-14, 0.0] {
+            let mut x = vec![0.0; n];
+            let settings = ConjugateGradientSettings { relative_tolerance, max_iterations: 5000 };
+            let report = conjugate_gradient(&a, &Identity, &b, &mut x, &settings).unwrap();
+            let r: Vec<f64> = b.iter().zip(a.times(&x)).map(|(b, ax)| b - ax).collect();
+            let again = norm(&r) / norm(&b);
+            assert!((report.relative_residual - again).abs() <= 1e-15, "{again} {report:?}");
+            assert_eq!(report.converged(), again <= relative_tolerance, "{again} {report:?}");
+        }
+    }
+
+    #[test]
+    fn negative_curvature_is_told() {
+        let n = 20;
+        let exact = irregular(n);
+        for a in [
+            Dense::from_fn(n, |i, j| if i == j { i as f64 - 2.5 } else { 0.0 }),
+            Dense::from_fn(n, |i, j| if i == j { -1.0 } else { 0.0 }),
+        ] {
+            let b = a.times(&exact);
+            let mut x = vec![0.0; n];
+            let report = conjugate_gradient(&a, &Identity, &b, &mut x, &TIGHT).unwrap();
+            assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
+            assert!(report.relative_residual <= 1.0);
+        }
+        // An indefinite preconditioner under a definite operator.
+        let m = Dense::from_fn(n, |i, j| if i == j { [1.0, -3.0][i % 2] } else { 0.0 });
+        let mut x = vec![0.0; n];
+        let report = conjugate_gradient(&chain(n), &m, &exact, &mut x, &TIGHT).unwrap();
+        assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
+    }
+
+    /// The second difference of a ring (or of a chain with free ends): constants are its null space.
+    fn free(n: usize, ring: bool) -> Dense {
+        Dense::from_fn(n, |i, j| {
+            let neighbours = |i: usize, j: usize| i.abs_diff(j) == 1 || (ring && i.abs_diff(j) == n - 1);
+            if i == j { (0..n).filter(|&k| neighbours(i, k)).count() as f64 } else { -f64::from(neighbours(i, j)) }
+        })
+    }
+
+    #[test]
+    fn singular_consistent_system_gives_the_least_norm() {
+        for (n, ring) in [(30, true), (31, false), (200, true)] {
+            let a = free(n, ring);
+            // Of all solutions, which differ by constants, the one with mean zero is shortest.
+            let mut exact = irregular(n);
+            let mean = exact.iter().sum::<f64>() / n as f64;
+            exact.iter_mut().for_each(|x| *x -= mean);
+            let b = a.times(&exact);
+            let mut x = vec![1.0; n];
+            let report = conjugate_gradient(&a, &Identity, &b, &mut x, &TIGHT).unwrap();
+            assert!(report.converged() && distance(&x, &exact) < 1e-8, "{report:?} {}", distance(&x, &exact));
+            // With M ≠ I the norm is that of M: Σ mᵢ xᵢ = 0.
+            let report = conjugate_gradient(&a, &a, &b, &mut x, &TIGHT).unwrap();
+            let weighted: f64 = (0..n).map(|i| a.0[i][i] * x[i]).sum();
+            assert!(report.converged() && weighted.abs() < 1e-9 * n as f64, "{weighted}");
+            // Beyond what round-off allows it ends all the same, and no worse.
+            let settings = ConjugateGradientSettings { relative_tolerance: 0.0, max_iterations: 100_000 };
+            let report = conjugate_gradient(&a, &Identity, &b, &mut x, &settings).unwrap();
+            assert!(report.relative_residual < 1e-12 && report.iterations < 20 * n, "{report:?}");
+            assert_ne!(report.outcome, LinearOutcome::IterationLimit);
+        }
+    }
+
+    #[test]
+    fn singular_inconsistent_system_ends() {
+        let a = free(30, true);
+        let mut x = vec![0.0; 30];
+        let report = conjugate_gradient(&a, &Identity, &irregular(30), &mut x, &TIGHT).unwrap();
+        assert!(matches!(report.outcome, LinearOutcome::Stagnated | LinearOutcome::NegativeCurvature), "{report:?}");
+        assert!(report.relative_residual < 1.0 && report.iterations < 200);
+        // b wholly in the null space.
+        let report = conjugate_gradient(&a, &Identity, &[1.0; 30], &mut x, &TIGHT).unwrap();
+        assert_eq!((report.outcome, report.relative_residual), (LinearOutcome::Stagnated, 1.0));
+        assert_eq!(x, [0.0; 30]);
+    }
+
+    #[test]
+    fn zero_and_not_finite() {
+        let a = chain(3);
+        let mut x = vec![1.0; 3];
+        let report = conjugate_gradient(&a, &Identity, &[0.0; 3], &mut x, &TIGHT).unwrap();
+        assert_eq!((report.iterations, x.as_slice()), (0, [0.0; 3].as_slice()));
+        let not_finite = |result| matches!(result, Err(LinearError::NotFinite { .. }));
+        assert!(not_finite(conjugate_gradient(&a, &Identity, &[1.0, f64::NAN, 1.0], &mut x, &TIGHT)));
+        let bad = Dense::from_fn(3, |i, j| if (i, j) == (1, 2) { f64::NAN } else { a.0[i][j] });
+        assert!(not_finite(conjugate_gradient(&bad, &Identity, &[1.0; 3], &mut x, &TIGHT)));
+        let zero_mass = Dense::from_fn(3, |i, j| if i == j && i < 2 { 1.0 } else { 0.0 });
+        assert!(not_finite(conjugate_gradient(&a, &zero_mass, &[1.0; 3], &mut x, &TIGHT)));
+    }
+}

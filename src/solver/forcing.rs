@@ -1,0 +1,92 @@
+//! How accurately each linear system of Newton's method is solved.
+
+use super::InvalidSetting;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The factor γ of choice 2.
+const GAMMA: f64 = 0.9;
+
+/// A forcing term is never looser than this.
+pub(super) const LOOSEST: f64 = 0.9;
+
+/// Forcing term of the first iteration.
+const FIRST: f64 = 0.5;
+
+/// The fall in η is limited only while γ η² is above this (Eisenstat and Walker, sec. 2.1).
+const SAFEGUARD: f64 = 0.1;
+
+/// The forcing term η of ‖R + K d‖ ≤ η ‖R‖.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Forcing {
+    /// The same at every iteration, between 0 and 0.9, both excluded. Small values keep Newton's convergence quadratic.
+    Fixed(f64),
+    /// Choice 2 of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996) with γ = 0.9, α = 2: loose at first, tighter as the
+    /// residual falls, never tighter than the end of the iteration needs.
+    EisenstatWalker,
+}
+
+/// What the forcing term of the next iteration follows from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Progress {
+    /// The last forcing term.
+    pub forcing: f64,
+    /// The last ‖R_k‖ / ‖R_k₋₁‖.
+    pub ratio: f64,
+}
+
+impl Forcing {
+    pub(super) fn check(self) -> Result<(), InvalidSetting> {
+        match self {
+            Self::Fixed(η) => {
+                InvalidSetting::check(η > 0.0 && η < LOOSEST, "forcing", η, "more than 0 and less than 0.9")
+            }
+            Self::EisenstatWalker => Ok(()),
+        }
+    }
+
+    /// The next forcing term; `wanted` is the residual norm that ends Newton's iteration over the present one.
+    pub(super) fn next(self, last: Option<Progress>, wanted: f64) -> f64 {
+        match self {
+            Self::Fixed(η) => η,
+            Self::EisenstatWalker => {
+                // η = γ (‖R_k‖ / ‖R_k₋₁‖)²
+                let choice = last.map_or(FIRST, |last| {
+                    let limit = GAMMA * last.forcing * last.forcing;
+                    let η = GAMMA * last.ratio * last.ratio;
+                    if limit > SAFEGUARD { η.max(limit) } else { η }
+                });
+                // Half of what is left to do is enough (Kelley 1995, eq. 6.20).
+                choice.max(0.5 * wanted).min(LOOSEST)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choice_two_tightens_with_the_residual_and_not_too_fast() {
+        let next = |forcing, ratio, wanted| Forcing::EisenstatWalker.next(Some(Progress { forcing, ratio }), wanted);
+        assert_eq!(Forcing::EisenstatWalker.next(None, 0.0), 0.5);
+        assert_eq!(next(0.1, 0.1, 0.0), 0.9 * 0.1 * 0.1);
+        // After a loose step γ η² = 0.225 holds it back.
+        assert_eq!(next(0.5, 1e-3, 0.0), 0.9 * 0.5 * 0.5);
+        // A residual that grew does not ask for a step that is no solution at all.
+        assert_eq!(next(0.5, 7.0, 0.0), 0.9);
+        // At the end no more than needed.
+        assert_eq!(next(0.01, 1e-4, 0.02), 0.01);
+        assert_eq!(Forcing::Fixed(1e-8).next(Some(Progress { forcing: 0.5, ratio: 0.5 }), 0.5), 1e-8);
+    }
+
+    #[test]
+    fn range_of_the_fixed_term() {
+        for bad in [0.0, -1.0, 0.9, 2.0, f64::NAN] {
+            assert!(Forcing::Fixed(bad).check().is_err(), "{bad}");
+        }
+        assert!(Forcing::Fixed(1e-8).check().is_ok());
+    }
+}

@@ -1,0 +1,355 @@
+//! What every shape function promises, for every family in 1, 2 and 3 dimensions.
+
+use bfree::approximation::{
+    Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction,
+    Support, Validate,
+};
+use bfree::grid::Grid;
+use bfree::tensor::Vector;
+use proptest::prelude::*;
+
+const H: f64 = 0.5;
+
+fn families(dimension: usize) -> Vec<Approximation> {
+    let mut list: Vec<Approximation> = vec![Linear.into(), Bspline::Quadratic.into(), Bspline::Cubic.into()];
+    list.extend([0.5, 0.3, 0.25, 0.01].map(|half_width| Gimp { half_width }.into()));
+    list.extend([0.1, 0.8, 1.8, 4.0, 10.0].map(|gamma| Lme::new(gamma, 1e-6).into()));
+    list.extend([0.4, 0.8, 1.8, 4.0, 9.0, 11.0].map(|gamma| LmeCircle::new(gamma, 1e-6).into()));
+    list.retain(|family| family.validate(dimension).is_ok());
+    list
+}
+
+fn support<const D: usize>(
+    family: &Approximation,
+    grid: &Grid<D>,
+    x: &Vector<f64, D>,
+) -> Result<Support<D>, ApproximationError> {
+    let mut found = Support::default();
+    family.evaluate(grid, x, &mut Scratch::default(), &mut found)?;
+    Ok(found)
+}
+
+/// The largest error in Σ N = 1, Σ N (x_I − x) = 0, Σ h∇N = 0, Σ (x_I − x) ⊗ ∇N = I, lengths in units of h.
+/// Not-a-number counts as infinite.
+fn inconsistency<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>, found: &Support<D>) -> f64 {
+    let mut errors = vec![found.values.iter().sum::<f64>() - 1.0];
+    let arm = |i: usize, k: usize| (grid.position(found.nodes[i])[k] - x[k]) / grid.spacing;
+    let all = 0..found.nodes.len();
+    for k in 0..D {
+        errors.push(all.clone().map(|i| found.values[i] * arm(i, k)).sum());
+        errors.push(all.clone().map(|i| found.gradients[i][k] * grid.spacing).sum());
+        for m in 0..D {
+            let sum: f64 = all.clone().map(|i| arm(i, k) * found.gradients[i][m] * grid.spacing).sum();
+            errors.push(sum - if k == m { 1.0 } else { 0.0 });
+        }
+    }
+    errors.iter().map(|e| if e.is_nan() { f64::INFINITY } else { e.abs() }).fold(0.0, f64::max)
+}
+
+/// All points whose coordinates come from `lists`, one list an axis.
+fn combinations<const D: usize>(lists: [Vec<f64>; D]) -> Vec<Vector<f64, D>> {
+    let mut points = vec![Vector::zeros()];
+    for (k, list) in lists.iter().enumerate() {
+        points = points
+            .into_iter()
+            .flat_map(|point: Vector<f64, D>| {
+                list.iter().map(move |&x| {
+                    let mut next = point;
+                    next[k] = x;
+                    next
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+fn grids<const D: usize>() -> Vec<Grid<D>> {
+    let at = |start: f64, cells: [u32; 3]| Grid {
+        // A start of 0 puts the lower wall at 0, a start of 1 the upper one: only there 1e-300 is a distance.
+        origin: Vector::from_fn(|k, _| -start * f64::from(cells[k]) * H),
+        spacing: H,
+        cells: std::array::from_fn(|k| cells[k]),
+    };
+    vec![at(0.0, [5, 4, 3]), at(1.0, [5, 4, 3]), at(0.0, [1, 1, 1]), at(0.0, [2, 1, 6])]
+}
+
+/// Walls and what is next to them, nodes, faces, and the inside of cells.
+fn coordinates<const D: usize>(grid: &Grid<D>, k: usize) -> Vec<f64> {
+    let (lower, upper) = (grid.origin[k], grid.origin[k] + f64::from(grid.cells[k]) * H);
+    let mut list = vec![lower, upper, lower + 1e-300, lower + 1e-17, upper - 1e-300, upper - 1e-17];
+    list.extend([lower + 1e-9, lower + 0.13 * H, lower + 0.5 * H, upper - 0.999 * H]);
+    if grid.cells[k] > 1 {
+        list.extend([lower + H, lower + H + 1e-12, lower + 1.41 * H]);
+    }
+    list
+}
+
+fn consistent<const D: usize>() {
+    for family in families(D) {
+        let mut worst: f64 = 0.0;
+        for grid in grids::<D>() {
+            for x in combinations::<D>(std::array::from_fn(|k| coordinates(&grid, k))) {
+                let found = support(&family, &grid, &x).unwrap_or_else(|error| panic!("{family:?}: {error}"));
+                let error = inconsistency(&grid, &x, &found);
+                assert!(error < 1e-13, "{family:?} at {x:?} in {grid:?}: {error:e}");
+                worst = worst.max(error);
+            }
+        }
+        println!("{D}D {family:?}: {worst:.1e}");
+    }
+}
+
+#[test]
+fn partition_of_unity_and_linear_consistency_hold_everywhere() {
+    consistent::<1>();
+    consistent::<2>();
+    consistent::<3>();
+}
+
+/// N of `node`, zero if it is not listed.
+fn value<const D: usize>(found: &Support<D>, node: [u32; D]) -> f64 {
+    found.nodes.iter().position(|&other| other == node).map_or(0.0, |i| found.values[i])
+}
+
+fn gradients_are_differences<const D: usize>() {
+    let grid = Grid::<D> { origin: Vector::repeat(-0.2), spacing: H, cells: [6; D] };
+    let places: [Vec<f64>; D] = std::array::from_fn(|_| [0.07, 0.38, 2.61, 3.17, 5.93].map(|s| s * H - 0.2).to_vec());
+    for family in families(D) {
+        for x in combinations(places.clone()) {
+            let found = support(&family, &grid, &x).expect("inside the box");
+            for k in 0..D {
+                let step = 1e-5 * H;
+                let moved = |step: f64| {
+                    let mut at = x;
+                    at[k] += step;
+                    support(&family, &grid, &at).expect("inside the box")
+                };
+                let (after, before) = (moved(step), moved(-step));
+                for (node, gradient) in found.nodes.iter().zip(&found.gradients) {
+                    let difference = (value(&after, *node) - value(&before, *node)) / (2.0 * step);
+                    let error = H * (difference - gradient[k]).abs();
+                    assert!(error < 1e-6, "{D}D {family:?} at {x:?}, node {node:?}, axis {k}: {error:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn gradients_are_those_of_the_values() {
+    gradients_are_differences::<1>();
+    gradients_are_differences::<2>();
+    gradients_are_differences::<3>();
+}
+
+fn walls_are_nodal<const D: usize>() {
+    let grid = Grid::<D> { origin: Vector::zeros(), spacing: H, cells: [4; D] };
+    for family in families(D) {
+        for (wall, inward) in [(0.0, 1.0), (4.0 * H, -1.0)] {
+            let mut x: Vector<f64, D> = Vector::repeat(0.71);
+            x[0] = wall;
+            let on_wall = support(&family, &grid, &x).expect("inside the box");
+            for (node, n) in on_wall.nodes.iter().zip(&on_wall.values) {
+                let there = f64::from(node[0]) * H == wall;
+                assert!(there || n.abs() < 1e-13, "{D}D {family:?}: node {node:?} has N = {n:e} on the wall {wall}");
+            }
+            // The normal derivative has its one-sided limit.
+            let step = 1e-7 * H;
+            x[0] = wall + inward * step;
+            let inside = support(&family, &grid, &x).expect("inside the box");
+            for (i, node) in on_wall.nodes.iter().enumerate() {
+                let difference = inward * (value(&inside, *node) - on_wall.values[i]) / step;
+                let error = H * (difference - on_wall.gradients[i][0]).abs();
+                // For GIMP the curvature next to a wall is 2/l.
+                assert!(error < 5e-5, "{D}D {family:?}: node {node:?} at the wall {wall}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn values_are_nodal_at_walls_and_the_normal_derivative_has_its_limit() {
+    walls_are_nodal::<1>();
+    walls_are_nodal::<2>();
+    walls_are_nodal::<3>();
+}
+
+#[test]
+fn a_node_without_value_but_with_gradient_is_kept() {
+    let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [4, 4] };
+    // On a face of the cell: the two far nodes have N = 0 and a finite gradient.
+    let on_face = support(&Linear.into(), &grid, &Vector::from([H, 0.6])).expect("inside the box");
+    assert_eq!(on_face.nodes, [[1, 1], [2, 1], [1, 2], [2, 2]]);
+    assert_eq!(on_face.values[1], 0.0);
+    assert!((on_face.gradients[1][0] - 0.8 / H).abs() < 1e-14);
+    // On a node: the node diagonally across has nothing at all.
+    let on_node = support(&Linear.into(), &grid, &Vector::from([H, H])).expect("inside the box");
+    assert_eq!(on_node.nodes, [[1, 1], [2, 1], [1, 2]]);
+}
+
+#[test]
+fn scaling_lengths_by_a_power_of_two_keeps_the_bits() {
+    let x = Vector::from([0.813, 1.377]);
+    let grid = Grid { origin: Vector::from([-0.1, 0.2]), spacing: 0.3, cells: [5, 6] };
+    for family in families(2) {
+        let found = support(&family, &grid, &x).expect("inside the box");
+        let scale = 1024.0;
+        let large = Grid { origin: grid.origin * scale, spacing: grid.spacing * scale, cells: grid.cells };
+        let scaled = support(&family, &large, &(x * scale)).expect("inside the box");
+        assert_eq!(found.values, scaled.values, "{family:?}");
+        let gradients: Vec<_> = scaled.gradients.iter().map(|g| g.map(|g| g * scale)).collect();
+        assert_eq!(found.gradients, gradients, "{family:?}");
+    }
+}
+
+#[test]
+fn box_and_circle_differ_by_the_truncation() {
+    let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [12, 12] };
+    for (gamma, bound) in [(0.8, 1e-6), (1.8, 5e-6), (4.0, 4e-5)] {
+        let mut largest: f64 = 0.0;
+        for i in 0..400_u32 {
+            let x = Vector::from([0.618_034 * f64::from(i) % 1.0 * 6.0, 0.754_878 * f64::from(i) % 1.0 * 6.0]);
+            let on_box = support(&Lme::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
+            let on_circle = support(&LmeCircle::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
+            for (node, n) in on_box.nodes.iter().zip(&on_box.values) {
+                largest = largest.max((n - value(&on_circle, *node)).abs());
+            }
+        }
+        println!("γ {gamma}: {largest:.1e}");
+        assert!(largest < bound && largest > 0.05 * bound, "γ {gamma}: {largest:e}");
+    }
+}
+
+#[test]
+fn in_one_dimension_the_circle_is_the_box() {
+    let grid = Grid { origin: Vector::from([0.0]), spacing: H, cells: [9] };
+    for gamma in [0.5, 3.0, 13.0] {
+        for i in 0..=100 {
+            let x = Vector::from([f64::from(i) * 0.045]);
+            let on_box = support(&Lme::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
+            let on_circle = support(&LmeCircle::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
+            for (node, n) in on_circle.nodes.iter().zip(&on_circle.values) {
+                assert!((n - value(&on_box, *node)).abs() < 2e-14, "γ {gamma} at {x:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn for_large_gamma_the_separable_functions_are_the_linear_ones() {
+    let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [4, 4] };
+    for x in [[0.61, 1.27], [H, 0.9], [0.0, 2.0], [2.0, 2.0], [1e-300, H]] {
+        let max_ent = support(&Lme::new(1e4, 1e-6).into(), &grid, &Vector::from(x)).expect("inside the box");
+        let linear = support(&Linear.into(), &grid, &Vector::from(x)).expect("inside the box");
+        assert_eq!(max_ent.nodes, linear.nodes, "at {x:?}");
+        for i in 0..linear.nodes.len() {
+            assert!((max_ent.values[i] - linear.values[i]).abs() < 1e-14, "at {x:?}");
+            for k in 0..2 {
+                assert!(H * (max_ent.gradients[i][k] - linear.gradients[i][k]).abs() < 1e-12, "at {x:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_axis_is_wider_than_announced() {
+    let axis = Grid { origin: Vector::from([0.0]), spacing: 1.0, cells: [40] }.axis(0);
+    for family in families(1) {
+        let Some(separable) = family.separable() else { continue };
+        let mut weights = AxisWeights::default();
+        let mut widest = 0;
+        for i in 0..=4000 {
+            separable.axis(&axis, f64::from(i) * 0.01, &mut weights).expect("on the axis");
+            widest = widest.max(weights.values.len());
+        }
+        assert_eq!(widest, separable.width(), "{family:?}");
+    }
+}
+
+#[test]
+fn outside_the_box_is_an_error_that_names_it() {
+    let grid = Grid { origin: Vector::from([0.0, 1.0]), spacing: H, cells: [4, 2] };
+    for family in families(2) {
+        for x in [[-1e-9, 1.5], [0.3, 2.0 + 1e-9], [f64::NAN, 1.5], [0.3, f64::INFINITY]] {
+            match support(&family, &grid, &Vector::from(x)) {
+                Err(ApproximationError::Outside { position, lower, upper }) => {
+                    assert_eq!(position[1].to_bits(), x[1].to_bits());
+                    assert_eq!((lower, upper), (vec![0.0, 1.0], vec![2.0, 2.0]));
+                }
+                other => panic!("{family:?} at {x:?}: {other:?}"),
+            }
+        }
+        let empty = Grid { cells: [0, 2], ..grid };
+        assert!(matches!(
+            support(&family, &empty, &Vector::from([0.0, 1.5])),
+            Err(ApproximationError::Grid { cells: 0, .. })
+        ));
+    }
+}
+
+#[test]
+fn impossible_parameters_are_refused() {
+    for gamma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(Lme::new(gamma, 1e-6).validate(2), Err(ApproximationError::Gamma { .. })));
+        assert!(matches!(LmeCircle::new(gamma, 1e-6).validate(2), Err(ApproximationError::Gamma { .. })));
+    }
+    for tolerance in [0.0, -1e-6, 1.0, f64::NAN, 1e-200] {
+        assert!(matches!(Lme::new(3.0, tolerance).validate(2), Err(ApproximationError::Tolerance { .. })));
+    }
+    for half_width in [0.0, -0.1, 0.5001, f64::NAN] {
+        assert!(matches!(Gimp { half_width }.validate(2), Err(ApproximationError::HalfWidth { .. })));
+    }
+    // −ln 1e-6 / 1.25 = 11.05: the limit the reference program found in the plane.
+    assert!(LmeCircle::new(11.05, 1e-6).validate(2).is_ok());
+    let too_local = LmeCircle::new(11.06, 1e-6);
+    assert!(matches!(too_local.validate(2), Err(ApproximationError::SupportTooSmall { dimension: 2, .. })));
+    let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [4, 4] };
+    let error = support(&too_local.into(), &grid, &Vector::from([0.6, 0.7])).expect_err("too few nodes");
+    assert!(error.to_string().contains("γ must be < 11.05"), "{error}");
+    assert!(LmeCircle::new(10.0, 1e-6).validate(3).is_err() && LmeCircle::new(10.0, 1e-6).validate(1).is_ok());
+}
+
+/// A coordinate of an axis 0 … `length`, often on a node or extremely close to one or to a wall.
+fn coordinate(cells: u32) -> impl Strategy<Value = f64> {
+    let length = f64::from(cells);
+    prop_oneof![
+        0.0..=length,
+        (0..=cells).prop_map(f64::from),
+        (0..=cells, -300.0..0.0_f64).prop_map(move |(node, e)| (f64::from(node) + 10_f64.powf(e)).min(length)),
+        (0..=cells, -17.0..0.0_f64).prop_map(move |(node, e)| (f64::from(node) - 10_f64.powf(e)).max(0.0)),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn separable_max_ent_never_fails(
+        (cells, x, y) in (1..30_u32).prop_flat_map(|cells| (Just(cells), coordinate(cells), coordinate(cells))),
+        log_gamma in -4.0..4.0_f64,
+        log_tolerance in -100.0..-0.01_f64,
+        usual in any::<bool>(),
+    ) {
+        let tolerance = if usual { 1e-6 } else { 10_f64.powf(log_tolerance) };
+        let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 1.0, cells: [cells, cells] };
+        let x = Vector::from([x, y]);
+        let found = support(&Lme::new(10_f64.powf(log_gamma), tolerance).into(), &grid, &x)?;
+        prop_assert!(found.values.iter().all(|n| (0.0..=1.0).contains(n)));
+        let error = inconsistency(&grid, &x, &found);
+        prop_assert!(error < 1e-12, "{error:e}");
+    }
+
+    #[test]
+    fn max_ent_on_the_circle_never_fails_below_its_limit(
+        (cells, x, y) in (1..9_u32).prop_flat_map(|cells| (Just(cells), coordinate(cells), coordinate(cells))),
+        gamma in 0.4..11.05_f64,
+    ) {
+        let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 1.0, cells: [cells, cells] };
+        let x = Vector::from([x, y]);
+        let found = support(&LmeCircle::new(gamma, 1e-6).into(), &grid, &x)?;
+        prop_assert!(found.values.iter().all(|n| (0.0..=1.0 + 1e-14).contains(n)));
+        let error = inconsistency(&grid, &x, &found);
+        prop_assert!(error < 1e-12, "{error:e}");
+    }
+}

@@ -1,0 +1,122 @@
+//! Five steps of 36 jittered particles in a corner, against an independent program (tests/reference/dynamics.json).
+
+use bfree::approximation::{Approximation, Linear, Lme, LmeCircle};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
+use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::{Forcing, NewtonSettings};
+use bfree::tensor::Vector;
+use serde_json::Value;
+
+type Failure = Box<dyn std::error::Error>;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+fn vectors(value: &Value) -> Vec<Vector<f64, 2>> {
+    value.as_array().into_iter().flatten().map(|x| Vector::from([number(&x[0]), number(&x[1])])).collect()
+}
+
+fn wall(name: &str, axis: usize) -> Prescribed<2> {
+    let mut motion = [None, None];
+    motion[axis] = Some(Motion::Rest);
+    Prescribed { name: name.into(), on: Selection::Face { axis, upper: false }, motion }
+}
+
+fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<2>, Failure> {
+    let lame = Lame::new(number(&reference["Lambda"]), number(&reference["G"]))?;
+    let (density, volume) = (number(&reference["rho0"]), number(&reference["V0"]));
+    let mut particles = Particles::default();
+    for (x, v) in vectors(&reference["x0"]).into_iter().zip(vectors(&reference["v0"])) {
+        particles.push(x, v, volume, density * volume, 0);
+    }
+    let gravity = Vector::from([number(&reference["gravity"][0]), number(&reference["gravity"][1])]);
+    Ok(Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 10] },
+        approximation,
+        bodies: vec![Body { name: "body".into(), law: Material::from(NeoHookean::ciarlet(lame)), density }],
+        particles,
+        loads: Loads {
+            gravity: Some(Gravity { acceleration: gravity, curve: Curve::constant(1.0) }),
+            surface: Vec::new(),
+            prescribed: vec![wall("left", 0), wall("bottom", 1)],
+        },
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping: 1.0,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::Literal,
+            // Tight, so that every iterate is that of a direct solver.
+            newton: NewtonSettings {
+                relative_tolerance: 3e-14,
+                forcing: Forcing::Fixed(1e-13),
+                ..NewtonSettings::default()
+            },
+        },
+        clock: Clock::new(number(&reference["dt"]), 0),
+        external_work: 0.0,
+    })
+}
+
+#[test]
+fn five_steps_agree_with_an_independent_program() -> Result<(), Failure> {
+    let reference: Value = serde_json::from_str(include_str!("reference/dynamics.json"))?;
+    for run in reference["runs"].as_array().into_iter().flatten() {
+        let shape = run["shape"].as_str().unwrap_or_default();
+        let gamma = number(&run["gamma_lme"]);
+        let approximation = match shape {
+            "Q4" => Linear.into(),
+            "LME_circle" => LmeCircle::new(gamma, 1e-6).into(),
+            _ => Lme::new(gamma, 1e-6).into(),
+        };
+        let mut simulation = corner(&reference, approximation)?;
+        for (step, expected) in run["residuals"].as_array().into_iter().flatten().enumerate() {
+            let report = simulation.step()?;
+            let history = &report.newton.history;
+            let norms = history.first_residual.into_iter().chain(history.iterations.iter().map(|it| it.residual));
+            let scale = number(&expected[0]);
+            for (k, (norm, expected)) in norms.zip(expected.as_array().into_iter().flatten()).enumerate() {
+                let expected = number(expected);
+                let difference = (norm - expected).abs();
+                assert!(
+                    difference <= 1e-6 * expected + 1e-14 * scale,
+                    "{shape}, step {step}, iteration {k}: {norm:e} instead of {expected:e}"
+                );
+            }
+            let energies = &run["energies"][step];
+            let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
+            assert!((kinetic - number(&energies[0])).abs() < 1e-9, "{shape}, step {step}: kinetic {kinetic}");
+            assert!((strain - number(&energies[1])).abs() < 1e-9, "{shape}, step {step}: strain {strain}");
+            if step == 4 {
+                assert_eq!(report.active_nodes as f64, number(&run["active_last"]), "{shape}: active nodes");
+            }
+        }
+        let particles = &simulation.particles;
+        for (name, ours, theirs, scale) in [
+            ("x", &particles.position, vectors(&run["x"]), 1.0),
+            ("v", &particles.velocity, vectors(&run["v"]), 1.0),
+            ("a", &particles.acceleration, vectors(&run["a"]), 20.0),
+        ] {
+            for (p, (ours, theirs)) in ours.iter().zip(theirs).enumerate() {
+                let difference = (ours - theirs).amax();
+                assert!(difference < 1e-9 * scale, "{shape}: {name} of particle {p} differs by {difference:e}");
+            }
+        }
+        for (p, h) in particles.displacement_gradient.iter().enumerate() {
+            for i in 0..2 {
+                for k in 0..2 {
+                    let f = h[(i, k)] + f64::from(i == k);
+                    let expected = number(&run["F"][p][i][k]);
+                    assert!((f - expected).abs() < 1e-9, "{shape}: F of particle {p}");
+                }
+            }
+        }
+    }
+    Ok(())
+}
