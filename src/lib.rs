@@ -6,6 +6,7 @@ pub mod grid;
 pub mod material;
 pub mod mechanics;
 pub mod nodes;
+pub mod output;
 pub mod particles;
 pub mod phases;
 pub mod plan;
