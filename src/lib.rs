@@ -9,6 +9,7 @@ pub mod nodes;
 pub mod output;
 pub mod particles;
 pub mod phases;
+pub mod plan;
 pub mod scalar;
 pub mod scene;
 pub mod shape;

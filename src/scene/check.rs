@@ -147,7 +147,7 @@ impl Display for Problems {
 }
 
 /// Finite, and small enough to be squared.
-fn sensible(x: f64) -> bool {
+pub(super) fn sensible(x: f64) -> bool {
     x.abs() <= LARGEST
 }
 

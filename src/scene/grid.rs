@@ -1,10 +1,10 @@
 //! The box and its background grid.
 
-use super::check::{Number, Problems};
+use super::check::{Number, Problems, sensible};
 use crate::grid::Grid;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Cells along one axis, at most.
 const MAX_CELLS: f64 = 1e6;
@@ -13,7 +13,7 @@ const MAX_CELLS: f64 = 1e6;
 const WHOLE: f64 = 1e-9;
 
 /// The box in which everything happens, and the spacing of its background nodes. Nothing exists outside of it.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridBox {
     /// The lower corner of the box (length). Default: zeros.
@@ -42,7 +42,7 @@ impl GridBox {
     /// The grid itself; `None` unless the section is valid and of dimension `D`.
     pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
         let origin = self.origin();
-        if self.size.len() != D || origin.len() != D {
+        if self.size.len() != D || origin.len() != D || !origin.iter().all(|&x| sensible(x)) {
             return None;
         }
         let mut cells = [0; D];

@@ -4,10 +4,10 @@ use super::body::Body;
 use super::check::Problems;
 use super::load::check_body;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What a run writes.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// The time between two snapshots of all particles, > 0. Default: no snapshots.
@@ -28,7 +28,7 @@ impl Default for Output {
 }
 
 /// A quantity of the particles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Field {
     /// Displacement since t = 0 (length).
@@ -54,7 +54,7 @@ pub enum Field {
 }
 
 /// The history of one field at one place.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
     /// The name of the history; no two probes share one. Letters, digits, `_` and `-`.
@@ -69,7 +69,7 @@ pub struct Probe {
 }
 
 /// The place of a probe.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum At {
     /// The particle that is nearest to this point at t = 0, wherever it goes.
@@ -92,8 +92,8 @@ impl Output {
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),
-                format_args!("{field:?} again"),
-                "one mention is enough",
+                format_args!("{field:?}, given before,"),
+                "must be listed once",
             );
         }
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
