@@ -43,13 +43,18 @@ pub enum OutputError {
         particles: usize,
     },
     /// A probe at a point that is none, or without any particle to look at.
-    #[error("probe {name:?} at {point:?} has no nearest particle; its coordinates must be finite, and particles must exist")]
+    #[error(
+        "probe {name:?} at {point:?} has no nearest particle; its coordinates must be finite, and its body must have particles"
+    )]
     ProbePoint {
         /// Name of the probe.
         name: String,
         /// The point asked for.
         point: Vec<f64>,
     },
+    /// Time between snapshots out of range.
+    #[error("the time between snapshots is {0:e}; it must be finite and > 0")]
+    SnapshotEvery(f64),
     /// Two columns of one table would have the same name.
     #[error("two columns of {} would be called {column:?}; use different names", path.display())]
     DuplicateColumn {

@@ -27,13 +27,13 @@ pub enum Field {
     /// J = det F, the present volume over the reference volume.
     Jacobian,
     /// Green-Lagrange strain E = (FᵀF - I) / 2.
-    GreenLagrangeStrain,
+    Strain,
     /// Cauchy stress, with the out-of-plane normal stress.
-    CauchyStress,
+    Stress,
     /// Pressure, minus a third of the trace of the Cauchy stress; positive in compression.
     Pressure,
     /// Von Mises equivalent of the Cauchy stress.
-    VonMisesStress,
+    VonMises,
     /// Strain energy per reference volume.
     EnergyDensity,
     /// Mass.
@@ -84,10 +84,10 @@ impl Field {
             Self::Acceleration => "acceleration",
             Self::DeformationGradient => "deformation_gradient",
             Self::Jacobian => "jacobian",
-            Self::GreenLagrangeStrain => "green_lagrange_strain",
-            Self::CauchyStress => "cauchy_stress",
+            Self::Strain => "strain",
+            Self::Stress => "stress",
             Self::Pressure => "pressure",
-            Self::VonMisesStress => "von_mises_stress",
+            Self::VonMises => "von_mises",
             Self::EnergyDensity => "energy_density",
             Self::Mass => "mass",
             Self::Volume => "volume",
@@ -100,14 +100,11 @@ impl Field {
         match self {
             Self::Position | Self::Displacement | Self::Velocity | Self::Acceleration => Kind::Vector,
             Self::DeformationGradient => Kind::Tensor,
-            Self::GreenLagrangeStrain | Self::CauchyStress => Kind::Symmetric,
+            Self::Strain | Self::Stress => Kind::Symmetric,
             Self::Body => Kind::Index,
-            Self::Jacobian
-            | Self::Pressure
-            | Self::VonMisesStress
-            | Self::EnergyDensity
-            | Self::Mass
-            | Self::Volume => Kind::Scalar,
+            Self::Jacobian | Self::Pressure | Self::VonMises | Self::EnergyDensity | Self::Mass | Self::Volume => {
+                Kind::Scalar
+            }
         }
     }
 
@@ -125,9 +122,7 @@ impl Field {
         let particles = &simulation.particles;
         let h = || particles.displacement_gradient[particle];
         let law = || &simulation.bodies[particles.body[particle] as usize].law;
-        let stress = || {
-            cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle, source })
-        };
+        let stress = || cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle, source });
         match self {
             Self::Position => out.extend(padded(&particles.position[particle])),
             Self::Displacement => {
@@ -140,16 +135,16 @@ impl Field {
                 out.extend(f.transpose().iter());
             }
             Self::Jacobian => out.push(Deformation::new(h()).jacobian),
-            Self::GreenLagrangeStrain => {
+            Self::Strain => {
                 let strain = crate::material::embed(&Deformation::new(h()).green_lagrange());
                 out.extend(SYMMETRIC.map(|at| strain[at]));
             }
-            Self::CauchyStress => {
+            Self::Stress => {
                 let stress = stress()?;
                 out.extend(SYMMETRIC.map(|at| stress[at]));
             }
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
-            Self::VonMisesStress => out.push(von_mises(&stress()?)),
+            Self::VonMises => out.push(von_mises(&stress()?)),
             Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()))),
             Self::Mass => out.push(particles.mass[particle]),
             Self::Volume => out.push(particles.volume[particle]),

@@ -32,7 +32,7 @@ pub mod vtu;
 
 pub use error::OutputError;
 pub use fields::Field;
-pub use probes::{Place, Probe};
+pub use probes::{Place, Probe, nearest};
 pub use recorder::{OutputSettings, Recorder};
 pub use reference::Reference;
 pub use summary::Summary;

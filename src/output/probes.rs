@@ -4,6 +4,7 @@ use super::csv::{Row, Table};
 use super::fields::{Field, Kind};
 use super::{OutputError, Reference};
 use crate::material::Law;
+use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use std::path::PathBuf;
@@ -14,7 +15,12 @@ pub enum Place<const D: usize> {
     /// At a particle, which it follows.
     Particle(usize),
     /// At the particle nearest to a fixed point, found anew each time; of equally near ones, the first. No field is interpolated.
-    Nearest(Vector<f64, D>),
+    Nearest {
+        /// The point.
+        point: Vector<f64, D>,
+        /// Look at the particles of this body only.
+        body: Option<u32>,
+    },
 }
 
 /// A field at a place.
@@ -37,26 +43,30 @@ impl<const D: usize> Probe<D> {
     }
 
     /// The particle looked at now.
-    fn particle<L, A>(&self, simulation: &Simulation<D, L, A>) -> Result<usize, OutputError> {
-        let positions = &simulation.particles.position;
+    fn particle(&self, particles: &Particles<D>) -> Result<usize, OutputError> {
+        let name = || self.name.clone();
         match self.place {
-            Place::Particle(particle) if particle < positions.len() => Ok(particle),
+            Place::Particle(particle) if particle < particles.len() => Ok(particle),
             Place::Particle(particle) => {
-                Err(OutputError::ProbeParticle { name: self.name.clone(), particle, particles: positions.len() })
+                Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
             }
-            Place::Nearest(point) => {
-                let distances = positions.iter().map(|x| (x - point).norm_squared()).enumerate();
-                distances
-                    .filter(|(_, distance)| distance.is_finite())
-                    .min_by(|a, b| a.1.total_cmp(&b.1))
-                    .map(|(particle, _)| particle)
-                    .ok_or_else(|| OutputError::ProbePoint {
-                        name: self.name.clone(),
-                        point: point.iter().copied().collect(),
-                    })
+            Place::Nearest { point, body } => {
+                let nearest = nearest(particles, &point, body);
+                nearest.ok_or_else(|| OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() })
             }
         }
     }
+}
+
+/// The particle nearest to `point`, among those of `body` if one is given; of equally near ones, the first.
+pub fn nearest<const D: usize>(particles: &Particles<D>, point: &Vector<f64, D>, body: Option<u32>) -> Option<usize> {
+    let candidates = particles.position.iter().zip(&particles.body).enumerate();
+    candidates
+        .filter(|(_, (_, of))| body.is_none_or(|body| body == **of))
+        .map(|(particle, (x, _))| (particle, (x - point).norm_squared()))
+        .filter(|(_, distance)| distance.is_finite())
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(particle, _)| particle)
 }
 
 /// Writes `probes.csv`.
@@ -91,7 +101,7 @@ impl<const D: usize> Probes<D> {
         let mut values = Vec::new();
         for probe in &self.probes {
             values.clear();
-            probe.field.append(simulation, reference, probe.particle(simulation)?, &mut values)?;
+            probe.field.append(simulation, reference, probe.particle(&simulation.particles)?, &mut values)?;
             row.extend(values.iter().copied().take(probe.components().len()));
         }
         self.table.row(&row)

@@ -12,7 +12,6 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::simulation::{Simulation, StepReport};
 use serde_json::Value;
-use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,8 +22,9 @@ pub struct OutputSettings<const D: usize> {
     pub directory: PathBuf,
     /// Fields of the snapshots.
     pub fields: Vec<Field>,
-    /// Nominal steps between snapshots, besides the first and the last state; without it there are no snapshots.
-    pub snapshot_every: Option<NonZeroU64>,
+    /// Time between snapshots, > 0: the first state is written, every state that reaches a multiple of it, and the last. Without it
+    /// there are no snapshots.
+    pub snapshot_every: Option<f64>,
     /// Fields at particles or points, every step.
     pub probes: Vec<Probe<D>>,
     /// Time at which the run will end, for the progress bar.
@@ -55,7 +55,7 @@ pub struct Recorder<const D: usize> {
     history: History,
     reactions: Option<Reactions>,
     probes: Option<Probes<D>>,
-    snapshots: Option<(NonZeroU64, Snapshots)>,
+    snapshots: Option<Snapshots>,
     newton: NewtonLog,
     progress: Progress,
     counts: Counts,
@@ -67,7 +67,7 @@ impl<const D: usize> Recorder<D> {
     /// Makes the directory and the files, and writes the state before the first step.
     ///
     /// # Errors
-    /// The system refuses; a probe at a particle that does not exist; names that lead to equal columns; a reference with another number of particles.
+    /// The system refuses; a probe at a particle that does not exist; names that lead to equal columns; a time between snapshots that is not positive; a reference with another number of particles.
     pub fn start<L: Law, A: ShapeFunction>(
         settings: OutputSettings<D>,
         simulation: &Simulation<D, L, A>,
@@ -89,7 +89,10 @@ impl<const D: usize> Recorder<D> {
                 true => None,
                 false => Some(Probes::create(at("probes.csv"), probes)?),
             },
-            snapshots: snapshot_every.map(|every| (every, Snapshots::new(directory.clone(), &fields))),
+            snapshots: match snapshot_every {
+                None => None,
+                Some(every) => Some(Snapshots::new(directory.clone(), &fields, every)?),
+            },
             newton: NewtonLog::create(at("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, quiet),
             counts: Counts { particles: simulation.particles.len(), ..Counts::default() },
@@ -98,7 +101,7 @@ impl<const D: usize> Recorder<D> {
             reference,
             directory,
         };
-        recorder.write_state(simulation, Cost::default(), true)?;
+        recorder.write_state(simulation, Cost::default())?;
         recorder.flush()?;
         Ok(recorder)
     }
@@ -119,12 +122,10 @@ impl<const D: usize> Recorder<D> {
             reactions.write(simulation.clock.time(), &step.reactions)?;
         }
         let newton = &step.newton.history;
-        let cost =
-            Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };
-        self.write_state(simulation, cost, false)?;
+        let cost = Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };
+        self.write_state(simulation, cost)?;
         let clock = &simulation.clock;
-        self.progress
-            .show(clock.time(), Shown { step: clock.steps(), newton: cost.newton, krylov: cost.krylov });
+        self.progress.show(clock.time(), Shown { step: clock.steps(), newton: cost.newton, krylov: cost.krylov });
         Ok(())
     }
 
@@ -138,7 +139,7 @@ impl<const D: usize> Recorder<D> {
         settings: &Value,
         failure: Option<&str>,
     ) -> Result<Summary, OutputError> {
-        if let Some((_, snapshots)) = &mut self.snapshots {
+        if let Some(snapshots) = &mut self.snapshots {
             snapshots.write(simulation, &self.reference)?;
         }
         self.flush()?;
@@ -163,18 +164,13 @@ impl<const D: usize> Recorder<D> {
         &mut self,
         simulation: &Simulation<D, L, A>,
         cost: Cost,
-        first: bool,
     ) -> Result<(), OutputError> {
         self.history.write(simulation, &self.reference, cost)?;
         if let Some(probes) = &mut self.probes {
             probes.write(simulation, &self.reference)?;
         }
-        if let Some((every, snapshots)) = &mut self.snapshots {
-            let clock = &simulation.clock;
-            let due = clock.on_nominal() && clock.nominal_steps().is_multiple_of(every.get());
-            if first || due {
-                snapshots.write(simulation, &self.reference)?;
-            }
+        if let Some(snapshots) = &mut self.snapshots {
+            snapshots.write_if_due(simulation, &self.reference)?;
         }
         Ok(())
     }

@@ -180,7 +180,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_residuals_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>> {
+    fn the_residuals_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>>
+    {
         let directory = tempfile::tempdir()?;
         let energies = Energies { kinetic: f64::NAN, strain: 0.1, external: 0.0, total: f64::INFINITY, balance: 0.0 };
         let settings = serde_json::json!({"nested": {"deep": {}}});
@@ -198,7 +199,8 @@ mod tests {
             let path = directory.path().join("report.json");
             report.write(&path, log)?;
             let read: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
-            let residuals: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;
+            let residuals: Vec<Value> =
+                lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;
             assert_eq!(read["newton_residuals"], Value::from(residuals));
             assert_eq!((&read["settings"], &read["outcome"]), (&settings, &"finished".into()));
             assert_eq!((&read["energies"]["kinetic"], &read["energies"]["total"]), (&"NaN".into(), &"inf".into()));

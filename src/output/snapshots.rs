@@ -17,14 +17,21 @@ pub(crate) struct Snapshots {
     directory: PathBuf,
     fields: Vec<Field>,
     series: Series,
+    /// Time between snapshots.
+    every: f64,
     written: usize,
     /// Steps taken when the last one was written.
     last: Option<u64>,
+    /// How many multiples of `every` the time had passed then.
+    passed: f64,
 }
 
 impl Snapshots {
-    /// Of `fields` (each once, whatever the list says), into `directory`.
-    pub(crate) fn new(directory: PathBuf, fields: &[Field]) -> Self {
+    /// Of `fields` (each once, whatever the list says), into `directory`, whenever the time passes a multiple of `every`.
+    pub(crate) fn new(directory: PathBuf, fields: &[Field], every: f64) -> Result<Self, OutputError> {
+        if !(every > 0.0 && every.is_finite()) {
+            return Err(OutputError::SnapshotEvery(every));
+        }
         let mut unique = Vec::new();
         for &field in fields {
             if !unique.contains(&field) {
@@ -32,7 +39,23 @@ impl Snapshots {
             }
         }
         let series = Series::new(directory.join(SERIES));
-        Self { directory, fields: unique, series, written: 0, last: None }
+        Ok(Self { directory, fields: unique, series, every, written: 0, last: None, passed: f64::NEG_INFINITY })
+    }
+
+    /// Writes the present state if the time has reached a multiple of `every` since the last snapshot, or if there is none yet.
+    pub(crate) fn write_if_due<const D: usize, L: Law, A>(
+        &mut self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+    ) -> Result<(), OutputError> {
+        // Round-off must not put a step that ends on a multiple before it.
+        let clock = &simulation.clock;
+        let passed = ((clock.time() + 1e-6 * clock.nominal()) / self.every).floor();
+        if passed > self.passed {
+            self.passed = passed;
+            self.write(simulation, reference)?;
+        }
+        Ok(())
     }
 
     /// Writes the present state, unless it is already written.

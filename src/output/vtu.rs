@@ -154,7 +154,8 @@ impl Snapshot {
         field_data(&mut xml, "Float64", "grid_spacing", &[background.spacing]);
         field_data(&mut xml, "UInt32", "grid_cells", &background.cells);
         let count = self.points.len();
-        let _ = writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
+        let _ =
+            writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
         for array in &self.arrays {
             let (vtk_type, bytes) = bytes_of(&array.values);
             data.array(&mut xml, vtk_type, &array.name, &array.components, &bytes);
@@ -191,7 +192,8 @@ impl Snapshot {
         let (xml, data) = (&content[..split], &content[split + MARK.len()..]);
         let xml = std::str::from_utf8(xml).map_err(|_| "the header is not UTF-8")?;
         let numbers = |name: &str| -> Result<Vec<f64>, String> {
-            let (_, text) = elements(xml).find(|(tag, _)| attribute(tag, "Name") == Some(name)).ok_or(format!("no {name}"))?;
+            let (_, text) =
+                elements(xml).find(|(tag, _)| attribute(tag, "Name") == Some(name)).ok_or(format!("no {name}"))?;
             text.split_whitespace().map(|x| x.parse().map_err(|_| format!("{name} holds {x:?}"))).collect()
         };
         let scalar = |name: &str| numbers(name)?.first().copied().ok_or(format!("{name} is empty"));

@@ -99,7 +99,7 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
 /// The range of the finite values, `padding` wider at either end, and never so narrow that axes could not be labelled.
 pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f64) {
     let drawable = values.filter(|x| x.abs() < 1e100);
-    let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (x.min(a), x.max(b)));
     if low > high {
         return (0.0, 1.0);
     }
@@ -113,8 +113,8 @@ pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f6
 
 /// A number at an axis, without the round-off of its place.
 pub(super) fn tick(x: f64) -> String {
-    let rounded = format!("{x:.9e}").parse().unwrap_or(x);
-    match f64::abs(rounded) {
+    let rounded: f64 = format!("{x:.9e}").parse().unwrap_or(x);
+    match rounded.abs() {
         size if size < 1e-100 => "0".to_owned(),
         size if (1e-3..1e6).contains(&size) => format!("{rounded}"),
         _ => format!("{rounded:e}"),
@@ -127,13 +127,13 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if drawable.len() <= 2 * INTERVALS {
         return drawable;
     }
-    let mut kept = Vec::with_capacity(2 * INTERVALS);
+    let mut kept: Vec<(f64, f64)> = Vec::with_capacity(2 * INTERVALS);
     for interval in drawable.chunks(drawable.len().div_ceil(INTERVALS)) {
-        let by_height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let by_height = |a: &&(f64, f64), b: &&(f64, f64)| f64::total_cmp(&a.1, &b.1);
         let extremes = interval.iter().min_by(by_height).into_iter().chain(interval.iter().max_by(by_height));
         let start = kept.len();
         kept.extend(extremes);
-        kept[start..].sort_by(|a, b| a.0.total_cmp(&b.0));
+        kept[start..].sort_by(|a, b| f64::total_cmp(&a.0, &b.0));
     }
     kept
 }
