@@ -2,6 +2,7 @@
 
 pub mod approximation;
 pub mod clock;
+pub mod field;
 pub mod grid;
 pub mod material;
 pub mod mechanics;

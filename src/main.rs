@@ -1,7 +1,7 @@
 //! The command-line program: joins scenes, simulations and output.
 
 use bfree::material::Material;
-use bfree::output::{Field, OutputSettings, Place, Probe, Recorder, Reference};
+use bfree::output::{OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Scene, output::At};
 use bfree::simulation::Simulation;
@@ -157,7 +157,7 @@ impl Run {
         let settings = OutputSettings {
             directory: directory.clone(),
             fields: scene.output.fields.clone(),
-            snapshot_every: scene.output.every.map(|every| steps_between(every, scene.time.step)),
+            snapshot_every: scene.output.every,
             probes: probes(scene, &simulation),
             end_time: last as f64 * simulation.clock.nominal(),
             quiet: self.quiet,
@@ -187,7 +187,11 @@ impl Run {
         }
         match failure {
             Some(error) => {
-                eprintln!("stopped at t = {} after the last good step; its state is in {}", simulation.clock.time(), directory.display());
+                eprintln!(
+                    "stopped at t = {} after the last good step; its state is in {}",
+                    simulation.clock.time(),
+                    directory.display()
+                );
                 Err(Failure::run(error))
             }
             None => Ok(()),
@@ -217,11 +221,6 @@ fn steps_until<const D: usize>(simulation: &Simulation<D, Material>, end: f64) -
     (end / simulation.clock.nominal() - 1e-9).ceil().max(0.0) as u64
 }
 
-/// Steps between two snapshots `every` apart in time, at least one.
-fn steps_between(every: f64, step: f64) -> NonZeroU64 {
-    NonZeroU64::new((every / step).round() as u64).unwrap_or(NonZeroU64::MIN)
-}
-
 /// Set by Ctrl-C: the run then ends after the current step.
 fn stop_on_interrupt() -> Result<Arc<AtomicBool>, ctrlc::Error> {
     let interrupted = Arc::new(AtomicBool::new(false));
@@ -241,7 +240,7 @@ fn probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Prob
             At::Particle(_) => Place::Particle(nearest(&simulation.particles, &point, body)?),
             At::Point(_) => Place::Nearest { point, body },
         };
-        Some(Probe { name: probe.name.clone(), field: field(probe.field), place })
+        Some(Probe { name: probe.name.clone(), field: probe.field, place })
     };
     scene.output.probes.iter().filter_map(probe).collect()
 }

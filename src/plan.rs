@@ -57,7 +57,9 @@ impl Plan {
     ///
     /// # Errors
     /// A particle without shape functions.
-    pub fn of<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Result<Self, SupportError> {
+    pub fn of<const D: usize, L: Law, A: ShapeFunction>(
+        simulation: &Simulation<D, L, A>,
+    ) -> Result<Self, SupportError> {
         let (supports, nodes) =
             Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
         let prescribed = simulation.prescribed(&nodes);
@@ -95,7 +97,11 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> Vec<Ter
         term("internal force", true, "F S of every particle"),
         term("gravity", loads.gravity.is_some(), "only with gravity; from the lumped mass, no pass over particles"),
         term("tractions", tractions > 0, &format!("{tractions} loaded particles")),
-        term("follower pressure", pressures > 0, &format!("{pressures} loaded particles; makes the tangent unsymmetric")),
+        term(
+            "follower pressure",
+            pressures > 0,
+            &format!("{pressures} loaded particles; makes the tangent unsymmetric"),
+        ),
         term("prescribed nodes", !loads.prescribed.is_empty(), &format!("{} conditions", loads.prescribed.len())),
         term("work of moving walls", moving, "only where a prescribed motion does not rest"),
     ]
@@ -133,7 +139,8 @@ fn surfaces<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<Strin
         let count = load.points.len();
         let area: f64 = load.points.iter().map(|point| point.area).sum();
         let offsets = || load.points.iter().map(|point| point.offset);
-        let (low, high) = offsets().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) =
+            offsets().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         format!("{kind} on {count} particles, area {area:.6} in all, {low:.4} to {high:.4} below the true surface")
     };
     simulation.loads.surface.iter().map(describe).collect()

@@ -15,7 +15,7 @@
 
 mod csv;
 mod error;
-pub mod fields;
+mod fields;
 mod files;
 pub mod history;
 pub mod plot;
@@ -31,7 +31,6 @@ mod summary;
 pub mod vtu;
 
 pub use error::OutputError;
-pub use fields::Field;
 pub use probes::{Place, Probe, nearest};
 pub use recorder::{OutputSettings, Recorder};
 pub use reference::Reference;

@@ -1,8 +1,8 @@
 //! `probes.csv`: fields at chosen particles or points against time.
 
 use super::csv::{Row, Table};
-use super::fields::{Field, Kind};
 use super::{OutputError, Reference};
+use crate::field::{Field, Kind};
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::simulation::Simulation;

@@ -1,6 +1,5 @@
 //! Everything that is written about a run, in one place.
 
-use super::fields::Field;
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
 use super::progress::{Progress, Shown};
@@ -9,6 +8,7 @@ use super::report::{Counts, NewtonLog, Report, Seconds};
 use super::snapshots::{SERIES, Snapshots};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
+use crate::field::Field;
 use crate::material::Law;
 use crate::simulation::{Simulation, StepReport};
 use serde_json::Value;

@@ -1,9 +1,10 @@
 //! Snapshots of the particles: `particles_*.vtu`, and the series `particles.pvd`.
 
-use super::fields::{Field, Kind, padded};
+use super::fields::padded;
 use super::pvd::Series;
 use super::vtu::{Array, Background, Snapshot, Values};
 use super::{OutputError, Reference};
+use crate::field::{Field, Kind};
 use crate::material::Law;
 use crate::simulation::Simulation;
 use std::path::PathBuf;

@@ -4,6 +4,7 @@ use super::body::Body;
 use super::check::Problems;
 use super::grid::GridBox;
 use super::load::check_body;
+use crate::field::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,32 +27,6 @@ impl Default for Output {
     fn default() -> Self {
         Self { every: None, fields: Self::default_fields(), probes: Vec::new() }
     }
-}
-
-/// A quantity of the particles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Field {
-    /// Displacement since t = 0 (length).
-    Displacement,
-    /// Velocity.
-    Velocity,
-    /// Acceleration.
-    Acceleration,
-    /// Cauchy stress, the out-of-plane component included.
-    Stress,
-    /// Green–Lagrange strain.
-    Strain,
-    /// Deformation gradient F.
-    DeformationGradient,
-    /// J = det F.
-    Jacobian,
-    /// Pressure, −tr σ / 3 (stress).
-    Pressure,
-    /// Equivalent stress of von Mises.
-    VonMises,
-    /// Strain energy per reference volume.
-    EnergyDensity,
 }
 
 /// The history of one field at one place.
