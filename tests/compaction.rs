@@ -1,0 +1,52 @@
+//! The compaction of section 4.2 against an independent program.
+
+mod support;
+
+use support::{Failure, scene, table};
+
+/// The largest difference of u_y at (0.525, 0.975) from the reference, over its largest value.
+fn difference(name: &str, reference: &str, overrides: &[&str]) -> Result<f64, Failure> {
+    let mut simulation = scene::<2>(name, overrides)?;
+    assert_eq!(simulation.particles.len(), 400);
+    let start = simulation.particles.position.clone();
+    let near = |x: &bfree::tensor::Vector<f64, 2>| (x[0] - 0.525).abs() + (x[1] - 0.975).abs() < 1e-9;
+    let probe = start.iter().position(near).ok_or("no particle at (0.525, 0.975)")?;
+    let (mut largest, mut scale): (f64, f64) = (0.0, 0.0);
+    for row in table(reference) {
+        if row[0] > 0.0 {
+            simulation.advance()?;
+        }
+        assert!((simulation.clock.time() - row[0]).abs() < 1e-9);
+        let displacement = simulation.particles.position[probe][1] - start[probe][1];
+        largest = largest.max((displacement - row[1]).abs());
+        scale = scale.max(row[1].abs());
+    }
+    Ok(largest / scale)
+}
+
+const FREE: &str = include_str!("reference/compaction_free_lme3.csv");
+const CONFINED: &str = include_str!("reference/compaction_confined_lme3.csv");
+const CIRCLE: &str = r#"approximation={"lme":{"gamma":3,"support":"circle"}}"#;
+
+#[test]
+fn the_free_block_follows_the_reference() -> Result<(), Failure> {
+    let largest = difference("compaction.json", FREE, &[])?;
+    assert!(largest < 1e-3, "differs by {largest:e}");
+    Ok(())
+}
+
+#[test]
+fn the_confined_block_follows_the_reference() -> Result<(), Failure> {
+    let largest = difference("compaction_confined.json", CONFINED, &[])?;
+    assert!(largest < 1e-3, "differs by {largest:e}");
+    Ok(())
+}
+
+#[test]
+fn the_circular_support_follows_the_reference_closely() -> Result<(), Failure> {
+    let free = difference("compaction.json", FREE, &[CIRCLE])?;
+    assert!(free < 1e-6, "free: differs by {free:e}");
+    let confined = difference("compaction_confined.json", CONFINED, &[CIRCLE])?;
+    assert!(confined < 1e-6, "confined: differs by {confined:e}");
+    Ok(())
+}
