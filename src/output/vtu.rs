@@ -104,7 +104,11 @@ impl Appended {
     /// Appends an array and writes its XML element.
     fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
         let offset = self.push(bytes);
-        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfComponents="{}""#, components.len());
+        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}""#);
+        // A scalar does not name its one component: readers then give a plain list.
+        if components.len() != 1 {
+            let _ = write!(xml, r#" NumberOfComponents="{}""#, components.len());
+        }
         for (k, component) in components.iter().enumerate().filter(|(_, component)| !component.is_empty()) {
             let _ = write!(xml, r#" ComponentName{k}="{component}""#);
         }
@@ -252,7 +256,7 @@ fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, Str
         return Ok(None);
     }
     let number = |text: &str| text.parse::<usize>().map_err(|_| format!("{name}: {text:?} is no number"));
-    let (width, offset) = (number(get("NumberOfComponents")?)?, number(get("offset")?)?);
+    let (width, offset) = (number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?, number(get("offset")?)?);
     let bytes = data.get(offset..).and_then(inflated).ok_or(format!("{name}: damaged data"))?;
     let values = match vtk_type {
         "Float64" => Values::Float(bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()),

@@ -1,6 +1,6 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
-use super::chart::{LABEL, TITLE, range, tick};
+use super::chart::{LABEL, TITLE, range, rounded, tick};
 use super::palette::{BLUE, viridis};
 use super::{PlotError, draw_error};
 use crate::output::vtu::{Array, Snapshot, Values};
@@ -81,7 +81,7 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
     root.fill(&WHITE)?;
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
     let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
-    let rest = root.titled(&format!("t = {}{part}", tick(snapshot.time)), TITLE)?;
+    let rest = root.titled(&format!("t = {}{part}", rounded(snapshot.time)), TITLE)?;
     let (main, side) = rest.split_horizontally(left + width as u32 + 20);
 
     let mut chart = ChartBuilder::on(&main)
@@ -97,8 +97,8 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
         .y_desc(up.map_or(label, |axis| ["x", "y", "z"][axis]))
         .label_style(LABEL)
         .axis_desc_style(LABEL)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
+        .x_label_formatter(&|at| tick(*at, x))
+        .y_label_formatter(&|at| tick(*at, y))
         .draw()?;
     let grey = BLACK.mix(0.15);
     if let Some(up) = up {
@@ -139,7 +139,7 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
             .y_desc(label)
             .label_style(LABEL)
             .axis_desc_style(LABEL)
-            .y_label_formatter(&|y| tick(*y))
+            .y_label_formatter(&|at| tick(*at, (low, high)))
             .draw()?;
     }
     root.present()?;
