@@ -51,6 +51,15 @@ pub struct Background {
     pub cells: [u32; 3],
 }
 
+impl Background {
+    fn check(&self) -> Result<(), String> {
+        let finite = self.origin.iter().all(|x| x.is_finite()) && self.spacing.is_finite() && self.spacing > 0.0;
+        let axes = self.cells.get(..self.dimension as usize);
+        let whole = axes.is_some_and(|cells| !cells.is_empty() && !cells.contains(&0));
+        if finite && whole { Ok(()) } else { Err(format!("{self:?} is no grid")) }
+    }
+}
+
 /// Points with arrays, at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
@@ -208,6 +217,7 @@ impl Snapshot {
             spacing: scalar("grid_spacing")?,
             cells: triple("grid_cells")?.map(|x| x as u32),
         };
+        background.check()?;
         let time = scalar("TimeValue")?;
         let count = xml
             .split_once("<Piece")
