@@ -232,7 +232,16 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>, ctrlc::Error> {
 
 /// The probes of a scene, those on particles bound to the nearest one.
 fn probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Probe<D>> {
-    let _ = (At::Point(vec![]), Field::Mass, Place::<D>::Particle(0), Vector::<f64, D>::zeros());
-    let _ = (scene, simulation);
-    Vec::new()
+    let probe = |probe: &scene::output::Probe| {
+        let body = |name: &String| simulation.bodies.iter().position(|body| body.name == *name).map(|body| body as u32);
+        let body = probe.body.as_ref().and_then(body);
+        let (At::Particle(x) | At::Point(x)) = &probe.at;
+        let point = Vector::<f64, D>::from_iterator(x.iter().copied());
+        let place = match &probe.at {
+            At::Particle(_) => Place::Particle(nearest(&simulation.particles, &point, body)?),
+            At::Point(_) => Place::Nearest { point, body },
+        };
+        Some(Probe { name: probe.name.clone(), field: field(probe.field), place })
+    };
+    scene.output.probes.iter().filter_map(probe).collect()
 }

@@ -236,6 +236,12 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
     (r#""name": "mid""#, r#""name": "../mid""#, "output.probes[1].name", &["file name"]),
+    (
+        r#""point": [2, 1]"#,
+        r#""point": [2, 2.5]"#,
+        "output.probes[1].at.point",
+        &["[2.0, 2.5]", "must lie in the grid"],
+    ),
     (r#""point": [2, 1]"#, r#""point": [2]"#, "output.probes[1].at.point", &["length 1"]),
 ];
 
@@ -261,6 +267,7 @@ const WRONG_TEXT: &[(&str, &str, &str, &[&str])] = &[
         "bodies[0].shape.difference.minus",
         &["unknown variant", "`ball`"],
     ),
+    (r#"{ "ball": { "center": [4, 2], "radius": 0.6 } }"#, "{}", "prescribed[0].region", &["exactly one key"]),
     (r#""max_halvings": 3"#, r#""max_halvings": -3"#, "time.max_halvings", &["-3", "whole number"]),
     (r#""max_halvings": 3"#, r#""max_halvings": 2.5"#, "time.max_halvings", &["2.5", "whole number"]),
     ("[0, -9.81]", "9.81", "gravity.acceleration", &["a list"]),

@@ -33,7 +33,7 @@ pub enum Face {
     Sliding,
     /// Not move.
     Fixed,
-    /// Move in the components that are `false`; the others are held.
+    /// Per component: `true` is held, `false` is free.
     Held(Vec<bool>),
     /// Follow a table of displacements since t = 0 (length); constant after the last row.
     Displacement(Table),

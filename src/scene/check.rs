@@ -6,8 +6,8 @@ use std::fmt::{self, Display};
 /// Problems kept; a table of a million wrong rows needs no million messages.
 const KEPT: usize = 50;
 
-/// Bodies, loads, regions or probes, at most.
-const MOST: usize = 1000;
+/// Bodies, loads, parts of a shape or probes, at most.
+pub(super) const MOST: usize = 1000;
 
 /// Characters shown of a value.
 const SHOWN: usize = 80;

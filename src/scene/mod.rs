@@ -136,7 +136,7 @@ impl Scene {
             }
         }
         self.solver.check(&mut problems, !self.pressures.is_empty());
-        self.output.check(&mut problems, &self.bodies, dimension);
+        self.output.check(&mut problems, &self.bodies, &self.grid);
         problems
     }
 

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::check::Problems;
+use super::grid::GridBox;
 use super::load::check_body;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,7 +84,7 @@ impl Output {
         vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian]
     }
 
-    pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], dimension: usize) {
+    pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
         if let Some(every) = self.every {
             problems.positive("output.every", every);
         }
@@ -97,7 +98,7 @@ impl Output {
             );
         }
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
-            probe.check(problems, &format!("output.probes[{i}]"), bodies, dimension);
+            probe.check(problems, &format!("output.probes[{i}]"), bodies, grid);
             let again = self.probes.iter().take(i).any(|earlier| earlier.name == probe.name);
             let allowed = "must differ from the names of the probes before";
             problems.require(!again, &format!("output.probes[{i}].name"), format_args!("{:?}", probe.name), allowed);
@@ -106,7 +107,7 @@ impl Output {
 }
 
 impl Probe {
-    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], grid: &GridBox) {
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let named = !self.name.is_empty() && self.name.chars().all(letters);
         let allowed = "must consist of letters, digits, _ and -: it becomes part of a file name";
@@ -114,9 +115,13 @@ impl Probe {
         if let Some(body) = &self.body {
             check_body(problems, &format!("{path}.body"), body, bodies);
         }
-        match &self.at {
-            At::Particle(x) => problems.vector(&format!("{path}.at.particle"), x, dimension),
-            At::Point(x) => problems.vector(&format!("{path}.at.point"), x, dimension),
+        let (key, x) = match &self.at {
+            At::Particle(x) => ("particle", x),
+            At::Point(x) => ("point", x),
         };
+        let path = format!("{path}.at.{key}");
+        if problems.vector(&path, x, grid.dimension()) && grid.cells().is_some() {
+            problems.require(grid.holds(x), &path, format_args!("{x:?}"), "must lie in the grid");
+        }
     }
 }

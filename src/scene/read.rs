@@ -216,6 +216,7 @@ fn explain(message: &str) -> String {
         "u32" => "a whole number from 0 to 4294967295",
         "a sequence" => "a list",
         "a boolean" => "true or false",
+        "map with a single key" => "an object with exactly one key",
         "string or map" => "a word or an object with one key",
         struct_name if struct_name.starts_with("struct ") => "an object",
         row if row.starts_with("tuple struct Row") => "a row [time, [components]]",

@@ -1,6 +1,6 @@
 //! Regions of space in a scene.
 
-use super::check::{Number, Problems};
+use super::check::{MOST, Number, Problems};
 use crate::shape;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -115,9 +115,9 @@ impl Shape {
 }
 
 fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    let mut ok = !parts.is_empty();
-    problems.require(ok, path, "an empty list", "must have at least one shape");
-    for (i, part) in parts.iter().enumerate() {
+    let mut ok = (1..=MOST).contains(&parts.len());
+    problems.require(!parts.is_empty(), path, "an empty list", "must have at least one shape");
+    for (i, part) in problems.few(path, parts).iter().enumerate() {
         ok &= part.check(problems, &format!("{path}[{i}]"), dimension);
     }
     ok
