@@ -51,6 +51,15 @@ pub struct Background {
     pub cells: [u32; 3],
 }
 
+impl Background {
+    fn check(&self) -> Result<(), String> {
+        let finite = self.origin.iter().all(|x| x.is_finite()) && self.spacing.is_finite() && self.spacing > 0.0;
+        let axes = self.cells.get(..self.dimension as usize);
+        let whole = axes.is_some_and(|cells| !cells.is_empty() && !cells.contains(&0));
+        if finite && whole { Ok(()) } else { Err(format!("{self:?} is no grid")) }
+    }
+}
+
 /// Points with arrays, at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
@@ -104,7 +113,11 @@ impl Appended {
     /// Appends an array and writes its XML element.
     fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
         let offset = self.push(bytes);
-        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfComponents="{}""#, components.len());
+        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}""#);
+        // A scalar does not name its one component: readers then give a plain list.
+        if components.len() != 1 {
+            let _ = write!(xml, r#" NumberOfComponents="{}""#, components.len());
+        }
         for (k, component) in components.iter().enumerate().filter(|(_, component)| !component.is_empty()) {
             let _ = write!(xml, r#" ComponentName{k}="{component}""#);
         }
@@ -204,6 +217,7 @@ impl Snapshot {
             spacing: scalar("grid_spacing")?,
             cells: triple("grid_cells")?.map(|x| x as u32),
         };
+        background.check()?;
         let time = scalar("TimeValue")?;
         let count = xml
             .split_once("<Piece")
@@ -252,7 +266,7 @@ fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, Str
         return Ok(None);
     }
     let number = |text: &str| text.parse::<usize>().map_err(|_| format!("{name}: {text:?} is no number"));
-    let (width, offset) = (number(get("NumberOfComponents")?)?, number(get("offset")?)?);
+    let (width, offset) = (number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?, number(get("offset")?)?);
     let bytes = data.get(offset..).and_then(inflated).ok_or(format!("{name}: damaged data"))?;
     let values = match vtk_type {
         "Float64" => Values::Float(bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()),

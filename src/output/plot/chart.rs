@@ -73,8 +73,8 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .y_desc(panel.y)
         .label_style(LABEL)
         .axis_desc_style(LABEL)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
+        .x_label_formatter(&|at| tick(*at, x))
+        .y_label_formatter(&|at| tick(*at, y))
         .y_labels(6)
         .draw()?;
     for line in &panel.lines {
@@ -111,11 +111,16 @@ pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f6
     }
 }
 
-/// A number at an axis, without the round-off of its place.
-pub(super) fn tick(x: f64) -> String {
+/// A number at an axis that shows `range`, without the round-off of its place.
+pub(super) fn tick(x: f64, range: (f64, f64)) -> String {
+    if x.abs() < 1e-9 * (range.1 - range.0) { "0".to_owned() } else { rounded(x) }
+}
+
+/// A number with at most ten digits.
+pub(super) fn rounded(x: f64) -> String {
     let rounded: f64 = format!("{x:.9e}").parse().unwrap_or(x);
     match rounded.abs() {
-        size if size < 1e-100 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         size if (1e-3..1e6).contains(&size) => format!("{rounded}"),
         _ => format!("{rounded:e}"),
     }
@@ -158,6 +163,9 @@ mod tests {
             let (low, high) = range(values.iter().copied(), 0.05);
             assert!(high - low > 1e-7 * low.abs().max(high.abs()), "{values:?}: {low}, {high}");
         }
-        assert_eq!([tick(0.30000000000000004), tick(-2e-14), tick(0.0), tick(250.0)], ["0.3", "-2e-14", "0", "250"]);
+        let labels = [0.30000000000000004, -2e-14, 0.0, 250.0].map(rounded);
+        assert_eq!(labels, ["0.3", "-2e-14", "0", "250"]);
+        // what plotters makes of 0 among ticks of 0.05, and the same number where it counts
+        assert_eq!([tick(2.8e-17, (-0.2, 0.0)), tick(2.8e-17, (0.0, 1e-16))], ["0", "2.8e-17"]);
     }
 }

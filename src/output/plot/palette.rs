@@ -25,8 +25,7 @@ const VIRIDIS: [[f64; 3]; 9] = [
 /// The colour of `x` in [0, 1]; what lies outside gets the colour of the end, NaN that of 0.
 pub(super) fn viridis(x: f64) -> RGBColor {
     let last = VIRIDIS.len() - 1;
-    // max and min drop a NaN
-    let place = x.max(0.0).min(1.0) * last as f64;
+    let place = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) * last as f64 };
     let piece = (place as usize).min(last - 1);
     let weight = place - piece as f64;
     let mix = |k: usize| (VIRIDIS[piece][k] * (1.0 - weight) + VIRIDIS[piece + 1][k] * weight).round() as u8;

@@ -1,6 +1,6 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
-use super::chart::{LABEL, TITLE, range, tick};
+use super::chart::{LABEL, TITLE, range, rounded, tick};
 use super::palette::{BLUE, viridis};
 use super::{PlotError, draw_error};
 use crate::output::vtu::{Array, Snapshot, Values};
@@ -21,7 +21,8 @@ const MAX_DRAWN: usize = 50_000;
 /// The picture as SVG.
 ///
 /// In one dimension the field is drawn over x; in three, the particles are seen along y. The field is the first of the
-/// snapshot that is not the body, as its length if it is a vector, or its Frobenius norm if it is a tensor.
+/// snapshot that is not the body: in one dimension its first component, otherwise the length of a vector, the Frobenius norm of a
+/// tensor.
 pub(super) fn draw(name: &'static str, snapshot: &Snapshot) -> Result<String, PlotError> {
     let mut svg = String::new();
     draw_on(&mut svg, snapshot).map_err(|error| draw_error(name)(&*error))?;
@@ -30,17 +31,23 @@ pub(super) fn draw(name: &'static str, snapshot: &Snapshot) -> Result<String, Pl
 
 /// The name of a field, and one number a particle.
 fn colouring(snapshot: &Snapshot) -> Option<(String, Vec<f64>)> {
-    let float = |array: &'_ Array| match &array.values {
-        Values::Float(values) => Some((array.name.replace('_', " "), array.components.len(), values.clone())),
-        Values::Index(_) => None,
-    };
-    let (name, width, values) = snapshot.arrays.iter().find_map(float)?;
+    fn float(array: &Array) -> Option<(String, &[String], Vec<f64>)> {
+        match &array.values {
+            Values::Float(values) => Some((array.name.replace('_', " "), &array.components, values.clone())),
+            Values::Index(_) => None,
+        }
+    }
+    let (name, components, values) = snapshot.arrays.iter().find_map(float)?;
+    let (width, component) = (components.len(), components.first()?);
     // The off-diagonal components of a symmetric tensor count twice.
     let weight = |k: usize| if width == 6 && k >= 3 { 2.0 } else { 1.0 };
     let size = |tuple: &[f64]| tuple.iter().enumerate().map(|(k, x)| weight(k) * x * x).sum::<f64>().sqrt();
     match width {
-        0 => None,
         1 => Some((name, values)),
+        _ if snapshot.background.dimension == 1 => Some((
+            format!("{name} {component}"),
+            values.chunks(width).filter_map(|tuple| tuple.first().copied()).collect(),
+        )),
         _ => Some((format!("|{name}|"), values.chunks(width).map(size).collect())),
     }
 }
@@ -62,18 +69,20 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
         let start = background.origin[axis];
         (start, start + background.spacing * f64::from(background.cells[axis]))
     };
-    let (x, mut y) = (extent(0), up.map_or_else(|| range([low, high].into_iter(), 0.05), extent));
+    let (mut x, mut y) = (extent(0), up.map_or_else(|| range([low, high].into_iter(), 0.05), extent));
     let scale = match up {
         Some(_) => SIDE.0 / (x.1 - x.0).max(y.1 - y.0),
         None => SIDE.0 / (x.1 - x.0),
     };
-    let width = ((x.1 - x.0) * scale).max(SIDE.1);
-    let mut height = if up.is_some() { (y.1 - y.0) * scale } else { SIDE.0 / 2.0 };
-    if height < SIDE.1 {
-        // A flat box gets air above and below rather than another scale.
-        let air = 0.5 * (SIDE.1 - height) / scale;
-        (y, height) = ((y.0 - air, y.1 + air), SIDE.1);
-    }
+    // A slender box gets air on both sides rather than another scale.
+    let widened = |range: (f64, f64)| {
+        let length = (range.1 - range.0) * scale;
+        let air = 0.5 * (SIDE.1 - length).max(0.0) / scale;
+        ((range.0 - air, range.1 + air), length.max(SIDE.1))
+    };
+    let (width, height);
+    (x, width) = widened(x);
+    (y, height) = if up.is_some() { widened(y) } else { (y, SIDE.0 / 2.0) };
     let (left, below, above, bar) = MARGINS;
     let size = (left + width as u32 + 20 + bar, above + height as u32 + below + 10);
 
@@ -81,26 +90,30 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
     root.fill(&WHITE)?;
     let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
     let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
-    let rest = root.titled(&format!("t = {}{part}", tick(snapshot.time)), TITLE)?;
+    let rest = root.titled(&format!("t = {}{part}", rounded(snapshot.time)), TITLE)?;
     let (main, side) = rest.split_horizontally(left + width as u32 + 20);
 
     let mut chart = ChartBuilder::on(&main)
         .margin_right(20)
         .margin_top(10)
+        .margin_left(6)
         .x_label_area_size(below)
-        .y_label_area_size(left)
+        .y_label_area_size(left - 6)
         .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+    // Over the background grid, lines at the labels would only confuse.
+    let grey = BLACK.mix(0.15);
+    let mesh = if up.is_some() { TRANSPARENT } else { grey };
     chart
         .configure_mesh()
-        .disable_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(mesh)
         .x_desc("x")
         .y_desc(up.map_or(label, |axis| ["x", "y", "z"][axis]))
         .label_style(LABEL)
         .axis_desc_style(LABEL)
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
+        .x_label_formatter(&|at| tick(*at, x))
+        .y_label_formatter(&|at| tick(*at, y))
         .draw()?;
-    let grey = BLACK.mix(0.15);
     if let Some(up) = up {
         let (right, top) = (extent(0), extent(up));
         let node = |axis: usize, k: u32| background.origin[axis] + background.spacing * f64::from(k);
@@ -110,7 +123,8 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
             chart.draw_series(upright.chain(level).map(|line| PathElement::new(line, grey)))?;
         }
     }
-    let radius = (0.22 * background.spacing * scale).clamp(1.5, 6.0) as i32;
+    let least = if up.is_some() { 1.5 } else { 3.0 };
+    let radius = (0.22 * background.spacing * scale).clamp(least, 6.0) as i32;
     let dots = (0..snapshot.points.len()).step_by(stride).filter_map(|p| {
         let point = &snapshot.points[p];
         let value = values(p);
@@ -139,7 +153,7 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
             .y_desc(label)
             .label_style(LABEL)
             .axis_desc_style(LABEL)
-            .y_label_formatter(&|y| tick(*y))
+            .y_label_formatter(&|at| tick(*at, (low, high)))
             .draw()?;
     }
     root.present()?;
