@@ -242,6 +242,23 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
+    /// The same simulation with other laws, one for each body.
+    pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
+        let bodies = self.bodies.iter();
+        let bodies =
+            bodies.map(|body| Body { name: body.name.clone(), law: law(body), density: body.density }).collect();
+        Simulation {
+            grid: self.grid,
+            approximation: self.approximation,
+            bodies,
+            particles: self.particles,
+            loads: self.loads,
+            settings: self.settings,
+            clock: self.clock,
+            external_work: self.external_work,
+        }
+    }
+
     /// Σ V₀ W, the strain energy of all particles.
     pub fn strain_energy(&self) -> f64 {
         let particles = &self.particles;

@@ -1,8 +1,11 @@
 //! The compaction of section 4.2 against an independent program.
 
 mod support;
+#[path = "support/table.rs"]
+mod table;
 
-use support::{Failure, scene, table};
+use support::{Failure, scene};
+use table::rows;
 
 /// The largest difference of u_y at (0.525, 0.975) from the reference, over its largest value.
 fn difference(name: &str, reference: &str, overrides: &[&str]) -> Result<f64, Failure> {
@@ -12,7 +15,7 @@ fn difference(name: &str, reference: &str, overrides: &[&str]) -> Result<f64, Fa
     let near = |x: &bfree::tensor::Vector<f64, 2>| (x[0] - 0.525).abs() + (x[1] - 0.975).abs() < 1e-9;
     let probe = start.iter().position(near).ok_or("no particle at (0.525, 0.975)")?;
     let (mut largest, mut scale): (f64, f64) = (0.0, 0.0);
-    for row in table(reference) {
+    for row in rows(reference) {
         if row[0] > 0.0 {
             simulation.advance()?;
         }

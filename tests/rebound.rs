@@ -1,9 +1,12 @@
 //! The rebound of section 4.3 against an independent program (tests/reference/rebound_lme3.csv).
 
 mod support;
+#[path = "support/table.rs"]
+mod table;
 
 use bfree::simulation::Simulation;
-use support::{Failure, scene, table};
+use support::{Failure, scene};
+use table::rows;
 
 const REFERENCE: &str = include_str!("reference/rebound_lme3.csv");
 /// The energy at the start.
@@ -18,7 +21,7 @@ fn difference(overrides: &[&str], end: f64) -> Result<f64, Failure> {
     let mut simulation = scene::<2>("rebound.json", overrides)?;
     assert_eq!(simulation.particles.len(), 112);
     let mut largest: f64 = 0.0;
-    for row in table(REFERENCE).take_while(|row| row[0] < end + 0.025) {
+    for row in rows(REFERENCE).take_while(|row| row[0] < end + 0.025) {
         if row[0] > 0.0 {
             simulation.advance()?;
         }

@@ -1,0 +1,158 @@
+//! Moving walls, follower pressure, tractions: facts about loads on whole runs.
+
+use bfree::mechanics::loads::Pressing;
+use bfree::scene;
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use serde_json::json;
+use std::path::Path;
+
+type Failure = Box<dyn std::error::Error>;
+
+fn build<const D: usize>(scene: &serde_json::Value) -> Result<Simulation<D>, Failure> {
+    Ok(scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
+}
+
+/// A body that fills a box whose four faces all follow `table`.
+fn carried(table: &serde_json::Value, velocity: f64, step: f64) -> serde_json::Value {
+    let moving = json!({"velocity": table});
+    json!({
+        "grid": {"size": [2, 2], "spacing": 0.5},
+        "time": {"step": step, "end": 1},
+        "bodies": [{
+            "name": "load", "shape": {"box": {"min": [0, 0], "max": [2, 2]}}, "density": 1, "velocity": [velocity, 0],
+            "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}, "particles_per_cell": 2
+        }],
+        "boundary": {"left": moving, "right": moving, "bottom": moving, "top": moving}
+    })
+}
+
+#[test]
+fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<(), Failure> {
+    let v = 0.05;
+    let mut simulation: Simulation<2> = build(&carried(&json!([[0, [v, 0]]]), v, 0.02))?;
+    let start = simulation.particles.position.clone();
+    for _ in 0..50 {
+        simulation.advance()?;
+    }
+    for (x, x0) in simulation.particles.position.iter().zip(&start) {
+        assert!((x - x0 - Vector::from([v, 0.0])).amax() < 1e-12);
+    }
+    for velocity in &simulation.particles.velocity {
+        assert!((velocity - Vector::from([v, 0.0])).amax() < 1e-11, "v = {velocity}");
+    }
+    assert!(simulation.strain_energy() < 1e-20);
+    // No force, no work: round-off of the reactions, against the energy of the motion.
+    let work = simulation.external_work.abs();
+    assert!(work < 1e-9 * simulation.particles.kinetic_energy(), "work {work:e}");
+    Ok(())
+}
+
+#[test]
+fn accelerating_walls_take_the_body_along_and_their_work_is_its_energy() -> Result<(), Failure> {
+    // V(t) = 0.1 t: slow against waves that cross the box in 2/√3000 = 0.037.
+    let mut simulation: Simulation<2> = build(&carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01))?;
+    let mut reactions = Vector::zeros();
+    for _ in 0..100 {
+        reactions = simulation.advance()?.reactions.iter().sum();
+    }
+    let mass: f64 = simulation.particles.mass.iter().sum();
+    let mean = simulation.particles.momentum() / mass;
+    assert!((mean - Vector::from([0.1, 0.0])).amax() < 2e-3, "mean velocity {mean}");
+    for velocity in &simulation.particles.velocity {
+        assert!((velocity - Vector::from([0.1, 0.0])).amax() < 1e-2, "v = {velocity}");
+    }
+    // F = m a up to the ringing, and the work is the kinetic energy (the strain is of order 1e-8).
+    assert!((reactions[0] - 0.1 * mass).abs() < 0.05 * mass, "reactions {reactions}");
+    let kinetic = simulation.particles.kinetic_energy();
+    assert!((simulation.external_work - kinetic).abs() < 0.05 * kinetic, "{} {kinetic}", simulation.external_work);
+    Ok(())
+}
+
+/// A ring of radii 1 and 1.5 whose hole is under pressure.
+fn ring(spacing: f64, pressure: f64) -> serde_json::Value {
+    json!({
+        "grid": {"size": [4, 4], "spacing": spacing},
+        "time": {"step": 0.05, "end": 2, "beta": 0.5, "gamma": 0.9},
+        "bodies": [{
+            "name": "ring", "density": 1, "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}},
+            "shape": {"difference": {"of": {"ball": {"center": [2, 2], "radius": 1.5}},
+                                     "minus": {"ball": {"center": [2, 2], "radius": 1}}}},
+            "particles_per_cell": 2
+        }],
+        "pressures": [{"body": "ring", "pressure": pressure, "curve": [[0, 0], [1, 1]],
+                       "region": {"ball": {"center": [2, 2], "radius": 1.2}}}]
+    })
+}
+
+/// The mean radial displacement around r = 1.25, over Lamé's.
+fn inflation(spacing: f64) -> Result<f64, Failure> {
+    let pressure = 2.0;
+    let mut simulation: Simulation<2> = build(&ring(spacing, pressure))?;
+    let load = &simulation.loads.surface[0];
+    assert!(matches!(load.pressing, Pressing::Pressure(_)));
+    // The areas sum up to the circle through the loaded particles, half a particle spacing outside the hole.
+    let area: f64 = load.points.iter().map(|point| point.area).sum();
+    let circle = 2.0 * std::f64::consts::PI * (1.0 + 0.25 * spacing);
+    assert!((area / circle - 1.0).abs() < 0.05, "area {area} against {circle}");
+    let closed: Vector<f64, 2> = load.points.iter().map(|point| point.normal * point.area).sum();
+    assert!(closed.norm() < 1e-12 * area, "the surface is closed");
+    let start = simulation.particles.position.clone();
+    for _ in 0..40 {
+        simulation.advance()?;
+    }
+    assert!(simulation.particles.momentum().norm() < 1e-9, "a closed surface pushes nowhere");
+    assert!(simulation.external_work > 0.0);
+    // Lamé, plane strain, small strains: u(r) = p a² / (2G (b² − a²)) [ (1−2ν) r + b²/r ], here with ν = ¼.
+    let (a, b, shear, poisson) = (1.0_f64, 1.5_f64, 1000.0, 0.25);
+    let exact = |r: f64| pressure * a * a / (2.0 * shear * (b * b - a * a)) * ((1.0 - 2.0 * poisson) * r + b * b / r);
+    let center = Vector::from([2.0, 2.0]);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (x, x0) in simulation.particles.position.iter().zip(&start) {
+        let r = (x0 - center).norm();
+        if (1.2..1.3).contains(&r) {
+            sum += ((x - center).norm() - r) / exact(r);
+            count += 1.0;
+        }
+    }
+    Ok(sum / count)
+}
+
+#[test]
+fn follower_pressure_inflates_a_ring_and_tends_to_lame_s_solution() -> Result<(), Failure> {
+    // The load acts h/4 outside the hole and the ring is a staircase: both errors are of first order in h.
+    let (coarse, fine) = (inflation(0.1)? - 1.0, inflation(0.05)? - 1.0);
+    assert!(coarse.abs() < 0.15, "off Lamé's solution by {coarse}");
+    assert!(fine.abs() < 0.65 * coarse.abs(), "off by {coarse}, then by {fine} at half the spacing");
+    Ok(())
+}
+
+#[test]
+fn a_traction_pulls_a_bar_to_its_static_stretch() -> Result<(), Failure> {
+    // Uniaxial strain, P(F) = (Λ/2 + G)(F − 1/F) = T at rest.
+    // Small enough that the outermost particle, which carries all of it, does not break off.
+    let traction = 25.0;
+    let mut simulation: Simulation<1> = build(&json!({
+        "grid": {"size": [3], "spacing": 0.125},
+        "time": {"step": 0.05, "end": 20, "beta": 0.5, "gamma": 1.0},
+        "bodies": [{"name": "bar", "shape": {"box": {"min": [0], "max": [2]}}, "density": 1,
+                    "material": {"neo_hookean": {"lambda": 200, "shear": 150}}, "particles_per_cell": 2}],
+        "boundary": {"left": "fixed"},
+        "tractions": [{"body": "bar", "traction": [traction], "curve": [[0, 0], [2, 1]],
+                       "region": {"half_space": {"point": [1], "normal": [-1]}}}]
+    }))?;
+    assert_eq!(simulation.loads.surface[0].points.len(), 1);
+    assert_eq!(simulation.loads.surface[0].points[0].area, 1.0);
+    for _ in 0..400 {
+        simulation.advance()?;
+    }
+    // F − 1/F = t gives F = t/2 + √(1 + t²/4)
+    let t: f64 = traction / 250.0;
+    let stretch = 0.5 * t + (1.0 + 0.25 * t * t).sqrt();
+    for (x, h) in simulation.particles.position.iter().zip(&simulation.particles.displacement_gradient) {
+        if (0.3..1.8).contains(&x[0]) {
+            assert!((1.0 + h[(0, 0)] - stretch).abs() < 0.02 * stretch, "F = {} at {}", 1.0 + h[(0, 0)], x[0]);
+        }
+    }
+    Ok(())
+}

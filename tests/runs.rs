@@ -1,0 +1,116 @@
+//! Facts about whole runs: units, threads, failures.
+
+mod support;
+
+use bfree::simulation::{Simulation, StepError};
+use bfree::solver::NewtonSettings;
+use support::{Failure, scene};
+
+/// Everything a particle carries, as bits.
+fn bits<const D: usize>(simulation: &Simulation<D>) -> Vec<u64> {
+    let particles = &simulation.particles;
+    let vectors = particles.position.iter().chain(&particles.velocity).chain(&particles.acceleration);
+    let mut bits: Vec<u64> = vectors.flat_map(|x| x.iter().map(|x| x.to_bits())).collect();
+    bits.extend(particles.displacement_gradient.iter().flat_map(|h| h.iter().map(|x| x.to_bits())));
+    bits
+}
+
+#[test]
+fn powers_of_two_as_units_give_the_same_bits() -> Result<(), Failure> {
+    for exponent in [-30, 30] {
+        let [length, mass, time] = [2.0_f64.powi(exponent), 2.0_f64.powi(-exponent / 2), 2.0_f64.powi(exponent / 3)];
+        let reference = scene::<2>("compaction.json", &[])?;
+        let mut plain = reference.clone();
+        let mut scaled = reference;
+        // stress: mass / (length time²); density per area: mass / length³ of a unit thickness scaled with the rest
+        let stress = mass / (length * time * time);
+        scaled.grid.origin *= length;
+        scaled.grid.spacing *= length;
+        for body in &mut scaled.bodies {
+            let bfree::material::Material::NeoHookean(law) = &mut body.law else { return Err("another law".into()) };
+            law.lame.lambda *= stress;
+            law.lame.shear *= stress;
+            body.density *= mass / length.powi(3);
+        }
+        let particles = &mut scaled.particles;
+        particles.position.iter_mut().for_each(|x| *x *= length);
+        particles.velocity.iter_mut().for_each(|v| *v *= length / time);
+        particles.volume.iter_mut().for_each(|volume| *volume *= length * length);
+        particles.mass.iter_mut().for_each(|m| *m *= mass / length);
+        if let Some(gravity) = &mut scaled.loads.gravity {
+            gravity.acceleration *= length / (time * time);
+            gravity.curve = bfree::mechanics::loads::Curve::new(vec![[0.0, 0.0], [time, 1.0]])?;
+        }
+        scaled.clock = bfree::clock::Clock::new(0.01 * time, 10);
+        for _ in 0..60 {
+            plain.advance()?;
+            scaled.advance()?;
+        }
+        for (x, y) in plain.particles.position.iter().zip(&scaled.particles.position) {
+            assert_eq!(x.map(|x| (x * length).to_bits()), y.map(f64::to_bits));
+        }
+        for (v, w) in plain.particles.velocity.iter().zip(&scaled.particles.velocity) {
+            assert_eq!(v.map(|v| (v * (length / time)).to_bits()), w.map(f64::to_bits));
+        }
+        assert_eq!(plain.particles.displacement_gradient, scaled.particles.displacement_gradient);
+    }
+    Ok(())
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() -> Result<(), Failure> {
+    let run = |threads: usize| -> Result<Vec<u64>, Failure> {
+        let mut simulation = scene::<3>("ball_drop.json", &[])?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        pool.install(|| (0..4).try_for_each(|_| simulation.advance().map(|_| ())))?;
+        Ok(bits(&simulation))
+    };
+    let one = run(1)?;
+    assert_eq!(one, run(2)?);
+    assert_eq!(one, run(5)?);
+    Ok(())
+}
+
+#[test]
+fn a_step_that_fails_is_halved_and_leaves_the_particles_alone() -> Result<(), Failure> {
+    // Three Newton iterations are too few for a whole step of the hard impact, but not for a short one.
+    let mut simulation = scene::<2>("rebound_fast.json", &["time.step=0.2", "solver.newton.max_iterations=3"])?;
+    let mut halvings = 0;
+    while simulation.clock.time() < 6.0 {
+        let before = bits(&simulation);
+        let time = simulation.clock.time();
+        let mut attempt = simulation.clone();
+        if attempt.step().is_err() {
+            assert_eq!(bits(&attempt), before);
+            assert_eq!(attempt.clock.time(), time);
+        }
+        halvings += simulation.advance()?.halvings;
+    }
+    assert!(halvings > 0, "the test is meant to see a failing step");
+    Ok(())
+}
+
+#[test]
+fn a_run_that_cannot_go_on_says_why() -> Result<(), Failure> {
+    let mut simulation = scene::<2>("rebound_fast.json", &["time.max_halvings=2"])?;
+    simulation.settings.newton = NewtonSettings { max_iterations: 0, ..simulation.settings.newton };
+    let before = bits(&simulation);
+    assert!(matches!(simulation.advance(), Err(StepError::Newton(_))));
+    assert_eq!(bits(&simulation), before);
+    Ok(())
+}
+
+#[test]
+fn a_particle_that_leaves_the_grid_is_named() -> Result<(), Failure> {
+    let free = r#"boundary={"bottom":"sliding","top":"sliding"}"#;
+    let mut simulation = scene::<2>("rebound.json", &[free, "bodies.0.velocity=[-8,0]"])?;
+    let error = loop {
+        if let Err(error) = simulation.advance() {
+            break error;
+        }
+    };
+    let StepError::LeftGrid { particle, position } = &error else { return Err(error.into()) };
+    assert!(*particle < 112 && position[0] < 0.0, "{error}");
+    assert!(simulation.particles.position.iter().all(|x| simulation.grid.contains(x)));
+    Ok(())
+}
