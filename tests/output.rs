@@ -2,6 +2,7 @@
 
 use bfree::approximation::{Approximation, Linear};
 use bfree::clock::Clock;
+use bfree::field::Field;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
@@ -9,7 +10,7 @@ use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::output::plot::plot_run;
 use bfree::output::vtu::{Snapshot, Values};
-use bfree::output::{Field, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
+use bfree::output::{OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::NewtonSettings;

@@ -64,7 +64,7 @@ pub enum BuildError {
         /// The file.
         file: String,
         /// What is wrong.
-        source: ParticleFileError,
+        source: Box<ParticleFileError>,
     },
     /// A particle of a file that lies outside the grid.
     #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]
@@ -88,7 +88,7 @@ pub enum BuildError {
     #[error("initial_velocity: {source}")]
     InitialVelocity {
         /// What is wrong.
-        source: StepError,
+        source: Box<StepError>,
     },
 }
 
@@ -284,7 +284,7 @@ impl Scene {
                 let last = regions.iter().rev().find(|(region, _)| region.contains(x));
                 last.map_or_else(Vector::zeros, |(_, velocity)| *velocity)
             })
-            .map_err(|source| BuildError::InitialVelocity { source })
+            .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })
     }
 }
 
@@ -340,7 +340,7 @@ impl Body {
             let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
                 path: path.clone(),
                 file: place.display().to_string(),
-                source,
+                source: Box::new(source),
             })?;
             for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
                 if !grid.contains(x) {
