@@ -57,6 +57,9 @@ struct Run {
     /// Threads [default: all cores]. The results have the same bits for any number.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroU64>,
+    /// Compare the tangent with dual numbers every EVERY steps, and stop where they part.
+    #[arg(long, value_name = "EVERY", num_args = 0..=1, default_missing_value = "1")]
+    check_tangent: Option<NonZeroU64>,
     /// Show no progress and no summary.
     #[arg(long)]
     quiet: bool,
@@ -150,6 +153,7 @@ impl Run {
 
     fn execute_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
         let mut simulation = scene.build::<D>(self.scene.folder()).map_err(Failure::scene)?;
+        simulation.settings.check_tangent = self.check_tangent;
         let last = self.last_step(&simulation, scene.time.end);
         let directory = self.out.clone().unwrap_or_else(|| {
             Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))

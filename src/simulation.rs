@@ -4,6 +4,7 @@ use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{Law, Material};
+use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{SupportError, Supports};
@@ -14,6 +15,7 @@ use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
 use crate::solver::{LinearError, NewtonError, NewtonReport, NewtonSettings, newton};
 use crate::tensor::{Deformation, Vector};
+use std::num::NonZeroU64;
 
 /// Where Newton starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +40,8 @@ pub struct Settings {
     pub wall_update: WallUpdate,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
+    /// Compare the tangent with dual numbers at the end of every so many steps.
+    pub check_tangent: Option<NonZeroU64>,
 }
 
 /// An implicit material point simulation in `D` dimensions.
@@ -97,6 +101,9 @@ pub enum StepError {
     /// The state at the start of the step is impossible.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
+    /// The tangent is not the derivative of the residual.
+    #[error("the check of the tangent failed")]
+    Tangent(#[from] CheckError),
     /// A particle would leave the grid.
     #[error(
         "particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition"
@@ -134,6 +141,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &self.settings.newton)?;
         watch.lap(Phase::Newton);
+        self.check_tangent(&equilibrium, &dphi)?;
 
         let (reactions, work) = self.reactions_and_work(&equilibrium, t, &dphi)?;
         let moved = Moved::new(
@@ -231,6 +239,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             work += 0.5 * (f_end + f_start).dot(dphi);
         }
         Ok((reactions, work))
+    }
+
+    /// The check a run may ask for: the tangent at the solution against dual numbers, in a direction of its own for each step.
+    fn check_tangent(&self, equilibrium: &Equilibrium<'_, D, L>, dphi: &[Vector<f64, D>]) -> Result<(), StepError> {
+        match self.settings.check_tangent {
+            Some(every) if self.clock.steps().is_multiple_of(every.get()) => {
+                Ok(equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_inside(&self, positions: &[Vector<f64, D>]) -> Result<(), StepError> {

@@ -12,6 +12,7 @@ use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 use serde_json::Value;
+use std::num::NonZeroU64;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -58,6 +59,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
                 forcing: Forcing::Fixed(1e-13),
                 ..NewtonSettings::default()
             },
+            check_tangent: NonZeroU64::new(1),
         },
         clock: Clock::new(number(&reference["dt"]), 0),
         external_work: 0.0,

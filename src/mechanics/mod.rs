@@ -1,5 +1,6 @@
 //! The weak form: transfer, loads, residual, and the matrix-free tangent.
 
+pub mod check;
 pub mod loads;
 pub mod residual;
 pub mod sweep;

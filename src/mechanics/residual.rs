@@ -132,7 +132,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// V₀ F S F_nᵀ of particle `p`: times ∇_n N_I it is the internal force on node I.
     #[inline(always)]
-    fn internal<T: Real>(&self, p: usize, g: &Tensor<T, D>, carry: Carry) -> Result<Tensor<T, D>, Inadmissible> {
+    pub(crate) fn internal<T: Real>(
+        &self,
+        p: usize,
+        g: &Tensor<T, D>,
+        carry: Carry,
+    ) -> Result<Tensor<T, D>, Inadmissible> {
         let h_n = &self.particles.displacement_gradient[p];
         let h = compose(g, h_n);
         let f_left = identity::<T, D>() + h.map(|x| carried(x, carry.left));

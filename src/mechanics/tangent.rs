@@ -46,7 +46,6 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         u: &[Vector<f64, D>],
     ) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
         let mut out = vec![Vector::zeros(); u.len()];
-        let states = self.states(dphi)?;
         match term {
             Term::Inertia => {
                 self.add_lumped_inertia(u, &mut out);
@@ -58,22 +57,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
                 )?;
             }
             Term::Geometric | Term::Material => {
-                let delta_piola = |p: usize, delta_f: &Tensor<f64, D>| {
-                    let (law, at) = (self.law(p), &states[p]);
-                    match term {
-                        // δF S
-                        Term::Geometric => delta_f * law.stress(at),
-                        // F [ℂ : Fᵀ δF]
-                        _ => at.f * law.elasticity(at, &(at.f.transpose() * delta_f)),
-                    }
-                };
+                let states = self.states(dphi)?;
                 self.supports.assemble(
                     u,
                     &mut out,
-                    |p, _, l| {
-                        let f_n = self.f_n(p);
-                        Ok(scaled(&(delta_piola(p, &(l * f_n)) * f_n.transpose()), self.particles.volume[p]))
-                    },
+                    |p, _, l| Ok(self.particle_product(term, p, &states[p], &l)),
                     |stress, _, grad_n| stress * grad_n,
                 )?;
             }
@@ -84,6 +72,26 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             }
         }
         Ok(out)
+    }
+
+    /// V₀ δP F_nᵀ of one particle for the geometric or the material term, δF = L F_n.
+    pub(crate) fn particle_product(
+        &self,
+        term: Term,
+        p: usize,
+        at: &Deformation<f64, D>,
+        l: &Tensor<f64, D>,
+    ) -> Tensor<f64, D> {
+        let (law, f_n) = (self.law(p), self.f_n(p));
+        let delta_f = l * f_n;
+        let delta_piola = match term {
+            // δF S
+            Term::Geometric => delta_f * law.stress(at),
+            // F [ℂ : Fᵀ δF]
+            Term::Material => at.f * law.elasticity(at, &(at.f.transpose() * delta_f)),
+            Term::Inertia | Term::Pressure => Tensor::zeros(),
+        };
+        scaled(&(delta_piola * f_n.transpose()), self.particles.volume[p])
     }
 
     /// The same term by dual numbers through the residual: the derivative of R in the direction u.
@@ -107,7 +115,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 
     /// The deformation of every particle at Δφ.
-    fn states(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
+    pub(crate) fn states(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
         self.supports.interpolate(dphi, |p, _, g| {
             admissible(compose(&g, &self.particles.displacement_gradient[p]))
                 .map_err(|source| Inadmissible { particle: p, source })

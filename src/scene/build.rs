@@ -169,6 +169,7 @@ impl Scene {
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },
+            check_tangent: None,
         }
     }
 
