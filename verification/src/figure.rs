@@ -1,5 +1,6 @@
 //! A line chart as SVG.
 
+use crate::report::short;
 use plotters::prelude::*;
 use std::ops::Range;
 
@@ -30,7 +31,7 @@ impl Axis {
     }
 
     fn tick(&self, place: f64) -> String {
-        if self.logarithmic { format!("1e{place:.0}") } else { format!("{place}") }
+        if self.logarithmic { short(10.0_f64.powf(place)) } else { format!("{place}") }
     }
 }
 

@@ -9,8 +9,11 @@
 //! # Ok::<(), bfree::material::LameError>(())
 //! ```
 
+pub mod baseline;
 mod check;
 pub mod figure;
+pub mod forced;
+pub mod manufactured;
 pub mod prepared;
 pub mod random;
 pub mod report;

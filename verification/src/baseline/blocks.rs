@@ -128,7 +128,11 @@ impl<'a, const D: usize> BlockMatrix<'a, D> {
     pub fn iter(&self) -> impl Iterator<Item = (usize, usize, &Tensor<f64, D>)> {
         (0..self.pattern.rows()).flat_map(move |row| {
             let range = self.pattern.starts[row]..self.pattern.starts[row + 1];
-            self.pattern.row(row).iter().zip(&self.blocks[range]).map(move |(&column, block)| (row, column as usize, block))
+            self.pattern
+                .row(row)
+                .iter()
+                .zip(&self.blocks[range])
+                .map(move |(&column, block)| (row, column as usize, block))
         })
     }
 

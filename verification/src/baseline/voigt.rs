@@ -62,15 +62,14 @@ impl<const D: usize> Stiffness<D> for Voigt {
         let (moduli, stress) = (moduli(law, at, volume), scaled(&law.stress(at), volume));
         let b: Vec<_> = gradients.iter().map(|grad| strain_matrix(&at.f, grad)).collect();
         let d_b: Vec<_> = (b.iter())
-            .map(|b| {
-                SMatrix::<f64, MOST, D>::from_fn(|row, i| (0..count).map(|k| moduli[(row, k)] * b[(k, i)]).sum())
-            })
+            .map(|b| SMatrix::<f64, MOST, D>::from_fn(|row, i| (0..count).map(|k| moduli[(row, k)] * b[(k, i)]).sum()))
             .collect();
         let s_grad: Vec<_> = gradients.iter().map(|grad| stress * grad).collect();
         for (i, grad_i) in gradients.iter().enumerate() {
             for j in 0..gradients.len() {
                 // Only the rows that exist are multiplied.
-                let material = Tensor::<f64, D>::from_fn(|a, c| (0..count).map(|row| b[i][(row, a)] * d_b[j][(row, c)]).sum());
+                let material =
+                    Tensor::<f64, D>::from_fn(|a, c| (0..count).map(|row| b[i][(row, a)] * d_b[j][(row, c)]).sum());
                 add(i, j, material + scaled(&identity(), grad_i.dot(&s_grad[j])));
             }
         }

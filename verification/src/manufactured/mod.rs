@@ -61,8 +61,7 @@ pub fn body_force<M: Motion<D>, L: Law, const D: usize>(
     x: &Vector<f64, D>,
     t: f64,
 ) -> Vector<f64, D> {
-    let acceleration =
-        motion.displacement(&x.map(Dual2_64::from_re), Dual2_64::from_re(t).derivative()).map(|u| u.v2);
+    let acceleration = motion.displacement(&x.map(Dual2_64::from_re), Dual2_64::from_re(t).derivative()).map(|u| u.v2);
     let mut divergence = Vector::<f64, D>::zeros();
     for k in 0..D {
         // (DIV P)_i = Σ_k ∂P_ik/∂X_k
@@ -90,11 +89,13 @@ mod tests {
             let (tau, omega) = (std::f64::consts::TAU, motion.frequency);
             let s = [(omega * t).sin(), -(omega * t).sin()];
             let place = [x, y];
-            let stretch: [f64; 2] = std::array::from_fn(|i| 1.0 + motion.amplitude * tau * (tau * place[i]).cos() * s[i]);
+            let stretch: [f64; 2] =
+                std::array::from_fn(|i| 1.0 + motion.amplitude * tau * (tau * place[i]).cos() * s[i]);
             for i in 0..2 {
                 let (f, other) = (stretch[i], stretch[1 - i]);
                 // P_ii = Λ/2 (f²o² − 1)/f + G (f − 1/f)
-                let stiffness = 0.5 * lame.lambda * (other * other + 1.0 / (f * f)) + lame.shear * (1.0 + 1.0 / (f * f));
+                let stiffness =
+                    0.5 * lame.lambda * (other * other + 1.0 / (f * f)) + lame.shear * (1.0 + 1.0 / (f * f));
                 let slope = -motion.amplitude * tau * tau * (tau * place[i]).sin() * s[i];
                 let acceleration = -omega * omega * motion.amplitude * (tau * place[i]).sin() * s[i];
                 let expected = acceleration - stiffness * slope / density;

@@ -89,6 +89,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             }
             points.push((dt, lost));
         }
+        let points = points.into_iter().map(|(dt, lost)| (1.0 / dt, lost)).collect();
         lines.push(Line { name: format!("{name} wall update"), points });
     }
 
@@ -137,7 +138,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let figure = Figure {
         name: "order".into(),
         title: "Rebound: energy lost in the first impact (eps = 1)".into(),
-        x: Axis::logarithmic("time step"),
+        x: Axis::logarithmic("steps per unit of time, 1/dt"),
         y: Axis::logarithmic("energy lost, of 3.5"),
         lines,
     };

@@ -1,6 +1,7 @@
 //! What holds for any layout of particles: affine motion, rigid motion, momentum; and what does not.
 
 use super::{Effort, Outcome, StudyError};
+use crate::check_approximation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::table::Table;
@@ -41,10 +42,16 @@ fn families() -> [(&'static str, Approximation); 7] {
     ]
 }
 
-/// Runs the study. That N is a partition of unity, consistent to first order, with the right gradients, is checked place by place by
-/// [`crate::check_approximation`], in the study of the shape functions.
+/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut affine = Report::new("affine motion, random layouts with points on nodes, faces, walls and corners", &["quantity", "shape", "D"]);
+    let mut shapes = Report::new("shape functions, worst place", &["quantity", "D", "place", "shape"]).as_matrix(&[0, 1], 3, 2);
+    for (name, shape) in &families() {
+        for cell in check_approximation(shape).cells() {
+            let labels: Vec<&str> = cell.labels.iter().map(String::as_str).chain([*name]).collect();
+            shapes.push(&labels, cell.value, cell.bound);
+        }
+    }
     let mut imbalance = Table::new(
         "force of a uniform stress on inner nodes over the sum of its magnitudes (exact equilibrium is 0)",
         ["shape", "D", "regular", "jittered", "random"],
@@ -87,7 +94,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
          With eps = 0 that sum vanishes by first-order consistency, and the drift with dt."
             .into(),
     ];
-    Ok(Outcome { reports: vec![affine, rigid, momentum], tables: vec![imbalance, angular], remarks, ..Outcome::default() })
+    Ok(Outcome { reports: vec![shapes, affine, rigid, momentum], tables: vec![imbalance, angular], remarks, ..Outcome::default() })
 }
 
 /// The grid of the patch; its spacing is a power of two so that points on nodes are exact.
