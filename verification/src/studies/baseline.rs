@@ -41,7 +41,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             "the tangent of one step (bytes and seconds; times are the best of several)",
             [
                 "case", "law", "particles", "unknowns", "blocks", "MB free", "MB matrix", "ratio", "s pattern", "s B-free", "s Voigt",
-                "s freeze", "s K u free", "s K u matrix",
+                "s freeze", "s K u free", "s K u matrix", "products to pay",
             ],
         ),
         solves: Table::new(
@@ -66,6 +66,11 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         "MB free: shape functions and frozen point tangents, all that the matrix-free product reads; MB matrix: blocks and pattern.".into(),
         "s freeze is what the matrix-free tangent costs instead of the assembly, its preconditioner's blocks included.".into(),
     ];
+    remarks.push(
+        "Products to pay: how many products of one tangent it takes until the faster product of the matrix has paid for its assembly \
+         (a Newton iteration takes about ten to sixty)."
+            .into(),
+    );
     if !cfg!(feature = "direct") {
         remarks.push("The sparse direct solve needs `--features direct` (faer takes a minute to build).".into());
     }
@@ -143,6 +148,7 @@ impl Study {
             seconds(freeze_seconds),
             seconds(free_seconds),
             seconds(matrix_seconds),
+            format!("{:.0}", ((pattern_seconds + b_free_seconds - freeze_seconds) / (free_seconds - matrix_seconds)).max(0.0)),
         ]);
         if matches!(law, Material::NeoHookean(_)) {
             self.solve(&case, &equilibrium, &dphi, &b_free)?;

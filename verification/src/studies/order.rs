@@ -28,6 +28,9 @@ const BY_LUMPING: [(f64, Option<f64>); 4] = [(1.0, Some(3.038)), (0.5, Some(3.12
 /// That program uses the circle of nodes, and its numbers are rounded to 5e-4.
 const AGREEMENT: f64 = 2e-3;
 
+/// The two readings of Algorithm 1 at a resting wall.
+const WALLS: [(WallUpdate, &str); 2] = [(WallUpdate::Literal, "literal"), (WallUpdate::Consistent, "consistent")];
+
 /// One run.
 struct Run {
     energy: f64,
@@ -60,7 +63,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         Effort::Short => &BY_STEP[1..4],
         Effort::Full => &BY_STEP[..],
     };
-    for (walls, name) in [(WallUpdate::Literal, "literal"), (WallUpdate::Consistent, "consistent")] {
+    for (walls, name) in WALLS {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for &(dt, expected) in steps {
             let run = rebound(&[circle.clone(), format!("time.step={dt}")], walls)?;
@@ -85,7 +88,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             // An undamped method and a passive wall: energy is lost, never gained.
             report.push(&["energy lost", &label, name], lost, Bound::Between(0.0, ENERGY));
             if let Some(&(_, before)) = points.last() {
-                report.push(&["lost / lost at the longer step", &label, name], lost / before, Bound::AtMost(1.0));
+                // Read literally, Algorithm 1 loses less with every refinement; made consistent, it has a limit in space.
+                let bound = if walls == WallUpdate::Literal { Bound::AtMost(0.8) } else { Bound::Reported };
+                report.push(&["lost / lost at twice the step", &label, name], lost / before, bound);
             }
             points.push((dt, lost));
         }
@@ -94,7 +99,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     }
 
     let mut by_lumping = Table::new("energy lost of 3.5 against eps (dt = 0.05)", ["eps", "walls", "energy", "lost", "Newton"]);
-    for (walls, name) in [(WallUpdate::Literal, "literal"), (WallUpdate::Consistent, "consistent")] {
+    for (walls, name) in WALLS {
         for &(lumping, expected) in &BY_LUMPING {
             if *effort == Effort::Short && (walls != WallUpdate::Literal || lumping == 1.0 || expected.is_none()) {
                 continue;
@@ -119,19 +124,23 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
 
     let mut tables = vec![by_step, by_lumping];
     if *effort == Effort::Full {
-        // In space: the particles refined with the grid; the time step fixed, then in proportion to h.
-        let mut by_spacing = Table::new("energy lost of 3.5 against h (eps = 1)", ["h", "dt", "energy", "lost", "Newton"]);
-        for (h, dt) in [(0.5, 0.05), (0.25, 0.05), (0.25, 0.025), (0.125, 0.0125)] {
-            let run = rebound(&[format!("grid.spacing={h}"), format!("time.step={dt}")], WallUpdate::Literal)?;
-            let lost = ENERGY - run.energy;
-            report.push(&["energy lost", &format!("h = {h}, dt = {dt}"), "literal"], lost, Bound::Between(0.0, ENERGY));
-            by_spacing.push([
-                format!("{h}"),
-                format!("{dt}"),
-                format!("{:.4}", run.energy),
-                format!("{lost:.4}"),
-                run.iterations.to_string(),
-            ]);
+        // The particles are refined with the grid.
+        let header = ["h", "dt", "walls", "energy", "lost", "Newton"];
+        let mut by_spacing = Table::new("energy lost of 3.5 against h (eps = 1)", header);
+        for (walls, name) in WALLS {
+            for (h, dt) in [(0.5, 0.05), (0.25, 0.05), (0.25, 0.025), (0.125, 0.0125)] {
+                let run = rebound(&[format!("grid.spacing={h}"), format!("time.step={dt}")], walls)?;
+                let lost = ENERGY - run.energy;
+                report.push(&["energy lost", &format!("h = {h}, dt = {dt}"), name], lost, Bound::Between(0.0, ENERGY));
+                by_spacing.push([
+                    format!("{h}"),
+                    format!("{dt}"),
+                    name.into(),
+                    format!("{:.4}", run.energy),
+                    format!("{lost:.4}"),
+                    run.iterations.to_string(),
+                ]);
+            }
         }
         tables.push(by_spacing);
     }
@@ -143,9 +152,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         lines,
     };
     let remarks = vec![
-        "Newmark's rule alone would lose O(dt^2). What is lost here goes with every projection: each step filters the velocity near the \
-         wall by the lumped mass once, and halving dt doubles the number of filterings while halving what each one sees; with eps -> 0 \
-         the filter vanishes."
+        "Newmark's rule alone loses O(dt^2). With the literal update the loss keeps falling with dt, at an order of 0.45 to 0.7; with the \
+         consistent one it falls to a limit that dt no longer moves: there the velocity that the wall takes from its nodes is taken \
+         from the particles at once, an error in space. Both fall with eps and h."
             .into(),
     ];
     Ok(Outcome { reports: vec![report], tables, remarks, figures: vec![figure] })
