@@ -26,10 +26,13 @@ pub struct Axis {
 
 impl Axis {
     /// `x` in units of the spacing, from node 0; `None` outside the axis (or if `x` is not a number).
+    ///
+    /// The upper end is where the last node is: rounding in (x − origin)/h does not push it out.
     #[inline]
     pub fn local(&self, x: f64) -> Option<f64> {
-        let s = (x - self.origin) / self.spacing;
-        (s >= 0.0 && s <= f64::from(self.cells)).then_some(s)
+        let cells = f64::from(self.cells);
+        let inside = x >= self.origin && x <= self.origin + cells * self.spacing;
+        inside.then(|| ((x - self.origin) / self.spacing).min(cells))
     }
 
     /// Last node of the axis.
@@ -84,8 +87,33 @@ impl<const D: usize> Grid<D> {
     pub fn cell(&self, x: &Vector<f64, D>) -> Option<[u32; D]> {
         let mut cell = [0; D];
         for k in 0..D {
-            cell[k] = (self.axis(k).local(x[k])? as u32).min(self.cells[k] - 1);
+            cell[k] = (self.axis(k).local(x[k])? as u32).min(self.cells[k].saturating_sub(1));
         }
         Some(cell)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_node_lies_in_the_box_whatever_the_rounding() {
+        for cells in 1..200 {
+            for tenths in 0..20 {
+                let origin = f64::from(tenths) * 0.1;
+                let grid = Grid { origin: Vector::from([origin]), spacing: 0.1, cells: [cells] };
+                assert!(grid.contains(&grid.position([cells])), "{cells} cells from {origin}");
+                assert_eq!(grid.cell(&grid.position([cells])), Some([cells - 1]));
+            }
+        }
+    }
+
+    #[test]
+    fn ids_and_indices_are_inverse_to_each_other() {
+        let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [4, 2, 3] };
+        for id in 0..grid.node_count() {
+            assert_eq!(grid.id(grid.index(id)), id);
+        }
     }
 }

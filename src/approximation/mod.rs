@@ -5,7 +5,7 @@
 //! the user's unit of length, values have none, gradients are per length.
 //!
 //! ```
-//! use bfree::approximation::{Approximation, Lme, Scratch, ShapeFunction, Support};
+//! use bfree::approximation::{Approximation, Lme, Scratch, ShapeFunction, Support, Validate};
 //! use bfree::grid::Grid;
 //! use bfree::tensor::Vector;
 //!

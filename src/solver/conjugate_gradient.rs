@@ -63,7 +63,8 @@ pub fn conjugate_gradient<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized
     let mut r_norm = b_norm;
     loop {
         let allowed = settings.max_iterations - report.iterations.min(settings.max_iterations);
-        let run = descend(operator, preconditioner, &mut r, r_norm, target, solution, allowed, report.iterations)?;
+        let run = descend(operator, preconditioner, &mut r, r_norm, target, solution, allowed)
+            .map_err(|error| error.after(report.iterations))?;
         report.iterations += run.iterations;
         report.products += run.products + 1;
         finite(norm(solution), "the norm of the solution", report.iterations)?;
@@ -92,9 +93,7 @@ struct Run {
     products: usize,
 }
 
-/// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`. `before` counts earlier
-/// iterations, for errors.
-#[allow(clippy::too_many_arguments)]
+/// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`.
 fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     operator: &A,
     preconditioner: &M,
@@ -103,7 +102,6 @@ fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     target: f64,
     solution: &mut [f64],
     allowed: usize,
-    before: usize,
 ) -> Result<Run, LinearError> {
     let n = r.len();
     let mut x = solution.to_vec();
@@ -118,7 +116,7 @@ fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     let mut run = Run { outcome: LinearOutcome::Converged, iterations: 0, products: 0 };
     let stop = |outcome, run: Run| Ok(Run { outcome, ..run });
     loop {
-        let at = before + run.iterations;
+        let at = run.iterations;
         if run.iterations >= allowed {
             return stop(LinearOutcome::IterationLimit, run);
         }

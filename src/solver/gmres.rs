@@ -77,15 +77,8 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
             return Ok(report);
         }
         let length = restart.min(settings.max_iterations - report.iterations);
-        let taken =
-            cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction).map_err(
-                |error| match error {
-                    LinearError::NotFinite { what, iteration } => {
-                        LinearError::NotFinite { what, iteration: iteration + report.iterations }
-                    }
-                    other => other,
-                },
-            )?;
+        let taken = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
+            .map_err(|error| error.after(report.iterations))?;
         report.iterations += taken;
         report.products += taken + 1;
         trial.copy_from_slice(solution);

@@ -129,6 +129,16 @@ pub enum LinearError {
     },
 }
 
+impl LinearError {
+    /// The same error with `earlier` iterations counted before it.
+    fn after(self, earlier: usize) -> Self {
+        match self {
+            Self::NotFinite { what, iteration } => Self::NotFinite { what, iteration: iteration + earlier },
+            other => other,
+        }
+    }
+}
+
 /// A setting outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {value:e}; it must be {allowed}")]

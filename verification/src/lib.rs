@@ -14,6 +14,7 @@ pub mod figure;
 pub mod prepared;
 pub mod random;
 pub mod report;
+pub mod shipped;
 pub mod studies;
 pub mod table;
 

@@ -258,7 +258,7 @@ impl ShapeFunction for LmeCircle {
         };
         let lambda = dual.minimize(start, NEWTON_STEPS).ok_or_else(|| failed(&start))?;
         let Moments { log_z, r, j } = dual.moments(&lambda);
-        if determinant(&j) <= 0.0 {
+        if solve(&j, &r).is_none() {
             return Err(failed(&lambda));
         }
 

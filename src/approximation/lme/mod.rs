@@ -23,7 +23,7 @@ fn validate(gamma: f64, tolerance: f64) -> Result<(), ApproximationError> {
     if !(gamma > 0.0 && gamma.is_finite()) {
         return Err(ApproximationError::Gamma { gamma });
     }
-    if !(tolerance >= SMALLEST_TOLERANCE && tolerance < 1.0) {
+    if !(SMALLEST_TOLERANCE..1.0).contains(&tolerance) {
         return Err(ApproximationError::Tolerance { tolerance });
     }
     Ok(())

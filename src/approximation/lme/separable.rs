@@ -26,7 +26,8 @@ use crate::grid::Axis;
 /// ```
 ///
 /// f increases with a slope of at least 1, so that |μ* − μ| ≤ |f(μ)|: one evaluation gives a bracket, and Newton kept in
-/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: three to five iterations.
+/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: one to three evaluations of f inside a body of
+/// nodes, at most five near a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lme {
     gamma: f64,

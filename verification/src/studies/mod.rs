@@ -58,4 +58,4 @@ macro_rules! studies {
     };
 }
 
-studies!(tangent);
+studies!(tangent, taylor, newton);

@@ -1,0 +1,186 @@
+//! Conditions at the faces of the box and prescribed motion inside of it.
+
+use super::check::{Number, Problems};
+use super::shape::Shape;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the nodes of each face of the box may do. Faces that the dimension lacks must not be named.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Boundary {
+    /// The face at the lower end of x. Default: free.
+    pub left: Option<Face>,
+    /// The face at the upper end of x. Default: free.
+    pub right: Option<Face>,
+    /// The face at the lower end of y. Default: free.
+    pub bottom: Option<Face>,
+    /// The face at the upper end of y. Default: free.
+    pub top: Option<Face>,
+    /// The face at the lower end of z. Default: free.
+    pub back: Option<Face>,
+    /// The face at the upper end of z. Default: free.
+    pub front: Option<Face>,
+}
+
+/// What the nodes of a face may do.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Face {
+    /// Move freely.
+    Free,
+    /// Slide: the normal component is held.
+    Sliding,
+    /// Not move.
+    Fixed,
+    /// Per component: `true` is held, `false` is free.
+    Held(Vec<bool>),
+    /// Follow a table of displacements since t = 0 (length); constant after the last row.
+    Displacement(Table),
+    /// Follow a table of velocities; constant after the last row.
+    Velocity(Table),
+}
+
+/// A motion: rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Table(pub Vec<Row>);
+
+/// One row of a table: a time, and at that time the components that are prescribed.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+pub struct Row(pub f64, pub Vec<Option<f64>>);
+
+/// Motion of the nodes inside a region, given by either a displacement or a velocity.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Prescribed {
+    /// The region; the nodes that lie in it at t = 0 are meant.
+    pub region: Shape,
+    /// A table of displacements since t = 0 (length); constant after the last row.
+    pub displacement: Option<Table>,
+    /// A table of velocities; constant after the last row.
+    pub velocity: Option<Table>,
+}
+
+/// What a table holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Quantity {
+    Displacement,
+    Velocity,
+}
+
+impl Boundary {
+    /// The condition at the lower (`false`) or upper (`true`) face of an axis.
+    pub fn face(&self, axis: usize, upper: bool) -> &Face {
+        let face = match (axis, upper) {
+            (0, false) => &self.left,
+            (0, true) => &self.right,
+            (1, false) => &self.bottom,
+            (1, true) => &self.top,
+            (_, false) => &self.back,
+            (_, true) => &self.front,
+        };
+        face.as_ref().unwrap_or(&Face::Free)
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, dimension: usize) {
+        let faces = [
+            ("left", &self.left),
+            ("right", &self.right),
+            ("bottom", &self.bottom),
+            ("top", &self.top),
+            ("back", &self.back),
+            ("front", &self.front),
+        ];
+        for (i, (name, face)) in faces.into_iter().enumerate() {
+            let Some(face) = face else { continue };
+            let path = format!("boundary.{name}");
+            if i / 2 >= dimension {
+                let allowed = format!("a grid of {dimension} dimension(s) has no such face");
+                problems.refuse(&path, "a condition", allowed);
+                continue;
+            }
+            match face {
+                Face::Free | Face::Sliding | Face::Fixed => {}
+                Face::Held(held) => {
+                    problems.length(&format!("{path}.held"), held.len(), dimension);
+                }
+                Face::Displacement(table) => {
+                    table.check(problems, &format!("{path}.displacement"), dimension, Quantity::Displacement);
+                }
+                Face::Velocity(table) => {
+                    table.check(problems, &format!("{path}.velocity"), dimension, Quantity::Velocity);
+                }
+            }
+        }
+    }
+}
+
+impl Prescribed {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        self.region.check(problems, &format!("{path}.region"), dimension);
+        match (&self.displacement, &self.velocity) {
+            (Some(table), None) => {
+                table.check(problems, &format!("{path}.displacement"), dimension, Quantity::Displacement);
+            }
+            (None, Some(table)) => table.check(problems, &format!("{path}.velocity"), dimension, Quantity::Velocity),
+            (Some(_), Some(_)) => {
+                problems.refuse(path, "both displacement and velocity", "must have exactly one of the two");
+            }
+            (None, None) => {
+                problems.refuse(path, "neither displacement nor velocity", "must have exactly one of the two");
+            }
+        }
+    }
+}
+
+impl Table {
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize, quantity: Quantity) {
+        check_times(problems, path, self.0.iter().map(|row| row.0));
+        let Some(first) = self.0.first() else { return };
+        if first.0 != 0.0 {
+            problems.refuse(
+                &format!("{path}[0][0]"),
+                Number(first.0),
+                "must be 0: the table starts with the simulation",
+            );
+        }
+        for (i, Row(_, row)) in self.0.iter().enumerate() {
+            let right_length = problems.length(&format!("{path}[{i}][1]"), row.len(), dimension);
+            for (k, component) in row.iter().enumerate().filter(|_| right_length) {
+                let path = format!("{path}[{i}][1][{k}]");
+                if let Some(x) = component {
+                    problems.number(&path, *x);
+                }
+                let as_first = first.1.get(k).is_none_or(|start| start.is_some() == component.is_some());
+                let found = component.map_or("null".to_owned(), |x| Number(x).to_string());
+                problems.require(as_first, &path, found, "a component must be null in every row or in none");
+            }
+        }
+        if first.1.iter().all(Option::is_none) {
+            problems.refuse(&format!("{path}[0][1]"), "a row without numbers", "must prescribe at least one component");
+        }
+        for (k, start) in first.1.iter().enumerate() {
+            let Some(start) = start.filter(|start| quantity == Quantity::Displacement && *start != 0.0) else {
+                continue;
+            };
+            let allowed = "must be 0: displacements are counted from the start";
+            problems.refuse(&format!("{path}[0][1][{k}]"), Number(start), allowed);
+        }
+    }
+}
+
+/// Times of a table or curve: at least one, finite and increasing.
+pub(super) fn check_times(problems: &mut Problems, path: &str, times: impl Iterator<Item = f64>) {
+    let mut last: Option<f64> = None;
+    for (i, t) in times.enumerate() {
+        let path = format!("{path}[{i}][0]");
+        problems.number(&path, t);
+        if let Some(last) = last.filter(|last| t <= *last) {
+            let allowed = format!("must be later than the row before, {}", Number(last));
+            problems.refuse(&path, Number(t), allowed);
+        }
+        last = Some(t);
+    }
+    problems.require(last.is_some(), path, "an empty list", "must have at least one row");
+}

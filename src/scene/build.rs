@@ -1,0 +1,407 @@
+//! From a checked scene to a simulation. The dimension becomes a type here and nowhere else: see [`Scene::dimension`].
+
+use super::body::{Body, Material};
+use super::boundary::{Face, Table};
+use super::particle_file::{self, ParticleFileError};
+use super::solver::{Forcing, Method};
+use super::{Scene, approximation, load, time};
+use crate::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use crate::clock::Clock;
+use crate::grid::Grid;
+use crate::material::{LameError, NeoHookean, StVenantKirchhoff};
+use crate::mechanics::loads::{
+    Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
+};
+use crate::mechanics::time::Newmark;
+use crate::mechanics::transfer::WallUpdate;
+use crate::particles::{self, Particles};
+use crate::shape::{FillError, Shape, fill};
+use crate::simulation::{InitialGuess, Settings, Simulation, StepError};
+use crate::solver::{self, NewtonSettings};
+use crate::tensor::Vector;
+use std::path::Path;
+
+/// Why a checked scene still gives no simulation.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The scene was not checked, or is of another dimension.
+    #[error("{path}: does not fit {dimension} dimensions")]
+    Dimension {
+        /// The key.
+        path: String,
+        /// The dimension asked for.
+        dimension: usize,
+    },
+    /// The constants of a law.
+    #[error("{path}: {source}")]
+    Material {
+        /// The key.
+        path: String,
+        /// What is wrong.
+        source: LameError,
+    },
+    /// A curve or table.
+    #[error("{path}: {source}")]
+    Curve {
+        /// The key.
+        path: String,
+        /// What is wrong.
+        source: CurveError,
+    },
+    /// A shape without particles, or with too many.
+    #[error("{path}: {source}")]
+    Fill {
+        /// The key.
+        path: String,
+        /// What is wrong.
+        source: FillError,
+    },
+    /// A particle file.
+    #[error("{path}: {file}: {source}")]
+    ParticleFile {
+        /// The key.
+        path: String,
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: ParticleFileError,
+    },
+    /// A particle of a file that lies outside the grid.
+    #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]
+    Outside {
+        /// The key.
+        path: String,
+        /// Its number in the file, from 1.
+        particle: usize,
+        /// Where it lies.
+        position: Vec<f64>,
+    },
+    /// A surface load that finds no particles.
+    #[error("{path}: no particle of body {body:?} lies on the loaded surface; enlarge the region or remove the load")]
+    NoSurface {
+        /// The key.
+        path: String,
+        /// The body.
+        body: String,
+    },
+    /// The initial velocity could not be interpolated.
+    #[error("initial_velocity: {source}")]
+    InitialVelocity {
+        /// What is wrong.
+        source: StepError,
+    },
+}
+
+impl Scene {
+    /// 1 (uniaxial strain), 2 (plane strain) or 3.
+    pub fn dimension(&self) -> usize {
+        self.grid.dimension()
+    }
+
+    /// The simulation at t = 0. Particle files are looked for in `folder`.
+    ///
+    /// # Errors
+    /// What only shows once particles are there; and any scene whose dimension is not `D`.
+    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Simulation<D>, BuildError> {
+        let grid: Grid<D> =
+            self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
+        let mut particles = Particles::default();
+        let mut bodies = Vec::new();
+        for (i, body) in self.bodies.iter().enumerate() {
+            let path = format!("bodies[{i}]");
+            body.fill(&path, folder, &grid, i as u32, &mut particles)?;
+            bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
+        }
+        let loads = self.loads(&grid, &particles)?;
+        let mut simulation = Simulation {
+            grid,
+            approximation: self.shape_functions(),
+            bodies,
+            particles,
+            loads,
+            settings: self.settings(),
+            clock: Clock::new(self.time.step, self.time.max_halvings),
+            external_work: 0.0,
+        };
+        self.set_initial_velocity(&mut simulation)?;
+        Ok(simulation)
+    }
+
+    fn shape_functions(&self) -> Approximation {
+        match &self.approximation {
+            approximation::Approximation::Linear => Linear.into(),
+            approximation::Approximation::Gimp => {
+                Gimp::particles_per_axis(self.bodies.first().map_or(2, |body| body.particles_per_cell)).into()
+            }
+            approximation::Approximation::Bspline(spline) if spline.degree == 2 => Bspline::Quadratic.into(),
+            approximation::Approximation::Bspline(_) => Bspline::Cubic.into(),
+            approximation::Approximation::Lme(lme) => match lme.support {
+                approximation::Support::Separable => Lme::new(lme.gamma, lme.tolerance).into(),
+                approximation::Support::Circle => LmeCircle::new(lme.gamma, lme.tolerance).into(),
+            },
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
+        Settings {
+            newmark: Newmark { beta: self.time.beta, gamma: self.time.gamma },
+            lumping: self.time.lumping,
+            initial_guess: match self.time.initial_guess {
+                time::InitialGuess::Zero => InitialGuess::Zero,
+                time::InitialGuess::Velocity => InitialGuess::Velocity,
+            },
+            wall_update: match self.time.wall_update {
+                time::WallUpdate::Literal => WallUpdate::Literal,
+                time::WallUpdate::Consistent => WallUpdate::Consistent,
+            },
+            newton: NewtonSettings {
+                relative_tolerance: newton.tolerance,
+                max_iterations: newton.max_iterations as usize,
+                forcing: match krylov.forcing {
+                    Forcing::Fixed(tolerance) => solver::Forcing::Fixed(tolerance),
+                    Forcing::EisenstatWalker => solver::Forcing::EisenstatWalker,
+                },
+                krylov: match &krylov.method {
+                    Method::Gmres(gmres) => solver::Krylov::Gmres { restart: gmres.restart as usize },
+                    Method::ConjugateGradient => solver::Krylov::ConjugateGradient,
+                },
+                max_krylov_iterations: krylov.max_iterations as usize,
+                ..NewtonSettings::default()
+            },
+        }
+    }
+
+    fn loads<const D: usize>(&self, grid: &Grid<D>, particles: &Particles<D>) -> Result<Loads<D>, BuildError> {
+        let mut loads = Loads::default();
+        if let Some(gravity) = &self.gravity {
+            loads.gravity = Some(Gravity {
+                acceleration: vector("gravity.acceleration", &gravity.acceleration)?,
+                curve: curve("gravity.curve", gravity.curve.as_ref())?,
+            });
+        }
+        for axis in 0..D {
+            for upper in [false, true] {
+                let name = FACES[axis][usize::from(upper)];
+                let motion = self.boundary.face(axis, upper).motion::<D>(&format!("boundary.{name}"), axis)?;
+                if motion.iter().any(Option::is_some) {
+                    loads.prescribed.push(Prescribed {
+                        name: name.into(),
+                        on: Selection::Face { axis, upper },
+                        motion,
+                    });
+                }
+            }
+        }
+        for (i, prescribed) in self.prescribed.iter().enumerate() {
+            let path = format!("prescribed[{i}]");
+            let region = prescribed.region.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let motion = match (&prescribed.displacement, &prescribed.velocity) {
+                (Some(table), _) => table.motion(&format!("{path}.displacement"), Motion::Displacement)?,
+                (None, Some(table)) => table.motion(&format!("{path}.velocity"), Motion::Velocity)?,
+                (None, None) => std::array::from_fn(|_| None),
+            };
+            loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });
+        }
+        for (i, traction) in self.tractions.iter().enumerate() {
+            let path = format!("tractions[{i}]");
+            let pressing = Pressing::Traction(vector(&format!("{path}.traction"), &traction.traction)?);
+            let curve = curve(&format!("{path}.curve"), traction.curve.as_ref())?;
+            let on = SurfaceOf { body: &traction.body, region: &traction.region, given: &traction.surface };
+            let points = self.surface(&path, &on, grid, particles)?;
+            loads.surface.push(SurfaceLoad { pressing, curve, points });
+        }
+        for (i, pressure) in self.pressures.iter().enumerate() {
+            let path = format!("pressures[{i}]");
+            let curve = curve(&format!("{path}.curve"), pressure.curve.as_ref())?;
+            let on = SurfaceOf { body: &pressure.body, region: &pressure.region, given: &pressure.surface };
+            let points = self.surface(&path, &on, grid, particles)?;
+            loads.surface.push(SurfaceLoad { pressing: Pressing::Pressure(pressure.pressure), curve, points });
+        }
+        Ok(loads)
+    }
+
+    /// The particles of a body that stand for its surface: those less than one particle spacing s below it, each for the area
+    /// V₀/s, with the normal of the nearest point of the surface.
+    fn surface<const D: usize>(
+        &self,
+        path: &str,
+        on: &SurfaceOf<'_>,
+        grid: &Grid<D>,
+        particles: &Particles<D>,
+    ) -> Result<Vec<SurfacePoint<D>>, BuildError> {
+        let region = match on.region {
+            Some(region) => Some(region.build::<D>().ok_or_else(|| dimension::<D>(path))?),
+            None => None,
+        };
+        let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
+            return Err(dimension::<D>(path));
+        };
+        let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
+        let spacing = grid.spacing / f64::from(body.particles_per_cell);
+        let given = match on.given {
+            Some(given) => {
+                Some((vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize(), given.area))
+            }
+            None => None,
+        };
+        let mut points = Vec::new();
+        for particle in 0..particles.len() {
+            let x = &particles.position[particle];
+            let elsewhere = region.as_ref().is_some_and(|region| !region.contains(x));
+            if particles.body[particle] as usize != number || elsewhere {
+                continue;
+            }
+            let near = shape.as_ref().map(|shape| shape.distance_and_normal(x));
+            let too_deep = near.is_some_and(|(distance, _)| distance <= -spacing * (1.0 - 1e-9));
+            let offset = near.map_or(0.0, |(distance, _)| -distance);
+            match (given, near) {
+                _ if too_deep => {}
+                (Some((normal, area)), _) => points.push(SurfacePoint { particle, normal, area, offset }),
+                (None, Some((_, normal))) => {
+                    let area = particles.volume[particle] / spacing;
+                    points.push(SurfacePoint { particle, normal, area, offset });
+                }
+                (None, None) => {}
+            }
+        }
+        if points.is_empty() {
+            return Err(BuildError::NoSurface { path: path.into(), body: on.body.into() });
+        }
+        Ok(points)
+    }
+
+    fn set_initial_velocity<const D: usize>(&self, simulation: &mut Simulation<D>) -> Result<(), BuildError> {
+        let Some(initial) = &self.initial_velocity else { return Ok(()) };
+        let mut regions: Vec<(Shape<D>, Vector<f64, D>)> = Vec::new();
+        for (i, node) in initial.nodes.iter().enumerate() {
+            let path = format!("initial_velocity.nodes[{i}]");
+            let region = node.region.build().ok_or_else(|| dimension::<D>(&path))?;
+            regions.push((region, vector(&format!("{path}.velocity"), &node.velocity)?));
+        }
+        simulation
+            .set_velocity_on_nodes(|x| {
+                let last = regions.iter().rev().find(|(region, _)| region.contains(x));
+                last.map_or_else(Vector::zeros, |(_, velocity)| *velocity)
+            })
+            .map_err(|source| BuildError::InitialVelocity { source })
+    }
+}
+
+/// Names of the faces, lower and upper, along each axis.
+const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+
+/// Which surface a load acts on.
+struct SurfaceOf<'a> {
+    body: &'a str,
+    region: &'a Option<super::shape::Shape>,
+    given: &'a Option<load::Surface>,
+}
+
+impl Body {
+    fn law(&self, path: &str) -> Result<crate::material::Material, BuildError> {
+        let path = format!("{path}.material");
+        let lame = match self.material.constants().lame() {
+            Some(lame) => lame.map_err(|source| BuildError::Material { path, source })?,
+            None => return Err(BuildError::Dimension { path, dimension: 0 }),
+        };
+        Ok(match self.material {
+            Material::NeoHookean(_) => NeoHookean::ciarlet(lame).into(),
+            Material::NeoHookeanLogarithmic(_) => NeoHookean::logarithmic(lame).into(),
+            Material::StVenantKirchhoff(_) => StVenantKirchhoff { lame }.into(),
+        })
+    }
+
+    fn fill<const D: usize>(
+        &self,
+        path: &str,
+        folder: &Path,
+        grid: &Grid<D>,
+        number: u32,
+        particles: &mut Particles<D>,
+    ) -> Result<(), BuildError> {
+        let common = match &self.velocity {
+            Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
+            None => None,
+        };
+        if let Some(shape) = &self.shape {
+            let path = format!("{path}.shape");
+            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let volume = (grid.spacing / f64::from(self.particles_per_cell)).powi(D as i32);
+            let velocity = common.unwrap_or_else(Vector::zeros);
+            let positions = fill(grid, &shape, self.particles_per_cell, self.fill.into())
+                .map_err(|source| BuildError::Fill { path, source })?;
+            for x in positions {
+                particles.push(x, velocity, volume, self.density * volume, number);
+            }
+        } else if let Some(file) = &self.particles {
+            let path = format!("{path}.particles.file");
+            let place = folder.join(&file.file);
+            let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
+                path: path.clone(),
+                file: place.display().to_string(),
+                source,
+            })?;
+            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
+                if !grid.contains(x) {
+                    let position = x.iter().copied().collect();
+                    return Err(BuildError::Outside { path, particle: k + 1, position });
+                }
+                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
+                let velocity = common.or(own).unwrap_or_else(Vector::zeros);
+                particles.push(*x, velocity, volume, self.density * volume, number);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Face {
+    /// The motion of each component on a face across `axis`.
+    fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion>; D], BuildError> {
+        let held = |holds: &dyn Fn(usize) -> bool| std::array::from_fn(|i| holds(i).then_some(Motion::Rest));
+        Ok(match self {
+            Self::Free => held(&|_| false),
+            Self::Sliding => held(&|i| i == axis),
+            Self::Fixed => held(&|_| true),
+            Self::Held(components) => held(&|i| components.get(i) == Some(&true)),
+            Self::Displacement(table) => table.motion(&format!("{path}.displacement"), Motion::Displacement)?,
+            Self::Velocity(table) => table.motion(&format!("{path}.velocity"), Motion::Velocity)?,
+        })
+    }
+}
+
+impl Table {
+    /// One curve a prescribed component.
+    fn motion<const D: usize>(
+        &self,
+        path: &str,
+        kind: impl Fn(Curve) -> Motion,
+    ) -> Result<[Option<Motion>; D], BuildError> {
+        let mut motion = std::array::from_fn(|_| None);
+        for (i, motion) in motion.iter_mut().enumerate() {
+            let points: Vec<[f64; 2]> = self.0.iter().filter_map(|row| Some([row.0, (*row.1.get(i)?)?])).collect();
+            if !points.is_empty() {
+                *motion =
+                    Some(kind(Curve::new(points).map_err(|source| BuildError::Curve { path: path.into(), source })?));
+            }
+        }
+        Ok(motion)
+    }
+}
+
+/// The factor in time of a load, 1 if none is given.
+fn curve(path: &str, given: Option<&load::Curve>) -> Result<Curve, BuildError> {
+    match given {
+        Some(curve) => Curve::new(curve.0.clone()).map_err(|source| BuildError::Curve { path: path.into(), source }),
+        None => Ok(Curve::constant(1.0)),
+    }
+}
+
+fn vector<const D: usize>(path: &str, components: &[f64]) -> Result<Vector<f64, D>, BuildError> {
+    super::shape::vector(components).ok_or_else(|| dimension::<D>(path))
+}
+
+fn dimension<const D: usize>(path: &str) -> BuildError {
+    BuildError::Dimension { path: path.into(), dimension: D }
+}

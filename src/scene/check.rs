@@ -1,0 +1,162 @@
+//! Validation: every problem of a scene at once, each with its place, the value found and what is allowed.
+
+use super::place::Place;
+use std::fmt::{self, Display};
+
+/// Problems kept; a table of a million wrong rows needs no million messages.
+const KEPT: usize = 50;
+
+/// Bodies, loads, parts of a shape or probes, at most.
+pub(super) const MOST: usize = 1000;
+
+/// Characters shown of a value.
+const SHOWN: usize = 80;
+
+/// No length, time or modulus may be larger: squares and products of allowed numbers then stay finite.
+const LARGEST: f64 = 1e100;
+
+/// One thing wrong in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// The key, such as `bodies[0].density`.
+    pub path: String,
+    /// What stands there.
+    pub value: String,
+    /// What may stand there.
+    pub allowed: String,
+    /// Where it stands; unknown for keys that are absent.
+    pub place: Option<Place>,
+}
+
+impl Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} is not allowed; {}", self.path, self.value, self.allowed)?;
+        match &self.place {
+            Some(place) => write!(f, "\n{place}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// All problems found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Problems {
+    /// The first ones, in the order of the scene's sections.
+    pub list: Vec<Problem>,
+    /// Problems found beyond those in the list.
+    pub more: usize,
+}
+
+impl Problems {
+    /// Whether nothing is wrong.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Adds a problem: `value` stands at `path`, but `allowed`.
+    pub(super) fn refuse(&mut self, path: &str, value: impl Display, allowed: impl Display) {
+        if self.list.len() == KEPT {
+            self.more += 1;
+            return;
+        }
+        let (path, allowed) = (path.to_owned(), allowed.to_string());
+        let value = value.to_string().chars().take(SHOWN).collect();
+        self.list.push(Problem { path, value, allowed, place: None });
+    }
+
+    /// Adds a problem unless `ok`.
+    pub(super) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) {
+        if !ok {
+            self.refuse(path, value, allowed);
+        }
+    }
+
+    /// A number of sensible size.
+    pub(super) fn number(&mut self, path: &str, x: f64) -> bool {
+        let ok = sensible(x);
+        self.require(ok, path, Number(x), format_args!("must be finite and at most {LARGEST:e} in size"));
+        ok
+    }
+
+    /// A number of sensible size, > 0.
+    pub(super) fn positive(&mut self, path: &str, x: f64) -> bool {
+        let ok = sensible(x) && x > 1.0 / LARGEST;
+        let allowed = if x > 0.0 {
+            format!("must lie between {:e} and {LARGEST:e}", 1.0 / LARGEST)
+        } else {
+            "must be finite and > 0".into()
+        };
+        self.require(ok, path, Number(x), allowed);
+        ok
+    }
+
+    /// A number between two, both allowed.
+    pub(super) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) {
+        let ok = x >= min && x <= max;
+        self.require(ok, path, Number(x), format_args!("must lie between {} and {}", Number(min), Number(max)));
+    }
+
+    /// A whole number between two, both allowed.
+    pub(super) fn whole(&mut self, path: &str, n: u32, min: u32, max: u32) {
+        self.require((min..=max).contains(&n), path, n, format_args!("must be a whole number from {min} to {max}"));
+    }
+
+    /// A list of bodies or the like; what is too long is not looked into.
+    pub(super) fn few<'a, T>(&mut self, path: &str, list: &'a [T]) -> &'a [T] {
+        let ok = list.len() <= MOST;
+        self.require(
+            ok,
+            path,
+            format_args!("a list of {}", list.len()),
+            format_args!("must have at most {MOST} entries"),
+        );
+        if ok { list } else { &[] }
+    }
+
+    /// A vector of one finite number per dimension.
+    pub(super) fn vector(&mut self, path: &str, x: &[f64], dimension: usize) -> bool {
+        let right_length = self.length(path, x.len(), dimension);
+        let mut ok = right_length;
+        for (k, &component) in x.iter().enumerate().take(3) {
+            ok &= self.number(&format!("{path}[{k}]"), component);
+        }
+        ok
+    }
+
+    /// One entry per dimension.
+    pub(super) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
+        let ok = entries == dimension;
+        self.require(
+            ok,
+            path,
+            format_args!("a vector of length {entries}"),
+            format_args!("must have {dimension} components, as many as grid.size"),
+        );
+        ok
+    }
+}
+
+impl Display for Problems {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, problem) in self.list.iter().enumerate() {
+            let separator = if i == 0 { "" } else { "\n" };
+            write!(f, "{separator}{problem}")?;
+        }
+        if self.more > 0 { write!(f, "\n… and {} more", self.more) } else { Ok(()) }
+    }
+}
+
+/// Finite, and small enough to be squared.
+pub(super) fn sensible(x: f64) -> bool {
+    x.abs() <= LARGEST
+}
+
+/// A number as a user would write it.
+pub(super) struct Number(pub f64);
+
+impl Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size != 0.0 && !(1e-4..1e6).contains(&size) { write!(f, "{:e}", self.0) } else { write!(f, "{}", self.0) }
+    }
+}

@@ -1,0 +1,98 @@
+//! The box and its background grid.
+
+use super::check::{Number, Problems, sensible};
+use crate::grid::Grid;
+use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Cells along one axis, at most.
+const MAX_CELLS: f64 = 1e6;
+
+/// How far, relative to itself, the number of cells of an axis may be from a whole number.
+const WHOLE: f64 = 1e-9;
+
+/// The box in which everything happens, and the spacing of its background nodes. Nothing exists outside of it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridBox {
+    /// The lower corner of the box (length). Default: zeros.
+    pub origin: Option<Vec<f64>>,
+    /// The edges of the box (length), each > 0. One, two or three numbers: they set the dimension of the scene (uniaxial
+    /// strain, plane strain, or three dimensions).
+    #[schemars(length(min = 1, max = 3))]
+    pub size: Vec<f64>,
+    /// The distance of neighbouring nodes, the same along all axes (length), > 0. It must divide every edge of the box, to
+    /// 1e-9 relative, into at most a million cells.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub spacing: f64,
+}
+
+impl GridBox {
+    /// The number of dimensions, 1 to 3 in a valid scene.
+    pub fn dimension(&self) -> usize {
+        self.size.len()
+    }
+
+    /// The lower corner, zeros if not given.
+    pub fn origin(&self) -> Vec<f64> {
+        self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
+    }
+
+    /// The grid itself; `None` unless the section is valid and of dimension `D`.
+    pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
+        let cells = self.cells()?.try_into().ok()?;
+        let origin: [f64; D] = self.origin().try_into().ok()?;
+        Some(Grid { origin: Vector::from(origin), spacing: self.spacing, cells })
+    }
+
+    /// Whether a point lies in the box, its faces included; a box that is not valid holds nothing.
+    pub fn holds(&self, x: &[f64]) -> bool {
+        let edges = self.origin().into_iter().zip(&self.size);
+        self.cells().is_some() && x.iter().zip(edges).all(|(x, (lower, size))| *x >= lower && *x <= lower + size)
+    }
+
+    /// The cells along each axis; `None` unless the section is valid.
+    pub fn cells(&self) -> Option<Vec<u32>> {
+        let origin = self.origin();
+        let sound = origin.len() == self.size.len() && origin.iter().all(|&x| sensible(x));
+        sound.then(|| self.size.iter().map(|&size| self.cells_along(size)).collect())?
+    }
+
+    /// How many cells fill an edge, if they fill it.
+    fn cells_along(&self, size: f64) -> Option<u32> {
+        let cells = size / self.spacing;
+        let whole = cells.round();
+        (self.spacing > 0.0 && (1.0..=MAX_CELLS).contains(&whole) && (cells - whole).abs() <= WHOLE * whole)
+            .then_some(whole as u32)
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems) {
+        if !(1..=3).contains(&self.size.len()) {
+            let found = format!("a vector of length {}", self.size.len());
+            problems.refuse("grid.size", found, "must have 1, 2 or 3 components: the dimension of the scene");
+            return;
+        }
+        if let Some(origin) = &self.origin {
+            problems.vector("grid.origin", origin, self.dimension());
+        }
+        let spacing_ok = problems.positive("grid.spacing", self.spacing);
+        for (k, &size) in self.size.iter().enumerate() {
+            let path = format!("grid.size[{k}]");
+            if !problems.positive(&path, size) || !spacing_ok || self.cells_along(size).is_some() {
+                continue;
+            }
+            let cells = size / self.spacing;
+            let allowed = if cells > MAX_CELLS {
+                format!(
+                    "at a spacing of {} it would take {cells:e} cells; at most {MAX_CELLS:e} are allowed",
+                    self.spacing
+                )
+            } else {
+                let whole = cells.round().max(1.0) * self.spacing;
+                format!("must be a multiple of the spacing {}, such as {}", Number(self.spacing), Number(whole))
+            };
+            problems.refuse(&path, Number(size), allowed);
+        }
+    }
+}

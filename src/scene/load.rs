@@ -1,0 +1,144 @@
+//! Gravity, tractions and pressures.
+
+use super::body::Body;
+use super::boundary::check_times;
+use super::check::Problems;
+use super::shape::{Shape, check_normal};
+use super::suggest::nearest;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A factor in time: rows `[t, factor]`, linear in between and constant outside.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Curve(pub Vec<[f64; 2]>);
+
+/// The same acceleration for all bodies.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Gravity {
+    /// The acceleration (length / time²).
+    pub acceleration: Vec<f64>,
+    /// A factor in time. Default: 1.
+    pub curve: Option<Curve>,
+}
+
+/// A force per reference area that keeps its direction, on the particles within one particle spacing of a body's surface.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Traction {
+    /// The name of the body.
+    pub body: String,
+    /// The part of the surface that is loaded. Default: all of it.
+    pub region: Option<Shape>,
+    /// The force per reference area (stress).
+    pub traction: Vec<f64>,
+    /// A factor in time. Default: 1.
+    pub curve: Option<Curve>,
+    /// Normal and area of the loaded particles; needed for bodies read from a file, otherwise found from the shape.
+    pub surface: Option<Surface>,
+}
+
+/// A pressure that follows the surface, on the particles within one particle spacing of a body's surface.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pressure {
+    /// The name of the body.
+    pub body: String,
+    /// The part of the surface that is loaded. Default: all of it.
+    pub region: Option<Shape>,
+    /// The pressure on the deformed surface (stress); positive pushes inwards.
+    pub pressure: f64,
+    /// A factor in time. Default: 1.
+    pub curve: Option<Curve>,
+    /// Normal and area of the loaded particles; needed for bodies read from a file, otherwise found from the shape.
+    pub surface: Option<Surface>,
+}
+
+/// The surface that each loaded particle stands for.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// The outward normal in the reference configuration, of any length but zero.
+    pub normal: Vec<f64>,
+    /// The reference area per particle (a length in 2D, 1 in 1D), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub area: f64,
+}
+
+impl Curve {
+    fn check(&self, problems: &mut Problems, path: &str) {
+        check_times(problems, path, self.0.iter().map(|row| row[0]));
+        for (i, row) in self.0.iter().enumerate() {
+            problems.number(&format!("{path}[{i}][1]"), row[1]);
+        }
+    }
+}
+
+impl Gravity {
+    pub(super) fn check(&self, problems: &mut Problems, dimension: usize) {
+        problems.vector("gravity.acceleration", &self.acceleration, dimension);
+        if let Some(curve) = &self.curve {
+            curve.check(problems, "gravity.curve");
+        }
+    }
+}
+
+impl Traction {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+        problems.vector(&format!("{path}.traction"), &self.traction, dimension);
+        let on = Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface };
+        on.check(problems, path, bodies, dimension);
+    }
+}
+
+impl Pressure {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+        problems.number(&format!("{path}.pressure"), self.pressure);
+        let on = Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface };
+        on.check(problems, path, bodies, dimension);
+    }
+}
+
+/// What tractions and pressures have in common.
+struct Loaded<'a> {
+    body: &'a str,
+    region: &'a Option<Shape>,
+    curve: &'a Option<Curve>,
+    surface: &'a Option<Surface>,
+}
+
+impl Loaded<'_> {
+    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+        check_body(problems, &format!("{path}.body"), self.body, bodies);
+        if let Some(region) = self.region {
+            region.check(problems, &format!("{path}.region"), dimension);
+        }
+        if let Some(curve) = self.curve {
+            curve.check(problems, &format!("{path}.curve"));
+        }
+        match self.surface {
+            Some(surface) => {
+                check_normal(problems, &format!("{path}.surface.normal"), &surface.normal, dimension);
+                problems.positive(&format!("{path}.surface.area"), surface.area);
+            }
+            None => {
+                let from_file = bodies.iter().any(|body| body.name == self.body && body.particles.is_some());
+                let allowed = "is needed for a body read from a file: {\"normal\": […], \"area\": …} of each particle";
+                problems.require(!from_file, &format!("{path}.surface"), "nothing", allowed);
+            }
+        }
+    }
+}
+
+/// A name that must be that of a body.
+pub(super) fn check_body(problems: &mut Problems, path: &str, name: &str, bodies: &[Body]) {
+    let names: Vec<&str> = bodies.iter().map(|body| body.name.as_str()).collect();
+    if names.contains(&name) {
+        return;
+    }
+    let meant = nearest(name, &names).map_or(String::new(), |name| format!("did you mean {name:?}? It "));
+    let known = names.get(..10).unwrap_or(&names);
+    let more = if names.len() > known.len() { ", …" } else { "" };
+    problems.refuse(path, format_args!("{name:?}"), format_args!("{meant}must be the name of a body: {known:?}{more}"));
+}

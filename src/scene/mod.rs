@@ -1,0 +1,158 @@
+//! The JSON scene: its types, and reading and checking them.
+//!
+//! Each key is declared once, as a field whose doc comment is the manual and the [`schema`]. Units are the user's own
+//! consistent set. [`read`] either gives a scene in which everything has been checked that can be without particles, or says
+//! where the text is wrong, or lists all values that are not allowed.
+
+pub mod approximation;
+pub mod body;
+pub mod boundary;
+pub mod check;
+pub mod grid;
+pub mod load;
+pub mod output;
+pub mod particle_file;
+pub mod place;
+pub mod shape;
+pub mod solver;
+pub mod time;
+
+mod build;
+mod overrides;
+mod read;
+mod suggest;
+
+pub use build::BuildError;
+pub use check::{Problem, Problems};
+pub use overrides::{Override, OverrideError};
+pub use place::Place;
+pub use read::{MAX_BYTES, SceneError, read, read_file};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// One line about the scene.
+    pub title: Option<String>,
+    /// The box and its background grid.
+    pub grid: grid::GridBox,
+    /// The shape functions. Default: `{"lme": {}}`.
+    #[serde(default)]
+    pub approximation: approximation::Approximation,
+    /// Time stepping.
+    pub time: time::Time,
+    /// The bodies, at least one.
+    #[schemars(length(min = 1))]
+    pub bodies: Vec<body::Body>,
+    /// Conditions at the faces of the box. Default: all free.
+    #[serde(default)]
+    pub boundary: boundary::Boundary,
+    /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
+    #[serde(default)]
+    pub prescribed: Vec<boundary::Prescribed>,
+    /// The acceleration of gravity. Default: none.
+    pub gravity: Option<load::Gravity>,
+    /// Forces on surfaces.
+    #[serde(default)]
+    pub tractions: Vec<load::Traction>,
+    /// Pressures on surfaces.
+    #[serde(default)]
+    pub pressures: Vec<load::Pressure>,
+    /// Velocities at the start, given to nodes instead of bodies.
+    pub initial_velocity: Option<InitialVelocity>,
+    /// How the equations of a step are solved.
+    #[serde(default)]
+    pub solver: solver::Solver,
+    /// What a run writes.
+    #[serde(default)]
+    pub output: output::Output,
+}
+
+/// Velocities given to nodes at the start, and interpolated once to the particles, in place of the bodies' velocities.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InitialVelocity {
+    /// Regions and the velocity of their nodes; other nodes rest, and later regions win. At least one.
+    #[schemars(length(min = 1))]
+    pub nodes: Vec<NodeVelocity>,
+}
+
+/// The velocity of the nodes in a region.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NodeVelocity {
+    /// The region.
+    pub region: shape::Shape,
+    /// The velocity.
+    pub velocity: Vec<f64>,
+}
+
+/// The JSON schema of a scene.
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(Scene)
+}
+
+impl Scene {
+    /// Everything that is wrong with the values of the scene, in the order of its sections.
+    pub fn check(&self) -> Problems {
+        let mut problems = Problems::default();
+        self.grid.check(&mut problems);
+        let dimension = self.grid.dimension();
+        if !(1..=3).contains(&dimension) {
+            // Every other length is judged by this one.
+            return problems;
+        }
+        self.approximation.check(&mut problems, dimension);
+        self.time.check(&mut problems);
+        self.check_bodies(&mut problems);
+        self.boundary.check(&mut problems, dimension);
+        for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
+            prescribed.check(&mut problems, &format!("prescribed[{i}]"), dimension);
+        }
+        if let Some(gravity) = &self.gravity {
+            gravity.check(&mut problems, dimension);
+        }
+        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
+            traction.check(&mut problems, &format!("tractions[{i}]"), &self.bodies, dimension);
+        }
+        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
+            pressure.check(&mut problems, &format!("pressures[{i}]"), &self.bodies, dimension);
+        }
+        if let Some(initial) = &self.initial_velocity {
+            let regions = &initial.nodes;
+            problems.require(
+                !regions.is_empty(),
+                "initial_velocity.nodes",
+                "an empty list",
+                "must have at least one region",
+            );
+            for (i, node) in problems.few("initial_velocity.nodes", regions).iter().enumerate() {
+                let path = format!("initial_velocity.nodes[{i}]");
+                node.region.check(&mut problems, &format!("{path}.region"), dimension);
+                problems.vector(&format!("{path}.velocity"), &node.velocity, dimension);
+            }
+        }
+        self.solver.check(&mut problems, !self.pressures.is_empty());
+        self.output.check(&mut problems, &self.bodies, &self.grid);
+        problems
+    }
+
+    fn check_bodies(&self, problems: &mut Problems) {
+        problems.require(!self.bodies.is_empty(), "bodies", "an empty list", "must have at least one body");
+        let gimp = self.approximation == approximation::Approximation::Gimp;
+        for (i, body) in problems.few("bodies", &self.bodies).iter().enumerate() {
+            let path = format!("bodies[{i}]");
+            body.check(problems, &path, &self.grid);
+            let again = self.bodies.iter().take(i).any(|earlier| earlier.name == body.name);
+            let allowed = "must differ from the names of the bodies before";
+            problems.require(!again, &format!("{path}.name"), format_args!("{:?}", body.name), allowed);
+            let first = self.bodies.first().map_or(body.particles_per_cell, |first| first.particles_per_cell);
+            let found = body.particles_per_cell;
+            let allowed = format!("must be {first} as in the first body: gimp has one half width for all particles");
+            problems.require(!gimp || found == first, &format!("{path}.particles_per_cell"), found, allowed);
+        }
+    }
+}

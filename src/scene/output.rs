@@ -1,0 +1,102 @@
+//! What a run writes.
+
+use super::body::Body;
+use super::check::Problems;
+use super::grid::GridBox;
+use super::load::check_body;
+use crate::field::Field;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a run writes.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// The time between two snapshots of all particles, > 0. Default: no snapshots.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub every: Option<f64>,
+    /// The fields of a snapshot, each at most once. Default: displacement, velocity, stress, jacobian.
+    #[serde(default = "Output::default_fields")]
+    pub fields: Vec<Field>,
+    /// Histories of one field at one place, written every step.
+    #[serde(default)]
+    pub probes: Vec<Probe>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { every: None, fields: Self::default_fields(), probes: Vec::new() }
+    }
+}
+
+/// The history of one field at one place.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// The name of the history; no two probes share one. Letters, digits, `_` and `-`.
+    #[schemars(regex(pattern = r"^[A-Za-z0-9_-]+$"))]
+    pub name: String,
+    /// The field.
+    pub field: Field,
+    /// The body whose particles are looked at. Default: all bodies.
+    pub body: Option<String>,
+    /// The place.
+    pub at: At,
+}
+
+/// The place of a probe.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum At {
+    /// The particle that is nearest to this point at t = 0, wherever it goes.
+    Particle(Vec<f64>),
+    /// This point, whatever is there.
+    Point(Vec<f64>),
+}
+
+impl Output {
+    fn default_fields() -> Vec<Field> {
+        vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian]
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
+        if let Some(every) = self.every {
+            problems.positive("output.every", every);
+        }
+        for (i, field) in problems.few("output.fields", &self.fields).iter().enumerate() {
+            let again = self.fields.iter().take(i).any(|earlier| earlier == field);
+            problems.require(
+                !again,
+                &format!("output.fields[{i}]"),
+                format_args!("{field:?}, given before,"),
+                "must be listed once",
+            );
+        }
+        for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
+            probe.check(problems, &format!("output.probes[{i}]"), bodies, grid);
+            let again = self.probes.iter().take(i).any(|earlier| earlier.name == probe.name);
+            let allowed = "must differ from the names of the probes before";
+            problems.require(!again, &format!("output.probes[{i}].name"), format_args!("{:?}", probe.name), allowed);
+        }
+    }
+}
+
+impl Probe {
+    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], grid: &GridBox) {
+        let letters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        let named = !self.name.is_empty() && self.name.chars().all(letters);
+        let allowed = "must consist of letters, digits, _ and -: it becomes part of a file name";
+        problems.require(named, &format!("{path}.name"), format_args!("{:?}", self.name), allowed);
+        if let Some(body) = &self.body {
+            check_body(problems, &format!("{path}.body"), body, bodies);
+        }
+        let (key, x) = match &self.at {
+            At::Particle(x) => ("particle", x),
+            At::Point(x) => ("point", x),
+        };
+        let path = format!("{path}.at.{key}");
+        if problems.vector(&path, x, grid.dimension()) && grid.cells().is_some() {
+            problems.require(grid.holds(x), &path, format_args!("{x:?}"), "must lie in the grid");
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Values replaced from the command line: `KEY.PATH=JSON`.
+
+use super::place::{Step, path, steps};
+use super::read::parse;
+use serde_json::Value;
+use std::str::FromStr;
+
+/// Keys one may descend through; scenes are nowhere near as deep.
+const MAX_STEPS: usize = 32;
+
+/// A value of the scene to replace or add, parsed from `KEY.PATH=JSON`.
+///
+/// ```
+/// use bfree::scene::Override;
+///
+/// assert!("time.step=0.01".parse::<Override>().is_ok());
+/// assert!("bodies.0.density=3".parse::<Override>().is_ok());
+/// assert!("approximation=linear".parse::<Override>().is_ok()); // a bare word is a string
+/// assert!("time.step".parse::<Override>().is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Override {
+    argument: String,
+    pub(super) steps: Vec<Step>,
+    value: Value,
+}
+
+/// An override that says nothing sensible.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum OverrideError {
+    /// No `KEY=`.
+    #[error("the override {0:?} is not allowed; must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3")]
+    Form(String),
+    /// The value is neither JSON nor a word.
+    #[error("the value of the override {argument:?} is not JSON: {message}")]
+    Value {
+        /// The whole argument.
+        argument: String,
+        /// What JSON says.
+        message: String,
+    },
+    /// A key leads into something that is not an object, or a number to an entry that a list does not have.
+    #[error("the override {argument:?} leads nowhere: {at} {message}")]
+    Path {
+        /// The whole argument.
+        argument: String,
+        /// How far one gets.
+        at: String,
+        /// What is wrong there.
+        message: String,
+    },
+}
+
+impl FromStr for Override {
+    type Err = OverrideError;
+
+    fn from_str(argument: &str) -> Result<Self, OverrideError> {
+        let form = || OverrideError::Form(argument.to_owned());
+        let (key, text) = argument.split_once('=').ok_or_else(form)?;
+        let steps = steps(key.trim());
+        if steps.is_empty() || steps.len() > MAX_STEPS {
+            return Err(form());
+        }
+        let value = match parse(text) {
+            Ok(value) => value,
+            Err(_) if is_word(text.trim()) => Value::String(text.trim().to_owned()),
+            Err(malformed) => {
+                let (argument, message) = (argument.to_owned(), malformed.message);
+                return Err(OverrideError::Value { argument, message });
+            }
+        };
+        Ok(Self { argument: argument.to_owned(), steps, value })
+    }
+}
+
+impl Override {
+    /// The argument as it was given.
+    pub fn argument(&self) -> &str {
+        &self.argument
+    }
+
+    /// Replaces or adds the value in a scene; objects on the way are made where they are absent.
+    pub(super) fn apply(&self, scene: &mut Value) -> Result<(), OverrideError> {
+        let mut here = scene;
+        for (i, step) in self.steps.iter().enumerate() {
+            let wrong = |message: String| {
+                let at = self.steps.get(..i).map(path).filter(|at| !at.is_empty()).unwrap_or("the scene".into());
+                OverrideError::Path { argument: self.argument.clone(), at, message }
+            };
+            if here.is_null() && matches!(step, Step::Key(_)) {
+                *here = Value::Object(serde_json::Map::new());
+            }
+            here = match (here, step) {
+                (Value::Object(object), Step::Key(key)) => object.entry(key.as_str()).or_insert(Value::Null),
+                (Value::Array(list), Step::Index(index)) => {
+                    let entries = list.len();
+                    list.get_mut(*index).ok_or_else(|| {
+                        wrong(format!("has {entries} entries, counted from 0; {index} is not one of them"))
+                    })?
+                }
+                (Value::Array(list), Step::Key(key)) => {
+                    return Err(wrong(format!("is a list of {} entries; it takes a number, not {key:?}", list.len())));
+                }
+                (Value::Object(_), Step::Index(index)) => {
+                    return Err(wrong(format!("is an object; it takes a key, not the number {index}")));
+                }
+                (value, _) => return Err(wrong(format!("is {}, which has no keys", kind(value)))),
+            };
+        }
+        *here = self.value.clone();
+        Ok(())
+    }
+}
+
+/// What a shell user means by text without quotes.
+fn is_word(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
+        && letters.all(|c| c.is_ascii_alphanumeric() || "_-./ ".contains(c))
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "true or false",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a string",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
+    }
+}

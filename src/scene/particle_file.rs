@@ -1,0 +1,220 @@
+//! Particles from a CSV file: `x[,y[,z]],volume[,vx[,vy[,vz]]]`.
+
+use crate::tensor::Vector;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Particles in one file, at most.
+pub const MAX_PARTICLES: usize = 100_000_000;
+
+/// Bytes of one line, at most.
+const MAX_LINE: u64 = 4096;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+const VELOCITIES: [&str; 3] = ["vx", "vy", "vz"];
+
+/// The particles of a file, one entry each in every list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileParticles<const D: usize> {
+    /// Positions (length).
+    pub positions: Vec<Vector<f64, D>>,
+    /// Reference volumes (length^D), each > 0.
+    pub volumes: Vec<f64>,
+    /// Velocities, if the file has them.
+    pub velocities: Option<Vec<Vector<f64, D>>>,
+}
+
+/// A particle file that cannot be used. Lines and columns are counted from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum ParticleFileError {
+    /// It cannot be read, or is not UTF-8.
+    #[error("line {line}: cannot be read: {source}")]
+    Io {
+        /// The line.
+        line: usize,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A line is too long.
+    #[error("line {line}: is longer than {MAX_LINE} bytes")]
+    LongLine {
+        /// The line.
+        line: usize,
+    },
+    /// The first line does not name the columns.
+    #[error("line 1: the header {found:?} is not allowed; must be {expected:?} or {with_velocity:?}")]
+    Header {
+        /// The line as it stands.
+        found: String,
+        /// Without velocities.
+        expected: String,
+        /// With velocities.
+        with_velocity: String,
+    },
+    /// A line has too few or too many columns.
+    #[error("line {line}: {found} columns are not allowed; must be {expected}, as in the header")]
+    Columns {
+        /// The line.
+        line: usize,
+        /// Columns found.
+        found: usize,
+        /// Columns of the header.
+        expected: usize,
+    },
+    /// A value is not a number, or not one that is allowed.
+    #[error("line {line}, column {column} ({name}): {found:?} is not allowed; must be {allowed}")]
+    Value {
+        /// The line.
+        line: usize,
+        /// The column.
+        column: usize,
+        /// Its name in the header.
+        name: &'static str,
+        /// The text that stands there.
+        found: String,
+        /// What may stand there.
+        allowed: &'static str,
+    },
+    /// A header and nothing below.
+    #[error("the file has no particles")]
+    Empty,
+    /// Too many lines.
+    #[error("line {line}: more than {MAX_PARTICLES} particles")]
+    TooMany {
+        /// The line.
+        line: usize,
+    },
+}
+
+/// Reads the particle file at `path`.
+///
+/// # Errors
+/// The first line, and in it the column, that is wrong.
+pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, ParticleFileError> {
+    let file = File::open(path).map_err(|source| ParticleFileError::Io { line: 1, source })?;
+    read(BufReader::new(file))
+}
+
+/// Reads particles from CSV text; blank lines are skipped.
+///
+/// # Errors
+/// The first line, and in it the column, that is wrong.
+pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, ParticleFileError> {
+    let mut lines = Lines { text, line: 0 };
+    let header = lines.next_line()?.unwrap_or_default();
+    let header = header.trim_start_matches('\u{feff}');
+    let plain: Vec<&'static str> = AXES.into_iter().take(D).chain(["volume"]).collect();
+    let moving: Vec<&'static str> = plain.iter().copied().chain(VELOCITIES.into_iter().take(D)).collect();
+    let found: Vec<&str> = header.split(',').map(str::trim).collect();
+    let names = if found == moving {
+        moving
+    } else if found == plain {
+        plain
+    } else {
+        let (expected, with_velocity) = (plain.join(","), moving.join(","));
+        return Err(ParticleFileError::Header { found: shortened(header), expected, with_velocity });
+    };
+
+    let mut particles = FileParticles { positions: Vec::new(), volumes: Vec::new(), velocities: None };
+    let mut velocities = Vec::new();
+    while let Some(text) = lines.next_line()? {
+        let line = lines.line;
+        if text.trim().is_empty() {
+            continue;
+        }
+        if particles.volumes.len() == MAX_PARTICLES {
+            return Err(ParticleFileError::TooMany { line });
+        }
+        let found = text.split(',').count();
+        if found != names.len() {
+            return Err(ParticleFileError::Columns { line, found, expected: names.len() });
+        }
+        let mut row = [0.0; 7];
+        for (column, ((value, name), word)) in row.iter_mut().zip(&names).zip(text.split(',')).enumerate() {
+            *value = number(word, line, column + 1, name)?;
+        }
+        particles.positions.push(Vector::from_fn(|k, _| row[k]));
+        particles.volumes.push(row[D]);
+        velocities.push(Vector::from_fn(|k, _| row[D + 1 + k]));
+    }
+    if particles.volumes.is_empty() {
+        return Err(ParticleFileError::Empty);
+    }
+    particles.velocities = (names.len() > D + 1).then_some(velocities);
+    Ok(particles)
+}
+
+fn number(word: &str, line: usize, column: usize, name: &'static str) -> Result<f64, ParticleFileError> {
+    let word = word.trim();
+    let volume = name == "volume";
+    match word.parse::<f64>() {
+        Ok(x) if x.abs() <= 1e100 && (!volume || x > 0.0) => Ok(x),
+        _ => {
+            let allowed = if volume { "a finite number > 0" } else { "a finite number, at most 1e100 in size" };
+            Err(ParticleFileError::Value { line, column, name, found: shortened(word), allowed })
+        }
+    }
+}
+
+fn shortened(text: &str) -> String {
+    text.trim_end().chars().take(80).collect()
+}
+
+/// Lines of bounded length, counted.
+struct Lines<R> {
+    text: R,
+    line: usize,
+}
+
+impl<R: BufRead> Lines<R> {
+    fn next_line(&mut self) -> Result<Option<String>, ParticleFileError> {
+        self.line += 1;
+        let line = self.line;
+        let mut text = String::new();
+        let read = self.text.by_ref().take(MAX_LINE + 1).read_line(&mut text);
+        match read.map_err(|source| ParticleFileError::Io { line, source })? {
+            0 => Ok(None),
+            length if length as u64 > MAX_LINE => Err(ParticleFileError::LongLine { line }),
+            _ => Ok(Some(text)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_volumes_and_velocities_are_read() {
+        let text = "\u{feff}x, y, volume, vx, vy\r\n1, 2, 0.25, -1, 0\r\n\n3,4,.5,1e-3,2\n";
+        let particles: FileParticles<2> = read(text.as_bytes()).unwrap();
+        assert_eq!(particles.positions, [Vector::from([1.0, 2.0]), Vector::from([3.0, 4.0])]);
+        assert_eq!(particles.volumes, [0.25, 0.5]);
+        assert_eq!(particles.velocities, Some(vec![Vector::from([-1.0, 0.0]), Vector::from([1e-3, 2.0])]));
+        let particles: FileParticles<1> = read("x,volume\n7,1".as_bytes()).unwrap();
+        assert_eq!((particles.positions[0][0], particles.velocities), (7.0, None));
+    }
+
+    #[test]
+    fn errors_name_line_and_column() {
+        let cases = [
+            ("", "line 1: the header \"\" is not allowed; must be \"x,y,volume\" or \"x,y,volume,vx,vy\""),
+            ("x,y\n", "line 1: the header \"x,y\""),
+            ("x,y,z,volume\n", "line 1: the header"),
+            ("x,y,volume\n", "the file has no particles"),
+            ("x,y,volume\n1,2,1\n1,2\n", "line 3: 2 columns are not allowed; must be 3"),
+            ("x,y,volume\n1,two,1\n", "line 2, column 2 (y): \"two\" is not allowed; must be a finite number"),
+            ("x,y,volume\n1,2,-1\n", "line 2, column 3 (volume): \"-1\" is not allowed; must be a finite number > 0"),
+            ("x,y,volume\n\nNaN,2,1\n", "line 3, column 1 (x): \"NaN\""),
+            ("x,y,volume\n1,2,1e999\n", "line 2, column 3 (volume): \"1e999\""),
+        ];
+        for (text, words) in cases {
+            let error = read::<2>(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.starts_with(words), "{text:?}: {error}");
+        }
+        let long = format!("x,y,volume\n1,2,{}", "1".repeat(5000));
+        assert!(matches!(read::<2>(long.as_bytes()), Err(ParticleFileError::LongLine { line: 2 })));
+        assert!(matches!(read::<2>(&b"x,y,volume\n\xff,2,1"[..]), Err(ParticleFileError::Io { line: 2, .. })));
+    }
+}

@@ -1,0 +1,289 @@
+//! From text to a checked scene.
+
+use super::check::Problems;
+use super::overrides::{Override, OverrideError};
+use super::place::{Place, Step, locate, path, steps};
+use super::{Scene, suggest};
+use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
+use serde_path_to_error::Segment;
+use std::fmt::{self, Display};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// The longest scene that is read, in bytes. Particles by the million belong into a CSV file.
+pub const MAX_BYTES: u64 = 16 << 20;
+
+/// A scene that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is too long.
+    #[error("the scene is longer than {MAX_BYTES} bytes, the most that is read; give many particles in a CSV file")]
+    TooLong,
+    /// The text is not UTF-8.
+    #[error("the scene is not UTF-8 text: byte {0} cannot be read")]
+    NotText(usize),
+    /// The text is not JSON, or a key or type is not that of a scene.
+    #[error(transparent)]
+    Malformed(#[from] Malformed),
+    /// An override is wrong in itself.
+    #[error(transparent)]
+    Override(#[from] OverrideError),
+    /// The text is a scene, but with values that are not allowed: all of them.
+    #[error("{0}")]
+    Values(Problems),
+}
+
+/// Text that is not JSON, or not of the types of a scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub struct Malformed {
+    /// The key, such as `bodies[0].density`; empty if the text is not JSON.
+    pub path: String,
+    /// What is wrong.
+    pub message: String,
+    /// Where.
+    pub place: Option<Place>,
+}
+
+impl Display for Malformed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let separator = if self.path.is_empty() { "" } else { ": " };
+        write!(f, "{}{separator}{}", self.path, self.message)?;
+        self.place.iter().try_for_each(|place| write!(f, "\n{place}"))
+    }
+}
+
+/// Reads the scene file at `path`, see [`read`].
+///
+/// # Errors
+/// Also a file that cannot be read, or is not UTF-8.
+pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
+    let failed = |source| SceneError::File { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(SceneError::TooLong);
+    }
+    let text = std::str::from_utf8(&bytes).map_err(|wrong| SceneError::NotText(wrong.valid_up_to()))?;
+    read(text, overrides)
+}
+
+/// Reads and checks a scene, with `overrides` applied in order.
+///
+/// The text becomes JSON, in which a key given twice is an error; the overrides replace values; JSON becomes a [`Scene`], where
+/// unknown keys and wrong types are errors; then all values are checked.
+///
+/// # Errors
+/// What is wrong, at which key, and where that stands in the text (or in which override).
+pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
+    if text.len() as u64 > MAX_BYTES {
+        return Err(SceneError::TooLong);
+    }
+    let text = text.trim_start_matches('\u{feff}');
+    let mut json = parse(text)?;
+    for replaced in overrides {
+        replaced.apply(&mut json)?;
+    }
+    if !json.is_object() {
+        let message = "a scene is an object: { \"grid\": …, \"time\": …, \"bodies\": … }".to_owned();
+        return Err(Malformed { path: String::new(), message, place: Some(Place::at(text, 0)) }.into());
+    }
+
+    let place = |steps: &[Step]| find(steps, text, overrides);
+    let scene: Scene = serde_path_to_error::deserialize(&json).map_err(|error| {
+        let steps = segments(error.path());
+        Malformed { path: path(&steps), message: explain(&error.inner().to_string()), place: place(&steps) }
+    })?;
+    if let Some((steps, message)) = serde_json::to_value(&scene).ok().and_then(|read| misshapen(&json, &read)) {
+        return Err(Malformed { path: path(&steps), message: message.to_owned(), place: place(&steps) }.into());
+    }
+    let mut problems = scene.check();
+    for problem in &mut problems.list {
+        problem.place = place(&steps(&problem.path));
+    }
+    if problems.is_empty() { Ok(scene) } else { Err(SceneError::Values(problems)) }
+}
+
+/// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in
+/// the order of their declaration, and a word as an object. Such a scene would change its meaning with the next version.
+fn misshapen(written: &Value, read: &Value) -> Option<(Vec<Step>, &'static str)> {
+    let within = |step: Step, written, read| {
+        misshapen(written, read).map(|(mut steps, message)| {
+            steps.insert(0, step);
+            (steps, message)
+        })
+    };
+    match (written, read) {
+        (Value::Array(_), Value::Object(_)) => Some((Vec::new(), "invalid type: a list, expected an object")),
+        (Value::Object(_), Value::String(_)) => Some((Vec::new(), "invalid type: an object, expected a word")),
+        (Value::Array(written), Value::Array(read)) => {
+            let pairs = written.iter().zip(read).enumerate();
+            pairs.map(|(i, (written, read))| within(Step::Index(i), written, read)).find_map(|found| found)
+        }
+        (Value::Object(written), Value::Object(read)) => {
+            let pairs = written.iter().filter_map(|(key, value)| Some((key, value, read.get(key)?)));
+            pairs.map(|(key, written, read)| within(Step::Key(key.clone()), written, read)).find_map(|found| found)
+        }
+        _ => None,
+    }
+}
+
+/// Text to JSON, refusing keys given twice.
+pub(super) fn parse(text: &str) -> Result<Value, Malformed> {
+    let mut json = serde_json::Deserializer::from_str(text);
+    let located = |path: String, error: &serde_json::Error| {
+        let place = Place::at_line(text, error.line(), error.column());
+        let full = error.to_string();
+        let bare = full.rfind(" at line ").and_then(|end| full.get(..end)).unwrap_or(&full);
+        let hint = match &place {
+            Place::Text { excerpt, indent, .. } => hint(&excerpt.chars().skip(*indent).collect::<String>()),
+            Place::Override(_) => "",
+        };
+        Malformed { path, message: format!("{bare}{hint}"), place: Some(place) }
+    };
+    let value: Unique = serde_path_to_error::deserialize(&mut json)
+        .map_err(|error| located(path(&segments(error.path())), error.inner()))?;
+    json.end().map_err(|error| located(String::new(), &error))?;
+    Ok(value.0)
+}
+
+/// What a text that is not JSON may have meant.
+fn hint(rest: &str) -> &'static str {
+    let starts = |words: &[&str]| words.iter().any(|word| rest.starts_with(word));
+    if starts(&["NaN", "nan", "Inf", "inf"]) {
+        "; JSON has no NaN and no infinity"
+    } else if starts(&["//", "/*", "#"]) {
+        "; JSON has no comments"
+    } else if starts(&["'"]) {
+        "; strings stand in double quotes"
+    } else {
+        ""
+    }
+}
+
+/// Where the value at `steps` comes from: the last override that set it, or the text.
+fn find(steps: &[Step], text: &str, overrides: &[Override]) -> Option<Place> {
+    let within = |one: &Override| steps.starts_with(&one.steps);
+    let found = locate(text, steps);
+    let in_text = found.is_some_and(|(_, depth)| depth == steps.len());
+    // An override may also have made the object that lacks a key or has a wrong one.
+    let made = |one: &Override| !in_text && one.steps.starts_with(steps);
+    let replaced = overrides.iter().rev().find(|one| within(one) || made(one));
+    replaced
+        .map(|one| Place::Override(one.argument().to_owned()))
+        .or_else(|| found.map(|(offset, _)| Place::at(text, offset)))
+}
+
+fn segments(path: &serde_path_to_error::Path) -> Vec<Step> {
+    path.iter()
+        .filter_map(|segment| match segment {
+            Segment::Seq { index } => Some(Step::Index(*index)),
+            Segment::Map { key } | Segment::Enum { variant: key } => Some(Step::Key(key.clone())),
+            Segment::Unknown => None,
+        })
+        .collect()
+}
+
+/// Characters of a message; it quotes what stands in the text.
+const MESSAGE: usize = 600;
+
+/// serde's message in the words of a scene's author, with the word that a misspelt one was meant to be.
+fn explain(message: &str) -> String {
+    if message.chars().count() > MESSAGE {
+        return message.chars().take(MESSAGE).chain("…".chars()).collect();
+    }
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        let meant = quoted.split_first().and_then(|(word, allowed)| suggest::nearest(word, allowed));
+        return match meant {
+            Some(meant) => format!("{message}; did you mean `{meant}`?"),
+            None => message.to_owned(),
+        };
+    }
+    let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
+    let expected = match expected {
+        "f64" => "a number",
+        "u32" => "a whole number from 0 to 4294967295",
+        "a sequence" => "a list",
+        "a boolean" => "true or false",
+        "map with a single key" => "an object with exactly one key",
+        "string or map" => "a word or an object with one key",
+        struct_name if struct_name.starts_with("struct ") => "an object",
+        row if row.starts_with("tuple struct Row") => "a row [time, [components]]",
+        other => other,
+    };
+    format!("{found}, expected {expected}")
+}
+
+/// JSON in which no object has a key twice.
+struct Unique(Value);
+
+impl<'de> Deserialize<'de> for Unique {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(UniqueVisitor).map(Self)
+    }
+}
+
+struct UniqueVisitor;
+
+impl<'de> Visitor<'de> for UniqueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, x: bool) -> Result<Value, E> {
+        Ok(Value::Bool(x))
+    }
+
+    fn visit_u64<E>(self, x: u64) -> Result<Value, E> {
+        Ok(Value::from(x))
+    }
+
+    fn visit_i64<E>(self, x: i64) -> Result<Value, E> {
+        Ok(Value::from(x))
+    }
+
+    fn visit_f64<E>(self, x: f64) -> Result<Value, E> {
+        Ok(Value::from(x))
+    }
+
+    fn visit_str<E>(self, x: &str) -> Result<Value, E> {
+        Ok(Value::String(x.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut list = Vec::new();
+        while let Some(Unique(entry)) = entries.next_element()? {
+            list.push(entry);
+        }
+        Ok(Value::Array(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some(key) = entries.next_key::<String>()? {
+            if object.contains_key(&key) {
+                return Err(de::Error::custom(format_args!("the key `{key}` is given twice in one object")));
+            }
+            let Unique(value) = entries.next_value()?;
+            object.insert(key, value);
+        }
+        Ok(Value::Object(object))
+    }
+}
