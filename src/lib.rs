@@ -2,12 +2,15 @@
 
 pub mod approximation;
 pub mod clock;
+pub mod field;
 pub mod grid;
 pub mod material;
 pub mod mechanics;
 pub mod nodes;
+pub mod output;
 pub mod particles;
 pub mod phases;
+pub mod plan;
 pub mod scalar;
 pub mod scene;
 pub mod shape;

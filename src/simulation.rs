@@ -4,15 +4,16 @@ use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{Law, Material};
-use crate::mechanics::loads::{Loads, prescribed_dofs};
+use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::time::{Alphas, Newmark};
 use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
+use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
 use crate::solver::{LinearError, NewtonError, NewtonReport, NewtonSettings, newton};
-use crate::tensor::Vector;
+use crate::tensor::{Deformation, Vector};
 
 /// Where Newton starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,7 +120,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut watch = Stopwatch::start();
 
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
-        let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &nodes, t, dt);
+        let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions);
 
         let projected = Nodal::project(&self.particles, &supports, nodes.len(), self.settings.lumping)?;
@@ -171,12 +172,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
+    /// The degrees of freedom prescribed in the coming step.
+    pub fn prescribed(&self, nodes: &Nodes) -> Vec<PrescribedDof> {
+        prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, self.clock.time(), self.clock.step())
+    }
+
     /// The equilibrium at time `t` on given supports.
     pub fn equilibrium<'a>(
         &'a self,
         supports: &'a Supports<D>,
         nodal: &'a Nodal<D>,
-        prescribed: &'a [crate::mechanics::loads::PrescribedDof],
+        prescribed: &'a [PrescribedDof],
         alphas: Alphas,
         t: f64,
     ) -> Equilibrium<'a, D, L> {
@@ -241,7 +247,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let particles = &self.particles;
         (0..particles.len())
             .map(|p| {
-                let at = crate::tensor::Deformation::new(particles.displacement_gradient[p]);
+                let at = Deformation::new(particles.displacement_gradient[p]);
                 particles.volume[p] * self.bodies[particles.body[p] as usize].law.energy(&at)
             })
             .sum()

@@ -81,9 +81,13 @@ impl<const D: usize> Supports<D> {
         self.particles
     }
 
-    /// Number of particle–node pairs.
-    pub fn entries(&self) -> usize {
-        self.blocks.iter().map(|block| block.values.len()).sum()
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        let entry = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
+        let of_block = |block: &Block<D>| {
+            block.values.len() * entry + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
+        };
+        self.blocks.iter().map(of_block).sum()
     }
 
     /// The entries (active node, N, ∇_n N) of one particle.

@@ -2,10 +2,10 @@
 
 use super::check::{Number, Problems};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The family of shape functions that joins particles and nodes.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Approximation {
     /// Products of hat functions. Simple and rough: forces jump when a particle crosses a cell face.
@@ -26,7 +26,7 @@ impl Default for Approximation {
 }
 
 /// B-splines.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bspline {
     /// The polynomial degree, 2 or 3.
@@ -42,16 +42,17 @@ impl Bspline {
 }
 
 /// Local maximum entropy functions, N = exp(−γ̂ |D|²/h² + λ·D)/Z.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Lme {
-    /// γ̂, how local the functions are (no unit), from 0.1; near 0.8 they are smooth and wide, near 4 almost hats. Support
-    /// regions must reach far enough: γ̂ < −ln tolerance for the separable support (13.8 at 1e-6), and
-    /// γ̂ < −ln tolerance / (1 + (D − 1)/4) for the circle (11.05 in two dimensions).
+    /// γ̂, how local the functions are (no unit), 0.1 to 1000; near 0.8 they are smooth and wide, near 4 almost hats. With the
+    /// circle it must be less than −ln tolerance / (1 + (D − 1)/4), 11.05 in two dimensions at 1e-6, for the circle to reach
+    /// enough nodes. Default 3.
     #[serde(default = "Lme::default_gamma")]
-    #[schemars(range(min = 0.1))]
+    #[schemars(range(min = 0.1, max = 1000.0))]
     pub gamma: f64,
     /// Where the functions are cut (no unit), 1e-16 to 1e-2: nodes nearer than h √(−ln tolerance / γ̂) support a particle.
+    /// Default 1e-6.
     #[serde(default = "Lme::default_tolerance")]
     #[schemars(range(min = 1e-16, max = 1e-2))]
     pub tolerance: f64,
@@ -61,7 +62,7 @@ pub struct Lme {
 }
 
 /// The region of the nodes that support a particle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Support {
     /// A box: the functions are then products of one-dimensional ones.
@@ -86,17 +87,12 @@ impl Lme {
         1e-6
     }
 
-    /// The γ̂ from which on some points of a cell lie outside of the hull of their supporting nodes, in `dimension`
-    /// dimensions.
+    /// The γ̂ that must not be reached with the circle in `dimension` dimensions.
     ///
-    /// The worst point is next to the middle of a cell face, √(1 + (D−1)/4) h away from the nodes opposite to it; with the
-    /// box only its distance along the axis, h, counts. Their distance must stay below R_a = h √(−ln TOL₀/γ̂).
-    pub fn largest_gamma(&self, dimension: usize) -> f64 {
-        let reach = match self.support {
-            Support::Separable => 1.0,
-            Support::Circle => 1.0 + 0.25 * (dimension.max(1) - 1) as f64,
-        };
-        -self.tolerance.ln() / reach
+    /// The worst point is next to the middle of a cell face, √(1 + (D−1)/4) h away from the nodes opposite to it; they must
+    /// be nearer than R_a = h √(−ln TOL₀/γ̂), or the point leaves the hull of its nodes.
+    pub fn circle_limit(&self, dimension: usize) -> f64 {
+        -self.tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
     }
 }
 
@@ -108,10 +104,11 @@ impl Approximation {
             Self::Lme(lme) => {
                 let tolerance_ok = (1e-16..=1e-2).contains(&lme.tolerance);
                 problems.between("approximation.lme.tolerance", lme.tolerance, 1e-16, 1e-2);
-                let largest = lme.largest_gamma(dimension);
-                if tolerance_ok && !(lme.gamma >= 0.1 && lme.gamma < largest) {
+                problems.between("approximation.lme.gamma", lme.gamma, 0.1, 1000.0);
+                let limit = lme.circle_limit(dimension);
+                if lme.support == Support::Circle && tolerance_ok && (limit..=1000.0).contains(&lme.gamma) {
                     let allowed = format!(
-                        "must be at least 0.1 and less than {largest:.4} for this support, tolerance and dimension"
+                        "must be less than {limit:.4} with the circle, at this tolerance and dimension; \"separable\" has no such limit"
                     );
                     problems.refuse("approximation.lme.gamma", Number(lme.gamma), allowed);
                 }

@@ -6,11 +6,11 @@ use super::shape::Shape;
 use crate::material::{Lame, LameError};
 use crate::shape as geometry;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A deformable body.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// The name by which loads and probes refer to it; no two bodies share one.
@@ -37,7 +37,7 @@ pub struct Body {
 }
 
 /// Particles from a file.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParticleFile {
     /// Path of a CSV file with the header `x[,y[,z]],volume[,vx[,vy[,vz]]]`, relative to the scene's folder.
@@ -46,7 +46,7 @@ pub struct ParticleFile {
 }
 
 /// Which of the regular positions become particles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fill {
     /// Those that lie in the shape.
@@ -66,7 +66,7 @@ impl From<Fill> for geometry::Fill {
 }
 
 /// A hyperelastic law with its constants.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Material {
     /// Neo-Hookean with Ciarlet's volumetric energy Λ/4 (J² − 1) − Λ/2 ln J: the paper's law.
@@ -96,7 +96,7 @@ impl Material {
 
 /// The constants of an isotropic law: exactly one of the pairs `lambda` and `shear`, `young` and `poisson`, `bulk` and
 /// `shear`.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Constants {
     /// Lamé's Λ (stress), > −2/3 `shear`.

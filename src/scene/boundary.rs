@@ -3,10 +3,10 @@
 use super::check::{Number, Problems};
 use super::shape::Shape;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What the nodes of each face of the box may do. Faces that the dimension lacks must not be named.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
     /// The face at the lower end of x. Default: free.
@@ -24,7 +24,7 @@ pub struct Boundary {
 }
 
 /// What the nodes of a face may do.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Face {
     /// Move freely.
@@ -33,7 +33,7 @@ pub enum Face {
     Sliding,
     /// Not move.
     Fixed,
-    /// Move in the components that are `false`; the others are held.
+    /// Per component: `true` is held, `false` is free.
     Held(Vec<bool>),
     /// Follow a table of displacements since t = 0 (length); constant after the last row.
     Displacement(Table),
@@ -42,16 +42,16 @@ pub enum Face {
 }
 
 /// A motion: rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Table(pub Vec<Row>);
 
 /// One row of a table: a time, and at that time the components that are prescribed.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 pub struct Row(pub f64, pub Vec<Option<f64>>);
 
 /// Motion of the nodes inside a region, given by either a displacement or a velocity.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prescribed {
     /// The region; the nodes that lie in it at t = 0 are meant.

@@ -6,8 +6,8 @@ use std::fmt::{self, Display};
 /// Problems kept; a table of a million wrong rows needs no million messages.
 const KEPT: usize = 50;
 
-/// Bodies, loads, regions or probes, at most.
-const MOST: usize = 1000;
+/// Bodies, loads, parts of a shape or probes, at most.
+pub(super) const MOST: usize = 1000;
 
 /// Characters shown of a value.
 const SHOWN: usize = 80;
@@ -147,7 +147,7 @@ impl Display for Problems {
 }
 
 /// Finite, and small enough to be squared.
-fn sensible(x: f64) -> bool {
+pub(super) fn sensible(x: f64) -> bool {
     x.abs() <= LARGEST
 }
 

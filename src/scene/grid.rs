@@ -1,10 +1,10 @@
 //! The box and its background grid.
 
-use super::check::{Number, Problems};
+use super::check::{Number, Problems, sensible};
 use crate::grid::Grid;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Cells along one axis, at most.
 const MAX_CELLS: f64 = 1e6;
@@ -13,7 +13,7 @@ const MAX_CELLS: f64 = 1e6;
 const WHOLE: f64 = 1e-9;
 
 /// The box in which everything happens, and the spacing of its background nodes. Nothing exists outside of it.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridBox {
     /// The lower corner of the box (length). Default: zeros.
@@ -41,22 +41,30 @@ impl GridBox {
 
     /// The grid itself; `None` unless the section is valid and of dimension `D`.
     pub fn build<const D: usize>(&self) -> Option<Grid<D>> {
+        let cells = self.cells()?.try_into().ok()?;
+        let origin: [f64; D] = self.origin().try_into().ok()?;
+        Some(Grid { origin: Vector::from(origin), spacing: self.spacing, cells })
+    }
+
+    /// Whether a point lies in the box, its faces included; a box that is not valid holds nothing.
+    pub fn holds(&self, x: &[f64]) -> bool {
+        let edges = self.origin().into_iter().zip(&self.size);
+        self.cells().is_some() && x.iter().zip(edges).all(|(x, (lower, size))| *x >= lower && *x <= lower + size)
+    }
+
+    /// The cells along each axis; `None` unless the section is valid.
+    pub fn cells(&self) -> Option<Vec<u32>> {
         let origin = self.origin();
-        if self.size.len() != D || origin.len() != D {
-            return None;
-        }
-        let mut cells = [0; D];
-        for (cells, size) in cells.iter_mut().zip(&self.size) {
-            *cells = self.cells_along(*size)?;
-        }
-        Some(Grid { origin: Vector::from_column_slice(&origin), spacing: self.spacing, cells })
+        let sound = origin.len() == self.size.len() && origin.iter().all(|&x| sensible(x));
+        sound.then(|| self.size.iter().map(|&size| self.cells_along(size)).collect())?
     }
 
     /// How many cells fill an edge, if they fill it.
     fn cells_along(&self, size: f64) -> Option<u32> {
         let cells = size / self.spacing;
         let whole = cells.round();
-        ((1.0..=MAX_CELLS).contains(&whole) && (cells - whole).abs() <= WHOLE * whole).then_some(whole as u32)
+        (self.spacing > 0.0 && (1.0..=MAX_CELLS).contains(&whole) && (cells - whole).abs() <= WHOLE * whole)
+            .then_some(whole as u32)
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {

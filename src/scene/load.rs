@@ -6,15 +6,15 @@ use super::check::Problems;
 use super::shape::{Shape, check_normal};
 use super::suggest::nearest;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A factor in time: rows `[t, factor]`, linear in between and constant outside.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Curve(pub Vec<[f64; 2]>);
 
 /// The same acceleration for all bodies.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gravity {
     /// The acceleration (length / time²).
@@ -24,7 +24,7 @@ pub struct Gravity {
 }
 
 /// A force per reference area that keeps its direction, on the particles within one particle spacing of a body's surface.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
     /// The name of the body.
@@ -40,7 +40,7 @@ pub struct Traction {
 }
 
 /// A pressure that follows the surface, on the particles within one particle spacing of a body's surface.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pressure {
     /// The name of the body.
@@ -56,7 +56,7 @@ pub struct Pressure {
 }
 
 /// The surface that each loaded particle stands for.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
     /// The outward normal in the reference configuration, of any length but zero.

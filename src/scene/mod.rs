@@ -29,10 +29,10 @@ pub use place::Place;
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// One line about the scene.
@@ -72,7 +72,7 @@ pub struct Scene {
 }
 
 /// Velocities given to nodes at the start, and interpolated once to the particles, in place of the bodies' velocities.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitialVelocity {
     /// Regions and the velocity of their nodes; other nodes rest, and later regions win. At least one.
@@ -81,7 +81,7 @@ pub struct InitialVelocity {
 }
 
 /// The velocity of the nodes in a region.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NodeVelocity {
     /// The region.
@@ -136,7 +136,7 @@ impl Scene {
             }
         }
         self.solver.check(&mut problems, !self.pressures.is_empty());
-        self.output.check(&mut problems, &self.bodies, dimension);
+        self.output.check(&mut problems, &self.bodies, &self.grid);
         problems
     }
 

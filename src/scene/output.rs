@@ -2,12 +2,14 @@
 
 use super::body::Body;
 use super::check::Problems;
+use super::grid::GridBox;
 use super::load::check_body;
+use crate::field::Field;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What a run writes.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// The time between two snapshots of all particles, > 0. Default: no snapshots.
@@ -27,34 +29,8 @@ impl Default for Output {
     }
 }
 
-/// A quantity of the particles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Field {
-    /// Displacement since t = 0 (length).
-    Displacement,
-    /// Velocity.
-    Velocity,
-    /// Acceleration.
-    Acceleration,
-    /// Cauchy stress, the out-of-plane component included.
-    Stress,
-    /// Green–Lagrange strain.
-    Strain,
-    /// Deformation gradient F.
-    DeformationGradient,
-    /// J = det F.
-    Jacobian,
-    /// Pressure, −tr σ / 3 (stress).
-    Pressure,
-    /// Equivalent stress of von Mises.
-    VonMises,
-    /// Strain energy per reference volume.
-    EnergyDensity,
-}
-
 /// The history of one field at one place.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
     /// The name of the history; no two probes share one. Letters, digits, `_` and `-`.
@@ -69,7 +45,7 @@ pub struct Probe {
 }
 
 /// The place of a probe.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum At {
     /// The particle that is nearest to this point at t = 0, wherever it goes.
@@ -83,7 +59,7 @@ impl Output {
         vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian]
     }
 
-    pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], dimension: usize) {
+    pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
         if let Some(every) = self.every {
             problems.positive("output.every", every);
         }
@@ -92,12 +68,12 @@ impl Output {
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),
-                format_args!("{field:?} again"),
-                "one mention is enough",
+                format_args!("{field:?}, given before,"),
+                "must be listed once",
             );
         }
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
-            probe.check(problems, &format!("output.probes[{i}]"), bodies, dimension);
+            probe.check(problems, &format!("output.probes[{i}]"), bodies, grid);
             let again = self.probes.iter().take(i).any(|earlier| earlier.name == probe.name);
             let allowed = "must differ from the names of the probes before";
             problems.require(!again, &format!("output.probes[{i}].name"), format_args!("{:?}", probe.name), allowed);
@@ -106,7 +82,7 @@ impl Output {
 }
 
 impl Probe {
-    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], grid: &GridBox) {
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         let named = !self.name.is_empty() && self.name.chars().all(letters);
         let allowed = "must consist of letters, digits, _ and -: it becomes part of a file name";
@@ -114,9 +90,13 @@ impl Probe {
         if let Some(body) = &self.body {
             check_body(problems, &format!("{path}.body"), body, bodies);
         }
-        match &self.at {
-            At::Particle(x) => problems.vector(&format!("{path}.at.particle"), x, dimension),
-            At::Point(x) => problems.vector(&format!("{path}.at.point"), x, dimension),
+        let (key, x) = match &self.at {
+            At::Particle(x) => ("particle", x),
+            At::Point(x) => ("point", x),
         };
+        let path = format!("{path}.at.{key}");
+        if problems.vector(&path, x, grid.dimension()) && grid.cells().is_some() {
+            problems.require(grid.holds(x), &path, format_args!("{x:?}"), "must lie in the grid");
+        }
     }
 }

@@ -104,11 +104,38 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         let steps = segments(error.path());
         Malformed { path: path(&steps), message: explain(&error.inner().to_string()), place: place(&steps) }
     })?;
+    if let Some((steps, message)) = serde_json::to_value(&scene).ok().and_then(|read| misshapen(&json, &read)) {
+        return Err(Malformed { path: path(&steps), message: message.to_owned(), place: place(&steps) }.into());
+    }
     let mut problems = scene.check();
     for problem in &mut problems.list {
         problem.place = place(&steps(&problem.path));
     }
     if problems.is_empty() { Ok(scene) } else { Err(SceneError::Values(problems)) }
+}
+
+/// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in
+/// the order of their declaration, and a word as an object. Such a scene would change its meaning with the next version.
+fn misshapen(written: &Value, read: &Value) -> Option<(Vec<Step>, &'static str)> {
+    let within = |step: Step, written, read| {
+        misshapen(written, read).map(|(mut steps, message)| {
+            steps.insert(0, step);
+            (steps, message)
+        })
+    };
+    match (written, read) {
+        (Value::Array(_), Value::Object(_)) => Some((Vec::new(), "invalid type: a list, expected an object")),
+        (Value::Object(_), Value::String(_)) => Some((Vec::new(), "invalid type: an object, expected a word")),
+        (Value::Array(written), Value::Array(read)) => {
+            let pairs = written.iter().zip(read).enumerate();
+            pairs.map(|(i, (written, read))| within(Step::Index(i), written, read)).find_map(|found| found)
+        }
+        (Value::Object(written), Value::Object(read)) => {
+            let pairs = written.iter().filter_map(|(key, value)| Some((key, value, read.get(key)?)));
+            pairs.map(|(key, written, read)| within(Step::Key(key.clone()), written, read)).find_map(|found| found)
+        }
+        _ => None,
+    }
 }
 
 /// Text to JSON, refusing keys given twice.
@@ -189,6 +216,7 @@ fn explain(message: &str) -> String {
         "u32" => "a whole number from 0 to 4294967295",
         "a sequence" => "a list",
         "a boolean" => "true or false",
+        "map with a single key" => "an object with exactly one key",
         "string or map" => "a word or an object with one key",
         struct_name if struct_name.starts_with("struct ") => "an object",
         row if row.starts_with("tuple struct Row") => "a row [time, [components]]",

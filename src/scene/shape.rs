@@ -1,13 +1,13 @@
 //! Regions of space in a scene.
 
-use super::check::{Number, Problems};
+use super::check::{MOST, Number, Problems};
 use crate::shape;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A region of space.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
     /// An axis-parallel box (an interval in 1D, a rectangle in 2D).
@@ -25,7 +25,7 @@ pub enum Shape {
 }
 
 /// Two corners of a box.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Corners {
     /// The lower corner (length).
@@ -35,7 +35,7 @@ pub struct Corners {
 }
 
 /// A ball.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ball {
     /// The centre (length).
@@ -46,7 +46,7 @@ pub struct Ball {
 }
 
 /// Everything behind a plane. A body of this shape is clipped to the grid's box.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {
     /// A point of the plane (length).
@@ -56,7 +56,7 @@ pub struct HalfSpace {
 }
 
 /// A solid with a hole.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Difference {
     /// The solid.
@@ -115,9 +115,9 @@ impl Shape {
 }
 
 fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    let mut ok = !parts.is_empty();
-    problems.require(ok, path, "an empty list", "must have at least one shape");
-    for (i, part) in parts.iter().enumerate() {
+    let mut ok = (1..=MOST).contains(&parts.len());
+    problems.require(!parts.is_empty(), path, "an empty list", "must have at least one shape");
+    for (i, part) in problems.few(path, parts).iter().enumerate() {
         ok &= part.check(problems, &format!("{path}[{i}]"), dimension);
     }
     ok

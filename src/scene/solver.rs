@@ -2,10 +2,10 @@
 
 use super::check::Problems;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// How the equations of a step are solved.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Solver {
     /// The outer iteration.
@@ -17,7 +17,7 @@ pub struct Solver {
 }
 
 /// Newton's method with a line search.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Newton {
     /// The residual norm at which a step has converged, relative to the sum of the magnitudes of its contributions,
@@ -48,7 +48,7 @@ impl Default for Newton {
 }
 
 /// The linear solver.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Krylov {
     /// The method.
@@ -77,7 +77,7 @@ impl Default for Krylov {
 }
 
 /// The Krylov method.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Restarted GMRES, for any tangent.
@@ -87,7 +87,7 @@ pub enum Method {
 }
 
 /// Restarted GMRES.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gmres {
     /// Basis vectors kept before a restart, 1 to 1000. Default 30.
@@ -109,7 +109,7 @@ impl Default for Method {
 }
 
 /// How far each linear problem is solved.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Forcing {
     /// To this relative residual, 1e-15 to 0.9.

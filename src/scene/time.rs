@@ -2,13 +2,13 @@
 
 use super::check::{Number, Problems};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Time steps of one run, at most.
 const MAX_STEPS: f64 = 1e9;
 
 /// The time steps and Newmark's constants.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     /// The time step Δt (time), > 0.
@@ -42,7 +42,7 @@ pub struct Time {
 }
 
 /// Where Newton's iteration of a step starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialGuess {
     /// Δφ = 0, as in the paper's tables.
@@ -53,7 +53,7 @@ pub enum InitialGuess {
 }
 
 /// How particles see prescribed nodes in their update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WallUpdate {
     /// As the paper's Algorithm 1 reads: a resting wall changes neither velocity nor acceleration of the particles.

@@ -17,6 +17,7 @@ pub mod manufactured;
 pub mod prepared;
 pub mod random;
 pub mod report;
+pub mod shipped;
 pub mod studies;
 pub mod table;
 

@@ -2,7 +2,7 @@
 
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
-use bfree::mechanics::loads::{PrescribedDof, prescribed_dofs};
+use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::time::Alphas;
@@ -37,7 +37,7 @@ impl<const D: usize> Prepared<D> {
         let (t, dt) = (simulation.clock.time(), simulation.clock.step());
         let (supports, nodes) =
             Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-        let prescribed = prescribed_dofs(&simulation.loads.prescribed, &simulation.grid, &nodes, t, dt);
+        let prescribed = simulation.prescribed(&nodes);
         let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), simulation.settings.lumping)?
             .with_prescribed(&prescribed);
         Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.newmark.alphas(dt), end: t + dt })

@@ -3,17 +3,16 @@
 use super::{Effort, Outcome, StudyError};
 use crate::prepared::Prepared;
 use crate::report::{Bound, Report};
+use crate::shipped;
 use crate::table::Table;
 use argmin::core::{CostFunction, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
-use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::solver::{Forcing, NewtonSettings, NonlinearProblem, newton};
 use bfree::tensor::Vector;
-use std::path::Path;
 
 /// What the study shows.
 pub(super) const ABOUT: &str = "argmin minimises the potential and lands on the increment that Newton found";
@@ -103,10 +102,8 @@ fn case(
     time: f64,
     lumping: f64,
 ) -> Result<(), StudyError> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
     let overrides = [format!("bodies.0.velocity=[{speed},0]"), format!("time.lumping={lumping}")];
-    let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
-    let mut simulation: Simulation<2> = scene::read_file(&folder.join("rebound.json"), &overrides)?.build(&folder)?;
+    let mut simulation: Simulation<2> = shipped::scene("rebound", &overrides.each_ref().map(String::as_str))?.build(&shipped::folder())?;
     // The step that ends at `time`.
     while simulation.clock.time() + 1.5 * simulation.clock.nominal() < time {
         simulation.advance()?;

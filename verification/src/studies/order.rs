@@ -3,11 +3,10 @@
 use super::{Effort, Outcome, StudyError};
 use crate::figure::{Axis, Figure, Line};
 use crate::report::{Bound, Report};
+use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::transfer::WallUpdate;
-use bfree::scene;
 use bfree::simulation::Simulation;
-use std::path::Path;
 
 /// What the study shows.
 pub(super) const ABOUT: &str = "the energy that the rebound loses, against dt, eps, h and the wall update";
@@ -39,10 +38,8 @@ struct Run {
 }
 
 /// The rebound up to t = 30.
-fn rebound(overrides: &[String], walls: WallUpdate) -> Result<Run, StudyError> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
-    let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
-    let mut simulation: Simulation<2> = scene::read_file(&folder.join("rebound.json"), &overrides)?.build(&folder)?;
+fn rebound(overrides: &[&str], walls: WallUpdate) -> Result<Run, StudyError> {
+    let mut simulation: Simulation<2> = shipped::scene("rebound", overrides)?.build(&shipped::folder())?;
     simulation.settings.wall_update = walls;
     let mut iterations = 0;
     while simulation.clock.time() < END - 1e-9 {
@@ -54,7 +51,7 @@ fn rebound(overrides: &[String], walls: WallUpdate) -> Result<Run, StudyError> {
 /// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("the rebound after its first impact, t = 30", &["quantity", "against", "walls"]);
-    let circle = String::from(r#"approximation={"lme":{"gamma":3,"support":"circle"}}"#);
+    let circle = r#"approximation={"lme":{"gamma":3,"support":"circle"}}"#;
     let mut lines = Vec::new();
 
     let mut by_step = Table::new("energy lost of 3.5 against dt (eps = 1)", ["dt", "walls", "energy", "lost", "order", "Newton"]);
@@ -66,7 +63,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     for (walls, name) in WALLS {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for &(dt, expected) in steps {
-            let run = rebound(&[circle.clone(), format!("time.step={dt}")], walls)?;
+            let run = rebound(&[circle, &format!("time.step={dt}")], walls)?;
             let lost = ENERGY - run.energy;
             let order = points.last().map_or_else(
                 || "-".into(),
@@ -104,7 +101,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             if *effort == Effort::Short && (walls != WallUpdate::Literal || lumping == 1.0 || expected.is_none()) {
                 continue;
             }
-            let run = rebound(&[circle.clone(), format!("time.lumping={lumping}")], walls)?;
+            let run = rebound(&[circle, &format!("time.lumping={lumping}")], walls)?;
             let lost = ENERGY - run.energy;
             by_lumping.push([
                 format!("{lumping}"),
@@ -129,7 +126,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         let mut by_spacing = Table::new("energy lost of 3.5 against h (eps = 1)", header);
         for (walls, name) in WALLS {
             for (h, dt) in [(0.5, 0.05), (0.25, 0.05), (0.25, 0.025), (0.125, 0.0125)] {
-                let run = rebound(&[format!("grid.spacing={h}"), format!("time.step={dt}")], walls)?;
+                let run = rebound(&[&format!("grid.spacing={h}"), &format!("time.step={dt}")], walls)?;
                 let lost = ENERGY - run.energy;
                 report.push(&["energy lost", &format!("h = {h}, dt = {dt}"), name], lost, Bound::Between(0.0, ENERGY));
                 by_spacing.push([

@@ -1,0 +1,103 @@
+//! The fields of the particles that a run can show: the list, known to scenes and to output.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A quantity that every particle has.
+///
+/// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing
+/// components of displacement, velocity and strain are 0, and the out-of-plane normal stress is that of plane (uniaxial) strain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Field {
+    /// Position x.
+    Position,
+    /// Displacement from the position at the start of the run.
+    Displacement,
+    /// Velocity v.
+    Velocity,
+    /// Acceleration a.
+    Acceleration,
+    /// Deformation gradient F.
+    DeformationGradient,
+    /// J = det F, the present volume over the reference volume.
+    Jacobian,
+    /// Green-Lagrange strain E = (FᵀF - I) / 2.
+    Strain,
+    /// Cauchy stress, with the out-of-plane normal stress.
+    Stress,
+    /// Pressure, minus a third of the trace of the Cauchy stress; positive in compression.
+    Pressure,
+    /// Von Mises equivalent of the Cauchy stress.
+    VonMises,
+    /// Strain energy per reference volume.
+    EnergyDensity,
+    /// Mass.
+    Mass,
+    /// Reference volume.
+    Volume,
+    /// Number of the body, from 0.
+    Body,
+}
+
+/// How many components a field has, and what they mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One number.
+    Scalar,
+    /// One whole number, ≥ 0.
+    Index,
+    /// x, y, z
+    Vector,
+    /// xx, yy, zz, xy, yz, xz
+    Symmetric,
+    /// xx, xy, xz, yx, yy, yz, zx, zy, zz
+    Tensor,
+}
+
+impl Kind {
+    /// Names of the components; that of a scalar is empty.
+    pub const fn components(self) -> &'static [&'static str] {
+        match self {
+            Self::Scalar | Self::Index => &[""],
+            Self::Vector => &["x", "y", "z"],
+            Self::Symmetric => &["xx", "yy", "zz", "xy", "yz", "xz"],
+            Self::Tensor => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
+        }
+    }
+}
+
+impl Field {
+    /// The name, as in scenes and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Position => "position",
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::DeformationGradient => "deformation_gradient",
+            Self::Jacobian => "jacobian",
+            Self::Strain => "strain",
+            Self::Stress => "stress",
+            Self::Pressure => "pressure",
+            Self::VonMises => "von_mises",
+            Self::EnergyDensity => "energy_density",
+            Self::Mass => "mass",
+            Self::Volume => "volume",
+            Self::Body => "body",
+        }
+    }
+
+    /// What its components are.
+    pub const fn kind(self) -> Kind {
+        match self {
+            Self::Position | Self::Displacement | Self::Velocity | Self::Acceleration => Kind::Vector,
+            Self::DeformationGradient => Kind::Tensor,
+            Self::Strain | Self::Stress => Kind::Symmetric,
+            Self::Body => Kind::Index,
+            Self::Jacobian | Self::Pressure | Self::VonMises | Self::EnergyDensity | Self::Mass | Self::Volume => {
+                Kind::Scalar
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Tables of comma-separated values with a header line, that grow row by row.
+
+use super::OutputError;
+use super::files::Stream;
+use std::collections::HashSet;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// A table on disk.
+#[derive(Debug)]
+pub(crate) struct Table(Stream);
+
+impl Table {
+    /// Creates the file and writes the header.
+    ///
+    /// # Errors
+    /// The system refuses, or two columns have the same name.
+    pub(crate) fn create(path: PathBuf, columns: &[String]) -> Result<Self, OutputError> {
+        let mut seen = HashSet::new();
+        if let Some(column) = columns.iter().find(|&column| !seen.insert(column)) {
+            return Err(OutputError::DuplicateColumn { path, column: column.clone() });
+        }
+        let header: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
+        let mut stream = Stream::create(path)?;
+        stream.line(&header.join(","))?;
+        stream.flush()?;
+        Ok(Self(stream))
+    }
+
+    /// Appends a row.
+    pub(crate) fn row(&mut self, row: &Row) -> Result<(), OutputError> {
+        self.0.line(&row.0)
+    }
+
+    /// Hands all rows to the system.
+    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
+        self.0.flush()
+    }
+}
+
+/// A name as a cell: in quotes if it holds what would break the row (RFC 4180).
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+}
+
+/// A row of numbers.
+#[derive(Debug, Default)]
+pub(crate) struct Row(String);
+
+impl Row {
+    /// Appends a cell; a float gets the fewest digits that read back as the same bits (NaN and inf are written as such).
+    pub(crate) fn push(&mut self, cell: impl std::fmt::Debug) {
+        if !self.0.is_empty() {
+            self.0.push(',');
+        }
+        // Writing to a string cannot fail.
+        let _ = write!(self.0, "{cell:?}");
+    }
+
+    /// Appends several cells.
+    pub(crate) fn extend(&mut self, cells: impl IntoIterator<Item = f64>) {
+        cells.into_iter().for_each(|cell| self.push(cell));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn floats_read_back_as_the_same_bits(bits in any::<u64>()) {
+            let x = f64::from_bits(bits);
+            let mut row = Row::default();
+            row.push(x);
+            let back: f64 = row.0.parse()?;
+            prop_assert!(back.to_bits() == bits || (x.is_nan() && back.is_nan()));
+        }
+    }
+
+    #[test]
+    fn names_cannot_break_a_table() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let path = directory.path().join("t.csv");
+        let mut table = Table::create(path.clone(), &["left, \"low\"_x".to_owned(), "time".to_owned()])?;
+        table.flush()?;
+        assert_eq!(std::fs::read_to_string(&path)?, "\"left, \"\"low\"\"_x\",time\n");
+        let twice = Table::create(path, &["a".to_owned(), "a".to_owned()]);
+        assert!(matches!(twice, Err(OutputError::DuplicateColumn { column, .. }) if column == "a"));
+        Ok(())
+    }
+}

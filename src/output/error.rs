@@ -1,0 +1,81 @@
+//! What can go wrong while results are written.
+
+use crate::material::NonPositiveJacobian;
+use std::path::{Path, PathBuf};
+
+/// Results could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// The file or directory.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The report could not be put into JSON.
+    #[error("cannot write {} as JSON: {source}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// A particle has no stress.
+    #[error("particle {particle} has no stress: {source}")]
+    Inadmissible {
+        /// Number of the particle.
+        particle: usize,
+        /// The determinant found.
+        source: NonPositiveJacobian,
+    },
+    /// A probe at a particle that does not exist.
+    #[error("probe {name:?} is at particle {particle}; there are {particles}, numbered from 0")]
+    ProbeParticle {
+        /// Name of the probe.
+        name: String,
+        /// The particle asked for.
+        particle: usize,
+        /// Number of particles.
+        particles: usize,
+    },
+    /// A probe at a point that is none, or without any particle to look at.
+    #[error(
+        "probe {name:?} at {point:?} has no nearest particle; its coordinates must be finite, and its body must have particles"
+    )]
+    ProbePoint {
+        /// Name of the probe.
+        name: String,
+        /// The point asked for.
+        point: Vec<f64>,
+    },
+    /// Time between snapshots out of range.
+    #[error("the time between snapshots is {0:e}; it must be finite and > 0")]
+    SnapshotEvery(f64),
+    /// Two columns of one table would have the same name.
+    #[error("two columns of {} would be called {column:?}; use different names", path.display())]
+    DuplicateColumn {
+        /// The table.
+        path: PathBuf,
+        /// The name.
+        column: String,
+    },
+    /// The reference belongs to another set of particles.
+    #[error("the reference state has {reference} particles, the simulation {particles}")]
+    Reference {
+        /// Particles of the reference.
+        reference: usize,
+        /// Particles of the simulation.
+        particles: usize,
+    },
+}
+
+impl OutputError {
+    /// For `map_err` on an input or output operation.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,101 @@
+//! The fields of the particles, computed on demand.
+
+use super::{OutputError, Reference};
+use crate::field::Field;
+use crate::material::{Law, first_piola};
+use crate::simulation::Simulation;
+use crate::tensor::{Deformation, Tensor, Vector};
+
+/// Rows and columns of the components of [`Kind::Symmetric`].
+const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
+impl Field {
+    /// Appends the components at one particle (which must exist in the simulation and the reference) to `out`.
+    ///
+    /// # Errors
+    /// A stress is asked for where det F ≤ 0.
+    pub fn append<const D: usize, L: Law, A>(
+        self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        particle: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<(), OutputError> {
+        let particles = &simulation.particles;
+        let h = || particles.displacement_gradient[particle];
+        let law = || &simulation.bodies[particles.body[particle] as usize].law;
+        let stress = || cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle, source });
+        match self {
+            Self::Position => out.extend(padded(&particles.position[particle])),
+            Self::Displacement => {
+                out.extend(padded(&(particles.position[particle] - reference.position[particle])));
+            }
+            Self::Velocity => out.extend(padded(&particles.velocity[particle])),
+            Self::Acceleration => out.extend(padded(&particles.acceleration[particle])),
+            Self::DeformationGradient => {
+                let f = crate::tensor::identity::<f64, 3>() + crate::material::embed(&h());
+                out.extend(f.transpose().iter());
+            }
+            Self::Jacobian => out.push(Deformation::new(h()).jacobian),
+            Self::Strain => {
+                let strain = crate::material::embed(&Deformation::new(h()).green_lagrange());
+                out.extend(SYMMETRIC.map(|at| strain[at]));
+            }
+            Self::Stress => {
+                let stress = stress()?;
+                out.extend(SYMMETRIC.map(|at| stress[at]));
+            }
+            Self::Pressure => out.push(-stress()?.trace() / 3.0),
+            Self::VonMises => out.push(von_mises(&stress()?)),
+            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()))),
+            Self::Mass => out.push(particles.mass[particle]),
+            Self::Volume => out.push(particles.volume[particle]),
+            Self::Body => out.push(f64::from(particles.body[particle])),
+        }
+        Ok(())
+    }
+
+    /// The components at all particles, particle after particle.
+    ///
+    /// # Errors
+    /// As [`Self::append`]; a reference with another number of particles.
+    pub fn values<const D: usize, L: Law, A>(
+        self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+    ) -> Result<Vec<f64>, OutputError> {
+        reference.check(simulation)?;
+        let count = simulation.particles.len();
+        let mut out = Vec::with_capacity(count * self.kind().components().len());
+        for particle in 0..count {
+            self.append(simulation, reference, particle, &mut out)?;
+        }
+        Ok(out)
+    }
+}
+
+/// A vector with zeros for the missing components.
+pub(crate) fn padded<const D: usize>(v: &Vector<f64, D>) -> [f64; 3] {
+    std::array::from_fn(|i| if i < D { v[i] } else { 0.0 })
+}
+
+/// σ = P Fᵀ / J with P = F S (eq. 7), and the out-of-plane normal stress of plane or uniaxial strain on the rest of the diagonal.
+fn cauchy_stress<const D: usize, L: Law>(
+    law: &L,
+    h: Tensor<f64, D>,
+) -> Result<Tensor<f64, 3>, crate::material::NonPositiveJacobian> {
+    let at = Deformation::new(h);
+    let piola = first_piola(law, &at.f, h)?;
+    let mut stress = crate::material::embed(&(piola * at.f.transpose() / at.jacobian));
+    for i in D..3 {
+        stress[(i, i)] = law.out_of_plane_stress(&at);
+    }
+    Ok(stress)
+}
+
+/// √(3/2 s:s), s being the deviator; from differences of the normal stresses, so that a pressure cancels exactly.
+fn von_mises(s: &Tensor<f64, 3>) -> f64 {
+    let normal = (s[(0, 0)] - s[(1, 1)]).powi(2) + (s[(1, 1)] - s[(2, 2)]).powi(2) + (s[(2, 2)] - s[(0, 0)]).powi(2);
+    let shear = s[(0, 1)].powi(2) + s[(1, 2)].powi(2) + s[(0, 2)].powi(2);
+    (0.5 * normal + 3.0 * shear).sqrt()
+}

@@ -1,0 +1,99 @@
+//! Two ways to put a file on disk: all at once or not at all, and line by line as it grows.
+
+use super::OutputError;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// What a dying process may lose of a growing file.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Writes a file under a temporary name, then renames it: a reader, or a killed run, sees the old file or the new one.
+///
+/// # Errors
+/// The system refuses; the file is then as before.
+pub(crate) fn write_atomically(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<(), OutputError> {
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".part");
+    let temporary = PathBuf::from(temporary);
+    let write = || -> std::io::Result<()> {
+        let mut file = BufWriter::new(File::create(&temporary)?);
+        content(&mut file)?;
+        file.into_inner()?.sync_all()?;
+        std::fs::rename(&temporary, path)
+    };
+    write().map_err(|source| {
+        // The first error is the one to report; the leftover may not even exist.
+        let _ = std::fs::remove_file(&temporary);
+        OutputError::io("write", path)(source)
+    })
+}
+
+/// A text file that grows line by line and is flushed every [`FLUSH_INTERVAL`], on [`Stream::flush`] and when dropped.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    path: PathBuf,
+    writer: BufWriter<File>,
+    flushed: Instant,
+}
+
+impl Stream {
+    /// Creates or empties the file.
+    pub(crate) fn create(path: PathBuf) -> Result<Self, OutputError> {
+        let file = File::create(&path).map_err(OutputError::io("create", &path))?;
+        Ok(Self { path, writer: BufWriter::new(file), flushed: Instant::now() })
+    }
+
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Appends a line.
+    pub(crate) fn line(&mut self, line: &str) -> Result<(), OutputError> {
+        writeln!(self.writer, "{line}").map_err(OutputError::io("write", &self.path))?;
+        if self.flushed.elapsed() >= FLUSH_INTERVAL { self.flush() } else { Ok(()) }
+    }
+
+    /// Hands everything to the system.
+    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
+        self.flushed = Instant::now();
+        self.writer.flush().map_err(OutputError::io("write", &self.path))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_write_that_fails_leaves_the_old_file_and_no_rubbish() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let path = directory.path().join("a.pvd");
+        write_atomically(&path, |file| file.write_all(b"old"))?;
+        // A directory where the temporary file should go makes the write fail.
+        std::fs::create_dir(directory.path().join("a.pvd.part"))?;
+        assert!(matches!(write_atomically(&path, |file| file.write_all(b"new")), Err(OutputError::Io { .. })));
+        assert_eq!(std::fs::read(&path)?, b"old");
+        std::fs::remove_dir(directory.path().join("a.pvd.part"))?;
+        write_atomically(&path, |file| file.write_all(b"new"))?;
+        assert_eq!(std::fs::read(&path)?, b"new");
+        assert_eq!(std::fs::read_dir(directory.path())?.count(), 1);
+        Ok(())
+    }
+
+    #[test]
+    fn lines_are_on_disk_soon_although_nobody_flushes() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let mut stream = Stream::create(directory.path().join("a.csv"))?;
+        stream.line("1")?;
+        std::thread::sleep(FLUSH_INTERVAL);
+        stream.line("2")?;
+        assert_eq!(std::fs::read_to_string(stream.path())?, "1\n2\n");
+        Ok(())
+    }
+}

@@ -1,0 +1,97 @@
+//! `history.csv`: energies, momentum and iterations of every step.
+
+use super::csv::{Row, Table};
+use super::{OutputError, Reference};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::simulation::Simulation;
+use std::path::PathBuf;
+
+/// The axes, as they end names of columns.
+pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The energies of a simulation, in the user's unit (per unit of the missing dimensions).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Energies {
+    /// Σ ½ m v·v
+    pub kinetic: f64,
+    /// Σ V₀ W
+    pub strain: f64,
+    /// Work of gravity, tractions, pressure and moving walls since the start.
+    pub external: f64,
+    /// Kinetic and strain energy.
+    pub total: f64,
+    /// total − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
+    pub balance: f64,
+}
+
+impl Energies {
+    /// Of the present state.
+    pub fn of<const D: usize, L: Law, A: ShapeFunction>(
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+    ) -> Self {
+        let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
+        let (external, total) = (simulation.external_work, kinetic + strain);
+        Self { kinetic, strain, external, total, balance: total - reference.energy - external }
+    }
+}
+
+/// What a step cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// Δt; 0 for the initial state.
+    pub dt: f64,
+    /// Newton iterations.
+    pub newton: usize,
+    /// Krylov iterations of all its linear systems.
+    pub krylov: usize,
+}
+
+/// Writes `history.csv`.
+#[derive(Debug)]
+pub struct History(Table);
+
+impl History {
+    /// Creates the file, with the header for `dimension` components of momentum.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn create(path: PathBuf, dimension: usize) -> Result<Self, OutputError> {
+        let fixed = ["step", "time", "dt", "kinetic", "strain", "external", "total", "balance"];
+        let mut columns: Vec<String> = fixed.map(str::to_owned).into();
+        columns.extend(AXES.iter().take(dimension).map(|axis| format!("momentum_{axis}")));
+        columns.extend(["newton", "krylov"].map(str::to_owned));
+        Ok(Self(Table::create(path, &columns)?))
+    }
+
+    /// Appends the present state; returns its energies.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn write<const D: usize, L: Law, A: ShapeFunction>(
+        &mut self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        cost: Cost,
+    ) -> Result<Energies, OutputError> {
+        let energies = Energies::of(simulation, reference);
+        let mut row = Row::default();
+        row.push(simulation.clock.steps());
+        row.extend([simulation.clock.time(), cost.dt]);
+        row.extend([energies.kinetic, energies.strain, energies.external, energies.total, energies.balance]);
+        row.extend(simulation.particles.momentum().iter().copied());
+        row.push(cost.newton);
+        row.push(cost.krylov);
+        self.0.row(&row)?;
+        Ok(energies)
+    }
+
+    /// Hands everything to the system.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        self.0.flush()
+    }
+}

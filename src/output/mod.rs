@@ -1,0 +1,37 @@
+//! Results on disk and on screen. Reads the simulation, changes nothing.
+//!
+//! A [`Recorder`] writes into one directory while the run goes on, so that whatever happened so far is there if it dies:
+//!
+//! | file | content |
+//! |---|---|
+//! | `history.csv` | energies, momentum, Newton and Krylov iterations of every step |
+//! | `reactions.csv` | force of every prescribed condition on the bodies, if there are any |
+//! | `probes.csv` | fields at chosen particles or points, if any are asked for |
+//! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
+//! | `newton.jsonl` | Newton residuals, one line a step; becomes part of `report.json` at the end |
+//! | `report.json` | settings, outcome, counts, seconds by phase, Newton residuals |
+//!
+//! [`plot::plot_run`] draws pictures of a directory. Floats in text files have as many digits as it takes to read the same bits back.
+
+mod csv;
+mod error;
+mod fields;
+mod files;
+pub mod history;
+pub mod plot;
+pub mod probes;
+pub mod progress;
+pub mod pvd;
+mod reactions;
+mod recorder;
+mod reference;
+pub mod report;
+mod snapshots;
+mod summary;
+pub mod vtu;
+
+pub use error::OutputError;
+pub use probes::{Place, Probe, nearest};
+pub use recorder::{OutputSettings, Recorder};
+pub use reference::Reference;
+pub use summary::Summary;

@@ -1,0 +1,34 @@
+//! Colours that remain distinct to colour-blind readers.
+
+use plotters::style::RGBColor;
+
+// Okabe and Ito, "Color Universal Design", 2008.
+pub(super) const BLACK: RGBColor = RGBColor(0, 0, 0);
+pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(super) const VERMILLION: RGBColor = RGBColor(213, 94, 0);
+pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
+pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
+
+/// Viridis (Smith, van der Walt; CC0), every eighth of its range.
+const VIRIDIS: [[f64; 3]; 9] = [
+    [68.0, 1.0, 84.0],
+    [71.0, 44.0, 122.0],
+    [59.0, 81.0, 139.0],
+    [44.0, 113.0, 142.0],
+    [33.0, 144.0, 141.0],
+    [39.0, 173.0, 129.0],
+    [92.0, 200.0, 99.0],
+    [170.0, 220.0, 50.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// The colour of `x` in [0, 1]; what lies outside gets the colour of the end, NaN that of 0.
+pub(super) fn viridis(x: f64) -> RGBColor {
+    let last = VIRIDIS.len() - 1;
+    // max and min drop a NaN
+    let place = x.max(0.0).min(1.0) * last as f64;
+    let piece = (place as usize).min(last - 1);
+    let weight = place - piece as f64;
+    let mix = |k: usize| (VIRIDIS[piece][k] * (1.0 - weight) + VIRIDIS[piece + 1][k] * weight).round() as u8;
+    RGBColor(mix(0), mix(1), mix(2))
+}

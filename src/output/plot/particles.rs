@@ -1,0 +1,147 @@
+//! The particles of a snapshot over the background grid, coloured by a field.
+
+use super::chart::{LABEL, TITLE, range, tick};
+use super::palette::{BLUE, viridis};
+use super::{PlotError, draw_error};
+use crate::output::vtu::{Array, Snapshot, Values};
+use plotters::prelude::*;
+
+/// The longer side of the drawing of the box, and the least the shorter one may have.
+const SIDE: (f64, f64) = (760.0, 160.0);
+
+/// Width of the labels at the left, height of those below and of the title, width of the colour bar.
+const MARGINS: (u32, u32, u32, u32) = (76, 52, 40, 120);
+
+/// Grid lines beyond so many along an axis would be a grey area.
+const MAX_LINES: u32 = 200;
+
+/// More particles than this are drawn in part, evenly thinned.
+const MAX_DRAWN: usize = 50_000;
+
+/// The picture as SVG.
+///
+/// In one dimension the field is drawn over x; in three, the particles are seen along y. The field is the first of the
+/// snapshot that is not the body, as its length if it is a vector, or its Frobenius norm if it is a tensor.
+pub(super) fn draw(name: &'static str, snapshot: &Snapshot) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    draw_on(&mut svg, snapshot).map_err(|error| draw_error(name)(&*error))?;
+    Ok(svg)
+}
+
+/// The name of a field, and one number a particle.
+fn colouring(snapshot: &Snapshot) -> Option<(String, Vec<f64>)> {
+    let float = |array: &'_ Array| match &array.values {
+        Values::Float(values) => Some((array.name.replace('_', " "), array.components.len(), values.clone())),
+        Values::Index(_) => None,
+    };
+    let (name, width, values) = snapshot.arrays.iter().find_map(float)?;
+    // The off-diagonal components of a symmetric tensor count twice.
+    let weight = |k: usize| if width == 6 && k >= 3 { 2.0 } else { 1.0 };
+    let size = |tuple: &[f64]| tuple.iter().enumerate().map(|(k, x)| weight(k) * x * x).sum::<f64>().sqrt();
+    match width {
+        0 => None,
+        1 => Some((name, values)),
+        _ => Some((format!("|{name}|"), values.chunks(width).map(size).collect())),
+    }
+}
+
+fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::error::Error>> {
+    let background = &snapshot.background;
+    let colouring = colouring(snapshot);
+    let values = |p: usize| colouring.as_ref().and_then(|(_, values)| values.get(p).copied());
+    let (low, high) = range((0..snapshot.points.len()).filter_map(values), 0.0);
+    let label = colouring.as_ref().map_or("", |(name, _)| name);
+
+    // Which coordinates go right and up; in one dimension the field itself goes up.
+    let up = match background.dimension {
+        1 => None,
+        2 => Some(1),
+        _ => Some(2),
+    };
+    let extent = |axis: usize| {
+        let start = background.origin[axis];
+        (start, start + background.spacing * f64::from(background.cells[axis]))
+    };
+    let (x, mut y) = (extent(0), up.map_or_else(|| range([low, high].into_iter(), 0.05), extent));
+    let scale = match up {
+        Some(_) => SIDE.0 / (x.1 - x.0).max(y.1 - y.0),
+        None => SIDE.0 / (x.1 - x.0),
+    };
+    let width = ((x.1 - x.0) * scale).max(SIDE.1);
+    let mut height = if up.is_some() { (y.1 - y.0) * scale } else { SIDE.0 / 2.0 };
+    if height < SIDE.1 {
+        // A flat box gets air above and below rather than another scale.
+        let air = 0.5 * (SIDE.1 - height) / scale;
+        (y, height) = ((y.0 - air, y.1 + air), SIDE.1);
+    }
+    let (left, below, above, bar) = MARGINS;
+    let size = (left + width as u32 + 20 + bar, above + height as u32 + below + 10);
+
+    let root = SVGBackend::with_string(svg, size).into_drawing_area();
+    root.fill(&WHITE)?;
+    let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
+    let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
+    let rest = root.titled(&format!("t = {}{part}", tick(snapshot.time)), TITLE)?;
+    let (main, side) = rest.split_horizontally(left + width as u32 + 20);
+
+    let mut chart = ChartBuilder::on(&main)
+        .margin_right(20)
+        .margin_top(10)
+        .x_label_area_size(below)
+        .y_label_area_size(left)
+        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_desc("x")
+        .y_desc(up.map_or(label, |axis| ["x", "y", "z"][axis]))
+        .label_style(LABEL)
+        .axis_desc_style(LABEL)
+        .x_label_formatter(&|x| tick(*x))
+        .y_label_formatter(&|y| tick(*y))
+        .draw()?;
+    let grey = BLACK.mix(0.15);
+    if let Some(up) = up {
+        let (right, top) = (extent(0), extent(up));
+        let node = |axis: usize, k: u32| background.origin[axis] + background.spacing * f64::from(k);
+        if background.cells[0] <= MAX_LINES && background.cells[up] <= MAX_LINES {
+            let upright = (0..=background.cells[0]).map(|k| [(node(0, k), top.0), (node(0, k), top.1)]);
+            let level = (0..=background.cells[up]).map(|k| [(right.0, node(up, k)), (right.1, node(up, k))]);
+            chart.draw_series(upright.chain(level).map(|line| PathElement::new(line, grey)))?;
+        }
+    }
+    let radius = (0.22 * background.spacing * scale).clamp(1.5, 6.0) as i32;
+    let dots = (0..snapshot.points.len()).step_by(stride).filter_map(|p| {
+        let point = &snapshot.points[p];
+        let value = values(p);
+        let color = value.map_or(BLUE, |value| viridis((value - low) / (high - low)));
+        let upright = up.map_or(value, |axis| Some(point[axis]))?;
+        (point[0].is_finite() && upright.is_finite()).then(|| Circle::new((point[0], upright), radius, color.filled()))
+    });
+    chart.draw_series(dots)?;
+
+    if up.is_some() && colouring.is_some() {
+        let mut chart = ChartBuilder::on(&side)
+            .margin_top(10)
+            .margin_bottom(below)
+            .right_y_label_area_size(92)
+            .build_cartesian_2d(0.0..1.0, low..high)?;
+        let steps = 128;
+        let at = |k: i32| low + (high - low) * f64::from(k) / f64::from(steps);
+        chart.draw_series((0..steps).map(|k| {
+            let color = viridis((f64::from(k) + 0.5) / f64::from(steps));
+            Rectangle::new([(0.0, at(k)), (1.0, at(k + 1))], color.filled())
+        }))?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .disable_x_axis()
+            .y_desc(label)
+            .label_style(LABEL)
+            .axis_desc_style(LABEL)
+            .y_label_formatter(&|y| tick(*y))
+            .draw()?;
+    }
+    root.present()?;
+    Ok(())
+}

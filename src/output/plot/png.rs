@@ -1,0 +1,27 @@
+//! PNG from SVG.
+
+use super::PlotError;
+use resvg::{tiny_skia, usvg};
+
+/// Pixels per unit of the SVG.
+const SCALE: f32 = 2.0;
+
+/// The family of the embedded font.
+const FAMILY: &str = "DejaVu Sans";
+
+/// Renders an SVG on white.
+pub(super) fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
+    let fail = |reason: String| PlotError::Draw { name, reason };
+    let mut options = usvg::Options::default();
+    let fonts = options.fontdb_mut();
+    fonts.load_font_data(dejavu::sans::regular().to_vec());
+    fonts.set_sans_serif_family(FAMILY);
+    let tree = usvg::Tree::from_str(svg, &options).map_err(|error| fail(error.to_string()))?;
+    let size = tree.size().to_int_size();
+    let pixels = |length: u32| (length as f32 * SCALE) as u32;
+    let (width, height) = (pixels(size.width()), pixels(size.height()));
+    let mut pixmap = tiny_skia::Pixmap::new(width, height).ok_or_else(|| fail(format!("{width} x {height} pixels")))?;
+    pixmap.fill(tiny_skia::Color::WHITE);
+    resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixmap.as_mut());
+    pixmap.encode_png().map_err(|error| fail(error.to_string()))
+}

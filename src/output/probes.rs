@@ -1,0 +1,114 @@
+//! `probes.csv`: fields at chosen particles or points against time.
+
+use super::csv::{Row, Table};
+use super::{OutputError, Reference};
+use crate::field::{Field, Kind};
+use crate::material::Law;
+use crate::particles::Particles;
+use crate::simulation::Simulation;
+use crate::tensor::Vector;
+use std::path::PathBuf;
+
+/// Where a probe looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place<const D: usize> {
+    /// At a particle, which it follows.
+    Particle(usize),
+    /// At the particle nearest to a fixed point, found anew each time; of equally near ones, the first. No field is interpolated.
+    Nearest {
+        /// The point.
+        point: Vector<f64, D>,
+        /// Look at the particles of this body only.
+        body: Option<u32>,
+    },
+}
+
+/// A field at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Probe<const D: usize> {
+    /// Name; columns are `name`, or `name_x`, … for the components of a vector, `name_xx`, … of a tensor.
+    pub name: String,
+    /// The field.
+    pub field: Field,
+    /// Where.
+    pub place: Place<D>,
+}
+
+impl<const D: usize> Probe<D> {
+    /// The components worth a column: vectors have `D`, tensors all.
+    fn components(&self) -> &'static [&'static str] {
+        let kind = self.field.kind();
+        let all = kind.components();
+        if kind == Kind::Vector { all.get(..D).unwrap_or(all) } else { all }
+    }
+
+    /// The particle looked at now.
+    fn particle(&self, particles: &Particles<D>) -> Result<usize, OutputError> {
+        let name = || self.name.clone();
+        match self.place {
+            Place::Particle(particle) if particle < particles.len() => Ok(particle),
+            Place::Particle(particle) => {
+                Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
+            }
+            Place::Nearest { point, body } => {
+                let nearest = nearest(particles, &point, body);
+                nearest.ok_or_else(|| OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() })
+            }
+        }
+    }
+}
+
+/// The particle nearest to `point`, among those of `body` if one is given; of equally near ones, the first.
+pub fn nearest<const D: usize>(particles: &Particles<D>, point: &Vector<f64, D>, body: Option<u32>) -> Option<usize> {
+    let candidates = particles.position.iter().zip(&particles.body).enumerate();
+    candidates
+        .filter(|(_, (_, of))| body.is_none_or(|body| body == **of))
+        .map(|(particle, (x, _))| (particle, (x - point).norm_squared()))
+        .filter(|(_, distance)| distance.is_finite())
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(particle, _)| particle)
+}
+
+/// Writes `probes.csv`.
+#[derive(Debug)]
+pub(crate) struct Probes<const D: usize> {
+    probes: Vec<Probe<D>>,
+    table: Table,
+}
+
+impl<const D: usize> Probes<D> {
+    /// Creates the file with its header.
+    pub(crate) fn create(path: PathBuf, probes: Vec<Probe<D>>) -> Result<Self, OutputError> {
+        let mut columns = vec!["time".to_owned()];
+        for probe in &probes {
+            columns.extend(probe.components().iter().map(|component| match *component {
+                "" => probe.name.clone(),
+                component => format!("{}_{component}", probe.name),
+            }));
+        }
+        Ok(Self { probes, table: Table::create(path, &columns)? })
+    }
+
+    /// Appends the present values.
+    pub(crate) fn write<L: Law, A>(
+        &mut self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+    ) -> Result<(), OutputError> {
+        reference.check(simulation)?;
+        let mut row = Row::default();
+        row.push(simulation.clock.time());
+        let mut values = Vec::new();
+        for probe in &self.probes {
+            values.clear();
+            probe.field.append(simulation, reference, probe.particle(&simulation.particles)?, &mut values)?;
+            row.extend(values.iter().copied().take(probe.components().len()));
+        }
+        self.table.row(&row)
+    }
+
+    /// Hands everything to the system.
+    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
+        self.table.flush()
+    }
+}

@@ -1,0 +1,154 @@
+//! How far a run is, for the one who waits: a bar on a terminal, a line now and then elsewhere, both on standard error.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::VecDeque;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// The pace is that of the last so many seconds.
+const WINDOW: f64 = 30.0;
+
+/// Between two lines where there is no terminal.
+const LINE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Resolution of the bar.
+const BAR_LENGTH: f64 = 1000.0;
+
+/// Predicts the time left from the simulated time per wall-clock second of the recent past: impacts and halved steps slow a
+/// run down, and an average since the start would hide it.
+#[derive(Clone, Debug, Default)]
+pub struct Pace {
+    /// (wall-clock seconds, simulated time), oldest first.
+    marks: VecDeque<(f64, f64)>,
+}
+
+impl Pace {
+    /// Simulated `time` is reached at wall-clock second `wall`.
+    pub fn mark(&mut self, wall: f64, time: f64) {
+        self.marks.push_back((wall, time));
+        // The window must stay covered: a mark goes when the next one is old enough to be the first.
+        while self.marks.get(1).is_some_and(|&(second, _)| second <= wall - WINDOW) {
+            self.marks.pop_front();
+        }
+    }
+
+    /// Wall-clock seconds until `end`; `None` as long as nothing can be said.
+    pub fn left(&self, end: f64) -> Option<f64> {
+        let (&(wall_0, time_0), &(wall_1, time_1)) = (self.marks.front()?, self.marks.back()?);
+        let left = (end - time_1) * ((wall_1 - wall_0) / (time_1 - time_0));
+        left.is_finite().then_some(left.max(0.0))
+    }
+}
+
+/// What is shown besides the time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Shown {
+    /// Steps taken.
+    pub step: u64,
+    /// Newton iterations of the last step.
+    pub newton: usize,
+    /// Krylov iterations of the last step.
+    pub krylov: usize,
+}
+
+/// The way it is shown.
+#[derive(Debug)]
+enum Display {
+    Bar(ProgressBar),
+    Lines { last: Instant },
+    Silent,
+}
+
+/// Shows how far a run is.
+#[derive(Debug)]
+pub struct Progress {
+    display: Display,
+    pace: Pace,
+    since: Instant,
+    start: f64,
+    end: f64,
+}
+
+impl Progress {
+    /// Starts now, at simulated time `start`, towards `end`; `quiet` shows nothing.
+    pub fn new(start: f64, end: f64, quiet: bool) -> Self {
+        let now = Instant::now();
+        let display = if quiet {
+            Display::Silent
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(BAR_LENGTH as u64);
+            // The template is a constant; should it be refused, indicatif's own is shown.
+            if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
+                bar.set_style(style);
+            }
+            Display::Bar(bar)
+        } else {
+            Display::Lines { last: now }
+        };
+        let mut pace = Pace::default();
+        pace.mark(0.0, start);
+        Self { display, pace, since: now, start, end }
+    }
+
+    /// Shows that `time` is reached.
+    pub fn show(&mut self, time: f64, shown: Shown) {
+        if matches!(self.display, Display::Silent) {
+            return;
+        }
+        self.pace.mark(self.since.elapsed().as_secs_f64(), time);
+        let left = self.pace.left(self.end).map_or_else(|| "unknown".to_owned(), readable);
+        let text = format!(
+            "t = {time:.6} of {:.6}, step {}, Newton {}, Krylov {}, {left} left",
+            self.end, shown.step, shown.newton, shown.krylov
+        );
+        match &mut self.display {
+            Display::Bar(bar) => {
+                bar.set_position((BAR_LENGTH * (time - self.start) / (self.end - self.start)) as u64);
+                bar.set_message(text);
+            }
+            Display::Lines { last } if last.elapsed() >= LINE_INTERVAL => {
+                eprintln!("{text}");
+                *last = Instant::now();
+            }
+            Display::Lines { .. } | Display::Silent => {}
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(self) {
+        if let Display::Bar(bar) = self.display {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Seconds as people say them.
+fn readable(seconds: f64) -> String {
+    match seconds {
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_estimate_follows_the_recent_pace() {
+        let mut pace = Pace::default();
+        assert_eq!(pace.left(10.0), None);
+        pace.mark(0.0, 0.0);
+        assert_eq!(pace.left(10.0), None);
+        // one unit a second for 5 s, then a tenth of that for longer than the window
+        pace.mark(5.0, 5.0);
+        assert_eq!(pace.left(10.0), Some(5.0));
+        for second in 1..=40 {
+            pace.mark(5.0 + f64::from(second), 5.0 + 0.1 * f64::from(second));
+        }
+        assert!(pace.left(10.0).is_some_and(|left| (left - 10.0).abs() < 1e-9), "{:?}", pace.left(10.0));
+        assert!(pace.marks.len() <= 32);
+    }
+}

@@ -1,0 +1,59 @@
+//! The series of snapshots as ParaView's `.pvd`: a list of times and files.
+
+use super::OutputError;
+use super::files::write_atomically;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// A growing series; the file is whole after every snapshot, so that a killed run still opens.
+#[derive(Clone, Debug)]
+pub struct Series {
+    path: PathBuf,
+    entries: String,
+}
+
+impl Series {
+    /// An empty series; the file appears with its first snapshot.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, entries: String::new() }
+    }
+
+    /// Adds `file`, given relative to the directory of the series, and rewrites the list, all or nothing.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn push(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.entries, r#"<DataSet timestep="{time:?}" part="0" file="{file}"/>"#);
+        let head = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
+        let tail = "</Collection>\n</VTKFile>\n";
+        write_atomically(&self.path, |file| write!(file, "{head}{}{tail}", self.entries))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_series_is_whole_after_every_snapshot() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let path = directory.path().join("particles.pvd");
+        let mut series = Series::new(path.clone());
+        let times = [0.0, 0.1 + 0.2, 1e-7];
+        for (k, time) in times.into_iter().enumerate() {
+            series.push(time, &format!("particles_{k}.vtu"))?;
+            let text = std::fs::read_to_string(&path)?;
+            assert!(text.ends_with("</Collection>\n</VTKFile>\n"));
+            let read: Vec<f64> = text
+                .split("timestep=\"")
+                .skip(1)
+                .map(|rest| rest.split('"').next().unwrap_or_default().parse())
+                .collect::<Result<_, _>>()?;
+            assert_eq!(read, times[..=k]);
+        }
+        assert_eq!(std::fs::read_dir(directory.path())?.count(), 1, "no temporary file stays");
+        Ok(())
+    }
+}

@@ -1,0 +1,36 @@
+//! What the output measures against: the state at the start of the run.
+
+use super::OutputError;
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::simulation::Simulation;
+use crate::tensor::Vector;
+
+/// Positions, energy and momentum at the start of the run. A restarted run keeps that of the first one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference<const D: usize> {
+    /// Position of every particle; displacements are measured from here.
+    pub position: Vec<Vector<f64, D>>,
+    /// Kinetic and strain energy, less the external work done so far.
+    pub energy: f64,
+    /// Σ m v
+    pub momentum: Vector<f64, D>,
+}
+
+impl<const D: usize> Reference<D> {
+    /// The present state as reference.
+    pub fn of<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Self {
+        let particles = &simulation.particles;
+        Self {
+            position: particles.position.clone(),
+            energy: particles.kinetic_energy() + simulation.strain_energy() - simulation.external_work,
+            momentum: particles.momentum(),
+        }
+    }
+
+    /// Whether it belongs to `simulation`, as far as can be told.
+    pub(crate) fn check<L, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
+        let (reference, particles) = (self.position.len(), simulation.particles.len());
+        if reference == particles { Ok(()) } else { Err(OutputError::Reference { reference, particles }) }
+    }
+}

@@ -1,0 +1,212 @@
+//! `report.json`: what was asked for, how it ended, what it cost, and the Newton residuals of every step.
+
+use super::OutputError;
+use super::files::{Stream, write_atomically};
+use super::history::Energies;
+use crate::phases::Phase;
+use crate::simulation::StepReport;
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+/// What was done, summed over all steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Particles.
+    pub particles: usize,
+    /// The most nodes active in a step.
+    pub max_active_nodes: usize,
+    /// Steps taken.
+    pub steps: u64,
+    /// How often a step was halved.
+    pub halvings: u64,
+    /// Newton iterations; those of failed attempts at a step are not counted, here and below.
+    pub newton_iterations: u64,
+    /// The most Newton iterations of a step.
+    pub max_newton_iterations: usize,
+    /// Krylov iterations.
+    pub krylov_iterations: u64,
+    /// Residuals evaluated by Newton's method.
+    pub residual_evaluations: u64,
+    /// Products with the tangent.
+    pub tangent_products: u64,
+    /// Iterations of the projection onto the nodes.
+    pub projection_iterations: u64,
+}
+
+impl Counts {
+    /// Adds a step.
+    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+        let newton = &step.newton.history;
+        self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
+        self.steps += 1;
+        self.halvings += u64::from(step.halvings);
+        self.newton_iterations += newton.iterations.len() as u64;
+        self.max_newton_iterations = self.max_newton_iterations.max(newton.iterations.len());
+        self.krylov_iterations += newton.counts.krylov_iterations as u64;
+        self.residual_evaluations += newton.counts.residuals as u64;
+        self.tangent_products += newton.counts.tangent_products as u64;
+        self.projection_iterations += step.projection_iterations as u64;
+    }
+}
+
+/// Seconds, summed over all steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Of each of [`Phase::ALL`].
+    pub phases: [f64; Phase::ALL.len()],
+    /// Since the start, output and failed attempts included.
+    pub total: f64,
+}
+
+impl Seconds {
+    /// Adds the phases of a step.
+    pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
+        for (sum, seconds) in self.phases.iter_mut().zip(step.seconds.seconds()) {
+            *sum += seconds;
+        }
+    }
+
+    /// The phases by name, and what is in none of them.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        let other = self.total - self.phases.iter().sum::<f64>();
+        Phase::ALL.iter().map(|phase| phase.1).zip(self.phases).chain([("other", other.max(0.0))])
+    }
+}
+
+/// A float in JSON, which has no NaN and no infinity: those become the strings "NaN", "inf" and "-inf" instead of null.
+#[derive(Clone, Copy, Debug)]
+struct Number(f64);
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0.is_finite() { serializer.serialize_f64(self.0) } else { serializer.collect_str(&self.0) }
+    }
+}
+
+/// `newton.jsonl`: the residual norms of a step on a line, while the run goes on.
+#[derive(Debug)]
+pub(crate) struct NewtonLog(Stream);
+
+impl NewtonLog {
+    /// Creates the file.
+    pub(crate) fn create(path: PathBuf) -> Result<Self, OutputError> {
+        Stream::create(path).map(Self)
+    }
+
+    /// Appends ‖R‖ at the initial guess and after each iteration.
+    pub(crate) fn write<const D: usize>(&mut self, step: &StepReport<D>) -> Result<(), OutputError> {
+        let history = &step.newton.history;
+        let residuals = history.first_residual.into_iter().chain(history.iterations.iter().map(|one| one.residual));
+        let line = serde_json::to_string(&residuals.map(Number).collect::<Vec<_>>());
+        self.0.line(&line.map_err(json(self.0.path()))?)
+    }
+
+    /// Hands everything to the system.
+    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
+        self.0.flush()
+    }
+}
+
+fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
+    move |source| OutputError::Json { path: path.to_owned(), source }
+}
+
+/// The report of a run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Report<'a> {
+    /// The settings used.
+    pub settings: &'a Value,
+    /// Why the run ended early, if it did.
+    pub failure: Option<&'a str>,
+    /// Time reached.
+    pub time: f64,
+    /// Energies at the end.
+    pub energies: Energies,
+    /// What was done.
+    pub counts: Counts,
+    /// How long it took.
+    pub seconds: Seconds,
+}
+
+impl Report<'_> {
+    /// Writes the report, all or nothing; the residuals move from `log` into it line by line, then `log` is removed.
+    pub(crate) fn write(&self, path: &Path, mut log: NewtonLog) -> Result<(), OutputError> {
+        log.flush()?;
+        let log = log.0.path();
+        let head = serde_json::to_string_pretty(&self.head(path)?).map_err(json(path))?;
+        let lines = BufReader::new(File::open(log).map_err(OutputError::io("read", log))?).lines();
+        write_atomically(path, |file| {
+            // The object is left open for one more key.
+            write!(file, "{},\n  \"newton_residuals\": [", head.strip_suffix("\n}").unwrap_or(&head))?;
+            for (k, line) in lines.enumerate() {
+                write!(file, "{}\n    {}", if k == 0 { "" } else { "," }, line?)?;
+            }
+            file.write_all(b"\n  ]\n}\n")
+        })?;
+        std::fs::remove_file(log).map_err(OutputError::io("remove", log))
+    }
+
+    fn head(&self, path: &Path) -> Result<Map<String, Value>, OutputError> {
+        let value = |number| serde_json::to_value(Number(number)).map_err(json(path));
+        let Energies { kinetic, strain, external, total, balance } = self.energies;
+        let mut energies = Map::new();
+        for (name, x) in
+            [("kinetic", kinetic), ("strain", strain), ("external", external), ("total", total), ("balance", balance)]
+        {
+            energies.insert(name.to_owned(), value(x)?);
+        }
+        let mut seconds = Map::new();
+        for (name, x) in self.seconds.named().chain([("total", self.seconds.total)]) {
+            seconds.insert(name.to_owned(), value(x)?);
+        }
+        let mut head = Map::new();
+        head.insert("program".to_owned(), concat!("bfree ", env!("CARGO_PKG_VERSION")).into());
+        head.insert("outcome".to_owned(), if self.failure.is_some() { "failed" } else { "finished" }.into());
+        head.insert("failure".to_owned(), self.failure.into());
+        head.insert("settings".to_owned(), self.settings.clone());
+        head.insert("time".to_owned(), value(self.time)?);
+        head.insert("energies".to_owned(), energies.into());
+        head.insert("counts".to_owned(), serde_json::to_value(self.counts).map_err(json(path))?);
+        head.insert("seconds".to_owned(), seconds.into());
+        Ok(head)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_residuals_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>>
+    {
+        let directory = tempfile::tempdir()?;
+        let energies = Energies { kinetic: f64::NAN, strain: 0.1, external: 0.0, total: f64::INFINITY, balance: 0.0 };
+        let settings = serde_json::json!({"nested": {"deep": {}}});
+        let report = Report {
+            settings: &settings,
+            failure: None,
+            time: 0.1 + 0.2,
+            energies,
+            counts: Counts::default(),
+            seconds: Seconds::default(),
+        };
+        for lines in [&[][..], &["[1.0,1e-9]"], &["[1.0,1e-9]", "[]", "[2.5]"]] {
+            let mut log = NewtonLog::create(directory.path().join("newton.jsonl"))?;
+            lines.iter().try_for_each(|line| log.0.line(line))?;
+            let path = directory.path().join("report.json");
+            report.write(&path, log)?;
+            let read: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
+            let residuals: Vec<Value> =
+                lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;
+            assert_eq!(read["newton_residuals"], Value::from(residuals));
+            assert_eq!((&read["settings"], &read["outcome"]), (&settings, &"finished".into()));
+            assert_eq!((&read["energies"]["kinetic"], &read["energies"]["total"]), (&"NaN".into(), &"inf".into()));
+            assert_eq!(read["time"], 0.1 + 0.2);
+            assert!(!directory.path().join("newton.jsonl").exists());
+        }
+        Ok(())
+    }
+}

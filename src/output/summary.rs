@@ -1,0 +1,52 @@
+//! The text printed at the end of a run.
+
+use super::history::Energies;
+use super::report::{Counts, Seconds};
+use std::fmt::{Display, Formatter, Result};
+
+/// A run in a few lines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Time reached.
+    pub time: f64,
+    /// Energies at the end.
+    pub energies: Energies,
+    /// |p − p₀|, the change of momentum.
+    pub momentum_change: f64,
+    /// Σ m |v| at the end, to compare it with.
+    pub momentum_scale: f64,
+    /// What was done.
+    pub counts: Counts,
+    /// How long it took.
+    pub seconds: Seconds,
+}
+
+impl Display for Summary {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self { time, energies, counts, seconds, .. } = self;
+        let mean = |sum: u64| sum as f64 / counts.steps.max(1) as f64;
+        writeln!(
+            f,
+            "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} halvings",
+            counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.halvings
+        )?;
+        writeln!(
+            f,
+            "energy    kinetic {:.6e}, strain {:.6e}, total {:.6e}, external work {:.6e}, balance {:.3e}",
+            energies.kinetic, energies.strain, energies.total, energies.external, energies.balance
+        )?;
+        writeln!(f, "momentum  changed by {:.3e}; sum of m |v| is {:.3e}", self.momentum_change, self.momentum_scale)?;
+        writeln!(
+            f,
+            "Newton    {:.2} iterations a step, at most {}; {:.1} Krylov iterations a step",
+            mean(counts.newton_iterations),
+            counts.max_newton_iterations,
+            mean(counts.krylov_iterations)
+        )?;
+        write!(f, "seconds  ")?;
+        for (k, (name, x)) in seconds.named().enumerate() {
+            write!(f, "{} {} {x:.2}", if k == 0 { "" } else { "," }, name.replace('_', " "))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,359 @@
+//! Snapshots as VTK's `.vtu`: an unstructured grid of vertices, arrays appended raw in zlib blocks, little endian.
+//!
+//! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read it; [`Snapshot::read`] reads what
+//! [`Snapshot::write`] wrote, bit for bit.
+
+use super::OutputError;
+use super::files::write_atomically;
+use flate2::Compression;
+use flate2::read::{ZlibDecoder, ZlibEncoder};
+use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::io::{Read, Write as _};
+use std::path::{Path, PathBuf};
+
+/// Bytes of an uncompressed block.
+const BLOCK: usize = 1 << 16;
+
+/// VTK's number of a cell that is one point.
+const VERTEX: u8 = 1;
+
+/// The numbers of an array.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// `Float64`
+    Float(Vec<f64>),
+    /// `UInt32`
+    Index(Vec<u32>),
+}
+
+/// An array with one tuple for each point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Its name.
+    pub name: String,
+    /// Names of the components; one, and empty, for a scalar.
+    pub components: Vec<String>,
+    /// All components of the first point, then of the next.
+    pub values: Values,
+}
+
+/// The background grid a snapshot was computed on, kept as field data so that a picture can show it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Background {
+    /// Number of dimensions.
+    pub dimension: u32,
+    /// Lower corner; 0 along missing axes.
+    pub origin: [f64; 3],
+    /// Distance of the nodes.
+    pub spacing: f64,
+    /// Cells along each axis; 0 along missing ones.
+    pub cells: [u32; 3],
+}
+
+/// Points with arrays, at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    /// Time.
+    pub time: f64,
+    /// The background grid.
+    pub background: Background,
+    /// The points; missing coordinates are 0.
+    pub points: Vec<[f64; 3]>,
+    /// Their arrays.
+    pub arrays: Vec<Array>,
+}
+
+/// A file is no snapshot of ours.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The system refused.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The content is not what [`Snapshot::write`] writes.
+    #[error("{} is not a snapshot written by bfree: {what}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is missing or wrong.
+        what: String,
+    },
+}
+
+/// The appended data, and the XML that points into it.
+#[derive(Default)]
+struct Appended(Vec<u8>);
+
+impl Appended {
+    /// Appends `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the compressed blocks; returns the offset.
+    fn push(&mut self, bytes: &[u8]) -> usize {
+        let offset = self.0.len();
+        let blocks: Vec<Vec<u8>> = bytes.par_chunks(BLOCK).map(compressed).collect();
+        let mut header = vec![blocks.len() as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
+        header.extend(blocks.iter().map(|block| block.len() as u64));
+        self.0.extend(header.iter().flat_map(|word| word.to_le_bytes()));
+        self.0.extend(blocks.iter().flatten());
+        offset
+    }
+
+    /// Appends an array and writes its XML element.
+    fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
+        let offset = self.push(bytes);
+        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfComponents="{}""#, components.len());
+        for (k, component) in components.iter().enumerate().filter(|(_, component)| !component.is_empty()) {
+            let _ = write!(xml, r#" ComponentName{k}="{component}""#);
+        }
+        let _ = writeln!(xml, r#" format="appended" offset="{offset}"/>"#);
+    }
+}
+
+fn compressed(block: &[u8]) -> Vec<u8> {
+    let mut out = Vec::new();
+    // Reading from memory into memory cannot fail.
+    let _ = ZlibEncoder::new(block, Compression::fast()).read_to_end(&mut out);
+    out
+}
+
+fn bytes_of(values: &Values) -> (&'static str, Vec<u8>) {
+    match values {
+        Values::Float(values) => ("Float64", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
+        Values::Index(values) => ("UInt32", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
+    }
+}
+
+/// An array of field data, as text.
+fn field_data(xml: &mut String, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
+    let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+    let (count, text) = (numbers.len(), text.join(" "));
+    let _ = writeln!(
+        xml,
+        r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfTuples="{count}" format="ascii">{text}</DataArray>"#
+    );
+}
+
+impl Snapshot {
+    /// Writes the file, all or nothing.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn write(&self, path: &Path) -> Result<(), OutputError> {
+        let mut data = Appended::default();
+        let mut xml = String::from(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
+        );
+        let background = &self.background;
+        field_data(&mut xml, "Float64", "TimeValue", &[self.time]);
+        field_data(&mut xml, "UInt32", "grid_dimension", &[background.dimension]);
+        field_data(&mut xml, "Float64", "grid_origin", &background.origin);
+        field_data(&mut xml, "Float64", "grid_spacing", &[background.spacing]);
+        field_data(&mut xml, "UInt32", "grid_cells", &background.cells);
+        let count = self.points.len();
+        let _ =
+            writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
+        for array in &self.arrays {
+            let (vtk_type, bytes) = bytes_of(&array.values);
+            data.array(&mut xml, vtk_type, &array.name, &array.components, &bytes);
+        }
+        xml.push_str("</PointData>\n<Points>\n");
+        let points: Vec<u8> = self.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        data.array(&mut xml, "Float64", "Points", &["x", "y", "z"].map(str::to_owned), &points);
+        xml.push_str("</Points>\n<Cells>\n");
+        let scalar = [String::new()];
+        let integers = |first: i64| (first..first + count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
+        data.array(&mut xml, "Int64", "connectivity", &scalar, &integers(0));
+        data.array(&mut xml, "Int64", "offsets", &scalar, &integers(1));
+        data.array(&mut xml, "UInt8", "types", &scalar, &vec![VERTEX; count]);
+        xml.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_");
+        write_atomically(path, |file| {
+            file.write_all(xml.as_bytes())?;
+            file.write_all(&data.0)?;
+            file.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+        })
+    }
+
+    /// Reads a file written by [`Self::write`].
+    ///
+    /// # Errors
+    /// The system refuses, or the file is another one or damaged.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let content = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+        Self::parse(&content).map_err(|what| ReadError::Format { path: path.to_owned(), what })
+    }
+
+    fn parse(content: &[u8]) -> Result<Self, String> {
+        const MARK: &[u8] = b"<AppendedData encoding=\"raw\">\n_";
+        let split = content.windows(MARK.len()).position(|window| window == MARK).ok_or("no appended raw data")?;
+        let (xml, data) = (&content[..split], &content[split + MARK.len()..]);
+        let xml = std::str::from_utf8(xml).map_err(|_| "the header is not UTF-8")?;
+        let numbers = |name: &str| -> Result<Vec<f64>, String> {
+            let (_, text) =
+                elements(xml).find(|(tag, _)| attribute(tag, "Name") == Some(name)).ok_or(format!("no {name}"))?;
+            text.split_whitespace().map(|x| x.parse().map_err(|_| format!("{name} holds {x:?}"))).collect()
+        };
+        let scalar = |name: &str| numbers(name)?.first().copied().ok_or(format!("{name} is empty"));
+        let triple = |name: &str| <[f64; 3]>::try_from(numbers(name)?).map_err(|_| format!("{name} has not 3 numbers"));
+        let background = Background {
+            dimension: scalar("grid_dimension")? as u32,
+            origin: triple("grid_origin")?,
+            spacing: scalar("grid_spacing")?,
+            cells: triple("grid_cells")?.map(|x| x as u32),
+        };
+        let time = scalar("TimeValue")?;
+        let count = xml
+            .split_once("<Piece")
+            .and_then(|(_, piece)| attribute(piece.split('>').next()?, "NumberOfPoints")?.parse::<usize>().ok())
+            .ok_or("no number of points")?;
+        let mut points = None;
+        let mut arrays = Vec::new();
+        for (tag, _) in elements(xml).filter(|(tag, _)| attribute(tag, "format") == Some("appended")) {
+            let array = read_array(tag, data, count)?;
+            match array {
+                Some(Array { name, values: Values::Float(values), .. }) if name == "Points" => {
+                    points = Some(values.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect());
+                }
+                Some(array) => arrays.push(array),
+                None => {}
+            }
+        }
+        Ok(Self { time, background, points: points.ok_or("no points")?, arrays })
+    }
+}
+
+/// The start tags of all data arrays, with the text that follows each.
+fn elements(xml: &str) -> impl Iterator<Item = (&str, &str)> {
+    xml.split("<DataArray ").skip(1).filter_map(|element| {
+        let (tag, rest) = element.split_once('>')?;
+        Some((tag, rest.split('<').next().unwrap_or_default()))
+    })
+}
+
+/// The value of an attribute in a start tag.
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    let mut parts = tag.split('"');
+    while let (Some(key), Some(value)) = (parts.next(), parts.next()) {
+        if key.trim().strip_suffix('=') == Some(name) {
+            return Some(value);
+        }
+    }
+    None
+}
+
+/// An appended array of floats or indices; `None` for the cells, which hold no information.
+fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, String> {
+    let get = |name: &str| attribute(tag, name).ok_or(format!("an array without {name}"));
+    let (name, vtk_type) = (get("Name")?, get("type")?);
+    if !matches!(vtk_type, "Float64" | "UInt32") {
+        return Ok(None);
+    }
+    let number = |text: &str| text.parse::<usize>().map_err(|_| format!("{name}: {text:?} is no number"));
+    let (width, offset) = (number(get("NumberOfComponents")?)?, number(get("offset")?)?);
+    let bytes = data.get(offset..).and_then(inflated).ok_or(format!("{name}: damaged data"))?;
+    let values = match vtk_type {
+        "Float64" => Values::Float(bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()),
+        _ => Values::Index(bytes.as_chunks().0.iter().map(|&x| u32::from_le_bytes(x)).collect()),
+    };
+    let found = match &values {
+        Values::Float(values) => values.len(),
+        Values::Index(values) => values.len(),
+    };
+    if Some(found) != count.checked_mul(width) {
+        return Err(format!("{name}: {found} numbers for {count} points of {width} components"));
+    }
+    let component = |k| attribute(tag, &format!("ComponentName{k}")).unwrap_or_default().to_owned();
+    Ok(Some(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values }))
+}
+
+/// Undoes [`Appended::push`].
+fn inflated(data: &[u8]) -> Option<Vec<u8>> {
+    let word = |k: usize| {
+        let bytes = data.get(k.checked_mul(8)?..)?.first_chunk::<8>()?;
+        usize::try_from(u64::from_le_bytes(*bytes)).ok()
+    };
+    let blocks = word(0)?;
+    let mut start = blocks.checked_add(3)?.checked_mul(8)?;
+    let mut out = Vec::new();
+    for k in 0..blocks {
+        let end = start.checked_add(word(3 + k)?)?;
+        ZlibDecoder::new(data.get(start..end)?).read_to_end(&mut out).ok()?;
+        start = end;
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn snapshot(count: usize) -> Snapshot {
+        let wild = [0.1, -0.0, f64::MIN_POSITIVE / 8.0, f64::MAX, 1.0 / 3.0];
+        let x = |k: usize| wild[k % wild.len()] * (1.0 + k as f64 * 1e-3);
+        let array = |name: &str, components: &[&str], values| Array {
+            name: name.to_owned(),
+            components: components.iter().map(|&c| c.to_owned()).collect(),
+            values,
+        };
+        Snapshot {
+            time: 0.1 + 0.2,
+            background: Background { dimension: 2, origin: [-0.5, 1e-9, 0.0], spacing: 0.1, cells: [20, 15, 0] },
+            points: (0..count).map(|k| [x(k), x(k + 1), 0.0]).collect(),
+            arrays: vec![
+                array("velocity", &["x", "y", "z"], Values::Float((0..3 * count).map(x).collect())),
+                array("jacobian", &[""], Values::Float((0..count).map(x).collect())),
+                array("body", &[""], Values::Index((0..count as u32).collect())),
+            ],
+        }
+    }
+
+    #[test]
+    fn a_snapshot_reads_back_bit_for_bit() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let path = directory.path().join("a.vtu");
+        // none; one block; whole blocks exactly (2¹⁶ / 8 doubles in a scalar); several and a rest
+        for count in [0, 1, 8192, 10_007] {
+            let written = snapshot(count);
+            written.write(&path)?;
+            let read = Snapshot::read(&path)?;
+            assert_eq!(read, written);
+            let bits = |s: &Snapshot| s.points.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&read), bits(&written)); // == does not see the sign of zero
+        }
+        Ok(())
+    }
+
+    /// Against the format's description rather than our reader: where the offset says, the header gives block count, block
+    /// size, the size of a partial last block (0 if it is whole) and the compressed sizes, all UInt64.
+    #[test]
+    fn the_layout_is_that_of_vtk() -> Result<(), Box<dyn std::error::Error>> {
+        let mut appended = Appended::default();
+        appended.push(b"before");
+        let bytes: Vec<u8> = (0..2 * BLOCK + 5).map(|k| (k % 251) as u8).collect();
+        let offset = appended.push(&bytes);
+        let words: Vec<u64> =
+            appended.0[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
+        assert_eq!(words[..3], [3, BLOCK as u64, 5]);
+        assert_eq!(words[3..].iter().sum::<u64>() as usize, appended.0.len() - offset - 6 * 8);
+        let mut first = Vec::new();
+        ZlibDecoder::new(&appended.0[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
+        assert_eq!(first, bytes[..BLOCK]);
+        Ok(())
+    }
+
+    #[test]
+    fn a_damaged_file_is_an_error_wherever_it_breaks_off() -> Result<(), Box<dyn std::error::Error>> {
+        let directory = tempfile::tempdir()?;
+        let path = directory.path().join("a.vtu");
+        snapshot(7).write(&path)?;
+        let whole = std::fs::read(&path)?;
+        let mark = whole.windows(2).position(|window| window == b"\n_").ok_or("no data")?;
+        for length in 0..mark + 60 {
+            assert!(Snapshot::parse(&whole[..length]).is_err(), "{length}");
+        }
+        Ok(())
+    }
+}

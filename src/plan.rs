@@ -1,0 +1,181 @@
+//! What a scene requires: which terms are in use and why, how many unknowns, and what each array costs in memory.
+
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::loads::{Motion, Pressing};
+use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::time::Newmark;
+use crate::simulation::Simulation;
+use crate::solver::Krylov;
+use crate::tensor::{Tensor, Vector};
+use std::fmt::{Display, Formatter};
+use std::mem::size_of;
+
+/// A term of the residual, or a part of the step, and whether this scene has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TermUse {
+    /// Its name.
+    pub name: &'static str,
+    /// Whether it is computed.
+    pub used: bool,
+    /// Why.
+    pub why: String,
+}
+
+/// An array and its bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArrayUse {
+    /// What it holds.
+    pub name: &'static str,
+    /// Bytes.
+    pub bytes: u64,
+}
+
+/// What a run of a simulation requires, at its present state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// 1, 2 or 3.
+    pub dimension: usize,
+    /// Number of particles.
+    pub particles: usize,
+    /// Nodes of the whole grid.
+    pub grid_nodes: u64,
+    /// Nodes with N ≠ 0 or ∇N ≠ 0 for some particle.
+    pub active_nodes: usize,
+    /// Free degrees of freedom of the first step.
+    pub unknowns: usize,
+    /// Terms of the residual and parts of the step.
+    pub terms: Vec<TermUse>,
+    /// The large arrays that live at the same time.
+    pub arrays: Vec<ArrayUse>,
+    /// What was assumed about loaded surfaces, a line each.
+    pub surfaces: Vec<String>,
+}
+
+impl Plan {
+    /// The plan of a simulation, from its shape functions at the present positions.
+    ///
+    /// # Errors
+    /// A particle without shape functions.
+    pub fn of<const D: usize, L: Law, A: ShapeFunction>(
+        simulation: &Simulation<D, L, A>,
+    ) -> Result<Self, SupportError> {
+        let (supports, nodes) =
+            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+        let prescribed = simulation.prescribed(&nodes);
+        Ok(Self {
+            dimension: D,
+            particles: simulation.particles.len(),
+            grid_nodes: simulation.grid.node_count(),
+            active_nodes: nodes.len(),
+            unknowns: D * nodes.len() - prescribed.len(),
+            terms: terms(simulation),
+            arrays: arrays(simulation, &supports, nodes.len()),
+            surfaces: surfaces(simulation),
+        })
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        self.arrays.iter().map(|array| array.bytes).sum()
+    }
+}
+
+fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> Vec<TermUse> {
+    let term = |name, used, why: &str| TermUse { name, used, why: why.into() };
+    let (loads, lumping) = (&simulation.loads, simulation.settings.lumping);
+    let Newmark { beta, gamma } = simulation.settings.newmark;
+    let surface = |pressure: bool| {
+        let of_kind = loads.surface.iter().filter(|load| matches!(load.pressing, Pressing::Pressure(_)) == pressure);
+        of_kind.map(|load| load.points.len()).sum::<usize>()
+    };
+    let (tractions, pressures) = (surface(false), surface(true));
+    let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
+    vec![
+        term("inertia, lumped", lumping > 0.0, &format!("time.lumping = {lumping}, Newmark β = {beta}, γ = {gamma}")),
+        term("inertia, consistent", lumping < 1.0, "only for time.lumping < 1; its projection is an iteration"),
+        term("internal force", true, "F S of every particle"),
+        term("gravity", loads.gravity.is_some(), "only with gravity; from the lumped mass, no pass over particles"),
+        term("tractions", tractions > 0, &format!("{tractions} loaded particles")),
+        term(
+            "follower pressure",
+            pressures > 0,
+            &format!("{pressures} loaded particles; makes the tangent unsymmetric"),
+        ),
+        term("prescribed nodes", !loads.prescribed.is_empty(), &format!("{} conditions", loads.prescribed.len())),
+        term("work of moving walls", moving, "only where a prescribed motion does not rest"),
+    ]
+}
+
+fn arrays<const D: usize, L: Law, A>(
+    simulation: &Simulation<D, L, A>,
+    supports: &Supports<D>,
+    nodes: usize,
+) -> Vec<ArrayUse> {
+    let (vector, tensor) = (size_of::<Vector<f64, D>>(), size_of::<Tensor<f64, D>>());
+    let particles = simulation.particles.len();
+    let krylov_vectors = match simulation.settings.newton.krylov {
+        Krylov::Gmres { restart } => restart + 1,
+        Krylov::ConjugateGradient => 4,
+    };
+    let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
+    vec![
+        array("particles: x, v, a, H, volume, mass, body", particles * (3 * vector + tensor + 2 * 8 + 4)),
+        array("particles: state after the step", particles * (3 * vector + tensor)),
+        array("shape functions: N, ∇N and their nodes", supports.bytes()),
+        array("frozen tangent", particles * size_of::<L::Frozen<f64, D>>()),
+        array("preconditioner: diagonal blocks", nodes * tensor),
+        array("Krylov vectors", nodes * vector * krylov_vectors),
+        array("other nodal fields: v, a, loads, residuals, Δφ", nodes * (12 * vector + 8)),
+    ]
+}
+
+fn surfaces<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<String> {
+    let describe = |load: &crate::mechanics::loads::SurfaceLoad<D>| {
+        let kind = match load.pressing {
+            Pressing::Traction(_) => "traction",
+            Pressing::Pressure(_) => "follower pressure",
+        };
+        let count = load.points.len();
+        let area: f64 = load.points.iter().map(|point| point.area).sum();
+        let offsets = || load.points.iter().map(|point| point.offset);
+        let (low, high) =
+            offsets().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        format!("{kind} on {count} particles, area {area:.6} in all, {low:.4} to {high:.4} below the true surface")
+    };
+    simulation.loads.surface.iter().map(describe).collect()
+}
+
+/// Bytes in a unit that suits them.
+fn readable(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "KiB", "MiB"] {
+        if value < 1024.0 {
+            return format!("{value:.1} {unit}");
+        }
+        value /= 1024.0;
+    }
+    format!("{value:.1} GiB")
+}
+
+impl Display for Plan {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let kinematics = ["uniaxial strain", "plane strain", "three dimensions"][(self.dimension - 1).min(2)];
+        writeln!(f, "dimension     {} ({kinematics})", self.dimension)?;
+        writeln!(f, "particles     {}", self.particles)?;
+        writeln!(f, "active nodes  {} of {}", self.active_nodes, self.grid_nodes)?;
+        writeln!(f, "unknowns      {}", self.unknowns)?;
+        writeln!(f, "terms")?;
+        for term in &self.terms {
+            writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;
+        }
+        for surface in &self.surfaces {
+            writeln!(f, "  surface: {surface}")?;
+        }
+        writeln!(f, "memory        {}", readable(self.bytes()))?;
+        for array in &self.arrays {
+            writeln!(f, "  {:>10}  {}", readable(array.bytes), array.name)?;
+        }
+        Ok(())
+    }
+}

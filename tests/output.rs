@@ -1,0 +1,279 @@
+//! What a run leaves on disk agrees with the simulation and with itself.
+
+use bfree::approximation::{Approximation, Linear};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
+use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::output::plot::plot_run;
+use bfree::output::vtu::{Snapshot, Values};
+use bfree::output::{Field, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::NewtonSettings;
+use bfree::tensor::{Tensor, Vector};
+use serde_json::{Value, json};
+use std::path::Path;
+
+type Failure = Box<dyn std::error::Error>;
+
+const LAMBDA: f64 = 150.0;
+const SHEAR: f64 = 30.0;
+
+/// One particle at rest in the middle of a unit box.
+fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
+    let mut particles = Particles::default();
+    particles.push(Vector::repeat(0.5), Vector::zeros(), 0.25, 0.5, 0);
+    particles.displacement_gradient[0] = h;
+    Ok(Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: 0.25, cells: [4; D] },
+        approximation: Approximation::from(Linear),
+        bodies: vec![Body {
+            name: "body".into(),
+            law: Material::from(NeoHookean::ciarlet(Lame::new(LAMBDA, SHEAR)?)),
+            density: 2.0,
+        }],
+        particles,
+        loads: Loads::default(),
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping: 1.0,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::Literal,
+            newton: NewtonSettings::default(),
+        },
+        clock: Clock::new(0.01, 3),
+        external_work: 0.0,
+    })
+}
+
+/// A square falls onto a sliding floor.
+fn falling() -> Result<Simulation<2>, Failure> {
+    let mut simulation = single::<2>(Tensor::zeros())?;
+    simulation.particles = Particles::default();
+    for k in 0..64 {
+        let x = Vector::from([0.28125 + 0.0625 * f64::from(k % 8), 0.03125 + 0.0625 * f64::from(k / 8)]);
+        simulation.particles.push(x, Vector::from([0.5, -1.0]), 0.0625 * 0.0625, 2.0 * 0.0625 * 0.0625, 0);
+    }
+    simulation.loads.gravity = Some(Gravity { acceleration: Vector::from([0.0, -9.81]), curve: Curve::constant(1.0) });
+    let on = Selection::Face { axis: 1, upper: false };
+    simulation.loads.prescribed = vec![Prescribed { name: "floor".into(), on, motion: [None, Some(Motion::Rest)] }];
+    Ok(simulation)
+}
+
+fn settings<const D: usize>(directory: &Path) -> OutputSettings<D> {
+    OutputSettings {
+        directory: directory.to_owned(),
+        fields: vec![Field::Stress, Field::Body, Field::Displacement],
+        snapshot_every: Some(0.05),
+        probes: Vec::new(),
+        end_time: 0.2,
+        quiet: true,
+    }
+}
+
+fn at_particle<const D: usize>(simulation: &Simulation<D>, field: Field) -> Result<Vec<f64>, OutputError> {
+    field.values(simulation, &Reference::of(simulation))
+}
+
+fn assert_close(found: &[f64], wanted: &[f64]) {
+    assert_eq!(found.len(), wanted.len());
+    for (found, wanted) in found.iter().zip(wanted) {
+        assert!((found - wanted).abs() <= 1e-14 * wanted.abs().max(1.0), "{found} instead of {wanted}");
+    }
+}
+
+/// F = diag(λ, 1, 1): J = λ, σ_xx = (Λ/2 (λ² − 1) + G (λ² − 1)) / λ, and Λ/2 (λ² − 1) / λ across, in plane or not.
+fn uniaxial<const D: usize>() -> Result<(), Failure> {
+    let stretch: f64 = 1.3;
+    let mut h = Tensor::<f64, D>::zeros();
+    h[(0, 0)] = stretch - 1.0;
+    let simulation = single(h)?;
+    let across = LAMBDA / 2.0 * (stretch * stretch - 1.0) / stretch;
+    let along = across + SHEAR * (stretch * stretch - 1.0) / stretch;
+    assert_close(&at_particle(&simulation, Field::Stress)?, &[along, across, across, 0.0, 0.0, 0.0]);
+    assert_close(&at_particle(&simulation, Field::Pressure)?, &[-(along + 2.0 * across) / 3.0]);
+    assert_close(&at_particle(&simulation, Field::VonMises)?, &[along - across]);
+    assert_close(&at_particle(&simulation, Field::Jacobian)?, &[stretch]);
+    let strain = (stretch * stretch - 1.0) / 2.0;
+    assert_close(&at_particle(&simulation, Field::Strain)?, &[strain, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    Ok(())
+}
+
+#[test]
+fn stresses_in_uniaxial_strain_are_those_by_hand_in_every_dimension() -> Result<(), Failure> {
+    uniaxial::<1>()?;
+    uniaxial::<2>()?;
+    uniaxial::<3>()
+}
+
+/// F = I + k e_x ⊗ e_y: J = 1 and σ = G (F Fᵀ − I), which tells the order of the components.
+#[test]
+fn stresses_in_simple_shear_are_those_by_hand() -> Result<(), Failure> {
+    let k = 0.7;
+    let mut h = Tensor::<f64, 3>::zeros();
+    h[(0, 1)] = k;
+    let simulation = single(h)?;
+    assert_close(&at_particle(&simulation, Field::Stress)?, &[SHEAR * k * k, 0.0, 0.0, SHEAR * k, 0.0, 0.0]);
+    let gradient = [1.0, k, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    assert_close(&at_particle(&simulation, Field::DeformationGradient)?, &gradient);
+    // E = ½ (FᵀF − I), not ½ (FFᵀ − I)
+    assert_close(&at_particle(&simulation, Field::Strain)?, &[0.0, k * k / 2.0, 0.0, k / 2.0, 0.0, 0.0]);
+    Ok(())
+}
+
+/// Rows of a table as text, by the name of the column.
+fn column(path: &Path, name: &str) -> Result<Vec<f64>, Failure> {
+    let text = std::fs::read_to_string(path)?;
+    let mut lines = text.lines();
+    let place = lines.next().ok_or("empty")?.split(',').position(|column| column == name).ok_or("no such column")?;
+    lines.map(|line| Ok(line.split(',').nth(place).ok_or("short row")?.parse()?)).collect()
+}
+
+#[test]
+fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let file = |name: &str| directory.path().join(name);
+    std::fs::write(file("particles_000099.vtu"), "of an earlier run")?;
+    let mut simulation = falling()?;
+    let initial = simulation.clone();
+    let reference = Reference::of(&simulation);
+    let corner = Vector::from([2.0, 2.0]);
+    let probes = vec![
+        Probe { name: "top".into(), field: Field::Displacement, place: Place::Particle(63) },
+        Probe { name: "near".into(), field: Field::Jacobian, place: Place::Nearest { point: corner, body: None } },
+    ];
+    let mut recorder =
+        Recorder::start(OutputSettings { probes, ..settings(directory.path()) }, &simulation, reference.clone())?;
+    let (mut energies, mut newton, mut floor, mut tops) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..20 {
+        let step = simulation.advance()?;
+        recorder.record(&simulation, &step)?;
+        energies.push(simulation.particles.kinetic_energy() + simulation.strain_energy());
+        newton.push(step.newton.history.iterations.len());
+        floor.push(step.reactions[0][1]);
+        tops.push(simulation.particles.position[63][1] - initial.particles.position[63][1]);
+    }
+    let summary = recorder.finish(&simulation, &json!({"scene": "falling"}), None)?;
+
+    let history = file("history.csv");
+    let header = "step,time,dt,kinetic,strain,external,total,balance,momentum_x,momentum_y,newton,krylov";
+    assert_eq!(std::fs::read_to_string(&history)?.lines().next(), Some(header));
+    let (total, external) = (column(&history, "total")?, column(&history, "external")?);
+    assert_eq!(total[1..], energies, "the same bits");
+    assert_eq!(column(&history, "time")?.last(), Some(&simulation.clock.time()));
+    assert_eq!(external.last(), Some(&simulation.external_work));
+    for (k, balance) in column(&history, "balance")?.into_iter().enumerate() {
+        assert_eq!(balance, total[k] - total[0] - external[k]);
+    }
+    assert_eq!((column(&history, "dt")?[0], column(&history, "newton")?[0]), (0.0, 0.0));
+    let newton_column: Vec<usize> = column(&history, "newton")?.iter().map(|&x| x as usize).collect();
+    assert_eq!(newton_column[1..], newton);
+    assert_eq!(column(&file("reactions.csv"), "floor_y")?, floor);
+    assert_eq!(column(&file("probes.csv"), "top_y")?[1..], tops);
+    assert_eq!(column(&file("probes.csv"), "near")?.len(), 21);
+
+    let report: Value = serde_json::from_slice(&std::fs::read(file("report.json"))?)?;
+    let residuals = report["newton_residuals"].as_array().ok_or("no residuals")?;
+    let lengths: Vec<_> = residuals.iter().map(|step| step.as_array().map_or(0, Vec::len)).collect();
+    assert_eq!(lengths, newton.iter().map(|n| n + 1).collect::<Vec<_>>());
+    assert_eq!(report["counts"]["newton_iterations"], newton.iter().sum::<usize>());
+    assert_eq!(report["counts"]["steps"], 20);
+    assert_eq!(report["settings"]["scene"], "falling");
+    assert_eq!(summary.counts.steps, 20);
+    assert!(!file("newton.jsonl").exists() && !file("particles_000099.vtu").exists());
+
+    // t = 0, 0.05, 0.1, 0.15, 0.2; the last is due and the end at once, and written once
+    let series = std::fs::read_to_string(file("particles.pvd"))?;
+    assert_eq!(series.matches("<DataSet").count(), 5);
+    let last = Snapshot::read(&file("particles_000004.vtu"))?;
+    assert_eq!(last.time, simulation.clock.time());
+    for (p, point) in last.points.iter().enumerate() {
+        let x = simulation.particles.position[p];
+        assert_eq!(*point, [x[0], x[1], 0.0]);
+    }
+    let names: Vec<_> = last.arrays.iter().map(|array| array.name.as_str()).collect();
+    assert_eq!(names, ["stress", "body", "displacement"], "what was asked for, and nothing else");
+    assert_eq!(last.arrays[0].values, Values::Float(Field::Stress.values(&simulation, &reference)?));
+    assert_eq!(last.arrays[2].values, Values::Float(Field::Displacement.values(&simulation, &reference)?));
+    Ok(())
+}
+
+#[test]
+fn a_run_that_dies_leaves_what_it_did() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let mut simulation = falling()?;
+    let reference = Reference::of(&simulation);
+    let mut recorder = Recorder::start(settings(directory.path()), &simulation, reference)?;
+    for _ in 0..7 {
+        let step = simulation.advance()?;
+        recorder.record(&simulation, &step)?;
+        std::thread::sleep(std::time::Duration::from_millis(60));
+    }
+    std::mem::forget(recorder); // as if killed: nothing is dropped, nothing is flushed
+    let times = column(&directory.path().join("history.csv"), "time")?;
+    assert!(times.len() >= 7, "{times:?}");
+    assert!(Snapshot::read(&directory.path().join("particles_000001.vtu")).is_ok());
+    let pictures = plot_run(directory.path())?;
+    assert_eq!(pictures.len(), 6);
+    for picture in pictures.iter().filter(|path| path.extension().is_some_and(|extension| extension == "png")) {
+        assert!(std::fs::read(picture)?.starts_with(b"\x89PNG"));
+    }
+    Ok(())
+}
+
+#[test]
+fn one_and_three_dimensions_are_drawn_too() -> Result<(), Failure> {
+    fn run<const D: usize>() -> Result<usize, Failure> {
+        let directory = tempfile::tempdir()?;
+        let simulation = single(Tensor::<f64, D>::zeros())?;
+        let recorder = Recorder::start(settings(directory.path()), &simulation, Reference::of(&simulation))?;
+        recorder.finish(&simulation, &Value::Null, Some("nothing to do"))?;
+        let report: Value = serde_json::from_slice(&std::fs::read(directory.path().join("report.json"))?)?;
+        assert_eq!((&report["outcome"], &report["failure"]), (&json!("failed"), &json!("nothing to do")));
+        Ok(plot_run(directory.path())?.len())
+    }
+    assert_eq!((run::<1>()?, run::<3>()?), (6, 6));
+    Ok(())
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused_with_their_numbers() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let simulation = falling()?;
+    let start = |change: &dyn Fn(&mut OutputSettings<2>)| {
+        let mut settings = settings(directory.path());
+        change(&mut settings);
+        Recorder::start(settings, &simulation, Reference::of(&simulation)).err()
+    };
+    let probe = |place| Probe { name: "p".into(), field: Field::Velocity, place };
+    let missing = start(&|settings| settings.probes = vec![probe(Place::Particle(64))]);
+    assert!(matches!(missing, Some(OutputError::ProbeParticle { particle: 64, particles: 64, .. })), "{missing:?}");
+    let nowhere = Place::Nearest { point: Vector::from([f64::NAN, 0.0]), body: None };
+    let nowhere = start(&|settings| settings.probes = vec![probe(nowhere)]);
+    assert!(matches!(nowhere, Some(OutputError::ProbePoint { .. })), "{nowhere:?}");
+    let twice = start(&|settings| settings.probes = vec![probe(Place::Particle(0)), probe(Place::Particle(1))]);
+    assert!(matches!(twice, Some(OutputError::DuplicateColumn { .. })), "{twice:?}");
+    let never = start(&|settings| settings.snapshot_every = Some(f64::NAN));
+    assert!(matches!(never, Some(OutputError::SnapshotEvery(_))), "{never:?}");
+    let file = directory.path().join("file");
+    std::fs::write(&file, "")?;
+    let under_a_file = start(&|settings| settings.directory = file.join("run"));
+    assert!(matches!(under_a_file, Some(OutputError::Io { .. })), "{under_a_file:?}");
+    let other = Recorder::start(settings(directory.path()), &simulation, Reference::of(&single(Tensor::zeros())?));
+    assert!(matches!(other, Err(OutputError::Reference { reference: 1, particles: 64 })));
+    Ok(())
+}
+
+#[test]
+fn the_nearest_particle_is_looked_for_in_its_body() -> Result<(), Failure> {
+    let mut particles = falling()?.particles;
+    particles.body[0] = 1;
+    let far = Vector::from([1.0, 1.0]);
+    assert_eq!(nearest(&particles, &far, None), Some(63));
+    assert_eq!(nearest(&particles, &far, Some(1)), Some(0));
+    assert_eq!(nearest(&particles, &far, Some(2)), None);
+    Ok(())
+}

@@ -1,0 +1,534 @@
+//! Scenes: the shipped ones are sound, wrong ones are refused with a message that helps, and no text brings the reader down.
+
+use bfree::scene::{self, Override, Place, Scene, SceneError};
+use bfree::shape::{Fill, fill};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Every kind of key at least once; the wrong scenes are this one with one word replaced.
+const GOOD: &str = r#"{
+  "title": "two blocks",
+  "grid": { "origin": [0, 0], "size": [4, 2], "spacing": 0.5 },
+  "approximation": { "lme": { "gamma": 3, "tolerance": 1e-6, "support": "circle" } },
+  "time": { "step": 0.01, "end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 0.5, "initial_guess": "velocity", "wall_update": "consistent", "max_halvings": 3 },
+  "bodies": [
+    { "name": "soft", "shape": { "difference": { "of": { "box": { "min": [0, 0], "max": [1, 1] } }, "minus": { "ball": { "center": [0.5, 0.5], "radius": 0.2 } } } },
+      "material": { "neo_hookean": { "young": 100, "poisson": 0.3 } }, "density": 2, "velocity": [1, 0], "particles_per_cell": 3, "fill": "cells" },
+    { "name": "stiff", "shape": { "intersection": [{ "half_space": { "point": [3, 0], "normal": [-1, 0] } }, { "union": [{ "box": { "min": [2, 0], "max": [4, 2] } }] }] },
+      "material": { "st_venant_kirchhoff": { "lambda": 1000, "shear": 500 } }, "density": 8 },
+    { "name": "grains", "particles": { "file": "grains.csv" }, "material": { "neo_hookean_logarithmic": { "bulk": 10, "shear": 1 } }, "density": 1, "particles_per_cell": 3 }
+  ],
+  "boundary": { "left": "sliding", "bottom": "fixed", "top": { "held": [true, false] }, "right": { "velocity": [[0, [-1, null]], [2, [0, null]]] } },
+  "prescribed": [{ "region": { "ball": { "center": [4, 2], "radius": 0.6 } }, "displacement": [[0, [0, null]], [1, [0.1, null]]] }],
+  "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]] },
+  "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
+  "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
+  "initial_velocity": { "nodes": [{ "region": { "box": { "min": [0, 0], "max": [1, 1] } }, "velocity": [10, 0] }] },
+  "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
+  "output": { "every": 0.1, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
+}"#;
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+fn refusal(text: &str) -> String {
+    scene::read(text, &[]).expect_err(text).to_string()
+}
+
+fn overridden(arguments: &[&str]) -> Result<Scene, SceneError> {
+    let overrides: Result<Vec<Override>, _> = arguments.iter().map(|argument| argument.parse()).collect();
+    scene::read(GOOD, &overrides?)
+}
+
+#[test]
+fn shipped_scenes_are_sound() {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder("scenes")).unwrap() {
+        let path = entry.unwrap().path();
+        let scene = scene::read_file(&path, &[]).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert!(scene.title.is_some(), "{}", path.display());
+        names.push(path.file_stem().unwrap().to_string_lossy().into_owned());
+    }
+    names.sort();
+    assert_eq!(names, ["ball_drop", "compaction", "compaction_confined", "rebound", "rebound_fast", "riemann"]);
+}
+
+/// Grid and number of particles of the first body of a shipped scene.
+fn filled<const D: usize>(name: &str) -> (bfree::grid::Grid<D>, usize) {
+    let scene = scene::read_file(&folder("scenes").join(name), &[]).unwrap();
+    let (grid, body) = (scene.grid.build::<D>().unwrap(), &scene.bodies[0]);
+    let shape = body.shape.as_ref().and_then(|shape| shape.build()).unwrap();
+    let particles = fill(&grid, &shape, body.particles_per_cell, Fill::from(body.fill)).unwrap();
+    (grid, particles.len())
+}
+
+#[test]
+fn shipped_scenes_have_the_published_sizes() {
+    assert_eq!(filled::<2>("rebound.json").1, 112);
+    let (grid, particles) = filled::<2>("compaction.json");
+    assert_eq!((grid.cells, particles), ([20, 15], 400));
+    assert_eq!(filled::<2>("compaction_confined.json").0.cells, [10, 15]);
+    let (grid, particles) = filled::<1>("riemann.json");
+    assert_eq!((grid.cells, particles), ([1000], 4000));
+    assert!((3800..4600).contains(&filled::<3>("ball_drop.json").1));
+    // Paper: Λ = 150 from K = 170 and G = 30
+    let rebound = scene::read_file(&folder("scenes").join("rebound.json"), &[]).unwrap();
+    let lame = rebound.bodies[0].material.constants().lame().unwrap().unwrap();
+    assert_eq!((lame.lambda, lame.shear), (150.0, 30.0));
+    assert_eq!((rebound.time.end / rebound.time.step).round(), 1600.0);
+}
+
+#[test]
+fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
+    scene::read(GOOD, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let least = r#"{"grid": {"size": [1], "spacing": 0.1}, "time": {"step": 1, "end": 1},
+        "bodies": [{"name": "a", "shape": {"half_space": {"point": [0.5], "normal": [1]}},
+                    "material": {"neo_hookean": {"bulk": 1, "shear": 1}}, "density": 1}]}"#;
+    let scene = scene::read(least, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let all = least.replacen('{', r#"{"approximation": {"lme": {"gamma": 3, "tolerance": 1e-6, "support": "separable"}},
+        "boundary": {}, "prescribed": [], "tractions": [], "pressures": [],
+        "solver": {"newton": {"tolerance": 1e-9, "max_iterations": 30},
+                   "krylov": {"method": {"gmres": {"restart": 30}}, "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
+        "output": {"fields": ["displacement", "velocity", "stress", "jacobian"], "probes": []}, "#, 1)
+        .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "wall_update": "literal", "max_halvings": 10"#)
+        .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "particles""#);
+    assert_eq!(scene, scene::read(&all, &[]).unwrap_or_else(|error| panic!("{error}")));
+    // what is written back is the same scene
+    let written = serde_json::to_string(&scene).unwrap();
+    assert_eq!(scene, scene::read(&written, &[]).unwrap_or_else(|error| panic!("{error}")));
+}
+
+/// (what stands in the good scene, what replaces it, the key to be named, words of the message)
+const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
+    ("[4, 2]", "[]", "grid.size", &["length 0", "1, 2 or 3"]),
+    ("[4, 2]", "[4, 2, 2, 2]", "grid.size", &["length 4", "1, 2 or 3"]),
+    ("[4, 2]", "[4.2, 2]", "grid.size[0]", &["4.2", "multiple of the spacing 0.5", "such as 4"]),
+    ("[4, 2]", "[4, -2]", "grid.size[1]", &["-2", "> 0"]),
+    (r#""spacing": 0.5"#, r#""spacing": 0"#, "grid.spacing", &["0 is not", "> 0"]),
+    ("[4, 2]", "[1e7, 2]", "grid.size[0]", &["1e7 is not", "at a spacing of 0.5", "2e7 cells", "at most 1e6"]),
+    (r#""origin": [0, 0]"#, r#""origin": [0]"#, "grid.origin", &["length 1", "2 components"]),
+    (r#""origin": [0, 0]"#, r#""origin": [0, -1e300]"#, "grid.origin[1]", &["-1e300", "1e100"]),
+    (r#""gamma": 3"#, r#""gamma": 11.1"#, "approximation.lme.gamma", &["11.1", "less than 11.0524"]),
+    (r#""gamma": 3"#, r#""gamma": 0"#, "approximation.lme.gamma", &["0 is not", "between 0.1 and 1000"]),
+    (
+        r#""tolerance": 1e-6"#,
+        r#""tolerance": 2"#,
+        "approximation.lme.tolerance",
+        &["2 is not", "between 1e-16 and 0.01"],
+    ),
+    (
+        r#"{ "lme": { "gamma": 3, "tolerance": 1e-6, "support": "circle" } }"#,
+        r#"{ "bspline": { "degree": 7 } }"#,
+        "approximation.bspline.degree",
+        &["7", "from 2 to 3"],
+    ),
+    (
+        r#"{ "lme": { "gamma": 3, "tolerance": 1e-6, "support": "circle" } }"#,
+        r#""gimp""#,
+        "bodies[1].particles_per_cell",
+        &["2 is not", "must be 3"],
+    ),
+    (r#""step": 0.01"#, r#""step": -1"#, "time.step", &["-1", "> 0"]),
+    (r#""step": 0.01"#, r#""step": 1e-12"#, "time.step", &["1e-12", "1e12 steps", "at most 1e9"]),
+    (r#""end": 1"#, r#""end": 0.001"#, "time.end", &["0.001", "at least one step, 0.01"]),
+    (r#""beta": 0.25"#, r#""beta": 0.2"#, "time.beta", &["0.2", "gamma/2 = 0.25"]),
+    (r#""gamma": 0.5"#, r#""gamma": 0.4"#, "time.gamma", &["0.4", "between 0.5"]),
+    (r#""lumping": 0.5"#, r#""lumping": 1.5"#, "time.lumping", &["1.5", "between 0 and 1"]),
+    (r#""max_halvings": 3"#, r#""max_halvings": 31"#, "time.max_halvings", &["31", "0 to 30"]),
+    (r#""name": "stiff""#, r#""name": """#, "bodies[1].name", &["empty"]),
+    (r#""name": "stiff""#, r#""name": "soft""#, "bodies[1].name", &["soft", "differ"]),
+    (r#""density": 2"#, r#""density": -4"#, "bodies[0].density", &["-4", "finite and > 0"]),
+    (r#""poisson": 0.3"#, r#""poisson": 0.5"#, "bodies[0].material.neo_hookean.poisson", &["0.5", "< 0.5"]),
+    (r#""young": 100"#, r#""young": 0"#, "bodies[0].material.neo_hookean.young", &["0 is not", "> 0"]),
+    (r#""lambda": 1000"#, r#""lambda": -400"#, "bodies[1].material.st_venant_kirchhoff.lambda", &["-400", "-333.33"]),
+    (
+        r#""lambda": 1000"#,
+        r#""lambda": 1000, "bulk": 1"#,
+        "bodies[1].material.st_venant_kirchhoff",
+        &["lambda with shear with bulk", "exactly one of the pairs"],
+    ),
+    (r#""young": 100, "#, "", "bodies[0].material.neo_hookean", &["poisson", "exactly one of the pairs"]),
+    (r#""young": 100, "poisson": 0.3"#, "", "bodies[0].material.neo_hookean", &["nothing", "exactly one of the pairs"]),
+    (r#""bulk": 10"#, r#""bulk": -1"#, "bodies[2].material.neo_hookean_logarithmic.bulk", &["-1", "> 0"]),
+    (r#""velocity": [1, 0], "#, r#""velocity": [1, 0, 0], "#, "bodies[0].velocity", &["length 3", "2 components"]),
+    (
+        r#""particles_per_cell": 3"#,
+        r#""particles_per_cell": 0"#,
+        "bodies[0].particles_per_cell",
+        &["0 is not", "1 to 100"],
+    ),
+    (
+        r#""max": [1, 1] } }, "minus""#,
+        r#""max": [1, 0] } }, "minus""#,
+        "bodies[0].shape.difference.of.box.max[1]",
+        &["0 is not", "greater than min[1] = 0"],
+    ),
+    (
+        r#""max": [1, 1] } }, "minus""#,
+        r#""max": [1, 2.5] } }, "minus""#,
+        "bodies[0].shape",
+        &["y = 0 to 2.5", "grid, from y = 0 to 2"],
+    ),
+    (r#""radius": 0.2"#, r#""radius": 0"#, "bodies[0].shape.difference.minus.ball.radius", &["0 is not", "> 0"]),
+    ("[-1, 0]", "[0, 0]", "bodies[1].shape.intersection[0].half_space.normal", &["zero vector"]),
+    (
+        r#"[{ "box": { "min": [2, 0], "max": [4, 2] } }]"#,
+        "[]",
+        "bodies[1].shape.intersection[1].union",
+        &["empty", "at least one"],
+    ),
+    (r#""particles": { "file": "grains.csv" }, "#, "", "bodies[2]", &["neither shape nor particles"]),
+    (
+        r#""density": 8"#,
+        r#""density": 8, "particles": { "file": "a.csv" }"#,
+        "bodies[1]",
+        &["both shape and particles"],
+    ),
+    (r#""left": "sliding""#, r#""back": "sliding""#, "boundary.back", &["2 dimension"]),
+    ("[true, false]", "[true]", "boundary.top.held", &["length 1", "2 components"]),
+    (
+        "[2, [0, null]]",
+        "[2, [0, 1]]",
+        "boundary.right.velocity[1][1][1]",
+        &["1 is not", "null in every row or in none"],
+    ),
+    (
+        "[[0, [-1, null]], [2, [0, null]]]",
+        "[[0, [null, null]]]",
+        "boundary.right.velocity[0][1]",
+        &["at least one component"],
+    ),
+    ("[2, [0, null]]", "[0, [0, null]]", "boundary.right.velocity[1][0]", &["later than the row before, 0"]),
+    ("[0, [0, null]]", "[0, [0.3, null]]", "prescribed[0].displacement[0][1][0]", &["0.3", "must be 0"]),
+    ("[0, [0, null]]", "[0.2, [0, null]]", "prescribed[0].displacement[0][0]", &["0.2", "must be 0"]),
+    (
+        r#""displacement": [[0, [0, null]], [1, [0.1, null]]]"#,
+        r#""displacement": []"#,
+        "prescribed[0].displacement",
+        &["empty"],
+    ),
+    (
+        r#", "displacement": [[0, [0, null]], [1, [0.1, null]]]"#,
+        "",
+        "prescribed[0]",
+        &["neither displacement nor velocity"],
+    ),
+    ("[0, -9.81]", "[-9.81]", "gravity.acceleration", &["length 1", "2 components"]),
+    ("[[0, 0], [1, 1]]", "[]", "gravity.curve", &["empty"]),
+    ("[[0, 0], [1, 1]]", "[[0, 0], [1, 1], [0.5, 1]]", "gravity.curve[2][0]", &["0.5", "later than the row before, 1"]),
+    (r#""body": "soft""#, r#""body": "sft""#, "tractions[0].body", &["sft", "did you mean \"soft\""]),
+    (r#""normal": [0, 1]"#, r#""normal": [0, 0]"#, "pressures[0].surface.normal", &["zero vector"]),
+    (r#""area": 0.1"#, r#""area": -0.1"#, "pressures[0].surface.area", &["-0.1", "> 0"]),
+    (
+        r#""surface": { "normal": [0, 1], "area": 0.1 }, "#,
+        "",
+        "pressures[0].surface",
+        &["needed for a body read from a file"],
+    ),
+    ("[10, 0]", "[10]", "initial_velocity.nodes[0].velocity", &["length 1"]),
+    (r#""tolerance": 1e-10"#, r#""tolerance": 0"#, "solver.newton.tolerance", &["0 is not", "between 1e-15 and 0.1"]),
+    (r#""restart": 50"#, r#""restart": 0"#, "solver.krylov.method.gmres.restart", &["0 is not", "1 to 1000"]),
+    (r#"{ "gmres": { "restart": 50 } }"#, r#""conjugate_gradient""#, "solver.krylov.method", &["pressures", "gmres"]),
+    (r#""fixed": 1e-7"#, r#""fixed": 1"#, "solver.krylov.forcing.fixed", &["1 is not", "0.9"]),
+    (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
+    (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
+    (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
+    (r#""name": "mid""#, r#""name": "../mid""#, "output.probes[1].name", &["file name"]),
+    (
+        r#""point": [2, 1]"#,
+        r#""point": [2, 2.5]"#,
+        "output.probes[1].at.point",
+        &["[2.0, 2.5]", "must lie in the grid"],
+    ),
+    (r#""point": [2, 1]"#, r#""point": [2]"#, "output.probes[1].at.point", &["length 1"]),
+];
+
+/// The same for text that is no scene at all.
+const WRONG_TEXT: &[(&str, &str, &str, &[&str])] = &[
+    (
+        r#""density": 2"#,
+        r#""densty": 2"#,
+        "bodies[0].densty",
+        &["unknown field", "did you mean `density`", "`velocity`"],
+    ),
+    (r#""density": 2"#, r#""density": "heavy""#, "bodies[0].density", &["string \"heavy\"", "a number"]),
+    (r#""density": 2"#, r#""density": null"#, "bodies[0].density", &["null", "a number"]),
+    (r#""density": 2"#, r#""density": 2, "density": 3"#, "bodies[0]", &["`density` is given twice"]),
+    (r#""density": 2"#, r#""density": 1e400"#, "bodies[0].density", &["number out of range"]),
+    (r#""density": 2"#, r#""density": NaN"#, "bodies[0].density", &["JSON has no NaN"]),
+    (r#", "density": 2"#, "", "bodies[0]", &["missing field `density`"]),
+    (r#""title""#, r#""titel""#, "titel", &["did you mean `title`"]),
+    (r#""left": "sliding""#, r#""left": "slding""#, "boundary.left", &["unknown variant", "did you mean `sliding`"]),
+    (
+        r#""ball": { "center": [0.5"#,
+        r#""sphere": { "center": [0.5"#,
+        "bodies[0].shape.difference.minus",
+        &["unknown variant", "`ball`"],
+    ),
+    (r#"{ "ball": { "center": [4, 2], "radius": 0.6 } }"#, "{}", "prescribed[0].region", &["exactly one key"]),
+    (r#""max_halvings": 3"#, r#""max_halvings": -3"#, "time.max_halvings", &["-3", "whole number"]),
+    (r#""max_halvings": 3"#, r#""max_halvings": 2.5"#, "time.max_halvings", &["2.5", "whole number"]),
+    ("[0, -9.81]", "9.81", "gravity.acceleration", &["a list"]),
+    (r#"{ "normal": [0, 1], "area": 0.1 }"#, "[[0, 1], 0.1]", "pressures[0].surface", &["a list, expected an object"]),
+    (r#""sliding""#, r#"{ "sliding": null }"#, "boundary.left", &["an object, expected a word"]),
+    ("[[0, 0], [1, 1]]", "[[0, 0], [1]]", "gravity.curve[1]", &["length 1"]),
+    (r#""title": "two blocks","#, "// two blocks", "", &["JSON has no comments"]),
+    (
+        r#""mid", "field": "velocity", "at": { "point": [2, 1] } }] }"#,
+        r#""mid", "field": "velocity""#,
+        "",
+        &["EOF while parsing"],
+    ),
+];
+
+fn mutated(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "the good scene has no {from}");
+    GOOD.replacen(from, to, 1)
+}
+
+#[test]
+fn wrong_values_are_named_with_what_is_allowed() {
+    for (from, to, path, words) in WRONG_VALUES {
+        let error = scene::read(&mutated(from, to), &[]).expect_err(to);
+        let SceneError::Values(problems) = &error else { panic!("{to}: {error}") };
+        let named = problems.list.iter().find(|problem| problem.path == *path);
+        let Some(problem) = named else { panic!("{to}: no problem at {path} in\n{error}") };
+        let message = problem.to_string();
+        assert!(message.starts_with(&format!("{path}: ")), "{message}");
+        for word in *words {
+            assert!(message.contains(word), "{to}: no {word:?} in\n{message}");
+        }
+        assert!(matches!(problem.place, Some(Place::Text { .. })), "{to}: no place");
+        assert_eq!(problems.list.len(), 1, "{to}: more than was wrong:\n{error}");
+    }
+}
+
+#[test]
+fn wrong_text_is_refused_at_its_place() {
+    for (from, to, path, words) in WRONG_TEXT {
+        let text = mutated(from, to);
+        let error = scene::read(&text, &[]).expect_err(to);
+        let SceneError::Malformed(malformed) = &error else { panic!("{to}: {error}") };
+        assert!(path.is_empty() || malformed.path == *path, "{to}: {path} expected, not {}", malformed.path);
+        for word in *words {
+            assert!(malformed.message.contains(word), "{to}: no {word:?} in\n{error}");
+        }
+        let Some(Place::Text { line, excerpt, .. }) = &malformed.place else { panic!("{to}: no place") };
+        let there = text.lines().nth(line - 1).unwrap();
+        assert!(there.contains(excerpt.as_str()), "{to}: line {line} has no {excerpt:?}");
+        if !path.is_empty() {
+            let changed = text[..GOOD.find(from).unwrap()].matches('\n').count() + 1;
+            assert!(line.abs_diff(changed) <= 1, "{to}: line {line} instead of {changed}");
+        }
+    }
+}
+
+#[test]
+fn the_message_shows_line_column_and_caret() {
+    let message = refusal(&GOOD.replace(r#""density": 8"#, r#""density": -8"#));
+    let expected = r#"bodies[1].density: -8 is not allowed; must be finite and > 0
+  --> line 10, column 80"#;
+    assert!(message.starts_with(expected), "{message}");
+    let lines: Vec<&str> = message.lines().collect();
+    assert_eq!(lines[2].find("\"density\""), lines[3].find('^'), "{message}");
+}
+
+#[test]
+fn all_wrong_values_are_told_at_once() {
+    let text = GOOD.replace(r#""density": 8"#, r#""density": -8"#).replace(r#""step": 0.01"#, r#""step": 0"#);
+    let Err(SceneError::Values(problems)) = scene::read(&text, &[]) else { panic!("accepted") };
+    let paths: Vec<&str> = problems.list.iter().map(|problem| problem.path.as_str()).collect();
+    assert_eq!(paths, ["time.step", "bodies[1].density"]);
+    // ten thousand wrong rows do not make ten thousand messages
+    let rows = vec!["[0, 0]"; 10_000].join(", ");
+    let Err(SceneError::Values(problems)) = scene::read(&GOOD.replace("[[0, 0], [1, 1]]", &format!("[{rows}]")), &[])
+    else {
+        panic!("accepted")
+    };
+    assert_eq!(problems.list.len() + problems.more, 9_999);
+    assert!(problems.list.len() <= 50);
+}
+
+#[test]
+fn overrides_replace_add_and_are_named() {
+    let scene =
+        overridden(&["time.step=0.02", "bodies.0.density=3", "bodies[1].density=4", "approximation=linear"]).unwrap();
+    assert_eq!((scene.time.step, scene.bodies[0].density, scene.bodies[1].density), (0.02, 3.0, 4.0));
+    assert_eq!(scene.approximation, scene::approximation::Approximation::Linear);
+    let scene =
+        overridden(&["bodies.1.velocity=[1, 2]", "bodies.1.velocity.0=5", r#"boundary.left={"held": [true, true]}"#])
+            .unwrap();
+    assert_eq!(scene.bodies[1].velocity, Some(vec![5.0, 2.0]));
+
+    for (argument, words) in [
+        ("time.step=-1", &["time.step: -1 is not allowed", "in the override time.step=-1"][..]),
+        ("time.stp=1", &["time.stp: unknown field", "did you mean `step`", "in the override time.stp=1"]),
+        ("gravty.acceleration=[0,1]", &["gravty: unknown field", "did you mean `gravity`", "in the override"]),
+        ("time.step=abc", &["time.step: invalid type: string \"abc\", expected a number", "in the override"]),
+        ("time={\"step\": 1}", &["time: missing field `end`", "in the override time="]),
+        ("bodies.7.density=1", &["bodies has 3 entries", "7 is not one of them"]),
+        ("bodies.density=1", &["bodies is a list of 3 entries", "takes a number"]),
+        ("time.0=1", &["time is an object", "takes a key"]),
+        ("time.step.x=1", &["time.step is a number, which has no keys"]),
+        ("time.step", &["must read KEY.PATH=JSON"]),
+        ("=1", &["must read KEY.PATH=JSON"]),
+        ("time.step=1e400", &["not JSON", "number out of range"]),
+        ("time={\"step\": 1, \"step\": 2}", &["not JSON", "given twice"]),
+        ("time.step=[1", &["not JSON", "EOF"]),
+    ] {
+        let error = overridden(&[argument]).expect_err(argument).to_string();
+        for word in words {
+            assert!(error.contains(word), "{argument}: no {word:?} in\n{error}");
+        }
+    }
+}
+
+#[test]
+fn text_that_is_too_long_too_deep_or_no_object_is_refused() {
+    assert!(matches!(scene::read(&" ".repeat(scene::MAX_BYTES as usize + 1), &[]), Err(SceneError::TooLong)));
+    assert!(refusal(&"[".repeat(100_000)).contains("recursion limit"));
+    let nested = format!("{}{}{}", r#"{"union": ["#.repeat(1000), "1", "]}".repeat(1000));
+    assert!(
+        refusal(&GOOD.replace(r#"{ "ball": { "center": [4, 2], "radius": 0.6 } }"#, &nested))
+            .contains("recursion limit")
+    );
+    for text in ["", "[]", "7", "null", "\u{feff}", "\"{}\""] {
+        refusal(text);
+    }
+    assert!(refusal("[1, 2]").contains("a scene is an object"));
+    assert!(matches!(scene::read_file(Path::new("/nowhere/scene.json"), &[]), Err(SceneError::File { .. })));
+    scene::read(&format!("\u{feff}{GOOD}"), &[]).unwrap();
+}
+
+#[test]
+fn the_schema_is_up_to_date_and_documents_every_key() {
+    let schema = scene::schema().to_value();
+    let path = folder("schemas").join("scene.schema.json");
+    if std::env::var_os("BFREE_WRITE_SCHEMA").is_some() {
+        std::fs::write(&path, serde_json::to_string_pretty(&schema).unwrap() + "\n").unwrap();
+    }
+    let stored: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    assert_eq!(stored, schema, "renew it: BFREE_WRITE_SCHEMA=1 cargo test --test scenes schema");
+
+    let types = schema["$defs"].as_object().unwrap().iter().map(|(name, schema)| (name.as_str(), schema));
+    for (name, schema) in types.chain([("Scene", &schema)]) {
+        assert!(schema["description"].is_string(), "{name} is not documented");
+        for (key, property) in schema["properties"].as_object().into_iter().flatten() {
+            assert!(property["description"].is_string(), "{name}.{key} is not documented");
+        }
+        for variant in schema["oneOf"].as_array().into_iter().flatten() {
+            assert!(variant["description"].is_string(), "{name}: {variant} is not documented");
+        }
+    }
+}
+
+/// Values that a scene's author, or a broken program, may write.
+fn junk() -> impl Strategy<Value = Value> {
+    prop_oneof![
+        Just(Value::Null),
+        any::<bool>().prop_map(Value::from),
+        any::<i64>().prop_map(Value::from),
+        any::<f64>().prop_map(Value::from),
+        prop::sample::select(vec![0.0, -0.0, -1.0, 0.5, 1e-320, 1e-150, 1e150, 1e308, -1e308, 3.0, 1e9])
+            .prop_map(Value::from),
+        ".{0,8}".prop_map(Value::from),
+        prop::collection::vec(-2.0..5.0, 0..5).prop_map(Value::from),
+        prop::sample::select(vec![
+            json!({}),
+            json!([]),
+            json!([[]]),
+            json!({"lme": {}}),
+            json!("linear"),
+            json!("gimp"),
+            json!({"union": []}),
+            json!({"ball": {"center": [1, 1], "radius": 1e300}}),
+            json!([[0, [0, 0]]]),
+            json!([[0, 1]]),
+            json!("free"),
+            json!({"young": 1e308, "poisson": 0.49999999999999994}),
+            json!({"velocity": [[0, [null]]]}),
+        ]),
+    ]
+}
+
+/// Replaces, removes or repeats the value that is number `pick` of all values of the scene.
+fn mutate(value: &mut Value, pick: &mut usize, junk: &Value, action: u8) -> bool {
+    let children: Vec<&mut Value> = match value {
+        Value::Object(object) => object.values_mut().collect(),
+        Value::Array(list) => list.iter_mut().collect(),
+        _ => Vec::new(),
+    };
+    for child in children {
+        if mutate(child, pick, junk, action) {
+            return true;
+        }
+    }
+    if *pick > 0 {
+        *pick -= 1;
+        return false;
+    }
+    match (value, action) {
+        (Value::Object(object), 1) => {
+            let key = object.keys().next().cloned().unwrap_or_default();
+            object.remove(&key);
+        }
+        (Value::Object(object), 2) => {
+            object.insert("extra".into(), junk.clone());
+        }
+        (Value::Array(list), 1) => {
+            list.pop();
+        }
+        (Value::Array(list), 2) => {
+            let copy = list.first().cloned().unwrap_or_else(|| junk.clone());
+            list.push(copy);
+        }
+        (value, _) => *value = junk.clone(),
+    }
+    true
+}
+
+/// What every refusal must be: a message of bounded length, with something in it.
+fn refused_well(result: Result<Scene, SceneError>) -> Result<(), TestCaseError> {
+    if let Err(error) = result {
+        let message = error.to_string();
+        prop_assert!(!message.is_empty() && message.len() < 100_000);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_wrong_value_brings_the_reader_down(changes in prop::collection::vec((0..260_usize, junk(), 0..4_u8), 1..4)) {
+        let mut scene: Value = serde_json::from_str(GOOD).unwrap();
+        for (pick, junk, action) in changes {
+            mutate(&mut scene, &mut pick.clone(), &junk, action);
+        }
+        refused_well(scene::read(&scene.to_string(), &[]))?;
+    }
+
+    #[test]
+    fn no_broken_text_brings_the_reader_down(
+        flips in prop::collection::vec((0..GOOD.len(), any::<u8>()), 0..4), cut in 0..2 * GOOD.len(),
+        repeat in (0..GOOD.len(), 0..40_usize),
+    ) {
+        let mut bytes = GOOD.as_bytes().to_vec();
+        for (at, byte) in flips {
+            bytes[at] = byte;
+        }
+        let copy = bytes[repeat.0..(repeat.0 + repeat.1).min(bytes.len())].to_vec();
+        bytes.splice(repeat.0..repeat.0, copy);
+        bytes.truncate(cut);
+        refused_well(scene::read(&String::from_utf8_lossy(&bytes), &[]))?;
+    }
+
+    #[test]
+    fn no_override_brings_the_reader_down(key in "[a-z0-9.\\[\\]]{0,20}|time\\.[a-z]{1,5}|bodies\\.[0-4]\\.[a-z]{1,8}", value in ".{0,12}", junk in junk()) {
+        for argument in [format!("{key}={value}"), format!("{key}={junk}"), key.clone()] {
+            refused_well(overridden(&[argument.as_str()]))?;
+        }
+    }
+}

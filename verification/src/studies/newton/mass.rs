@@ -1,0 +1,52 @@
+//! The eigenvalues of the mass matrix.
+
+use crate::prepared::Prepared;
+use bfree::particles::Particles;
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// An eigenvalue below this part of the largest one is zero.
+const NULL: f64 = 1e-13;
+
+/// What the eigenvalues say.
+pub(super) struct Spectrum {
+    pub largest: f64,
+    pub smallest: f64,
+    /// Largest over smallest of those that are not null.
+    pub condition: f64,
+    pub null_modes: usize,
+    /// The same of D^(−½) M̃ D^(−½), D the diagonal: what a Jacobi-preconditioned method sees.
+    pub scaled_condition: f64,
+    pub scaled_null_modes: usize,
+}
+
+/// Of M̃ = (1−ε) M + ε lumped(M), M_IJ = Σ_p m N_I N_J, on all active nodes.
+pub(super) fn spectrum<const D: usize>(particles: &Particles<D>, prepared: &Prepared<D>, lumping: f64) -> Spectrum {
+    let count = prepared.nodes.len();
+    let mut mass = DMatrix::<f64>::zeros(count, count);
+    for p in 0..particles.len() {
+        let m = particles.mass[p];
+        for (i, n_i, _) in prepared.supports.of(p) {
+            mass[(i, i)] += lumping * m * n_i;
+            for (j, n_j, _) in prepared.supports.of(p) {
+                mass[(i, j)] += (1.0 - lumping) * m * n_i * n_j;
+            }
+        }
+    }
+    let diagonal: Vec<f64> = (0..count).map(|i| mass[(i, i)]).collect();
+    // A node with ∇N ≠ 0 but N = 0 has no mass: its row stays zero.
+    let scale = |i: usize| if diagonal[i] > 0.0 { diagonal[i].sqrt().recip() } else { 0.0 };
+    let scaled = DMatrix::from_fn(count, count, |i, j| mass[(i, j)] * scale(i) * scale(j));
+    let (largest, smallest, condition, null_modes) = summary(mass);
+    let (_, _, scaled_condition, scaled_null_modes) = summary(scaled);
+    Spectrum { largest, smallest, condition, null_modes, scaled_condition, scaled_null_modes }
+}
+
+fn summary(matrix: DMatrix<f64>) -> (f64, f64, f64, usize) {
+    let mut values: Vec<f64> = SymmetricEigen::new(matrix).eigenvalues.iter().copied().collect();
+    values.sort_by(f64::total_cmp);
+    let largest = values.last().copied().unwrap_or(0.0);
+    let smallest = values.first().copied().unwrap_or(0.0);
+    let null_modes = values.iter().filter(|&&value| value < NULL * largest).count();
+    let least = values.get(null_modes).copied().unwrap_or(f64::NAN);
+    (largest, smallest, largest / least, null_modes)
+}
