@@ -130,7 +130,8 @@ impl Study {
             Material::NeoHookean(_) => size_of::<<NeoHookean as Law>::Frozen<f64, D>>(),
             Material::StVenantKirchhoff(_) => size_of::<<StVenantKirchhoff as Law>::Frozen<f64, D>>(),
         };
-        let free_bytes = prepared.supports.entries() * pair + particles * frozen;
+        let pairs: usize = (0..particles).map(|p| prepared.supports.of(p).count()).sum();
+        let free_bytes = pairs * pair + particles * frozen;
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");
         self.table.push([

@@ -27,24 +27,34 @@ const PER_AXIS: u32 = 2;
 /// Δt over h; waves travel 1.2 per unit of time, so the Courant number is about a half.
 const STEP_OVER_SPACING: f64 = 0.4;
 
-/// One family, and the order in space its error must show.
+/// The least order in space of the position error where ∇N is continuous.
+///
+/// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not fall with h
+/// (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1, once the
+/// interpolation error, of order 2, is below it. F then stops converging. Of that 1, 0.8 is asked for.
+const ORDER: f64 = 0.8;
+
+/// One family.
 struct Family {
     name: &'static str,
     shape: Approximation,
+    /// Whether ∇N is continuous on the scale of a cell. Where it jumps (linear functions, LME that is nearly linear), the force on a
+    /// node jumps whenever a particle crosses a face, and theory promises nothing.
+    smooth: bool,
 }
 
 fn families(effort: Effort) -> Vec<Family> {
-    let family = |name, shape| Family { name, shape };
+    let family = |name, shape, smooth| Family { name, shape, smooth };
     let mut families = vec![
-        family("linear", Linear.into()),
-        family("gimp", Gimp::particles_per_axis(PER_AXIS).into()),
-        family("quadratic", Bspline::Quadratic.into()),
-        family("cubic", Bspline::Cubic.into()),
-        family("lme 0.8", Lme::new(0.8, 1e-6).into()),
-        family("lme 3", Lme::new(3.0, 1e-6).into()),
+        family("linear", Linear.into(), false),
+        family("gimp", Gimp::particles_per_axis(PER_AXIS).into(), true),
+        family("quadratic", Bspline::Quadratic.into(), true),
+        family("cubic", Bspline::Cubic.into(), true),
+        family("lme 0.8", Lme::new(0.8, 1e-6).into(), true),
+        family("lme 3", Lme::new(3.0, 1e-6).into(), false),
     ];
     if effort == Effort::Full {
-        families.push(family("lme circle 3", LmeCircle::new(3.0, 1e-6).into()));
+        families.push(family("lme circle 3", LmeCircle::new(3.0, 1e-6).into(), false));
     }
     families
 }
@@ -187,6 +197,11 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     time(&AxisAligned::default(), "axis-aligned", *effort, &mut report, &mut outcome)?;
     time(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
     outcome.reports.push(report);
+    outcome.remarks.push(
+        "In time the trapezoidal rule promises order 2 on fixed nodes. The nodes are not fixed: every step projects the particles anew, and what the \
+         projection loses depends on how often it is made; where particles cross faces of functions with jumps in their gradient, no order is seen."
+            .into(),
+    );
     Ok(outcome)
 }
 
@@ -241,7 +256,8 @@ fn space<P: Problem>(
         let span = line.points.first().zip(line.points.last());
         if let Some((coarse, fine)) = span.filter(|_| line.points.len() > 1) {
             let overall = order(coarse.1, fine.1, fine.0 / coarse.0);
-            report.push(&["order in space, position", family.name, motion], overall, Bound::Reported);
+            let bound = if family.smooth { Bound::AtLeast(ORDER) } else { Bound::Reported };
+            report.push(&["order in space, position", family.name, motion], overall, bound);
         }
         lines.push(line);
     }
