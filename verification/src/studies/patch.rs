@@ -89,9 +89,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         }
     }
     let remarks = vec![
-        "The force imbalance is the quadrature error of particles; it is zero on regular layouts away from the rim where N is made for them.".into(),
-        "The spin changes by eps sum_I (X_I - x_I) x m_I dv_I, X_I being the centre of the mass that node I lumps: at order 0 in dt. \
-         With eps -> 0 that goes, by first-order consistency, and what is left falls with dt."
+        "The force imbalance is the quadrature error of particles; it is zero on regular layouts, up to the truncation of LME.".into(),
+        "The spin changes by eps sum_I (X_I - x_I) x m_I dv_I, X_I being the centre of the mass that node I lumps: an error of order 0 in dt, \
+         in proportion to eps (none by first-order consistency if eps = 0). What else there is, is of order 0 too, and two orders smaller."
             .into(),
     ];
     Ok(Outcome { reports: vec![shapes, affine, rigid, momentum], tables: vec![imbalance, angular], remarks, ..Outcome::default() })
