@@ -24,6 +24,9 @@ const ABOVE_FLOOR: f64 = 200.0;
 /// The slope is the median of this many local ones, the last above the floor.
 const LOCAL_SLOPES: usize = 5;
 
+/// One steep rise and two gentle falls.
+const SAWTOOTH: [f64; 3] = [0.0, 1.0, 0.5];
+
 /// How far a slope may be from a whole number.
 const TOLERANCE: f64 = 0.1;
 
@@ -77,15 +80,21 @@ impl Study {
         let mut x = vec![Vector::zeros(); prepared.nodes.len()];
         prepared.prescribe(&mut x);
         newton(&equilibrium, bytemuck::cast_slice_mut(&mut x), &simulation.settings.newton)?;
-        // A deformation of some percent at random, so that no term is at rest, and a direction of the same size.
+        // A deformation of some percent at random, so that no term is at rest.
         let mut random = Random::new(3);
         let size = 0.02 * simulation.grid.spacing;
         let mut shift = random.field::<D>(x.len());
-        let mut u = random.field::<D>(x.len());
         equilibrium.clear_prescribed(&mut shift);
-        equilibrium.clear_prescribed(&mut u);
         x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
-        u.iter_mut().for_each(|u| *u *= size);
+        // A direction of the same size, a skew sawtooth: stretches and compressions of equal shape would cancel in the third
+        // derivative of Π and show the fourth.
+        let indices = prepared.nodes.positions(&simulation.grid);
+        let mut u: Vec<Vector<f64, D>> = indices
+            .map(|(index, _)| {
+                Vector::from_fn(|k, _| size * (SAWTOOTH[index[k] as usize % SAWTOOTH.len()] + 0.2 * random.signed()))
+            })
+            .collect();
+        equilibrium.clear_prescribed(&mut u);
 
         let remainders = remainders(&equilibrium, &x, &u)?;
         let mut lines = Vec::new();

@@ -1,7 +1,10 @@
-//! The eigenvalues of the mass matrix.
+//! The eigenvalues of the mass matrix and of the whole tangent.
 
 use crate::prepared::Prepared;
+use bfree::material::Law;
+use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::particles::Particles;
+use bfree::tensor::Vector;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// An eigenvalue below this part of the largest one is zero.
@@ -39,6 +42,32 @@ pub(super) fn spectrum<const D: usize>(particles: &Particles<D>, prepared: &Prep
     let (largest, smallest, condition, null_modes) = summary(mass);
     let (_, _, scaled_condition, scaled_null_modes) = summary(scaled);
     Spectrum { largest, smallest, condition, null_modes, scaled_condition, scaled_null_modes }
+}
+
+/// Condition number and null modes of D^(−½) K D^(−½) on the free degrees of freedom, D the diagonal of K. K is symmetric: there is
+/// no follower pressure here.
+pub(super) fn tangent<L: Law>(
+    equilibrium: &Equilibrium<'_, 2, L>,
+    dphi: &[Vector<f64, 2>],
+) -> Result<(f64, usize), Inadmissible> {
+    let tangent = equilibrium.tangent(dphi)?;
+    let held = |node: usize, i: usize| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == i);
+    let all = (0..dphi.len()).flat_map(|node| (0..2).map(move |i| (node, i)));
+    let free: Vec<(usize, usize)> = all.filter(|&(node, i)| !held(node, i)).collect();
+    let mut matrix = DMatrix::<f64>::zeros(free.len(), free.len());
+    for (column, &(node, i)) in free.iter().enumerate() {
+        let mut unit = vec![Vector::zeros(); dphi.len()];
+        unit[node][i] = 1.0;
+        let mut product = vec![Vector::zeros(); dphi.len()];
+        tangent.product(&unit, &mut product);
+        for (row, &(node, i)) in free.iter().enumerate() {
+            matrix[(row, column)] = product[node][i];
+        }
+    }
+    let scale: Vec<f64> = (0..free.len()).map(|k| matrix[(k, k)].abs().sqrt().recip()).collect();
+    let scaled = DMatrix::from_fn(free.len(), free.len(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let (_, _, condition, null_modes) = summary(scaled);
+    Ok((condition, null_modes))
 }
 
 fn summary(matrix: DMatrix<f64>) -> (f64, f64, f64, usize) {

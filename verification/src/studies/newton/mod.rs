@@ -6,12 +6,12 @@ mod mass;
 use super::{Effort, Outcome, StudyError};
 use crate::figure::{Axis, Figure, Line};
 use crate::prepared::Prepared;
-use crate::report::{Bound, Report, short};
+use crate::report::{Bound, Report, chain, short};
 use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
-use bfree::simulation::Simulation;
+use bfree::simulation::{Simulation, StepError};
 use bfree::solver::{
     Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
 };
@@ -48,6 +48,9 @@ enum Product {
     Difference(f64),
 }
 
+/// No restart within the number of unknowns: with ε = 0 the blocks of the tangent precondition badly, and GMRES(30) stagnates.
+const RESTART: &str = r#"solver.krylov.method={"gmres":{"restart":200}}"#;
+
 struct Method {
     name: &'static str,
     product: Product,
@@ -69,19 +72,45 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut study = Study::new();
     for (lumping, label) in LUMPINGS {
         for scene in ["rebound", "rebound_fast"] {
-            let override_lumping = format!("time.lumping={lumping}");
-            let built = shipped::scene(scene, &[&override_lumping])?.build::<2>(&shipped::folder())?;
-            let mut simulation: Simulation<2, Material> = built;
+            let mut simulation = rebound(scene, if lumping == 0.0 { LEAST_LUMPING } else { lumping })?;
             for case in CASES.iter().filter(|case| case.scene == scene) {
-                let start = (case.end / simulation.clock.nominal()).round() as u64 - 1;
-                while simulation.clock.nominal_steps() < start {
-                    simulation.advance()?;
-                }
-                study.case(case, lumping, label, &simulation, effort)?;
+                let start = case.start(&simulation);
+                reach(&mut simulation, start)?;
+                let mut at = simulation.clone();
+                at.settings.lumping = lumping;
+                study.case(case, lumping, label, &at, effort)?;
+            }
+            if lumping == 0.0 && *effort == Effort::Full {
+                study.consistent_alone(scene, label)?;
             }
         }
     }
     Ok(study.outcome())
+}
+
+/// The state a step with ε = 0 starts from is reached with this ε: with ε = 0 the tangent is singular to round-off, and a run of its
+/// own does not get there (`full` shows how far).
+const LEAST_LUMPING: f64 = 0.01;
+
+impl Case {
+    /// Whole steps before it.
+    fn start(&self, simulation: &Simulation<2, Material>) -> u64 {
+        (self.end / simulation.clock.nominal()).round() as u64 - 1
+    }
+}
+
+/// A rebound at t = 0.
+fn rebound(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyError> {
+    let lumping = format!("time.lumping={lumping}");
+    Ok(shipped::scene(scene, &[&lumping, RESTART])?.build::<2>(&shipped::folder())?)
+}
+
+/// Runs to the start of a step.
+fn reach(simulation: &mut Simulation<2, Material>, step: u64) -> Result<(), StepError> {
+    while simulation.clock.nominal_steps() < step {
+        simulation.advance()?;
+    }
+    Ok(())
 }
 
 struct Study {
@@ -101,8 +130,11 @@ impl Study {
                 ["step", "eps", "method", "k", "|R|", "ratio", "|R|/|R before|^2", "order", "Krylov", "|R|/(u mag)"],
             ),
             masses: Table::new(
-                "mass matrix (1-eps) M + eps lumped(M) on all active nodes",
-                ["step", "eps", "nodes", "largest", "smallest", "condition", "null modes", "condition, scaled", "null modes, scaled"],
+                "condition and null modes of the mass (1-eps) M + eps lumped(M) on all active nodes, and of the tangent K on the free ones; scaled: diagonal 1",
+                [
+                    "step", "eps", "nodes", "largest", "smallest", "cond M", "null", "cond M scaled", "null",
+                    "cond K scaled", "null",
+                ],
             ),
             converged: Report::new(
                 "residual at the end, in units of eps times the magnitude of its contributions",
@@ -130,19 +162,9 @@ impl Study {
     ) -> Result<(), StudyError> {
         let prepared = Prepared::new(simulation)?;
         let equilibrium = prepared.equilibrium(simulation);
-        let mass = mass::spectrum(&simulation.particles, &prepared, lumping);
-        let numbers = [mass.largest, mass.smallest, mass.condition].map(short);
-        let scaled = [short(mass.scaled_condition), mass.scaled_null_modes.to_string()];
-        self.masses.push(
-            [case.name.into(), label.into(), prepared.nodes.len().to_string()]
-                .into_iter()
-                .chain(numbers)
-                .chain([mass.null_modes.to_string()])
-                .chain(scaled),
-        );
-
         let mut start = vec![Vector::zeros(); prepared.nodes.len()];
         prepared.prescribe(&mut start);
+        self.spectra(case.name, label, simulation, &prepared, &start)?;
         let start: &[f64] = bytemuck::cast_slice(&start);
         let mut lines = Vec::new();
         let mut solution = None;
@@ -151,7 +173,7 @@ impl Study {
                 // To round-off: the floor ends it.
                 relative_tolerance: 0.0,
                 forcing: method.forcing,
-                krylov: Krylov::Gmres { restart: 100 },
+                krylov: Krylov::Gmres { restart: 200 },
                 ..simulation.settings.newton
             };
             let mut x = start.to_vec();
@@ -179,7 +201,8 @@ impl Study {
             let last = residuals.last().copied().unwrap_or(f64::NAN) / (f64::EPSILON * magnitude);
             let iterations = history.iterations.len().to_string();
             // Differences of products are judged by nothing: they are there for contrast.
-            let bound = if method.product == Product::Exact { Bound::AtMost(ROUND_OFF) } else { Bound::Reported };
+            let judged = method.product == Product::Exact && (lumping > 0.0 || method.forcing == TIGHT);
+            let bound = if judged { Bound::AtMost(ROUND_OFF) } else { Bound::Reported };
             self.converged.push(&[case.name, label, method.name, &iterations], last, bound);
             lines.push(Line {
                 name: method.name.into(),
@@ -202,6 +225,52 @@ impl Study {
         if let Some(solution) = solution {
             self.single_steps(case, label, simulation.grid.spacing, &equilibrium, start, &solution, effort)?;
         }
+        Ok(())
+    }
+
+    /// How far a run with ε = 0 throughout gets.
+    fn consistent_alone(&mut self, scene: &'static str, label: &str) -> Result<(), StudyError> {
+        let mut simulation = rebound(scene, 0.0)?;
+        let Some(case) = CASES.iter().rfind(|case| case.scene == scene) else { return Ok(()) };
+        let start = case.start(&simulation);
+        let result = reach(&mut simulation, start);
+        let time = simulation.clock.time();
+        let name = format!("{scene}, alone, t={time:.3}");
+        let prepared = Prepared::new(&simulation)?;
+        let mut start = vec![Vector::zeros(); prepared.nodes.len()];
+        prepared.prescribe(&mut start);
+        self.spectra(&name, label, &simulation, &prepared, &start)?;
+        self.converged.note(match result {
+            Ok(()) => format!("{scene}, eps = {label} throughout: reaches t = {time:.3}"),
+            Err(error) => format!("{scene}, eps = {label} throughout: ends at t = {time:.3}, {}", chain(&error)),
+        });
+        Ok(())
+    }
+
+    /// A row of condition numbers, at the start of a step.
+    fn spectra(
+        &mut self,
+        name: &str,
+        label: &str,
+        simulation: &Simulation<2, Material>,
+        prepared: &Prepared<2>,
+        dphi: &[Vector<f64, 2>],
+    ) -> Result<(), StudyError> {
+        let mass = mass::spectrum(&simulation.particles, prepared, simulation.settings.lumping);
+        let (condition, null_modes) = mass::tangent(&prepared.equilibrium(simulation), dphi)?;
+        self.masses.push([
+            name.into(),
+            label.into(),
+            prepared.nodes.len().to_string(),
+            short(mass.largest),
+            short(mass.smallest),
+            short(mass.condition),
+            mass.null_modes.to_string(),
+            short(mass.scaled_condition),
+            mass.scaled_null_modes.to_string(),
+            short(condition),
+            null_modes.to_string(),
+        ]);
         Ok(())
     }
 
@@ -297,10 +366,11 @@ impl Study {
         self.converged.note(format!("Bound: {ROUND_OFF} eps times the magnitude, where Newton's method itself calls a residual round-off. Differences are shown for contrast only."));
         self.orders.note("Least squares on the half of the points nearer to the solution, down to round-off.");
         let remarks = vec![
-            "What is quadratic: every step with the exact tangent whose linear system is solved tightly, for lumped, mixed and consistent mass alike (order 2 of single steps, |R|/|R before|^2 bounded).".into(),
-            "The order seen between two iterations of one solve is below 2 at first: from zero, most of the first residual is inertia, which is linear in the unknowns and vanishes at once; and the last iteration ends in round-off.".into(),
-            "What is not: Eisenstat-Walker is superlinear by intention, it solves each linear system only as far as pays; differences are linear, with a ratio of their relative error (about 1e-7 or worse), which shows as order 1 near the solution.".into(),
-            "Mass: a consistent M that is singular or ill conditioned does not spoil Newton's order, for the tangent is alpha_1 M plus stiffness; restrained rows are kept out of the residual norm.".into(),
+            "Quadratic: every step shown with the exact tangent and a tight linear solve. A single Newton step has order 2 wherever its result is above round-off, for every eps.".into(),
+            "Between the iterations of one solve the order is less: from zero, most of the first residual is inertia, which is linear and vanishes at once, and the third iteration ends in round-off. |R|/|R before|^2 is the constant to look at, until round-off.".into(),
+            "Not quadratic, by intention: Eisenstat-Walker. It solves each linear system only as far as it pays: more iterations, fewer products, superlinear.".into(),
+            "Not quadratic, by nature: products by differences. Their error leaves a part of the residual, so the order falls to 1: with a length of 1e-3 h a factor of 1e-5 is left at every iteration; with 1.5e-8 h so little that only the last iterations show it.".into(),
+            "The mass: a mixed mass keeps the order 2 and costs Krylov iterations. With eps = 0 the mass has null modes and the tangent nearly so (columns `null`). The exact tangent with tight solves still converges, with order 2 near the solution but more iterations from zero; loose solves (Eisenstat-Walker) and differences leave the near-null modes unsolved and do not: that is the convergence trouble the paper reports. Those steps start from the state reached with eps = 0.01; `full` runs eps = 0 from the start and says where it ends.".into(),
         ];
         Outcome {
             tables: vec![self.iterations, self.masses],
