@@ -1,0 +1,72 @@
+//! The tangent as a matrix, the way most programs have it: to be compared with the matrix-free product.
+//!
+//! Two assemblies of the same blocks from the same supports: [`assemble`] with [`b_free`] (eqs. 34, 38) or [`voigt`] (BᵀDB).
+
+mod b_free;
+mod blocks;
+#[cfg(feature = "direct")]
+mod direct;
+mod voigt;
+
+pub use b_free::BFree;
+pub use blocks::{BlockMatrix, Pattern, TooManyBlocks};
+#[cfg(feature = "direct")]
+pub use direct::{DirectError, solve};
+pub use voigt::Voigt;
+
+use bfree::material::{Law, admissible};
+use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
+use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
+
+/// A way to the D×D block that two nodes share at one particle, geometric and material stiffness together.
+pub trait Stiffness<const D: usize> {
+    /// The blocks of all pairs of nodes of a particle with reference volume `volume` at the state `at`, from the nodes'
+    /// gradients in the reference configuration: `add(I, J, K_IJ)`, I and J numbering `gradients`.
+    fn blocks<L: Law>(
+        &self,
+        law: &L,
+        at: &Deformation<f64, D>,
+        volume: f64,
+        gradients: &[Vector<f64, D>],
+        add: impl FnMut(usize, usize, Tensor<f64, D>),
+    );
+}
+
+/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure is left out.
+///
+/// # Errors
+/// The first particle with det F ≤ 0.
+pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    dphi: &[Vector<f64, D>],
+    pattern: &'p Pattern,
+    stiffness: &S,
+) -> Result<BlockMatrix<'p, D>, Inadmissible> {
+    let eq = equilibrium;
+    let mut matrix = BlockMatrix::zeros(pattern);
+    for (node, &m) in eq.nodal.mass.iter().enumerate() {
+        matrix.add(node, node, &scaled(&identity(), eq.alphas.a1 * eq.lumping * m));
+    }
+    let (mut nodes, mut values, mut gradients) = (Vec::new(), Vec::new(), Vec::new());
+    for p in 0..eq.supports.particles() {
+        let h_n = &eq.particles.displacement_gradient[p];
+        let at = admissible(compose(&eq.supports.gradient_at(p, dphi), h_n))
+            .map_err(|source| Inadmissible { particle: p, source })?;
+        let f_n_t = (identity::<f64, D>() + h_n).transpose();
+        nodes.clear();
+        values.clear();
+        gradients.clear();
+        for (node, n, grad_n) in eq.supports.of(p) {
+            nodes.push(node);
+            values.push(n);
+            // ∇N = F_nᵀ ∇_n N
+            gradients.push(f_n_t * grad_n);
+        }
+        let mass = eq.alphas.a1 * (1.0 - eq.lumping) * eq.particles.mass[p];
+        stiffness.blocks(eq.law(p), &at, eq.particles.volume[p], &gradients, |i, j, block| {
+            let inertia = mass * values[i] * values[j];
+            matrix.add(nodes[i], nodes[j], &(block + scaled(&identity(), inertia)));
+        });
+    }
+    Ok(matrix)
+}

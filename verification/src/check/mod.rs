@@ -1,0 +1,10 @@
+//! The checks, one file each.
+
+mod approximation;
+mod material;
+pub(crate) mod regime;
+pub(crate) mod tangent;
+
+pub use approximation::check_approximation;
+pub use material::check_material;
+pub use tangent::check_tangent;

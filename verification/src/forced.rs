@@ -1,0 +1,60 @@
+//! A step of Algorithm 1 under a body force that varies in space: what manufactured solutions need and scenes do not.
+
+use bfree::approximation::ShapeFunction;
+use bfree::material::Law;
+use bfree::mechanics::loads::prescribed_dofs;
+use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::{Moved, Nodal};
+use bfree::simulation::{InitialGuess, Simulation, StepError};
+use bfree::solver::{NewtonReport, newton};
+use bfree::tensor::Vector;
+
+/// One step of `simulation` with the force `force(p, t)` per unit mass on particle `p`, in place of all its loads but the
+/// prescribed motion. It mirrors [`Simulation::step`], with one line changed: f_I = Σ_p m b_p(t_{n+1}) N_I.
+///
+/// # Errors
+/// As [`Simulation::step`]; the simulation is then untouched. A particle that leaves the grid is found at the next step.
+pub fn step<const D: usize, L: Law, A: ShapeFunction>(
+    simulation: &mut Simulation<D, L, A>,
+    force: impl Fn(usize, f64) -> Vector<f64, D> + Sync,
+) -> Result<NewtonReport, StepError> {
+    let (t, dt) = (simulation.clock.time(), simulation.clock.step());
+    let (particles, settings) = (&simulation.particles, &simulation.settings);
+    let alphas = settings.newmark.alphas(dt);
+
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let prescribed = prescribed_dofs(&simulation.loads.prescribed, &simulation.grid, &nodes, t, dt);
+    let projected = Nodal::project(particles, &supports, nodes.len(), settings.lumping)?;
+    let nodal = projected.with_prescribed(&prescribed);
+
+    let forces: Vec<_> = (0..particles.len()).map(|p| force(p, t + dt) * particles.mass[p]).collect();
+    let mut dead_load = vec![Vector::zeros(); nodes.len()];
+    supports.scatter(&mut dead_load, |p, n, _| forces[p] * n);
+
+    let equilibrium = Equilibrium::new(
+        particles,
+        &simulation.bodies,
+        &supports,
+        alphas,
+        settings.lumping,
+        &nodal,
+        dead_load,
+        Vec::new(),
+        &prescribed,
+    );
+    let mut dphi: Vec<_> = match settings.initial_guess {
+        InitialGuess::Zero => vec![Vector::zeros(); nodes.len()],
+        InitialGuess::Velocity => nodal.velocity.iter().map(|v| v * dt).collect(),
+    };
+    for dof in &prescribed {
+        dphi[dof.node][dof.component] = dof.step.increment;
+    }
+    let report = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
+
+    let walls = settings.wall_update;
+    let moved = Moved::new(particles, &supports, &alphas, &projected, &nodal, &prescribed, walls, &dphi);
+    moved.commit(&mut simulation.particles);
+    simulation.clock.advance();
+    Ok(report)
+}

@@ -1,0 +1,191 @@
+//! Runs studies, prints what they found, writes CSV, SVG and JSON; the exit code is the verdict.
+
+use clap::{Parser, ValueEnum};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+use verification::report::chain;
+use verification::studies::{Effort, Outcome, STUDIES, Study, StudyError};
+
+/// Everything that judges bfree.
+#[derive(Parser)]
+#[command(version, after_help = studies_list())]
+struct Arguments {
+    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps
+    #[arg(value_name = "STUDY", default_value = "all")]
+    studies: Vec<String>,
+    /// How much each study does; `full` as a study asks for full effort
+    #[arg(long, value_enum, default_value_t = EffortArgument::Short)]
+    effort: EffortArgument,
+    /// Write every cell, table and remark as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write CSV and SVG into this directory
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EffortArgument {
+    Short,
+    Full,
+}
+
+fn studies_list() -> String {
+    let mut text = String::from("Studies:");
+    for study in STUDIES {
+        text += &format!("\n  {:<14} {}", study.name, study.about);
+    }
+    text
+}
+
+/// The studies asked for, each once, and how much they do; the word that names none is the error.
+fn selected(arguments: &Arguments) -> Result<(Vec<&'static Study>, Effort), String> {
+    let mut effort = match arguments.effort {
+        EffortArgument::Short => Effort::Short,
+        EffortArgument::Full => Effort::Full,
+    };
+    let mut chosen: Vec<&Study> = Vec::new();
+    for word in &arguments.studies {
+        let named: Vec<&Study> = match word.as_str() {
+            "all" => STUDIES.iter().collect(),
+            "full" => {
+                effort = Effort::Full;
+                STUDIES.iter().collect()
+            }
+            name => vec![STUDIES.iter().find(|study| study.name == name).ok_or_else(|| word.clone())?],
+        };
+        for study in named {
+            if !chosen.iter().any(|one| one.name == study.name) {
+                chosen.push(study);
+            }
+        }
+    }
+    Ok((chosen, effort))
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let (studies, effort) = match selected(&arguments) {
+        Ok(selected) => selected,
+        Err(word) => {
+            eprintln!("error: there is no study `{word}`\n\n{}\n\nor `all`, or `full`", studies_list());
+            return ExitCode::from(2);
+        }
+    };
+    match run(&studies, effort, &arguments) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        // Nobody reads on: `… | head`.
+        Err(Failure { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {}", chain(&error));
+            ExitCode::from(1)
+        }
+    }
+}
+
+/// Results could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {place}")]
+struct Failure {
+    place: String,
+    source: io::Error,
+}
+
+fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
+    move |source| Failure { place: place.into(), source }
+}
+
+fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool, Failure> {
+    let mut out = io::stdout().lock();
+    let mut verdicts = Vec::new();
+    let mut documents = Vec::new();
+    for study in studies {
+        let start = Instant::now();
+        let result = (study.run)(&effort);
+        let seconds = start.elapsed().as_secs_f64();
+        let passed = matches!(&result, Ok(outcome) if outcome.passed());
+        print(&mut out, study, &result, seconds).map_err(writing("to standard output"))?;
+        if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
+            write_files(directory, study.name, outcome)?;
+        }
+        documents.push(document(study, &result, passed, seconds));
+        verdicts.push((study.name, passed, seconds));
+    }
+    let passed = verdicts.iter().all(|&(_, passed, _)| passed);
+    summary(&mut out, &verdicts).map_err(writing("to standard output"))?;
+    if let Some(path) = &arguments.json {
+        let text = format!("{:#}\n", json!({ "passed": passed, "studies": documents }));
+        fs::write(path, text).map_err(writing(path.display().to_string()))?;
+    }
+    Ok(passed)
+}
+
+fn print(out: &mut impl Write, study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) -> io::Result<()> {
+    writeln!(out, "\n=== {}: {} ===", study.name, study.about)?;
+    match result {
+        Ok(outcome) => {
+            for table in &outcome.tables {
+                write!(out, "{table}")?;
+            }
+            for report in &outcome.reports {
+                write!(out, "{report}")?;
+            }
+            for remark in &outcome.remarks {
+                writeln!(out, "{remark}")?;
+            }
+        }
+        Err(error) => writeln!(out, "FAIL  the study could not be finished: {}", chain(error.as_ref()))?,
+    }
+    writeln!(out, "({seconds:.1} s)")
+}
+
+fn summary(out: &mut impl Write, verdicts: &[(&str, bool, f64)]) -> io::Result<()> {
+    writeln!(out, "\n=== verdict ===")?;
+    for (name, passed, seconds) in verdicts {
+        writeln!(out, "{}  {name:<14} {seconds:8.1} s", if *passed { "PASS" } else { "FAIL" })?;
+    }
+    Ok(())
+}
+
+fn document(study: &Study, result: &Result<Outcome, StudyError>, passed: bool, seconds: f64) -> Value {
+    match result {
+        Ok(outcome) => json!({
+            "study": study.name, "passed": passed, "seconds": seconds,
+            "reports": outcome.reports, "tables": outcome.tables, "remarks": outcome.remarks,
+        }),
+        Err(error) => json!({
+            "study": study.name, "passed": false, "seconds": seconds, "error": chain(error.as_ref()),
+        }),
+    }
+}
+
+/// `<study>.csv`, or `<study>-1.csv`, … where there are several, and the figures by their names.
+fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), Failure> {
+    fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
+    let several = outcome.reports.len() + outcome.tables.len() > 1;
+    let mut number = 0;
+    let mut write = |content: &dyn Fn(&mut Vec<u8>) -> io::Result<()>| {
+        number += 1;
+        let name = if several { format!("{study}-{number}.csv") } else { format!("{study}.csv") };
+        let path = directory.join(name);
+        let mut bytes = Vec::new();
+        content(&mut bytes).and_then(|()| fs::write(&path, &bytes)).map_err(writing(path.display().to_string()))
+    };
+    for table in &outcome.tables {
+        write(&|bytes| table.write_csv(bytes))?;
+    }
+    for report in &outcome.reports {
+        write(&|bytes| report.write_csv(bytes))?;
+    }
+    for figure in &outcome.figures {
+        let path = directory.join(format!("{}.svg", figure.name));
+        let written = figure.svg().map_err(io::Error::other).and_then(|svg| fs::write(&path, svg));
+        written.map_err(writing(path.display().to_string()))?;
+    }
+    Ok(())
+}

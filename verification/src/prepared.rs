@@ -1,0 +1,60 @@
+//! The coming step of a simulation, taken apart: what a study needs to ask the residual and the tangent directly.
+
+use bfree::approximation::ShapeFunction;
+use bfree::material::Law;
+use bfree::mechanics::loads::PrescribedDof;
+use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::time::Alphas;
+use bfree::mechanics::transfer::Nodal;
+use bfree::nodes::Nodes;
+use bfree::simulation::{Simulation, StepError};
+use bfree::tensor::Vector;
+
+/// The ingredients of the equilibrium of the coming step.
+#[derive(Clone, Debug)]
+pub struct Prepared<const D: usize> {
+    /// Shape functions at x_n.
+    pub supports: Supports<D>,
+    /// Active nodes.
+    pub nodes: Nodes,
+    /// Prescribed degrees of freedom.
+    pub prescribed: Vec<PrescribedDof>,
+    /// Nodal state, prescribed values in place.
+    pub nodal: Nodal<D>,
+    /// Newmark's parameters of the step.
+    pub alphas: Alphas,
+    /// t_{n+1}
+    pub end: f64,
+}
+
+impl<const D: usize> Prepared<D> {
+    /// Does what a step does before Newton.
+    ///
+    /// # Errors
+    /// A particle without shape functions, or a projection that overflows.
+    pub fn new<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Result<Self, StepError> {
+        let (t, dt) = (simulation.clock.time(), simulation.clock.step());
+        let (supports, nodes) =
+            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+        let prescribed = simulation.prescribed(&nodes);
+        let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), simulation.settings.lumping)?
+            .with_prescribed(&prescribed);
+        Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.newmark.alphas(dt), end: t + dt })
+    }
+
+    /// The equilibrium of the step.
+    pub fn equilibrium<'a, L: Law, A: ShapeFunction>(
+        &'a self,
+        simulation: &'a Simulation<D, L, A>,
+    ) -> Equilibrium<'a, D, L> {
+        simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, self.alphas, self.end)
+    }
+
+    /// Puts the prescribed increments into Δφ.
+    pub fn prescribe(&self, dphi: &mut [Vector<f64, D>]) {
+        for dof in &self.prescribed {
+            dphi[dof.node][dof.component] = dof.step.increment;
+        }
+    }
+}

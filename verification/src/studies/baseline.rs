@@ -1,0 +1,314 @@
+//! The tangent as a matrix, B-free and by Voigt, beside the matrix-free product.
+
+use super::{Effort, Outcome, StudyError};
+use crate::baseline::{BFree, BlockMatrix, Pattern, Stiffness, Voigt, assemble};
+use crate::prepared::Prepared;
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use crate::table::Table;
+use bfree::approximation::{Approximation, Linear, Lme};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
+use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::{GmresSettings, NewtonSettings, NonlinearProblem, gmres};
+use bfree::tensor::{Tensor, Vector};
+use std::hint::black_box;
+use std::time::Instant;
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "the tangent assembled B-free and by Voigt's BtDB, beside the matrix-free product";
+
+/// Sums of at most some hundred products of size one.
+const ENTRIES: f64 = 1e-13;
+
+/// The most blocks assembled: 2.4 GB in 3D.
+const MOST_BLOCKS: usize = 30_000_000;
+
+/// A relative residual that GMRES reaches.
+const SOLVE: f64 = 1e-10;
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut study = Study {
+        report: Report::new("the same tangent three ways", &["quantity", "case"]),
+        table: Table::new(
+            "the tangent of one step (bytes and seconds; times are the best of several)",
+            [
+                "case", "law", "particles", "unknowns", "blocks", "MB free", "MB matrix", "ratio", "s pattern", "s B-free", "s Voigt",
+                "s freeze", "s K u free", "s K u matrix", "products to pay",
+            ],
+        ),
+        solves: Table::new(
+            "one linear solve, relative residual 1e-10",
+            ["case", "GMRES products", "s GMRES, matrix-free", "s GMRES, matrix", "s sparse LU"],
+        ),
+    };
+    let (plane, space) = match effort {
+        Effort::Short => (16, 4),
+        Effort::Full => (64, 10),
+    };
+    let lame = Lame::from_young_poisson(1000.0, 0.3)?;
+    let laws = [Material::from(NeoHookean::ciarlet(lame)), Material::from(StVenantKirchhoff { lame })];
+    let shapes = [("linear", Approximation::from(Linear)), ("lme 3", Lme::new(3.0, 1e-6).into())];
+    for (law, law_name) in laws.iter().zip(["neo-Hookean", "St. Venant-Kirchhoff"]) {
+        for (name, shape) in &shapes {
+            study.case::<2>(name, shape, law, law_name, plane)?;
+            study.case::<3>(name, shape, law, law_name, space)?;
+        }
+    }
+    let mut remarks = vec![
+        "MB free: shape functions and frozen point tangents, all that the matrix-free product reads; MB matrix: blocks and pattern.".into(),
+        "s freeze is what the matrix-free tangent costs instead of the assembly, its preconditioner's blocks included.".into(),
+    ];
+    remarks.push(
+        "Products to pay: how many products of one tangent it takes until the faster product of the matrix has paid for its assembly \
+         (a Newton iteration takes about ten to sixty)."
+            .into(),
+    );
+    if !cfg!(feature = "direct") {
+        remarks.push("The sparse direct solve needs `--features direct` (faer takes a minute to build).".into());
+    }
+    Ok(Outcome { reports: vec![study.report], tables: vec![study.table, study.solves], remarks, ..Outcome::default() })
+}
+
+struct Study {
+    report: Report,
+    table: Table,
+    solves: Table,
+}
+
+impl Study {
+    fn case<const D: usize>(
+        &mut self,
+        shape_name: &str,
+        shape: &Approximation,
+        law: &Material,
+        law_name: &str,
+        cells: u32,
+    ) -> Result<(), StudyError> {
+        let case = format!("{D}D {shape_name} {cells}^{D}, {law_name}");
+        let simulation = strained_block::<D>(shape.clone(), law.clone(), cells);
+        let prepared = Prepared::new(&simulation)?;
+        let equilibrium = prepared.equilibrium(&simulation);
+        let count = prepared.nodes.len();
+        let mut random = Random::new(11);
+        let mut dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * 0.01).collect();
+        prepared.prescribe(&mut dphi);
+
+        let start = Instant::now();
+        let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
+        let pattern_seconds = start.elapsed().as_secs_f64();
+        let (b_free, b_free_seconds) = built(&equilibrium, &dphi, &pattern, &BFree)?;
+        let voigt_seconds = {
+            let (voigt, seconds) = built(&equilibrium, &dphi, &pattern, &Voigt)?;
+            self.report.push(&["entries, B-free - Voigt", &case], b_free.difference(&voigt), Bound::AtMost(ENTRIES));
+            seconds
+        };
+
+        let start = Instant::now();
+        let tangent = equilibrium.tangent(&dphi)?;
+        let freeze_seconds = start.elapsed().as_secs_f64();
+        let mut u: Vec<Vector<f64, D>> = random.field(count);
+        equilibrium.clear_prescribed(&mut u);
+        let (mut by_matrix, mut free) = (vec![Vector::zeros(); count], vec![Vector::zeros(); count]);
+        let matrix_seconds = best(|| b_free.product(black_box(&u), &mut by_matrix));
+        let free_seconds = best(|| tangent.product(black_box(&u), &mut free));
+        equilibrium.clear_prescribed(&mut by_matrix);
+        let difference = distance(&by_matrix, &free) / norm(&free);
+        self.report.push(&["product, matrix - matrix-free", &case], difference, Bound::AtMost(ENTRIES));
+
+        // node, N, ∇N of every pair, and the frozen tangent of every particle
+        let pair = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
+        let particles = simulation.particles.len();
+        let frozen = match law {
+            Material::NeoHookean(_) => size_of::<<NeoHookean as Law>::Frozen<f64, D>>(),
+            Material::StVenantKirchhoff(_) => size_of::<<StVenantKirchhoff as Law>::Frozen<f64, D>>(),
+        };
+        let pairs: usize = (0..particles).map(|p| prepared.supports.of(p).count()).sum();
+        let free_bytes = pairs * pair + particles * frozen;
+        let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
+        let seconds = |s: f64| format!("{s:.5}");
+        self.table.push([
+            format!("{D}D {shape_name}"),
+            law_name.into(),
+            particles.to_string(),
+            (D * count).to_string(),
+            pattern.len().to_string(),
+            megabytes(free_bytes),
+            megabytes(b_free.bytes()),
+            format!("{:.1}", b_free.bytes() as f64 / free_bytes as f64),
+            seconds(pattern_seconds),
+            seconds(b_free_seconds),
+            seconds(voigt_seconds),
+            seconds(freeze_seconds),
+            seconds(free_seconds),
+            seconds(matrix_seconds),
+            format!("{:.0}", ((pattern_seconds + b_free_seconds - freeze_seconds) / (free_seconds - matrix_seconds)).max(0.0)),
+        ]);
+        if matches!(law, Material::NeoHookean(_)) {
+            self.solve(&case, &equilibrium, &dphi, &b_free)?;
+        }
+        Ok(())
+    }
+
+    /// K x = −R by GMRES with both products, and by sparse LU.
+    fn solve<const D: usize>(
+        &mut self,
+        case: &str,
+        equilibrium: &Equilibrium<'_, D, Material>,
+        dphi: &[Vector<f64, D>],
+        matrix: &BlockMatrix<'_, D>,
+    ) -> Result<(), StudyError> {
+        let mut right = equilibrium.residual::<f64>(dphi, Carry::ALL)?;
+        equilibrium.clear_prescribed(&mut right);
+        let right: &[f64] = bytemuck::cast_slice(&right);
+        let tangent = equilibrium.linearize(bytemuck::cast_slice(dphi))?;
+        let settings = GmresSettings { relative_tolerance: SOLVE, max_iterations: 4000, restart: 100 };
+        let mut x = vec![0.0; right.len()];
+        let start = Instant::now();
+        let report = gmres(&tangent, &tangent, right, &mut x, &settings)?;
+        let free_seconds = start.elapsed().as_secs_f64();
+        self.report.push(&["GMRES, relative residual", case], report.relative_residual, Bound::AtMost(SOLVE));
+
+        let mut y = vec![0.0; right.len()];
+        let start = Instant::now();
+        gmres(&Held { matrix, equilibrium }, &tangent, right, &mut y, &settings)?;
+        let matrix_seconds = start.elapsed().as_secs_f64();
+        let direct = self.direct(case, equilibrium, matrix, right, &x)?;
+        let seconds = |s: f64| format!("{s:.4}");
+        self.solves.push([
+            case.into(),
+            report.products.to_string(),
+            seconds(free_seconds),
+            seconds(matrix_seconds),
+            direct.map_or_else(|| "-".into(), seconds),
+        ]);
+        Ok(())
+    }
+
+    /// Seconds of a sparse LU whose answer is held against that of GMRES.
+    #[cfg(feature = "direct")]
+    fn direct<const D: usize>(
+        &mut self,
+        case: &str,
+        equilibrium: &Equilibrium<'_, D, Material>,
+        matrix: &BlockMatrix<'_, D>,
+        right: &[f64],
+        by_gmres: &[f64],
+    ) -> Result<Option<f64>, StudyError> {
+        let start = Instant::now();
+        let x = crate::baseline::solve(matrix, equilibrium.prescribed, bytemuck::cast_slice(right))?;
+        let seconds = start.elapsed().as_secs_f64();
+        // ‖x − y‖ ≤ κ ‖K(x − y)‖/‖K‖: judged in the residual norm, which both were solved in.
+        let difference: Vec<Vector<f64, D>> =
+            x.iter().zip(bytemuck::cast_slice::<_, Vector<f64, D>>(by_gmres)).map(|(a, b)| a - b).collect();
+        let mut residual = vec![Vector::zeros(); difference.len()];
+        matrix.product(&difference, &mut residual);
+        equilibrium.clear_prescribed(&mut residual);
+        let right: &[Vector<f64, D>] = bytemuck::cast_slice(right);
+        let label = ["K (x LU - x GMRES) / b", case];
+        self.report.push(&label, norm(&residual) / norm(right), Bound::AtMost(2.0 * SOLVE));
+        let relative = norm(&difference) / norm(&x);
+        self.report.push(&["(x LU - x GMRES) / x", case], relative, Bound::Reported);
+        Ok(Some(seconds))
+    }
+
+    #[cfg(not(feature = "direct"))]
+    fn direct<const D: usize>(
+        &mut self,
+        _case: &str,
+        _equilibrium: &Equilibrium<'_, D, Material>,
+        _matrix: &BlockMatrix<'_, D>,
+        _right: &[f64],
+        _by_gmres: &[f64],
+    ) -> Result<Option<f64>, StudyError> {
+        Ok(None)
+    }
+}
+
+/// The matrix on the free degrees of freedom.
+struct Held<'a, const D: usize> {
+    matrix: &'a BlockMatrix<'a, D>,
+    equilibrium: &'a Equilibrium<'a, D, Material>,
+}
+
+impl<const D: usize> bfree::solver::LinearOperator for Held<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
+        self.matrix.product(bytemuck::cast_slice(x), y);
+        self.equilibrium.clear_prescribed(y);
+    }
+}
+
+/// The assembled tangent, and the seconds it took.
+fn built<'p, const D: usize, S: Stiffness<D>>(
+    equilibrium: &Equilibrium<'_, D, Material>,
+    dphi: &[Vector<f64, D>],
+    pattern: &'p Pattern,
+    stiffness: &S,
+) -> Result<(BlockMatrix<'p, D>, f64), StudyError> {
+    let start = Instant::now();
+    let matrix = assemble(equilibrium, dphi, pattern, stiffness)?;
+    Ok((matrix, start.elapsed().as_secs_f64()))
+}
+
+/// The shortest of five runs after one to warm up.
+fn best(mut run: impl FnMut()) -> f64 {
+    run();
+    (0..5).fold(f64::INFINITY, |best: f64, _| {
+        let start = Instant::now();
+        run();
+        best.min(start.elapsed().as_secs_f64())
+    })
+}
+
+fn norm<const D: usize>(a: &[Vector<f64, D>]) -> f64 {
+    a.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
+}
+
+fn distance<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>().sqrt()
+}
+
+/// A block of `cells`ᴰ cells, 2ᴰ jittered particles in each, every one strained by tenths and moving at random, on a sliding floor.
+/// Half the mass is consistent; the Courant number is about 5, so that inertia and stiffness both count.
+fn strained_block<const D: usize>(approximation: Approximation, law: Material, cells: u32) -> Simulation<D> {
+    let mut random = Random::new(3);
+    let mut particles = Particles::default();
+    let side = 2 * cells as usize;
+    let volume = 0.5_f64.powi(D as i32);
+    for k in 0..side.pow(D as u32) {
+        let place = Vector::<f64, D>::from_fn(|i, _| ((k / side.pow(i as u32)) % side) as f64 * 0.5 + 0.25);
+        // One empty cell around the block, none below it.
+        let offset = Vector::<f64, D>::from_fn(|i, _| if i == D - 1 { 0.0 } else { 2.0 });
+        particles.push(place + offset + random.vector() * 0.1, random.vector() * 0.1, volume, volume, 0);
+    }
+    for h in &mut particles.displacement_gradient {
+        *h = Tensor::from_fn(|_, _| 0.15 * random.signed());
+    }
+    let mut motion = std::array::from_fn(|_| None);
+    motion[D - 1] = Some(Motion::Rest);
+    let floor = Prescribed { name: "floor".into(), on: Selection::Face { axis: D - 1, upper: false }, motion };
+    Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] },
+        approximation,
+        bodies: vec![Body { name: "block".into(), law, density: 1.0 }],
+        particles,
+        loads: Loads { gravity: None, surface: Vec::new(), prescribed: vec![floor] },
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping: 0.5,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::default(),
+            newton: NewtonSettings::default(),
+        },
+        clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),
+        external_work: 0.0,
+    }
+}

@@ -1,0 +1,340 @@
+//! Manufactured solutions with large rotation and large strain: observed orders in space and in time.
+
+use super::{Effort, Outcome, StudyError};
+use crate::figure::{Axis, Figure, Line};
+use crate::forced;
+use crate::manufactured::{AxisAligned, Motion, Vortex, body_force, state};
+use crate::report::{Bound, Report};
+use crate::table::Table;
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
+use bfree::mechanics::loads::{self, Loads, Prescribed, Selection};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::{Forcing, NewtonSettings};
+use bfree::tensor::Vector;
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "orders in space and time on a vortex and on an axis-aligned motion";
+
+/// Particles along each axis of a cell.
+const PER_AXIS: u32 = 2;
+
+/// Δt over h; waves travel 1.2 per unit of time, so the Courant number is about a half.
+const STEP_OVER_SPACING: f64 = 0.4;
+
+/// The least order in space of the position error where ∇N is continuously differentiable.
+///
+/// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not fall with h
+/// (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1, once the
+/// interpolation error, of order 2, is below it. Of that 1, 0.8 is asked for.
+const ORDER: f64 = 0.8;
+
+/// One family.
+struct Family {
+    name: &'static str,
+    shape: Approximation,
+    /// Whether ∇N is continuously differentiable, to rounding. Where it jumps or has kinks (LME of a large γ̂ is nearly linear), that
+    /// number is large and changes as particles cross faces: it shakes the grid, undamped and more often the finer it is, and nothing is
+    /// promised.
+    smooth: bool,
+}
+
+fn families(effort: Effort) -> Vec<Family> {
+    let family = |name, shape, smooth| Family { name, shape, smooth };
+    let mut families = vec![
+        family("linear", Linear.into(), false),
+        family("gimp", Gimp::particles_per_axis(PER_AXIS).into(), false),
+        family("quadratic", Bspline::Quadratic.into(), false),
+        family("cubic", Bspline::Cubic.into(), true),
+        family("lme 0.8", Lme::new(0.8, 1e-6).into(), true),
+        family("lme 3", Lme::new(3.0, 1e-6).into(), false),
+    ];
+    if effort == Effort::Full {
+        families.push(family("lme circle 3", LmeCircle::new(3.0, 1e-6).into(), false));
+    }
+    families
+}
+
+/// Root mean squares over the reference volume at t = 1.
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    position: f64,
+    velocity: f64,
+    strain: f64,
+}
+
+/// A motion of a body in a box.
+trait Problem: Motion<2> + Copy {
+    /// The box, in cells of edge `h`.
+    fn grid(&self, h: f64) -> Grid<2>;
+    /// Whether there is matter at the reference position `x`.
+    fn holds(&self, x: &Vector<f64, 2>) -> bool;
+    /// Whether the body touches the walls of the box.
+    const WALLS: bool;
+    /// The finest h in units of 1/8, as a number of halvings.
+    fn halvings(&self, effort: Effort) -> i32;
+}
+
+impl Problem for AxisAligned {
+    fn grid(&self, h: f64) -> Grid<2> {
+        Grid { origin: Vector::zeros(), spacing: h, cells: [(1.0 / h).round() as u32; 2] }
+    }
+    fn holds(&self, _: &Vector<f64, 2>) -> bool {
+        true
+    }
+    const WALLS: bool = true;
+    fn halvings(&self, effort: Effort) -> i32 {
+        if effort == Effort::Short { 2 } else { 3 }
+    }
+}
+
+impl Problem for Vortex {
+    fn grid(&self, h: f64) -> Grid<2> {
+        Grid { origin: Vector::from([-1.5, -1.5]), spacing: h, cells: [(3.0 / h).round() as u32; 2] }
+    }
+    fn holds(&self, x: &Vector<f64, 2>) -> bool {
+        x.norm() < 1.1875
+    }
+    const WALLS: bool = false;
+    fn halvings(&self, effort: Effort) -> i32 {
+        if effort == Effort::Short { 1 } else { 2 }
+    }
+}
+
+/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles, and their reference positions.
+fn simulate<P: Problem>(
+    problem: &P,
+    shape: &Approximation,
+    h: f64,
+    steps: u32,
+    lumping: f64,
+) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> {
+    let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1.0, 0.3)?));
+    let grid = problem.grid(h);
+    let density = 1.0;
+    let mut particles = Particles::default();
+    let mut reference = Vec::new();
+    let volume = (h / f64::from(PER_AXIS)).powi(2);
+    for j in 0..grid.cells[1] * PER_AXIS {
+        for i in 0..grid.cells[0] * PER_AXIS {
+            let x = grid.origin + Vector::from([f64::from(i) + 0.5, f64::from(j) + 0.5]) * (h / f64::from(PER_AXIS));
+            if problem.holds(&x) {
+                let start = state(problem, &x, 0.0);
+                particles.push(start.position, start.velocity, volume, density * volume, 0);
+                if let Some(a) = particles.acceleration.last_mut() {
+                    *a = start.acceleration;
+                }
+                reference.push(x);
+            }
+        }
+    }
+    let prescribed = if P::WALLS {
+        let walls = [(0, false), (0, true), (1, false), (1, true)];
+        walls
+            .map(|(axis, upper)| {
+                let mut motion = [None, None];
+                motion[axis] = Some(loads::Motion::Rest);
+                Prescribed { name: "wall".into(), on: Selection::Face { axis, upper }, motion }
+            })
+            .to_vec()
+    } else {
+        Vec::new()
+    };
+    let mut simulation = Simulation {
+        grid,
+        approximation: shape.clone(),
+        bodies: vec![Body { name: "body".into(), law: law.clone(), density }],
+        particles,
+        loads: Loads { gravity: None, surface: Vec::new(), prescribed },
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::Consistent,
+            newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
+        },
+        clock: Clock::new(1.0 / f64::from(steps), 0),
+        external_work: 0.0,
+    };
+    for _ in 0..steps {
+        forced::step(&mut simulation, |p, t| body_force(problem, &law, density, &reference[p], t))?;
+    }
+    Ok((simulation, reference))
+}
+
+fn errors<P: Problem>(problem: &P, simulation: &Simulation<2>, reference: &[Vector<f64, 2>]) -> Errors {
+    let particles = &simulation.particles;
+    let mut sums = [0.0; 3];
+    for (p, x) in reference.iter().enumerate() {
+        let exact = state(problem, x, simulation.clock.time());
+        sums[0] += (particles.position[p] - exact.position).norm_squared();
+        sums[1] += (particles.velocity[p] - exact.velocity).norm_squared();
+        sums[2] += (particles.displacement_gradient[p] - exact.displacement_gradient).norm_squared();
+    }
+    let [position, velocity, strain] = sums.map(|sum| (sum / reference.len() as f64).sqrt());
+    Errors { position, velocity, strain }
+}
+
+/// log of the ratio of two errors over that of the two sizes they belong to.
+fn order(coarse: f64, fine: f64, ratio: f64) -> f64 {
+    (coarse / fine).ln() / ratio.ln()
+}
+
+fn text(order: f64) -> String {
+    if order.is_finite() { format!("{order:.2}") } else { "-".into() }
+}
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut outcome = Outcome::default();
+    let mut report = Report::new("orders of the manufactured solutions", &["quantity", "shape", "motion"]);
+    space(&AxisAligned::default(), "axis-aligned", *effort, &mut report, &mut outcome)?;
+    space(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
+    time(&AxisAligned::default(), "axis-aligned", *effort, &mut report, &mut outcome)?;
+    time(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
+    outcome.reports.push(report);
+    outcome.remarks.push(
+        "In space only functions with smooth gradients converge: linear functions and LME with a large gamma diverge or stand still, GIMP and \
+         quadratic B-splines stop where the quadrature error of their kinks is reached (F off by 6 percent, whatever h). In time the trapezoidal \
+         rule promises order 2 on nodes that stay; here every step projects anew, and the orders seen lie between 0.4 and 1.9 even for smooth gradients."
+            .into(),
+    );
+    Ok(outcome)
+}
+
+/// h refined, Δt in proportion.
+fn space<P: Problem>(
+    problem: &P,
+    motion: &str,
+    effort: Effort,
+    report: &mut Report,
+    outcome: &mut Outcome,
+) -> Result<(), StudyError> {
+    let spacings = (0..=problem.halvings(effort)).map(|k| 0.125 * 0.5_f64.powi(k));
+    let mut table = Table::new(
+        format!("{motion}: rms errors at t = 1 in space, dt = {STEP_OVER_SPACING} h"),
+        ["shape", "h", "steps", "position", "order", "velocity", "order", "F", "order"],
+    );
+    let mut lines = Vec::new();
+    for family in families(effort) {
+        let mut line = Line { name: family.name.into(), points: Vec::new() };
+        let mut before: Option<Errors> = None;
+        for h in spacings.clone() {
+            let steps = (1.0 / (STEP_OVER_SPACING * h)).ceil() as u32;
+            let (simulation, reference) = match simulate(problem, &family.shape, h, steps, 1.0) {
+                Ok(run) => run,
+                Err(error) => {
+                    report.push_error(&[&format!("run at h = {h}"), family.name, motion], error.as_ref());
+                    break;
+                }
+            };
+            let now = errors(problem, &simulation, &reference);
+            let orders = before.map_or([f64::NAN; 3], |before| {
+                [
+                    order(before.position, now.position, 2.0),
+                    order(before.velocity, now.velocity, 2.0),
+                    order(before.strain, now.strain, 2.0),
+                ]
+            });
+            table.push([
+                family.name.into(),
+                format!("{h}"),
+                steps.to_string(),
+                format!("{:.3e}", now.position),
+                text(orders[0]),
+                format!("{:.3e}", now.velocity),
+                text(orders[1]),
+                format!("{:.3e}", now.strain),
+                text(orders[2]),
+            ]);
+            line.points.push((1.0 / h, now.position));
+            before = Some(now);
+        }
+        let span = line.points.first().zip(line.points.last());
+        if let Some((coarse, fine)) = span.filter(|_| line.points.len() > 1) {
+            let overall = order(coarse.1, fine.1, fine.0 / coarse.0);
+            let bound = if family.smooth { Bound::AtLeast(ORDER) } else { Bound::Reported };
+            report.push(&["order in space, position", family.name, motion], overall, bound);
+        }
+        lines.push(line);
+    }
+    outcome.tables.push(table);
+    outcome.figures.push(Figure {
+        name: format!("manufactured-{motion}"),
+        title: format!("{motion}: position error at t = 1 (dt = {STEP_OVER_SPACING} h)"),
+        x: Axis::logarithmic("cells per unit length, 1/h"),
+        y: Axis::logarithmic("rms error of the position"),
+        lines,
+    });
+    Ok(())
+}
+
+/// Δt refined at a fixed h, against the next finer Δt.
+fn time<P: Problem>(
+    problem: &P,
+    motion: &str,
+    effort: Effort,
+    report: &mut Report,
+    outcome: &mut Outcome,
+) -> Result<(), StudyError> {
+    let (h, counts): (f64, &[u32]) = match effort {
+        Effort::Short => (0.125, &[10, 20, 40]),
+        Effort::Full => (0.0625, &[10, 20, 40, 80]),
+    };
+    let mut table = Table::new(
+        format!("{motion}: rms differences at t = 1 between dt and dt/2, h = {h}"),
+        ["shape", "eps", "steps", "position", "order", "velocity", "order"],
+    );
+    // What has no order is shown once.
+    let shown = |family: &Family| effort == Effort::Full || family.smooth || family.name == "linear";
+    for family in families(effort).into_iter().filter(shown) {
+        for lumping in [1.0, 0.1] {
+            let mut before: Option<Simulation<2>> = None;
+            let mut differences: Vec<[f64; 2]> = Vec::new();
+            for &steps in counts {
+                let (now, _) = match simulate(problem, &family.shape, h, steps, lumping) {
+                    Ok(run) => run,
+                    Err(error) => {
+                        report.push_error(&[&format!("run of {steps} steps, eps = {lumping}"), family.name, motion], error.as_ref());
+                        break;
+                    }
+                };
+                if let Some(before) = before {
+                    let (a, b) = (&before.particles, &now.particles);
+                    let rms = |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| {
+                        (a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
+                    };
+                    let difference = [rms(&a.position, &b.position), rms(&a.velocity, &b.velocity)];
+                    let orders = differences.last().map_or([f64::NAN; 2], |before| {
+                        [order(before[0], difference[0], 2.0), order(before[1], difference[1], 2.0)]
+                    });
+                    table.push([
+                        family.name.into(),
+                        format!("{lumping}"),
+                        format!("{steps}/{}", steps / 2),
+                        format!("{:.3e}", difference[0]),
+                        text(orders[0]),
+                        format!("{:.3e}", difference[1]),
+                        text(orders[1]),
+                    ]);
+                    differences.push(difference);
+                }
+                before = Some(now);
+            }
+            if let (Some(first), Some(last), true) = (differences.first(), differences.last(), differences.len() > 1) {
+                let overall = order(first[0], last[0], 2.0_f64.powi(differences.len() as i32 - 1));
+                let label = format!("order in time, position, eps = {lumping}");
+                // The projection leaves no order to promise, but refinement must not make it worse.
+                let bound = if family.smooth { Bound::AtLeast(0.0) } else { Bound::Reported };
+                report.push(&[&label, family.name, motion], overall, bound);
+            }
+        }
+    }
+    outcome.tables.push(table);
+    Ok(())
+}

@@ -1,0 +1,61 @@
+//! The studies: one file a study, one list.
+
+use crate::figure::Figure;
+use crate::report::Report;
+use crate::table::Table;
+
+/// How much a study does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// What CI runs: seconds.
+    Short,
+    /// Long sweeps too: minutes.
+    Full,
+}
+
+/// What a study found.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// What is judged.
+    pub reports: Vec<Report>,
+    /// What is only shown.
+    pub tables: Vec<Table>,
+    /// What there is to say, in sentences.
+    pub remarks: Vec<String>,
+    /// Pictures.
+    pub figures: Vec<Figure>,
+}
+
+impl Outcome {
+    /// Whether every report passes, and there is one.
+    pub fn passed(&self) -> bool {
+        !self.reports.is_empty() && self.reports.iter().all(Report::passed)
+    }
+}
+
+/// Why a study could not be finished: whatever the simulations in it can fail with.
+pub type StudyError = Box<dyn std::error::Error>;
+
+/// A study.
+#[derive(Clone, Copy, Debug)]
+pub struct Study {
+    /// What it is called on the command line.
+    pub name: &'static str,
+    /// What it shows, in a sentence.
+    pub about: &'static str,
+    /// Runs it.
+    pub run: fn(&Effort) -> Result<Outcome, StudyError>,
+}
+
+/// The list of studies. A word here makes a study known to the program.
+macro_rules! studies {
+    ($($study:ident),* $(,)?) => {
+        $(mod $study;)*
+
+        /// All studies, in the order they run.
+        pub const STUDIES: &[Study] =
+            &[$(Study { name: stringify!($study), about: $study::ABOUT, run: $study::run }),*];
+    };
+}
+
+studies!(tangent, taylor, newton, baseline, patch, manufactured, minimiser, order);

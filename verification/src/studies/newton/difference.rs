@@ -1,0 +1,74 @@
+//! Products with the tangent by differences of the residual, as Jacobian-free Newton–Krylov methods make them.
+
+use bfree::solver::{LinearOperator, NonlinearProblem, Preconditioner};
+
+/// A problem whose tangent is known through its residual only; the blocks of the exact one precondition it.
+pub(super) struct Difference<'a, P> {
+    pub problem: &'a P,
+    /// Length of the step, in units of x.
+    pub length: f64,
+}
+
+/// K u ≈ [R(x + δ u/‖u‖) − R(x)] ‖u‖/δ
+pub(super) struct DifferenceTangent<'a, P: NonlinearProblem + 'a> {
+    problem: &'a P,
+    exact: P::Tangent<'a>,
+    length: f64,
+    x: Vec<f64>,
+    r: Vec<f64>,
+}
+
+impl<P: NonlinearProblem> LinearOperator for DifferenceTangent<'_, P> {
+    fn apply(&self, u: &[f64], y: &mut [f64]) {
+        let norm = u.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if norm == 0.0 {
+            y.fill(0.0);
+            return;
+        }
+        let factor = self.length / norm;
+        let moved: Vec<f64> = self.x.iter().zip(u).map(|(x, u)| x + factor * u).collect();
+        match self.problem.residual(&moved, y) {
+            Ok(()) => y.iter_mut().zip(&self.r).for_each(|(y, r)| *y = (*y - r) / factor),
+            // Outside the domain there is no difference to take; the Krylov method reports it.
+            Err(_) => y.fill(f64::NAN),
+        }
+    }
+}
+
+impl<P: NonlinearProblem> Preconditioner for DifferenceTangent<'_, P> {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+        self.exact.precondition(r, z);
+    }
+}
+
+impl<P: NonlinearProblem> NonlinearProblem for Difference<'_, P> {
+    type Inadmissible = P::Inadmissible;
+    type Tangent<'a>
+        = DifferenceTangent<'a, P>
+    where
+        Self: 'a;
+
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible> {
+        self.problem.residual(x, r)
+    }
+
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible> {
+        self.problem.magnitude(x)
+    }
+
+    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>> {
+        self.problem.potential(x)
+    }
+
+    fn linearize(&self, x: &[f64]) -> Result<Self::Tangent<'_>, Self::Inadmissible> {
+        let mut r = vec![0.0; x.len()];
+        self.problem.residual(x, &mut r)?;
+        Ok(DifferenceTangent {
+            problem: self.problem,
+            exact: self.problem.linearize(x)?,
+            length: self.length,
+            x: x.to_vec(),
+            r,
+        })
+    }
+}

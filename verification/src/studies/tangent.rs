@@ -1,0 +1,188 @@
+//! Every term of the tangent against dual numbers: every law × every shape function × D = 1, 2, 3 × every regime.
+
+use super::{Effort, Outcome, StudyError};
+use crate::check::regime::Regime;
+use crate::check::tangent::{PRESSURE_ASYMMETRY, measure};
+use crate::prepared::Prepared;
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Energy, FromEnergy, Lame, LameError, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::loads::{
+    Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
+};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::particles::{Body, Particles};
+use bfree::scalar::Real;
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::NewtonSettings;
+use bfree::tensor::{Tensor, Vector, contract, determinant, trace};
+
+pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
+
+const YOUNG: f64 = 1000.0;
+const SPACING: f64 = 0.5;
+
+/// Murnaghan's solid, given by its energy alone:
+/// W = Λ/2 (tr E)² + G E:E + l/3 (tr E)³ + m tr E E:E + n det E.
+#[derive(Clone, Copy, Debug)]
+struct Murnaghan {
+    lame: Lame,
+}
+
+impl Energy for Murnaghan {
+    fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+        let Lame { lambda, shear } = self.lame;
+        let (t, ee) = (trace(e), contract(e, e));
+        let third = t * t * t * T::lit(0.3 * shear) + t * ee * T::lit(0.2 * shear) + determinant(e) * T::lit(0.7 * shear);
+        t * t * T::lit(0.5 * lambda) + ee * T::lit(shear) + third
+    }
+}
+
+fn shapes() -> [(&'static str, Approximation); 6] {
+    [
+        ("linear", Linear.into()),
+        ("gimp", Gimp::particles_per_axis(2).into()),
+        ("bspline2", Bspline::Quadratic.into()),
+        ("bspline3", Bspline::Cubic.into()),
+        ("lme", Lme::new(1.8, 1e-6).into()),
+        ("lme circle", LmeCircle::new(1.8, 1e-6).into()),
+    ]
+}
+
+/// Terms and the whole product of K against dual numbers, symmetry where there is a potential.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let columns = ["quantity", "law", "D", "regime", "shape function"];
+    let mut report = Report::new(
+        "tangent: |K u - dual(R) u| / |K u|, worst shape function of each place, bound min(64 eps k(F)^2, 1e-10)",
+        &columns,
+    )
+    .as_matrix(&[0, 2, 1], 3, 4);
+    type Make<L> = fn(Lame) -> L;
+    let shipped: [(&str, Make<Material>); 3] = [
+        ("Ciarlet", |lame| NeoHookean::ciarlet(lame).into()),
+        ("logarithmic", |lame| NeoHookean::logarithmic(lame).into()),
+        ("St.V.-Kirchhoff", |lame| StVenantKirchhoff { lame }.into()),
+    ];
+    let seeds = if *effort == Effort::Full { 1..=8 } else { 1..=1 };
+    for seed in seeds {
+        for (name, law) in shipped {
+            dimensions(name, law, seed, &mut report)?;
+        }
+        dimensions("Murnaghan (W)", |lame| FromEnergy(Murnaghan { lame }), seed, &mut report)?;
+    }
+    report.note("k(F) = |F| |1/F| / 3 of the 3x3 F, the largest of all particles. In 1D there is no rotation ('-').");
+    report.note("Follower pressure: on part of the surface only (open), so u.Kw differs from w.Ku in 2D and 3D; in 1D cof F = 1 and its tangent is zero.");
+    report.note("eps = 0.5, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.");
+    Ok(Outcome { reports: vec![report], ..Outcome::default() })
+}
+
+fn dimensions<L: Law + Clone>(
+    name: &str,
+    law: impl Fn(Lame) -> L,
+    seed: u64,
+    report: &mut Report,
+) -> Result<(), StudyError> {
+    dimension::<1, L>(name, &law, seed, report)?;
+    dimension::<2, L>(name, &law, seed, report)?;
+    dimension::<3, L>(name, &law, seed, report)
+}
+
+fn dimension<const D: usize, L: Law + Clone>(
+    name: &str,
+    law: &impl Fn(Lame) -> L,
+    seed: u64,
+    report: &mut Report,
+) -> Result<(), StudyError> {
+    for regime in Regime::GENERAL.into_iter().chain([Regime::Isochoric]).filter(|regime| regime.exists(D)) {
+        let poisson = if regime == Regime::Isochoric { 0.499_999 } else { 0.3 };
+        let law = law(Lame::from_young_poisson(YOUNG, poisson)?);
+        for (shape, approximation) in shapes() {
+            let mut random = Random::new(seed);
+            let mut simulation = cloud::<D, L>(law.clone(), approximation, regime, &mut random)?;
+            for pressed in [true, false] {
+                if !pressed {
+                    simulation.loads.surface.clear();
+                }
+                let prepared = Prepared::new(&simulation)?;
+                let equilibrium = prepared.equilibrium(&simulation);
+                let size = regime.increment() * SPACING;
+                let mut dphi: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
+                prepared.prescribe(&mut dphi);
+                for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
+                    // What does not depend on the pressure was measured with it.
+                    let again = !pressed && !matches!(measured.quantity, "u.Kw - w.Ku" | "dual(Pi) - R.u");
+                    if again {
+                        continue;
+                    }
+                    let bound = if measured.quantity == PRESSURE_ASYMMETRY { Bound::AtLeast(1e-3) } else { measured.bound };
+                    report.push(&[measured.quantity, name, &D.to_string(), regime.name(), shape], measured.value, bound);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, under gravity and under
+/// pressure on part of their surface. Speeds and step are such that inertia is as large as stiffness.
+fn cloud<const D: usize, L: Law>(
+    law: L,
+    approximation: Approximation,
+    regime: Regime,
+    random: &mut Random,
+) -> Result<Simulation<D, L>, LameError> {
+    let density = 1.0;
+    let dt = SPACING / (Lame::from_young_poisson(YOUNG, 0.3)?.p_wave_modulus() / density).sqrt();
+    let speed = regime.increment() * SPACING / dt;
+    let per_axis: usize = if D == 3 { 4 } else { 6 };
+    let distance = 0.5 * SPACING;
+    let mut particles = Particles::<D>::default();
+    let mut points = Vec::new();
+    for p in 0..per_axis.pow(D as u32) {
+        let index: [usize; D] = std::array::from_fn(|k| p / per_axis.pow(k as u32) % per_axis);
+        let position =
+            Vector::from_fn(|k, _| (index[k] as f64 + 0.5 + 0.3 * random.signed()) * distance);
+        let volume = distance.powi(D as i32) * random.between(0.7, 1.3);
+        particles.push(position, random.vector() * speed, volume, density * volume, 0);
+        particles.acceleration[p] = random.vector() * (speed / dt);
+        particles.displacement_gradient[p] = regime.displacement_gradient(random);
+        if index[D - 1] == per_axis - 1 {
+            let normal = Vector::from_fn(|k, _| if k == D - 1 { 1.0 } else { 0.0 });
+            points.push(SurfacePoint { particle: p, normal, area: distance.powi(D as i32 - 1), offset: 0.0 });
+        }
+    }
+    let mut motion = std::array::from_fn(|_| None);
+    motion[0] = Some(Motion::Rest);
+    Ok(Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] },
+        approximation,
+        bodies: vec![Body { name: "cloud".into(), law, density }],
+        particles,
+        loads: Loads {
+            gravity: Some(Gravity { acceleration: random.vector() * (speed / dt), curve: Curve::constant(1.0) }),
+            surface: vec![SurfaceLoad {
+                pressing: Pressing::Pressure(0.1 * YOUNG),
+                curve: Curve::constant(1.0),
+                points,
+            }],
+            prescribed: vec![Prescribed {
+                name: "wall".into(),
+                on: Selection::Face { axis: 0, upper: false },
+                motion,
+            }],
+        },
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping: 0.5,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::Literal,
+            newton: NewtonSettings::default(),
+        },
+        clock: Clock::new(dt, 0),
+        external_work: 0.0,
+    })
+}

@@ -1,0 +1,196 @@
+//! Remainders of Taylor's expansion of Π and R along a line, on whole steps of every shipped scene.
+
+use super::{Effort, Outcome, StudyError};
+use crate::figure::{Axis, Figure, Line};
+use crate::prepared::Prepared;
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use crate::shipped;
+use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::simulation::Simulation;
+use bfree::material::Material;
+use bfree::solver::newton;
+use bfree::tensor::Vector;
+use num_dual::Dual2_64;
+
+pub(super) const ABOUT: &str = "slopes 2 and 3 of the remainders of the potential and of the residual, on steps of every scene";
+
+/// Points s = 2⁰, 2⁻¹, …
+const POINTS: i32 = 30;
+
+/// A remainder counts while it is this many times its round-off.
+const ABOVE_FLOOR: f64 = 200.0;
+
+/// The slope is the median of this many local ones, the last above the floor.
+const LOCAL_SLOPES: usize = 5;
+
+/// One steep rise and two gentle falls.
+const SAWTOOTH: [f64; 3] = [0.0, 1.0, 0.5];
+
+/// How far a slope may be from a whole number.
+const TOLERANCE: f64 = 0.1;
+
+/// Π(x + s u) and R(x + s u) less their expansions at x, for shrinking s.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let steps = if *effort == Effort::Full { 40 } else { 2 };
+    let mut study = Study {
+        report: Report::new("Taylor remainders: slope of log(remainder) over log(s)", &["scene", "remainder", "points"]),
+        figures: Vec::new(),
+    };
+    for name in shipped::names()? {
+        let scene = shipped::scene(&name, &[])?;
+        match scene.dimension() {
+            1 => study.scene(&name, scene.build::<1>(&shipped::folder())?, steps)?,
+            2 => study.scene(&name, scene.build::<2>(&shipped::folder())?, steps)?,
+            _ => study.scene(&name, scene.build::<3>(&shipped::folder())?, steps)?,
+        }
+    }
+    study.report.note(format!(
+        "After {steps} steps of the scene; x is the converged increment of the next one plus a random deformation. A slope is the median of the last {LOCAL_SLOPES} local ones whose remainders are {ABOVE_FLOOR} times their round-off, eps times the magnitude of the contributions; `points` are those above it.",
+    ));
+    study.report.note("Slope 2 of R - R(x) - s K u and slope 3 of Pi - ... - s^2/2 u.Ku hold only for the exact K; slope 3 of R uses its second derivative by dual numbers.");
+    Ok(Outcome { reports: vec![study.report], figures: study.figures, ..Outcome::default() })
+}
+
+/// The four remainders.
+const NAMES: [(&str, f64); 4] = [
+    ("Pi - (Pi + s R.u)", 2.0),
+    ("Pi - (Pi + s R.u + s^2/2 u.Ku)", 3.0),
+    ("R - (R + s K u)", 2.0),
+    ("R - (R + s K u + s^2/2 R''uu)", 3.0),
+];
+
+struct Study {
+    report: Report,
+    figures: Vec<Figure>,
+}
+
+impl Study {
+    fn scene<const D: usize>(
+        &mut self,
+        name: &str,
+        mut simulation: Simulation<D, Material>,
+        steps: usize,
+    ) -> Result<(), StudyError> {
+        for _ in 0..steps {
+            simulation.advance()?;
+        }
+        let prepared = Prepared::new(&simulation)?;
+        let equilibrium = prepared.equilibrium(&simulation);
+        let mut x = vec![Vector::zeros(); prepared.nodes.len()];
+        prepared.prescribe(&mut x);
+        newton(&equilibrium, bytemuck::cast_slice_mut(&mut x), &simulation.settings.newton)?;
+        // A deformation of some percent at random, so that no term is at rest.
+        let mut random = Random::new(3);
+        let size = 0.02 * simulation.grid.spacing;
+        let mut shift = random.field::<D>(x.len());
+        equilibrium.clear_prescribed(&mut shift);
+        x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
+        // A direction of the same size, a skew sawtooth: stretches and compressions of equal shape would cancel in the third
+        // derivative of Π and show the fourth.
+        let indices = prepared.nodes.positions(&simulation.grid);
+        let mut u: Vec<Vector<f64, D>> = indices
+            .map(|(index, _)| {
+                Vector::from_fn(|k, _| size * (SAWTOOTH[index[k] as usize % SAWTOOTH.len()] + 0.2 * random.signed()))
+            })
+            .collect();
+        equilibrium.clear_prescribed(&mut u);
+
+        let remainders = remainders(&equilibrium, &x, &u)?;
+        let mut lines = Vec::new();
+        for ((title, order), values) in NAMES.iter().zip(&remainders) {
+            if values.is_empty() {
+                continue;
+            }
+            let above: Vec<f64> =
+                values.iter().take_while(|point| point.remainder > ABOVE_FLOOR * point.floor).map(|p| p.remainder).collect();
+            let slope = slope(&above).unwrap_or(f64::NAN);
+            let bound = Bound::Between(order - TOLERANCE, order + TOLERANCE);
+            self.report.push(&[name, title, &above.len().to_string()], slope, bound);
+            let points = values.iter().map(|point| (point.s, point.remainder)).collect();
+            lines.push(Line { name: (*title).into(), points });
+        }
+        self.figures.push(Figure {
+            name: format!("taylor-{name}"),
+            title: format!("Taylor remainders: {name}"),
+            x: Axis::logarithmic("s"),
+            y: Axis::logarithmic("remainder"),
+            lines,
+        });
+        Ok(())
+    }
+}
+
+/// A remainder at s, and its round-off.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    s: f64,
+    remainder: f64,
+    floor: f64,
+}
+
+/// The median of the last local slopes, log₂ of the ratio over a halving of s; `None` if there are too few.
+fn slope(remainders: &[f64]) -> Option<f64> {
+    let mut local: Vec<f64> = remainders.windows(2).rev().take(LOCAL_SLOPES).map(|w| (w[0] / w[1]).log2()).collect();
+    local.sort_by(f64::total_cmp);
+    (local.len() >= 3).then(|| local[local.len() / 2])
+}
+
+/// The remainders of [`NAMES`]; those of Π are empty where there is none.
+fn remainders<const D: usize>(
+    equilibrium: &Equilibrium<'_, D, Material>,
+    x: &[Vector<f64, D>],
+    u: &[Vector<f64, D>],
+) -> Result<[Vec<Point>; 4], StudyError> {
+    let free = |mut field: Vec<Vector<f64, D>>| {
+        equilibrium.clear_prescribed(&mut field);
+        field
+    };
+    let r = free(equilibrium.residual::<f64>(x, Carry::ALL)?);
+    let mut k_u = vec![Vector::zeros(); x.len()];
+    equilibrium.tangent(x)?.product(u, &mut k_u);
+    // R(x + s u) = R + s R' + s²/2 R'': x + ε u with ε² kept.
+    let seeded: Vec<_> = x.iter().zip(u).map(|(x, u)| x.zip_map(u, |x, u| Dual2_64::new(x, u, 0.0))).collect();
+    let second = equilibrium.residual(&seeded, Carry::ALL)?.iter().map(|r| r.map(|x| x.v2)).collect();
+    let second = free(second);
+    let (r_u, u_k_u) = (dot(&r, u), dot(u, &k_u));
+    let potential = equilibrium.potential::<f64>(x).transpose()?;
+
+    let mut lists: [Vec<Point>; 4] = Default::default();
+    for k in 0..POINTS {
+        let s = 0.5_f64.powi(k);
+        let moved: Vec<_> = x.iter().zip(u).map(|(x, u)| x + u * s).collect();
+        if let (Some((at_x, _)), Some(moved)) = (potential, equilibrium.potential::<f64>(&moved)) {
+            let (at_moved, magnitude) = moved?;
+            let floor = f64::EPSILON * magnitude;
+            let first = at_moved - at_x - s * r_u;
+            lists[0].push(Point { s, remainder: first.abs(), floor });
+            lists[1].push(Point { s, remainder: (first - 0.5 * s * s * u_k_u).abs(), floor });
+        }
+        let r_moved = free(equilibrium.residual::<f64>(&moved, Carry::ALL)?);
+        let floor = f64::EPSILON * equilibrium.magnitude(&moved)?;
+        let of = |factor: f64| {
+            let all = r_moved.iter().zip(&r).zip(k_u.iter().zip(&second));
+            all.map(|((moved, r), (k, second))| (moved - r - k * s - second * factor).norm_squared()).sum::<f64>().sqrt()
+        };
+        lists[2].push(Point { s, remainder: of(0.0), floor });
+        lists[3].push(Point { s, remainder: of(0.5 * s * s), floor });
+    }
+    Ok(lists)
+}
+
+fn dot<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_a_cube_is_three_and_of_too_few_points_unknown() {
+        let cube: Vec<f64> = (0..9).map(|k| 7.0 * 0.125_f64.powi(k)).collect();
+        assert_eq!(slope(&cube), Some(3.0));
+        assert_eq!(slope(&cube[..3]), None);
+    }
+}

@@ -1,0 +1,80 @@
+//! A table of text, aligned when printed.
+
+use serde::Serialize;
+use std::fmt;
+use std::io::{self, Write};
+
+/// A titled table; shorter rows end early.
+#[derive(Clone, Debug, Serialize)]
+pub struct Table {
+    title: String,
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// Without rows.
+    pub fn new<S: Into<String>>(title: impl Into<String>, header: impl IntoIterator<Item = S>) -> Self {
+        Self { title: title.into(), header: header.into_iter().map(Into::into).collect(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push<S: Into<String>>(&mut self, row: impl IntoIterator<Item = S>) {
+        self.rows.push(row.into_iter().map(Into::into).collect());
+    }
+
+    /// The title.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Comma-separated values, with a header.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
+        for row in std::iter::once(&self.header).chain(&self.rows) {
+            let fields: Vec<_> = row.iter().map(|field| csv_field(field)).collect();
+            writeln!(out, "{}", fields.join(","))?;
+        }
+        Ok(())
+    }
+}
+
+/// Quoted where a comma, a quote or a line break would be misread.
+pub(crate) fn csv_field(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
+}
+
+/// Numbers stand to the right, words to the left.
+fn is_number(text: &str) -> bool {
+    text.parse::<f64>().is_ok()
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = |k: usize| {
+            let fields = std::iter::once(&self.header).chain(&self.rows).filter_map(|row| row.get(k));
+            fields.map(|field| field.chars().count()).max().unwrap_or(0)
+        };
+        let columns = std::iter::once(&self.header).chain(&self.rows).map(Vec::len).max().unwrap_or(0);
+        let widths: Vec<_> = (0..columns).map(width).collect();
+        writeln!(f, "\n{}", self.title)?;
+        let line = |f: &mut fmt::Formatter<'_>, row: &[String]| {
+            let mut text = String::new();
+            for (field, &width) in row.iter().zip(&widths) {
+                let pad = " ".repeat(width - field.chars().count().min(width));
+                let (left, right) = if is_number(field) { (pad.as_str(), "") } else { ("", pad.as_str()) };
+                text += &format!("  {left}{field}{right}");
+            }
+            writeln!(f, "{}", text.trim_end())
+        };
+        line(f, &self.header)?;
+        let rule: Vec<_> = widths.iter().map(|&width| "-".repeat(width)).collect();
+        line(f, &rule)?;
+        for row in &self.rows {
+            line(f, row)?;
+        }
+        Ok(())
+    }
+}

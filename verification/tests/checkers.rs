@@ -1,0 +1,241 @@
+//! The checkers pass on what is shipped, and name what is wrong in what is not.
+
+use bfree::approximation::{
+    Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, Separable, Validate,
+};
+use bfree::clock::Clock;
+use bfree::grid::{Axis, Grid};
+use bfree::material::{Lame, LameError, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::loads::Loads;
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::WallUpdate;
+use bfree::particles::{Body, Particles};
+use bfree::scalar::Real;
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::solver::NewtonSettings;
+use bfree::tensor::{Deformation, Tensor, Vector, contract, scaled};
+use verification::{Report, check_approximation, check_material, check_tangent};
+
+/// The labels in column `column` of the cells that fail, each once.
+fn red(report: &Report, column: usize) -> Vec<&str> {
+    let mut red: Vec<&str> = report.failures().filter_map(|cell| cell.labels.get(column).map(String::as_str)).collect();
+    red.sort_unstable();
+    red.dedup();
+    red
+}
+
+fn lame() -> Result<Lame, LameError> {
+    Lame::from_young_poisson(1000.0, 0.3)
+}
+
+#[test]
+fn shipped_laws_pass() -> Result<(), LameError> {
+    let shipped: [Material; 3] = [
+        NeoHookean::ciarlet(lame()?).into(),
+        NeoHookean::logarithmic(lame()?).into(),
+        StVenantKirchhoff { lame: lame()? }.into(),
+    ];
+    for law in shipped {
+        let report = check_material(&law);
+        assert!(report.passed(), "{law:?}\n{report}");
+    }
+    Ok(())
+}
+
+#[test]
+fn shipped_shape_functions_pass() {
+    let shipped: [Approximation; 7] = [
+        Linear.into(),
+        Gimp::particles_per_axis(2).into(),
+        Bspline::Quadratic.into(),
+        Bspline::Cubic.into(),
+        Lme::new(0.8, 1e-6).into(),
+        Lme::new(4.0, 1e-6).into(),
+        LmeCircle::new(1.8, 1e-6).into(),
+    ];
+    for shape in shipped {
+        let report = check_approximation(&shape);
+        assert!(report.passed(), "{shape:?}\n{report}");
+    }
+}
+
+/// What is wrong with [`Wrong`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    /// ℂ:X twice as large.
+    Factor,
+    /// ℂ takes X for symmetric.
+    Symmetrisation,
+}
+
+/// Ciarlet's law with a fault in ℂ.
+#[derive(Clone, Copy, Debug)]
+struct Wrong {
+    right: NeoHookean,
+    fault: Fault,
+}
+
+impl Law for Wrong {
+    type Frozen<T: Real, const D: usize> = <NeoHookean as Law>::Frozen<T, D>;
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.right.energy(at)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.right.stress(at)
+    }
+
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        if self.fault == Fault::Factor {
+            return scaled(&self.right.elasticity(at, x), T::lit(2.0));
+        }
+        // ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ X C⁻¹
+        let Lame { lambda, shear } = self.right.lame;
+        let f_inv_t = at.inverse_transpose();
+        let c_inv = f_inv_t.transpose() * f_inv_t;
+        let q = T::lit(0.5 * lambda) * at.jacobian_squared_minus_one() - T::lit(shear);
+        scaled(&c_inv, T::lit(lambda) * at.jacobian * at.jacobian * contract(&c_inv, x))
+            - scaled(&(c_inv * x * c_inv), q + q)
+    }
+
+    fn freeze<T: Real, const D: usize>(
+        &self,
+        f_n: &Tensor<T, D>,
+        at: &Deformation<T, D>,
+        volume: T,
+    ) -> Self::Frozen<T, D> {
+        self.right.freeze(f_n, at, volume)
+    }
+}
+
+fn wrong(fault: Fault) -> Result<Wrong, LameError> {
+    Ok(Wrong { right: NeoHookean::ciarlet(lame()?), fault })
+}
+
+#[test]
+fn a_factor_in_the_elasticity_is_named_and_nothing_else() -> Result<(), LameError> {
+    let report = check_material(&wrong(Fault::Factor)?);
+    assert_eq!(red(&report, 0), ["C:X against dual(S)"], "{report}");
+    assert_eq!(red(&report, 1), ["1", "2", "3"], "{report}");
+    assert_eq!(red(&report, 2).len(), 5, "{report}");
+    Ok(())
+}
+
+#[test]
+fn a_dropped_symmetrisation_shows_in_the_plane_and_in_space() -> Result<(), LameError> {
+    let report = check_material(&wrong(Fault::Symmetrisation)?);
+    assert_eq!(red(&report, 0), ["C:X against dual(S)"], "{report}");
+    assert_eq!(red(&report, 1), ["2", "3"], "in 1D nothing is to be symmetrised\n{report}");
+    Ok(())
+}
+
+/// Nine particles of one body in the middle of a grid, in motion.
+fn patch<L: Law>(law: L) -> Simulation<2, L> {
+    let mut particles = Particles::default();
+    for p in 0..9 {
+        let (i, k) = (f64::from(p % 3), f64::from(p / 3));
+        let position = Vector::from([1.1 + 0.31 * i + 0.05 * k, 1.2 + 0.27 * k]);
+        particles.push(position, Vector::from([0.4 * k - i, 0.7 * i]), 0.09, 0.09, 0);
+    }
+    Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6, 6] },
+        approximation: Bspline::Quadratic.into(),
+        bodies: vec![Body { name: "patch".into(), law, density: 1.0 }],
+        particles,
+        loads: Loads::default(),
+        settings: Settings {
+            newmark: Newmark::default(),
+            lumping: 0.5,
+            initial_guess: InitialGuess::Zero,
+            wall_update: WallUpdate::Literal,
+            newton: NewtonSettings::default(),
+        },
+        clock: Clock::new(0.01, 0),
+        external_work: 0.0,
+    }
+}
+
+#[test]
+fn the_tangent_of_a_simulation_is_judged_by_term() -> Result<(), LameError> {
+    let report = check_tangent(&patch(NeoHookean::ciarlet(lame()?)));
+    assert!(report.passed(), "{report}");
+    for fault in [Fault::Factor, Fault::Symmetrisation] {
+        let report = check_tangent(&patch(wrong(fault)?));
+        // The frozen product is the right one: only the term by its own formula is wrong.
+        assert_eq!(red(&report, 0), ["material"], "{fault:?}\n{report}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_simulation_that_cannot_be_set_up_fails_with_the_reason() -> Result<(), LameError> {
+    let mut outside = patch(NeoHookean::ciarlet(lame()?));
+    outside.particles.position[4][0] = -7.0;
+    let report = check_tangent(&outside);
+    assert!(!report.passed());
+    assert!(report.to_string().contains("particle 4"), "{report}");
+    Ok(())
+}
+
+/// Hats with slopes that are a thousandth too steep.
+struct Steep;
+
+impl Validate for Steep {
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
+}
+
+impl Separable for Steep {
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
+        Linear.axis(axis, x, out)?;
+        for derivative in &mut out.derivatives {
+            *derivative *= 1.001;
+        }
+        Ok(())
+    }
+
+    fn width(&self) -> usize {
+        2
+    }
+}
+
+/// Splines whose ghosts beyond a wall are left out instead of folded back.
+struct Cut;
+
+impl Validate for Cut {
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
+}
+
+impl Separable for Cut {
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
+        // Evaluated on a longer axis; the nodes that do not exist are dropped.
+        const BEYOND: u32 = 3;
+        let origin = axis.origin - f64::from(BEYOND) * axis.spacing;
+        let longer = Axis { origin, cells: axis.cells + 2 * BEYOND, ..*axis };
+        let mut all = AxisWeights::default();
+        Bspline::Quadratic.axis(&longer, x, &mut all)?;
+        let listed = |k: usize| (all.first + k as u32).checked_sub(BEYOND).filter(|&node| node <= axis.cells);
+        out.start((0..all.values.len()).find_map(listed).unwrap_or(0));
+        for k in (0..all.values.len()).filter(|&k| listed(k).is_some()) {
+            out.push(all.values[k], all.derivatives[k]);
+        }
+        Ok(())
+    }
+
+    fn width(&self) -> usize {
+        3
+    }
+}
+
+#[test]
+fn wrong_shape_functions_are_named() {
+    let report = check_approximation(&Steep);
+    assert_eq!(red(&report, 0), ["grad N against differences", "sum x_I grad N = I"], "{report}");
+    let report = check_approximation(&Cut);
+    let quantities = red(&report, 0);
+    assert!(quantities.contains(&"sum N = 1") && !quantities.contains(&"grad N against differences"), "{report}");
+}
