@@ -54,7 +54,7 @@ impl Place {
             Self::Face => x[axis] = x[axis].floor(),
             Self::Node => x.apply(|x| *x = x.floor()),
             Self::Wall => x[axis] = wall(0.0),
-            Self::Corner => x = Vector::from_fn(|i, _| if (k >> i) % 2 == 0 { 0.0 } else { last }),
+            Self::Corner => x = Vector::from_fn(|i, _| if (k >> i).is_multiple_of(2) { 0.0 } else { last }),
         }
         x
     }

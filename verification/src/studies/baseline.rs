@@ -306,6 +306,7 @@ fn strained_block<const D: usize>(approximation: Approximation, law: Material, c
             lumping: 0.5,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::default(),
+            check_tangent: None,
             newton: NewtonSettings::default(),
         },
         clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),

@@ -156,6 +156,7 @@ fn simulate<P: Problem>(
             lumping,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Consistent,
+            check_tangent: None,
             newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
         },
         clock: Clock::new(1.0 / f64::from(steps), 0),

@@ -259,6 +259,7 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
             lumping,
             initial_guess: InitialGuess::Velocity,
             wall_update: WallUpdate::default(),
+            check_tangent: None,
             newton: NewtonSettings {
                 relative_tolerance: 1e-14,
                 forcing: Forcing::Fixed(1e-6),

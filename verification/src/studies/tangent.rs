@@ -180,6 +180,7 @@ fn cloud<const D: usize, L: Law>(
             lumping: 0.5,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,
+            check_tangent: None,
             newton: NewtonSettings::default(),
         },
         clock: Clock::new(dt, 0),
