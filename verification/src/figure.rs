@@ -86,10 +86,10 @@ impl Figure {
     }
 
     fn draw(&self, text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
-        let placed: Vec<(usize, &Line, Vec<(f64, f64)>)> = (self.lines.iter().enumerate())
+        let placed: Vec<_> = (self.lines.iter().enumerate())
             .map(|(k, line)| {
                 let points = line.points.iter().filter_map(|&(x, y)| Some((self.x.place(x)?, self.y.place(y)?)));
-                (k, line, points.collect())
+                (k, line, points.collect::<Vec<(f64, f64)>>())
             })
             .collect();
         let all = || placed.iter().flat_map(|(_, _, points)| points.iter());

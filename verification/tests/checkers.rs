@@ -149,6 +149,7 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
             lumping: 0.5,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,
+            check_tangent: None,
             newton: NewtonSettings::default(),
         },
         clock: Clock::new(0.01, 0),

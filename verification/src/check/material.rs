@@ -56,8 +56,9 @@ struct Worst {
 
 impl Worst {
     fn take(&mut self, value: f64, bound: f64) {
-        // Written so that NaN is taken and kept.
-        if self.bound == 0.0 || (!self.value.is_nan() && !(value / bound <= self.value / self.bound)) {
+        // NaN is taken and kept.
+        let (share, worst) = (value / bound, self.value / self.bound);
+        if self.bound == 0.0 || (!self.value.is_nan() && (share.is_nan() || share > worst)) {
             *self = Self { value, bound };
         }
     }

@@ -68,7 +68,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
 
 #[test]
 fn five_steps_agree_with_an_independent_program() -> Result<(), Failure> {
-    let reference: Value = serde_json::from_str(include_str!("reference/dynamics.json"))?;
+    let reference: Value = serde_json::from_str(include_str!("../reference/dynamics.json"))?;
     for run in reference["runs"].as_array().into_iter().flatten() {
         let shape = run["shape"].as_str().unwrap_or_default();
         let gamma = number(&run["gamma_lme"]);

@@ -1,11 +1,6 @@
 //! The compaction of section 4.2 against an independent program.
 
-mod support;
-#[path = "support/table.rs"]
-mod table;
-
-use support::{Failure, scene};
-use table::rows;
+use crate::support::{Failure, rows, scene};
 
 /// The largest difference of u_y at (0.525, 0.975) from the reference, over its largest value.
 fn difference(name: &str, reference: &str, overrides: &[&str]) -> Result<f64, Failure> {
@@ -27,8 +22,8 @@ fn difference(name: &str, reference: &str, overrides: &[&str]) -> Result<f64, Fa
     Ok(largest / scale)
 }
 
-const FREE: &str = include_str!("reference/compaction_free_lme3.csv");
-const CONFINED: &str = include_str!("reference/compaction_confined_lme3.csv");
+const FREE: &str = include_str!("../reference/compaction_free_lme3.csv");
+const CONFINED: &str = include_str!("../reference/compaction_confined_lme3.csv");
 const CIRCLE: &str = r#"approximation={"lme":{"gamma":3,"support":"circle"}}"#;
 
 #[test]

@@ -1,10 +1,8 @@
 //! Facts about whole runs: units, threads, failures.
 
-mod support;
-
+use crate::support::{Failure, scene};
 use bfree::simulation::{Simulation, StepError};
 use bfree::solver::NewtonSettings;
-use support::{Failure, scene};
 
 /// Everything a particle carries, as bits.
 fn bits<const D: usize>(simulation: &Simulation<D>) -> Vec<u64> {

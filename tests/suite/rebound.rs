@@ -1,14 +1,9 @@
 //! The rebound of section 4.3 against an independent program (tests/reference/rebound_lme3.csv).
 
-mod support;
-#[path = "support/table.rs"]
-mod table;
-
+use crate::support::{Failure, rows, scene};
 use bfree::simulation::Simulation;
-use support::{Failure, scene};
-use table::rows;
 
-const REFERENCE: &str = include_str!("reference/rebound_lme3.csv");
+const REFERENCE: &str = include_str!("../reference/rebound_lme3.csv");
 /// The energy at the start.
 const ENERGY: f64 = 3.5;
 

@@ -52,7 +52,7 @@ struct Point {
 }
 
 fn reference() -> Reference {
-    serde_json::from_str(include_str!("reference/points.json")).expect("the reference is well-formed")
+    serde_json::from_str(include_str!("../reference/points.json")).expect("the reference is well-formed")
 }
 
 fn family(shape: &Shape, h: f64) -> Approximation {

@@ -12,3 +12,8 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
 }
+
+/// The rows of a reference table, without its header.
+pub fn rows(text: &str) -> impl Iterator<Item = Vec<f64>> + '_ {
+    text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+}

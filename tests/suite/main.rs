@@ -1,0 +1,12 @@
+//! Promises of the library, in one program: what is generic is compiled once.
+
+mod approximation;
+mod compaction;
+mod dynamics;
+mod loads;
+mod output;
+mod points;
+mod rebound;
+mod runs;
+mod scenes;
+mod support;
