@@ -134,6 +134,7 @@ impl Study {
         let free_bytes = pairs * pair + particles * frozen;
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");
+        let (spent, saved) = (pattern_seconds + b_free_seconds - freeze_seconds, free_seconds - matrix_seconds);
         self.table.push([
             format!("{D}D {shape_name}"),
             law_name.into(),
@@ -149,7 +150,7 @@ impl Study {
             seconds(freeze_seconds),
             seconds(free_seconds),
             seconds(matrix_seconds),
-            format!("{:.0}", ((pattern_seconds + b_free_seconds - freeze_seconds) / (free_seconds - matrix_seconds)).max(0.0)),
+            if saved > 0.0 { format!("{:.0}", (spent / saved).max(0.0)) } else { "never".into() },
         ]);
         if matches!(law, Material::NeoHookean(_)) {
             self.solve(&case, &equilibrium, &dphi, &b_free)?;
