@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tempfile::NamedTempFile;
 
 /// What a dying process may lose of a growing file.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
@@ -15,22 +16,22 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
 /// The system refuses; the file is then as before.
 pub(crate) fn write_atomically(
     path: &Path,
-    content: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    content: impl FnOnce(&mut BufWriter<NamedTempFile>) -> std::io::Result<()>,
 ) -> Result<(), OutputError> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".part");
-    let temporary = PathBuf::from(temporary);
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    // Readable by others as far as the umask allows, like any other file; the library's default is the owner only.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(&temporary)?);
+        let mut file = BufWriter::new(builder.tempfile_in(directory)?);
         content(&mut file)?;
-        file.into_inner()?.sync_all()?;
-        std::fs::rename(&temporary, path)
+        let file = file.into_inner()?;
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        Ok(())
     };
-    write().map_err(|source| {
-        // The first error is the one to report; the leftover may not even exist.
-        let _ = std::fs::remove_file(&temporary);
-        OutputError::io("write", path)(source)
-    })
+    write().map_err(OutputError::io("write", path))
 }
 
 /// A text file that grows line by line and is flushed every [`FLUSH_INTERVAL`], on [`Stream::flush`] and when dropped.
