@@ -1,8 +1,8 @@
 //! A law given by its energy alone; stress and tangent come from dual numbers.
 
-use super::{FrozenTangent, Law, embed};
+use super::{FrozenGeneral, Law, embed};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, identity, outer, scaled, symmetric};
+use crate::tensor::{Deformation, Tensor, symmetric};
 use num_dual::Dual;
 
 /// What a user writes to run a new law: one function.
@@ -89,53 +89,6 @@ impl<W: Energy> Law for FromEnergy<W> {
         at: &Deformation<T, D>,
         volume: T,
     ) -> FrozenGeneral<T, D> {
-        let e = embed(&at.green_lagrange());
-        let elasticity =
-            std::array::from_fn(|i| std::array::from_fn(|k| scaled(&self.elasticity_at(&e, &direction(i, k)), volume)));
-        FrozenGeneral { f_n: *f_n, f: at.f, stress: scaled(&self.stress_at(&e), volume), elasticity }
-    }
-}
-
-/// F_n, F and V₀ times S and the full ℂ: for laws that have nothing better.
-#[derive(Clone, Debug)]
-pub struct FrozenGeneral<T: Real, const D: usize> {
-    f_n: Tensor<T, D>,
-    f: Tensor<T, D>,
-    stress: Tensor<T, D>,
-    /// `elasticity[i][k]` = V₀ ℂ:(e_i ⊗ e_k)
-    elasticity: [[Tensor<T, D>; D]; D],
-}
-
-impl<T: Real, const D: usize> FrozenGeneral<T, D> {
-    /// V₀ ℂ:X
-    #[inline(always)]
-    fn elasticity(&self, x: &Tensor<T, D>) -> Tensor<T, D> {
-        let mut sum = Tensor::zeros();
-        for i in 0..D {
-            for k in 0..D {
-                sum += scaled(&self.elasticity[i][k], x[(i, k)]);
-            }
-        }
-        sum
-    }
-}
-
-impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenGeneral<T, D> {
-    #[inline(always)]
-    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
-        let delta_f = l * self.f_n;
-        let delta_s = self.elasticity(&(self.f.transpose() * delta_f));
-        (delta_f * self.stress + self.f * delta_s) * self.f_n.transpose()
-    }
-
-    /// F ℂmat{v,b} Fᵀ, column by column: ℂmat{v,b} e_k = [ℂ:(e_k ⊗ b)] v
-    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
-        let (v, b) = (self.f_n.transpose() * grad_i, self.f_n.transpose() * grad_j);
-        let mut density: Tensor<T, D> = Tensor::zeros();
-        for k in 0..D {
-            let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
-            density.set_column(k, &(self.elasticity(&outer(&e_k, &b)) * v));
-        }
-        self.f * density * self.f.transpose() + scaled(&identity(), v.dot(&(self.stress * b)))
+        FrozenGeneral::new(self, f_n, at, volume)
     }
 }

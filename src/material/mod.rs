@@ -6,14 +6,16 @@
 //! dual numbers check the geometric and the material tangent term by term.
 
 mod from_energy;
+mod frozen_general;
 mod lame;
 mod neo_hookean;
 mod st_venant_kirchhoff;
 
 pub use from_energy::{Energy, FromEnergy};
+pub use frozen_general::FrozenGeneral;
 pub use lame::{Lame, LameError};
-pub use neo_hookean::{NeoHookean, Volumetric};
-pub use st_venant_kirchhoff::StVenantKirchhoff;
+pub use neo_hookean::{FrozenNeoHookean, NeoHookean, Volumetric};
+pub use st_venant_kirchhoff::{FrozenStVenantKirchhoff, StVenantKirchhoff};
 
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, outer};

@@ -6,7 +6,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 use verification::report::chain;
 use verification::studies::{Effort, Outcome, STUDIES, Study, StudyError};
 
@@ -14,7 +14,8 @@ use verification::studies::{Effort, Outcome, STUDIES, Study, StudyError};
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
-    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps
+    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps, kept in
+    /// verification/RESULTS.md
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
     /// How much each study does; `full` as a study asks for full effort
@@ -102,6 +103,7 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
 
 fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
+    let mut results = Vec::new();
     let mut verdicts = Vec::new();
     let mut documents = Vec::new();
     for study in studies {
@@ -109,7 +111,9 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
         let result = (study.run)(&effort);
         let seconds = start.elapsed().as_secs_f64();
         let passed = matches!(&result, Ok(outcome) if outcome.passed());
-        print(&mut out, study, &result, seconds).map_err(writing("to standard output"))?;
+        let before = results.len();
+        print(&mut results, study, &result, seconds).map_err(writing("the results"))?;
+        out.write_all(&results[before..]).map_err(writing("to standard output"))?;
         if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
             write_files(directory, study.name, outcome)?;
         }
@@ -117,12 +121,26 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
         verdicts.push((study.name, passed, seconds));
     }
     let passed = verdicts.iter().all(|&(_, passed, _)| passed);
-    summary(&mut out, &verdicts).map_err(writing("to standard output"))?;
+    let before = results.len();
+    summary(&mut results, &verdicts).map_err(writing("the results"))?;
+    out.write_all(&results[before..]).map_err(writing("to standard output"))?;
+    if arguments.studies.iter().any(|word| word == "full") {
+        keep(&results)?;
+    }
     if let Some(path) = &arguments.json {
         let text = format!("{:#}\n", json!({ "passed": passed, "studies": documents }));
         fs::write(path, text).map_err(writing(path.display().to_string()))?;
     }
     Ok(passed)
+}
+
+/// Leaves the result of `full` in the repository, with its date and the command that makes it.
+fn keep(results: &[u8]) -> Result<(), Failure> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("RESULTS.md");
+    let date = humantime::format_rfc3339_seconds(SystemTime::now());
+    let header = format!("# The last full verification\n\n`cargo verify full`, {date}\n\n```text");
+    let text = [header.as_bytes(), results, b"```\n"].concat();
+    fs::write(&path, text).map_err(writing(path.display().to_string()))
 }
 
 fn print(out: &mut impl Write, study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) -> io::Result<()> {

@@ -1,0 +1,67 @@
+//! Your own law with its own analytic tangent, checked in your CI.
+//!
+//! A quadratic–cubic solid, W = Λ/2 (tr E)² + G E:E + κ/3 (tr E)³: St. Venant–Kirchhoff that stiffens in tension by κ. You write energy, stress and the
+//! action ℂ:X of the tangent. The test below is all that is needed to know, by term and by name, that they belong together:
+//! `cargo test --release --package own_law`.
+
+use bfree::material::{FrozenGeneral, Law};
+use bfree::scalar::Real;
+use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, symmetric, trace};
+
+/// W = Λ/2 (tr E)² + G E:E + κ/3 (tr E)³
+#[derive(Clone, Copy, Debug)]
+pub struct Stiffening {
+    /// Λ
+    pub lambda: f64,
+    /// G
+    pub shear: f64,
+    /// κ
+    pub kappa: f64,
+}
+
+impl Law for Stiffening {
+    type Frozen<T: Real, const D: usize> = FrozenGeneral<T, D>;
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        let e = at.green_lagrange();
+        let tr = trace(&e);
+        T::lit(0.5 * self.lambda) * tr * tr
+            + T::lit(self.shear) * contract(&e, &e)
+            + T::lit(self.kappa / 3.0) * tr * tr * tr
+    }
+
+    /// S = (Λ tr E + κ (tr E)²) I + 2G E
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        let e = at.green_lagrange();
+        let tr = trace(&e);
+        scaled(&identity(), T::lit(self.lambda) * tr + T::lit(self.kappa) * tr * tr)
+            + scaled(&e, T::lit(2.0 * self.shear))
+    }
+
+    /// ℂ:X = (Λ + 2κ tr E) tr(X) I + 2G sym X
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        let volumetric = T::lit(self.lambda) + T::lit(2.0 * self.kappa) * trace(&at.green_lagrange());
+        scaled(&identity(), volumetric * trace(x)) + scaled(&symmetric(x), T::lit(2.0 * self.shear))
+    }
+
+    fn freeze<T: Real, const D: usize>(
+        &self,
+        f_n: &Tensor<T, D>,
+        at: &Deformation<T, D>,
+        volume: T,
+    ) -> FrozenGeneral<T, D> {
+        FrozenGeneral::new(self, f_n, at, volume)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use verification::check_material;
+
+    #[test]
+    fn stress_and_tangent_are_the_derivatives_of_the_energy() {
+        let report = check_material(&Stiffening { lambda: 100.0, shear: 60.0, kappa: 40.0 });
+        assert!(report.passed(), "{report}");
+    }
+}
