@@ -195,6 +195,9 @@ const BLOCKS: &str = "blocks against frozen product";
 /// At strains of 1e-8 the work of the stress is 1e-8 of the stiffness that round-off is relative to.
 const TINY_WORK: &[&str] = &["F=I+1e-8"];
 
+/// At strains of 1e-8, FᵀF and FFᵀ differ by their square: less than round-off.
+const TINY_STRAIN: &[&str] = &["F=I+1e-8"];
+
 /// A fault, the law it is put into, and the cells of [`check_material`] that must turn red.
 type Mutant = (&'static str, fn(Lame) -> Material, Fault, &'static [Red]);
 
@@ -238,7 +241,12 @@ const MUTANTS: &[Mutant] = &[
     ),
     ("misprint (B9): G for 2G in C", kirchhoff, Fault::ElasticityHalfShear, &[red(C, ALL), red(CMAT, ALL)]),
     ("J for J^2 in C", ciarlet, Fault::ElasticitySingleJacobian, &[red(C, ALL), red(CMAT, ALL)]),
-    ("transposed F in C", ciarlet, Fault::ElasticityTransposedF, &[red(C, PLANE_AND_SPACE), red(CMAT, PLANE_AND_SPACE)]),
+    (
+        "transposed F in C",
+        ciarlet,
+        Fault::ElasticityTransposedF,
+        &[red(C, PLANE_AND_SPACE).except(TINY_STRAIN), red(CMAT, PLANE_AND_SPACE).except(TINY_STRAIN)],
+    ),
     ("v and b swapped in Cmat (equivalent in 1D)", kirchhoff, Fault::DensitySwapped, &[red(CMAT, PLANE_AND_SPACE)]),
     ("sign of the last term of Cmat", kirchhoff, Fault::DensitySign, &[red(CMAT, ALL)]),
     ("sign of the geometric part", ciarlet, Fault::ProductGeometricSign, &[red(FROZEN, ALL), red(BLOCKS, ALL)]),

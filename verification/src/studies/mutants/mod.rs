@@ -5,7 +5,10 @@
 
 mod forecast;
 mod laws;
+mod patches;
+mod schemata;
 mod shapes;
+mod shipped;
 mod terms;
 
 use super::{Effort, Outcome, StudyError};
@@ -21,9 +24,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     terms::judge(&mut report)?;
     let mut outcome = Outcome { reports: vec![report], ..Outcome::default() };
     if *effort == Effort::Full {
-        
+        shipped::run(&mut outcome)?;
     } else {
-        outcome.remarks.push(format!("Full effort patches the shipped files too: {} faults.", 0));
+        outcome.remarks.push(format!("Full effort patches the shipped files too: {} faults.", patches::PATCHES.len()));
     }
     Ok(outcome)
 }

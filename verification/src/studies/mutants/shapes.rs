@@ -1,6 +1,6 @@
 //! Wrong shape functions: linear functions and splines with one fault.
 
-use super::forecast::{ALL, Red, judge as compare, red};
+use super::forecast::{ALL, PLANE_AND_SPACE, Red, judge as compare, red};
 use crate::check_approximation;
 use crate::report::Report;
 use bfree::approximation::{ApproximationError, AxisWeights, Bspline, Linear, Separable, Validate};
@@ -90,16 +90,19 @@ const OFF_WALL: &str = "N = 0 off the wall";
 
 /// Where every coordinate is a node's, so that N is 0 or 1 and differences would step over a kink.
 const ON_NODES: &[&str] = &["on a node", "in a corner"];
+/// In 1D faces are nodes, and walls corners.
+const LINE: &[&str] = &["1"];
+const ON_NODES_OF_A_LINE: &[&str] = &["on a face", "on a node", "on a wall", "in a corner"];
 /// Where no coordinate is a node's.
 const OFF_NODES: &[&str] = &["inside a cell", "near a wall"];
-/// Where splines do not reach beyond a wall.
-const OFF_WALLS: &[&str] = &["inside a cell", "on a face", "on a node", "near a wall"];
+/// Where no point is on a wall; faces and nodes are drawn from all, those of the walls too.
+const OFF_WALLS: &[&str] = OFF_NODES;
 
 const MUTANTS: &[(&str, Fault, &[Red])] = &[
-    ("gradients per cell, not per length", Fault::GradientUnscaled, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, ALL).except(ON_NODES)]),
-    ("gradients with the other sign", Fault::GradientSign, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, ALL).except(ON_NODES)]),
+    ("gradients per cell, not per length", Fault::GradientUnscaled, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES), red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE)]),
+    ("gradients with the other sign", Fault::GradientSign, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES), red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE)]),
     ("no partition of unity, by 1e-6", Fault::Unity, &[red(UNITY, ALL), red(FIRST_GRADIENT, ALL)]),
-    ("no first-order consistency", Fault::Consistency, &[red(FIRST, ALL).except(ON_NODES), red(FIRST_GRADIENT, ALL)]),
+    ("no first-order consistency", Fault::Consistency, &[red(FIRST, PLANE_AND_SPACE).except(ON_NODES), red(FIRST, LINE).except(ON_NODES_OF_A_LINE), red(FIRST_GRADIENT, ALL)]),
     (
         "nodes with N = 0 left out",
         Fault::FarNodeDropped,
