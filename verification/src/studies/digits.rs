@@ -1,7 +1,7 @@
 //! The digits of the laws at tiny strains: H = F − I is kept so that none are lost.
 //!
 //! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Formed from F or from J, S would keep
-//! 4 digits and W none. The checks of derivatives do not see that: they allow for the round-off of F.
+//! 4 digits and W none. The checks of derivatives see only part of that: where W and S lose the same digits, they agree.
 
 use super::{Effort, Outcome, StudyError};
 use crate::random::Random;

@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(300);
 pub(super) enum ShippedFaultError {
     #[error(transparent)]
     Misfit(#[from] Misfit),
-    #[error("cannot copy {path}")]
+    #[error("cannot read or copy {path}")]
     Copy { path: PathBuf, source: io::Error },
     #[error("cannot run `{command}`")]
     Start { command: String, source: io::Error },
@@ -33,9 +33,27 @@ pub(super) enum ShippedFaultError {
     Unsound { name: &'static str },
 }
 
+/// Where the workspace is.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Whether every patch still fits its file: read, not built, so that the list cannot rot between two full runs.
+pub(super) fn fit() -> Result<(), ShippedFaultError> {
+    let mut files: Vec<&str> = PATCHES.iter().map(|patch| patch.file).collect();
+    files.dedup();
+    for file in files {
+        let path = root().join(file);
+        let text = fs::read_to_string(&path).map_err(|source| ShippedFaultError::Copy { path, source })?;
+        apply(file, &text, PATCHES)?;
+    }
+    Ok(())
+}
+
 /// Tries every patch.
 pub(super) fn run(outcome: &mut Outcome) -> Result<(), ShippedFaultError> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
+    fit()?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from).join("mutants");
     let source = target.join("source");
     copy(&root, &source)?;
@@ -108,10 +126,6 @@ fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(source) => return Err(ShippedFaultError::Copy { path, source }),
         }
-    }
-    // A patch of a file that is gone does not fit either.
-    for patch in PATCHES.iter().filter(|patch| !files.iter().any(|(file, _)| *file == patch.file)) {
-        apply(patch.file, "", std::slice::from_ref(patch))?;
     }
     for (file, bytes) in &mut files {
         if PATCHES.iter().any(|patch| patch.file == *file) {
