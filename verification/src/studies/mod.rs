@@ -58,4 +58,4 @@ macro_rules! studies {
     };
 }
 
-studies!(tangent, taylor, newton, baseline, patch, manufactured, minimiser, order);
+studies!(tangent, taylor, newton, baseline, patch, balance, digits, manufactured, minimiser, order, mutants);

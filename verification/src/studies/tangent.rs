@@ -23,8 +23,8 @@ use bfree::tensor::{Tensor, Vector, contract, determinant, trace};
 
 pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
 
-const YOUNG: f64 = 1000.0;
-const SPACING: f64 = 0.5;
+pub(super) const YOUNG: f64 = 1000.0;
+pub(super) const SPACING: f64 = 0.5;
 
 /// Murnaghan's solid, given by its energy alone:
 /// W = Λ/2 (tr E)² + G E:E + l/3 (tr E)³ + m tr E E:E + n det E.
@@ -129,7 +129,7 @@ fn dimension<const D: usize, L: Law + Clone>(
 
 /// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, under gravity and under
 /// pressure on part of their surface. Speeds and step are such that inertia is as large as stiffness.
-fn cloud<const D: usize, L: Law>(
+pub(super) fn cloud<const D: usize, L: Law>(
     law: L,
     approximation: Approximation,
     regime: Regime,

@@ -1,0 +1,58 @@
+//! The digits of the laws at tiny strains: H = F − I is kept so that none are lost.
+//!
+//! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Formed from F or from J, S would keep
+//! 4 digits and W none. The checks of derivatives see only part of that: where W and S lose the same digits, they agree.
+
+use super::{Effort, Outcome, StudyError};
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::tensor::{Deformation, Tensor, contract, symmetric};
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "the laws keep their digits at strains of 1e-12";
+
+/// Size of the strain.
+const STRAIN: f64 = 1e-12;
+
+/// What is left out is of the next order; a moderate factor for its coefficients.
+const LINEAR: f64 = 100.0 * STRAIN;
+
+/// Runs the study.
+pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
+    let lame = Lame::from_young_poisson(1000.0, 0.3)?;
+    let laws: [(&str, Material); 3] = [
+        ("Ciarlet", NeoHookean::ciarlet(lame).into()),
+        ("logarithmic", NeoHookean::logarithmic(lame).into()),
+        ("St.V.-Kirchhoff", StVenantKirchhoff { lame }.into()),
+    ];
+    let mut report = Report::new("strains of 1e-12 against the linear law", &["quantity", "law", "D"]);
+    for (name, law) in &laws {
+        linear::<1>(name, law, &mut report);
+        linear::<2>(name, law, &mut report);
+        linear::<3>(name, law, &mut report);
+    }
+    Ok(Outcome { reports: vec![report], ..Outcome::default() })
+}
+
+fn linear<const D: usize>(name: &str, law: &Material, report: &mut Report) {
+    let mut random = Random::new(37);
+    let at_rest = Deformation::<f64, D>::new(Tensor::zeros());
+    let (mut stress, mut energy): (f64, f64) = (0.0, 0.0);
+    for _ in 0..20 {
+        let at = Deformation::new(random.tensor::<D>() * STRAIN);
+        let strain = symmetric(&at.h);
+        let expected = law.elasticity(&at_rest, &strain);
+        let work = 0.5 * contract(&expected, &strain);
+        stress = worse(stress, (law.stress(&at) - expected).norm() / expected.norm());
+        energy = worse(energy, (law.energy(&at) - work).abs() / work);
+    }
+    let dimension = D.to_string();
+    report.push(&["S = C:E", name, &dimension], stress, Bound::AtMost(LINEAR));
+    report.push(&["W = E:C:E / 2", name, &dimension], energy, Bound::AtMost(LINEAR));
+}
+
+/// The larger one, and NaN if either is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}

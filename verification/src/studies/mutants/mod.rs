@@ -1,0 +1,33 @@
+//! Faults put in on purpose: each must turn exactly the cells red that are written down beside it.
+//!
+//! Wrong laws, wrong shape functions and wrong terms are made here and judged by the public checks, cell by cell. Full effort
+//! also patches the files under `src/` in a copy of the workspace, and runs the copy's own checks (see [`schemata`]).
+
+mod forecast;
+mod laws;
+mod patches;
+mod schemata;
+mod shapes;
+mod shipped;
+mod terms;
+
+use super::{Effort, Outcome, StudyError};
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "faults put in on purpose, each caught by the check named beforehand";
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut report = forecast::report();
+    laws::judge(&mut report)?;
+    shapes::judge(&mut report);
+    terms::judge(&mut report)?;
+    let mut outcome = Outcome { reports: vec![report], ..Outcome::default() };
+    if *effort == Effort::Full {
+        shipped::run(&mut outcome)?;
+    } else {
+        shipped::fit()?;
+        outcome.remarks.push(format!("Full effort patches the shipped files too: {} faults, which still fit their files.", patches::PATCHES.len()));
+    }
+    Ok(outcome)
+}
