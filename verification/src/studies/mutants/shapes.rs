@@ -42,7 +42,8 @@ impl Separable for Wrong {
             Fault::Consistency => {
                 for (value, slope) in out.values.iter_mut().zip(&mut out.derivatives) {
                     *slope *= 6.0 * *value * (1.0 - *value);
-                    *value *= *value * (3.0 - 2.0 * *value);
+                    let v = *value;
+                    *value = v * v * (3.0 - 2.0 * v);
                 }
             }
             // A node is left out if N = 0, whatever its gradient.
