@@ -1,6 +1,7 @@
 //! The command-line program: joins scenes, simulations and output.
 
 use bfree::material::Material;
+use bfree::output::plot::plot_run;
 use bfree::output::{OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Scene, output::At};
@@ -28,6 +29,11 @@ enum Command {
     Run(Run),
     /// Validate a scene and print what it requires.
     Check(SceneArguments),
+    /// Draw energies, iterations and particles of a run as SVG and PNG.
+    Plot {
+        /// The directory of the run's results.
+        directory: PathBuf,
+    },
     /// Print the JSON schema of scenes.
     Schema,
 }
@@ -85,6 +91,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
+        Command::Plot { directory } => plot(&directory),
         Command::Schema => print_schema(),
     };
     let (error, code) = match result {
@@ -99,6 +106,13 @@ fn main() -> ExitCode {
         cause = error.source();
     }
     ExitCode::from(code)
+}
+
+fn plot(directory: &Path) -> Result<(), Failure> {
+    for picture in plot_run(directory).map_err(Failure::run)? {
+        println!("{}", picture.display());
+    }
+    Ok(())
 }
 
 fn print_schema() -> Result<(), Failure> {

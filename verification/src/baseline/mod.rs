@@ -1,6 +1,6 @@
 //! The tangent as a matrix, the way most programs have it: to be compared with the matrix-free product.
 //!
-//! Two assemblies of the same blocks from the same supports: [`assemble`] with [`b_free`] (eqs. 34, 38) or [`voigt`] (BᵀDB).
+//! Two assemblies of the same blocks from the same supports: [`assemble`] with `b_free` (eqs. 34, 38) or `voigt` (BᵀDB).
 
 mod b_free;
 mod blocks;
