@@ -76,11 +76,12 @@ mod tests {
         let directory = tempfile::tempdir()?;
         let path = directory.path().join("a.pvd");
         write_atomically(&path, |file| file.write_all(b"old"))?;
-        // A directory where the temporary file should go makes the write fail.
-        std::fs::create_dir(directory.path().join("a.pvd.part"))?;
-        assert!(matches!(write_atomically(&path, |file| file.write_all(b"new")), Err(OutputError::Io { .. })));
+        let full_disk = |file: &mut BufWriter<NamedTempFile>| {
+            file.write_all(b"ne")?;
+            Err(std::io::Error::other("no space left"))
+        };
+        assert!(matches!(write_atomically(&path, full_disk), Err(OutputError::Io { .. })));
         assert_eq!(std::fs::read(&path)?, b"old");
-        std::fs::remove_dir(directory.path().join("a.pvd.part"))?;
         write_atomically(&path, |file| file.write_all(b"new"))?;
         assert_eq!(std::fs::read(&path)?, b"new");
         assert_eq!(std::fs::read_dir(directory.path())?.count(), 1);
