@@ -1,0 +1,161 @@
+//! Newton–Krylov with a backtracking line search.
+
+mod failure;
+mod linear;
+mod report;
+mod search;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+pub use failure::{LinearSolverFailure, NewtonError, NewtonFailure};
+pub use report::{Convergence, Merit, NewtonCounts, NewtonHistory, NewtonIteration, NewtonReport};
+pub use settings::{Krylov, NewtonSettings};
+
+use super::NonlinearProblem;
+use super::forcing::Progress;
+use super::vector::{dot, norm};
+use linear::solve;
+use search::{Search, Step, search};
+
+/// A residual that no longer falls is converged if it is below this multiple of the floor.
+const ROUND_OFF_MULTIPLE: f64 = 16.0;
+
+/// An iteration that leaves more than this part of the residual is no progress …
+const STALL_RATIO: f64 = 0.99;
+
+/// … and so many in a row, none of them justified by the potential, are stagnation.
+const STALL_LENGTH: usize = 8;
+
+/// The iteration has diverged when the residual is this many times the first one, or the first magnitude if larger.
+const DIVERGED: f64 = 1e8;
+
+/// Solves R(x) = 0 from the initial guess `x`.
+///
+/// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude), the magnitude being that of the initial guess.
+/// 2. K = linearize(x).
+/// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`]. A solve that ends early is still used if it is below 0.9.
+/// 4. s = 1.
+/// 5. Accept x + s d if ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
+///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
+/// 6. Otherwise, or where x + s d is inadmissible or R not finite, halve s and go to 5.
+/// 7. If no step is accepted, or none of the last 8 reduced ‖R‖ by a percent: converged if ‖R‖ ≤ 16 · floor · eps · magnitude, now
+///    evaluated at x; an error if not.
+/// 8. x ← x + s d, and back to 1.
+///
+/// Between calls into the problem: `x` holds accepted iterates only, also on error; every tangent is dropped before the
+/// next residual; the residual at an accepted iterate is not evaluated twice.
+///
+/// # Errors
+/// See [`NewtonFailure`]; the history so far comes with it.
+pub fn newton<P: NonlinearProblem>(
+    problem: &P,
+    x: &mut [f64],
+    settings: &NewtonSettings,
+) -> Result<NewtonReport, NewtonError<P::Inadmissible>> {
+    let mut history = NewtonHistory::default();
+    match iterate(problem, x, settings, &mut history) {
+        Ok(convergence) => Ok(NewtonReport { convergence, history }),
+        Err(cause) => Err(NewtonError { cause, history: Box::new(history) }),
+    }
+}
+
+fn iterate<P: NonlinearProblem>(
+    problem: &P,
+    x: &mut [f64],
+    settings: &NewtonSettings,
+    history: &mut NewtonHistory,
+) -> Result<Convergence, NewtonFailure<P::Inadmissible>> {
+    settings.check()?;
+    let n = x.len();
+    let (mut r, mut d) = (vec![0.0; n], vec![0.0; n]);
+    let (mut trial, mut r_trial) = (vec![0.0; n], vec![0.0; n]);
+
+    history.counts.residuals += 1;
+    problem.residual(x, &mut r).map_err(|source| NewtonFailure::Inadmissible { iteration: 0, source })?;
+    let first = norm(&r);
+    if !first.is_finite() {
+        return Err(NewtonFailure::NotFinite { what: "the residual", iteration: 0 });
+    }
+    history.first_residual = Some(first);
+    let floor = settings.floor * f64::EPSILON;
+    let first_magnitude = measure(problem, x, 0, history)?;
+    let target = (settings.relative_tolerance * first).max(floor * first_magnitude);
+    let too_large = DIVERGED * first.max(first_magnitude);
+
+    let mut residual = first;
+    let mut progress = None;
+    let mut stalled = 0;
+    loop {
+        if residual <= target {
+            return Ok(Convergence::Tolerance);
+        }
+        let iteration = history.iterations.len() + 1;
+        if iteration > settings.max_iterations {
+            return Err(NewtonFailure::MaxIterations { allowed: settings.max_iterations, residual, target });
+        }
+        let forcing = settings.forcing.next(progress, target / residual);
+        let (krylov, negative_curvature) = {
+            history.counts.linearizations += 1;
+            let tangent = problem
+                .linearize(x)
+                .map_err(|source| NewtonFailure::Inadmissible { iteration: iteration - 1, source })?;
+            solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts)
+                .map_err(|source| NewtonFailure::LinearSolverFailed { iteration, residual, source })?
+        };
+        let at = Step { x, d: &d, residual, slope: dot(&r, &d), linear: krylov.relative_residual };
+        let round_off = ROUND_OFF_MULTIPLE * floor * first_magnitude;
+        let searched = search(problem, &at, settings, round_off, &mut trial, &mut r_trial, &mut history.counts);
+        let accepted = match searched {
+            Search::Accepted(accepted) => accepted,
+            Search::RoundOff => return Ok(Convergence::RoundOff),
+            Search::Failed(failed) => {
+                if residual <= ROUND_OFF_MULTIPLE * floor * measure(problem, x, iteration - 1, history)? {
+                    return Ok(Convergence::RoundOff);
+                }
+                return Err(failed.into_failure(iteration, residual));
+            }
+        };
+        x.copy_from_slice(&trial);
+        std::mem::swap(&mut r, &mut r_trial);
+        let ratio = accepted.residual / residual;
+        residual = accepted.residual;
+        progress = Some(Progress { forcing, ratio });
+        history.iterations.push(NewtonIteration {
+            residual,
+            ratio,
+            step_length: accepted.length,
+            merit: accepted.merit,
+            forcing,
+            krylov,
+            negative_curvature,
+        });
+        if residual > too_large {
+            return Err(NewtonFailure::Diverged { iteration, residual, first });
+        }
+        stalled = if accepted.merit == Merit::Residual && ratio > STALL_RATIO { stalled + 1 } else { 0 };
+        if stalled >= STALL_LENGTH && residual > target {
+            let round_off = ROUND_OFF_MULTIPLE * floor * measure(problem, x, iteration, history)?;
+            if residual <= round_off {
+                return Ok(Convergence::RoundOff);
+            }
+            return Err(NewtonFailure::Stagnated { iteration, residual, target, round_off });
+        }
+    }
+}
+
+/// Evaluates the magnitude at the accepted iterate x.
+fn measure<P: NonlinearProblem>(
+    problem: &P,
+    x: &[f64],
+    iteration: usize,
+    history: &mut NewtonHistory,
+) -> Result<f64, NewtonFailure<P::Inadmissible>> {
+    history.counts.magnitudes += 1;
+    let magnitude = problem.magnitude(x).map_err(|source| NewtonFailure::Inadmissible { iteration, source })?;
+    if !magnitude.is_finite() {
+        return Err(NewtonFailure::NotFinite { what: "the magnitude of the residual's contributions", iteration });
+    }
+    history.magnitude = Some(magnitude);
+    Ok(magnitude)
+}

@@ -1,0 +1,73 @@
+//! What Newton's method may be told.
+
+use crate::solver::{Forcing, InvalidSetting};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Restart of the GMRES that takes over from conjugate gradients.
+pub(super) const FALLBACK_RESTART: usize = 30;
+
+/// The method for the linear systems of Newton's method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Krylov {
+    /// Restarted GMRES, for any tangent.
+    Gmres {
+        /// Iterations between restarts, at least 1; as many vectors are kept.
+        restart: usize,
+    },
+    /// Conjugate gradients, for symmetric tangents; where one turns out not to be positive definite, GMRES(30) solves
+    /// that system instead.
+    ConjugateGradient,
+}
+
+/// Settings of [`newton`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct NewtonSettings {
+    /// Wanted ‖R‖ over that of the initial guess, in [0, 1).
+    pub relative_tolerance: f64,
+    /// The least ‖R‖ asked for, in units of eps times the magnitude of the contributions to R: dimensionless, finite and
+    /// ≥ 0. A sum of a few dozen contributions is exact to about 4.
+    pub floor: f64,
+    /// Newton iterations allowed.
+    pub max_iterations: usize,
+    /// How accurately each linear system is solved.
+    pub forcing: Forcing,
+    /// How each linear system is solved.
+    pub krylov: Krylov,
+    /// Krylov iterations allowed for each linear system, at least 1.
+    pub max_krylov_iterations: usize,
+    /// How often the line search may halve the step, at most 60.
+    pub max_halvings: u32,
+}
+
+impl Default for NewtonSettings {
+    fn default() -> Self {
+        Self {
+            relative_tolerance: 1e-8,
+            floor: 4.0,
+            max_iterations: 50,
+            forcing: Forcing::Fixed(1e-8),
+            krylov: Krylov::Gmres { restart: FALLBACK_RESTART },
+            max_krylov_iterations: 1000,
+            max_halvings: 25,
+        }
+    }
+}
+
+impl NewtonSettings {
+    pub(super) fn check(&self) -> Result<(), InvalidSetting> {
+        InvalidSetting::check_tolerance("relative_tolerance", self.relative_tolerance)?;
+        let floor = self.floor;
+        InvalidSetting::check(floor >= 0.0 && floor.is_finite(), "floor", floor, "finite and at least 0")?;
+        self.forcing.check()?;
+        if let Krylov::Gmres { restart } = self.krylov {
+            InvalidSetting::check_restart(restart)?;
+        }
+        let krylov = self.max_krylov_iterations;
+        InvalidSetting::check(krylov >= 1, "max_krylov_iterations", krylov as f64, "at least 1")?;
+        let halvings = self.max_halvings;
+        InvalidSetting::check(halvings <= 60, "max_halvings", f64::from(halvings), "at most 60")
+    }
+}

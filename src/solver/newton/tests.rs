@@ -1,0 +1,361 @@
+//! Facts about the iteration on small problems with known answers.
+
+use super::*;
+use crate::solver::testing::Dense;
+use crate::solver::{Forcing, InvalidSetting, LinearOutcome, NonlinearProblem};
+
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("x = {0} is outside")]
+struct Outside(f64);
+
+/// R, its magnitude, Π and K as plain functions.
+struct Problem<R, M, W, K> {
+    residual: R,
+    magnitude: M,
+    potential: W,
+    tangent: K,
+}
+
+impl<R, M, W, K> NonlinearProblem for Problem<R, M, W, K>
+where
+    R: Fn(&[f64]) -> Result<Vec<f64>, Outside>,
+    M: Fn(&[f64]) -> f64,
+    W: Fn(&[f64]) -> Option<(f64, f64)>,
+    K: Fn(&[f64]) -> Dense,
+{
+    type Inadmissible = Outside;
+    type Tangent<'a>
+        = Dense
+    where
+        Self: 'a;
+
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Outside> {
+        r.copy_from_slice(&(self.residual)(x)?);
+        Ok(())
+    }
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Outside> {
+        Ok((self.magnitude)(x))
+    }
+    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Outside>> {
+        (self.potential)(x).map(Ok)
+    }
+    fn linearize(&self, x: &[f64]) -> Result<Dense, Outside> {
+        Ok((self.tangent)(x))
+    }
+}
+
+/// One unknown, no potential, contributions of magnitude 1.
+fn scalar(
+    residual: impl Fn(f64) -> Result<f64, Outside>,
+    derivative: impl Fn(f64) -> f64,
+) -> impl NonlinearProblem<Inadmissible = Outside> {
+    Problem {
+        residual: move |x: &[f64]| Ok(vec![residual(x[0])?]),
+        magnitude: |_: &[f64]| 1.0,
+        potential: |_: &[f64]| None,
+        tangent: move |x: &[f64]| Dense(vec![vec![derivative(x[0])]]),
+    }
+}
+
+fn rosenbrock(conservative: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
+    Problem {
+        residual: |x: &[f64]| {
+            let valley = x[1] - x[0] * x[0];
+            Ok(vec![2.0 * (x[0] - 1.0) - 400.0 * x[0] * valley, 200.0 * valley])
+        },
+        magnitude: |x: &[f64]| 400.0 * (x[0].abs() + 1.0).powi(3),
+        potential: move |x: &[f64]| {
+            let (a, b) = (x[0] - 1.0, x[1] - x[0] * x[0]);
+            let value = a * a + 100.0 * b * b;
+            conservative.then_some((value, value))
+        },
+        tangent: |x: &[f64]| {
+            let off = -400.0 * x[0];
+            Dense(vec![vec![2.0 - 400.0 * x[1] + 1200.0 * x[0] * x[0], off], vec![off, 200.0]])
+        },
+    }
+}
+
+/// Springs in a row, the first one held: n unknowns u, elongations g, force k g (1 − g²/2ℓ² + g⁴/2ℓ⁴), a load at the
+/// free end. Softening, then hardening.
+fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmissible = Outside> {
+    let elongation = |u: &[f64], i: usize| u[i] - if i == 0 { 0.0 } else { u[i - 1] };
+    let terms = move |g: f64| {
+        let s = (g / l) * (g / l);
+        [k * g, -0.5 * k * g * s, 0.5 * k * g * s * s]
+    };
+    Problem {
+        residual: move |u: &[f64]| {
+            let mut r = vec![0.0; n];
+            for i in 0..n {
+                let force = terms(elongation(u, i)).iter().sum::<f64>();
+                r[i] += force;
+                if i > 0 {
+                    r[i - 1] -= force;
+                }
+            }
+            r[n - 1] -= load;
+            Ok(r)
+        },
+        magnitude: move |u: &[f64]| {
+            let force = |i| terms(elongation(u, i)).iter().map(|f| f.abs()).sum::<f64>();
+            let sums: Vec<f64> = (0..n).map(|i| force(i) + if i + 1 < n { force(i + 1) } else { load.abs() }).collect();
+            norm(&sums)
+        },
+        potential: move |u: &[f64]| {
+            let (mut value, mut magnitude) = (-load * u[n - 1], (load * u[n - 1]).abs());
+            for i in 0..n {
+                let g = elongation(u, i);
+                for (term, power) in terms(g).into_iter().zip([2.0, 4.0, 6.0]) {
+                    value += term * g / power;
+                    magnitude += (term * g / power).abs();
+                }
+            }
+            Some((value, magnitude))
+        },
+        tangent: move |u: &[f64]| {
+            let stiffness = |i: usize| {
+                let s = (elongation(u, i) / l) * (elongation(u, i) / l);
+                k * (1.0 - 1.5 * s + 2.5 * s * s)
+            };
+            Dense::from_fn(n, |i, j| match i.abs_diff(j) {
+                0 => stiffness(i) + if i + 1 < n { stiffness(i + 1) } else { 0.0 },
+                1 => -stiffness(i.max(j)),
+                _ => 0.0,
+            })
+        },
+    }
+}
+
+fn solved(problem: &impl NonlinearProblem<Inadmissible = Outside>, x: &mut [f64]) -> NewtonReport {
+    newton(problem, x, &NewtonSettings::default()).unwrap()
+}
+
+fn failure(
+    problem: &impl NonlinearProblem<Inadmissible = Outside>,
+    x: &mut [f64],
+    settings: &NewtonSettings,
+) -> NewtonError<Outside> {
+    newton(problem, x, settings).unwrap_err()
+}
+
+#[test]
+fn rosenbrock_is_solved_and_counted() {
+    let mut x = [-1.2, 1.0];
+    let NewtonReport { history, .. } = solved(&rosenbrock(true), &mut x);
+    assert!((x[0] - 1.0).abs() < 1e-8 && (x[1] - 1.0).abs() < 1e-8, "{x:?}");
+    // The full second step multiplies the residual by 300 and lowers nothing: the line search must have worked.
+    assert!(history.iterations.iter().all(|i| i.merit == Merit::Potential || i.ratio < 1.0));
+    let counts = history.counts;
+    assert_eq!(counts.linearizations, history.iterations.len());
+    assert_eq!(counts.residuals, 1 + history.iterations.len() + counts.line_search);
+    assert_eq!(counts.krylov_iterations, history.iterations.iter().map(|i| i.krylov.iterations).sum::<usize>());
+    assert_eq!(counts.magnitudes, 1);
+}
+
+#[test]
+fn convergence_is_quadratic() {
+    let mut u = vec![0.0; 12];
+    let settings =
+        NewtonSettings { relative_tolerance: 1e-13, forcing: Forcing::Fixed(1e-12), ..NewtonSettings::default() };
+    let report = newton(&springs(3.0, 1.0, 1.2, 12), &mut u, &settings).unwrap();
+    let residuals: Vec<f64> = report.history.iterations.iter().map(|i| i.residual).collect();
+    // Order of the last three above round-off: log(r₃/r₂) / log(r₂/r₁) → 2.
+    let above: Vec<f64> = residuals.into_iter().filter(|r| *r > 1e-12).collect();
+    let [.., a, b, c] = above[..] else { panic!("{above:?}") };
+    let order = (c / b).ln() / (b / a).ln();
+    assert!(order > 1.8 && order < 2.5, "{order} {above:?}");
+}
+
+#[test]
+fn inadmissible_steps_are_shortened() {
+    // ln x = −1 from x = 10: the full step goes to x < 0.
+    let problem = scalar(|x| if x > 0.0 { Ok(x.ln() + 1.0) } else { Err(Outside(x)) }, |x| 1.0 / x);
+    let mut x = [10.0];
+    let report = solved(&problem, &mut x);
+    assert!((x[0] - (-1.0_f64).exp()).abs() < 1e-9);
+    assert!(report.history.iterations[0].step_length < 1.0 && report.history.counts.line_search > 0);
+    let mut x = [-1.0];
+    let error = failure(&problem, &mut x, &NewtonSettings::default());
+    assert!(matches!(error.cause, NewtonFailure::Inadmissible { iteration: 0, source: Outside(-1.0) }));
+    assert_eq!((x[0], error.history.first_residual), (-1.0, None));
+}
+
+#[test]
+fn scaling_by_powers_of_two_gives_the_same_bits() {
+    let n = 15;
+    for krylov in [Krylov::Gmres { restart: 6 }, Krylov::ConjugateGradient] {
+        for forcing in [Forcing::Fixed(1e-8), Forcing::EisenstatWalker] {
+            let settings = NewtonSettings { krylov, forcing, ..NewtonSettings::default() };
+            let mut reference = vec![0.0; n];
+            let report = newton(&springs(3.0, 0.7, 2.9, n), &mut reference, &settings).unwrap();
+            for (length, force) in [(30, 30), (-30, 30), (30, -90), (-30, -91), (29, 120)] {
+                let (length, force) = (2.0_f64.powi(length), 2.0_f64.powi(force));
+                let mut u = vec![0.0; n];
+                let problem = springs(3.0 * force / length, 0.7 * length, 2.9 * force, n);
+                let scaled = newton(&problem, &mut u, &settings).unwrap();
+                assert!(u.iter().zip(&reference).all(|(u, v)| u.to_bits() == (v * length).to_bits()));
+                assert_eq!(scaled.history.counts, report.history.counts);
+                for (a, b) in scaled.history.iterations.iter().zip(&report.history.iterations) {
+                    assert_eq!(*a, NewtonIteration { residual: b.residual * force, ..*b });
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn forcing_terms_reach_the_same_solution() {
+    let problem = springs(1.0, 1.0, 1.1, 20);
+    let solve = |forcing| {
+        let mut u = vec![0.0; 20];
+        let settings = NewtonSettings { relative_tolerance: 1e-11, forcing, ..NewtonSettings::default() };
+        let report = newton(&problem, &mut u, &settings).unwrap();
+        assert!(report.history.iterations.iter().all(|i| i.krylov.relative_residual <= i.forcing));
+        (u, report.history.counts.krylov_iterations)
+    };
+    let (exact, tight) = solve(Forcing::Fixed(1e-10));
+    let (u, loose) = solve(Forcing::EisenstatWalker);
+    assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
+    assert!(loose < tight, "{loose} {tight}");
+}
+
+#[test]
+fn negative_curvature_falls_back_to_gmres_and_says_so() {
+    // K = [1 + 3x², 2; 2, 1]: indefinite near 0, with a positive diagonal.
+    let problem = Problem {
+        residual: |x: &[f64]| Ok(vec![x[0] + 2.0 * x[1] + x[0].powi(3), 2.0 * x[0] + x[1]]),
+        magnitude: |_: &[f64]| 1.0,
+        potential: |_: &[f64]| None,
+        tangent: |x: &[f64]| Dense(vec![vec![1.0 + 3.0 * x[0] * x[0], 2.0], vec![2.0, 1.0]]),
+    };
+    let mut x = [0.5, -0.5];
+    let settings = NewtonSettings { krylov: Krylov::ConjugateGradient, ..NewtonSettings::default() };
+    let report = newton(&problem, &mut x, &settings).unwrap();
+    let first = report.history.iterations[0];
+    assert!(first.krylov.converged());
+    assert_eq!(first.negative_curvature.map(|r| r.outcome), Some(LinearOutcome::NegativeCurvature));
+    // Where the tangent is definite there is nothing to fall back from.
+    let mut u = vec![0.0; 5];
+    let report = newton(&springs(1.0, 1.0, 0.3, 5), &mut u, &settings).unwrap();
+    assert!(report.history.iterations.iter().all(|i| i.negative_curvature.is_none()));
+}
+
+#[test]
+fn potential_accepts_what_the_residual_norm_refuses() {
+    // Along Rosenbrock's curved valley every useful step raises the residual, while Π falls.
+    let solve = |potential| {
+        let settings = NewtonSettings { max_iterations: 500, ..NewtonSettings::default() };
+        newton(&rosenbrock(potential), &mut [-1.2, 1.0], &settings).map(|report| report.history)
+    };
+    let with = solve(true).unwrap();
+    assert!(with.iterations.iter().any(|i| i.merit == Merit::Potential && i.ratio > 1.0));
+    // The norm alone creeps along the valley, or gives up in it.
+    assert!(solve(false).map_or(true, |history| history.iterations.len() > 2 * with.iterations.len()));
+}
+
+#[test]
+fn not_finite_is_never_accepted() {
+    let problem = scalar(|_| Ok(f64::NAN), |_| 1.0);
+    let error = failure(&problem, &mut [1.0], &NewtonSettings::default());
+    assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 0, .. }));
+    // NaN beyond x = 1, where the full step goes: shortened like an inadmissible one.
+    for bad in [f64::NAN, f64::INFINITY] {
+        let problem = scalar(|x| Ok(if x > 1.0 { bad } else { x * x * x - 0.5 }), |x| 3.0 * x * x);
+        let mut x = [0.2];
+        assert!(solved(&problem, &mut x).history.iterations[0].step_length < 1.0);
+        assert!((x[0] - 0.5_f64.cbrt()).abs() < 1e-8);
+        // NaN everywhere but at the guess.
+        let problem = scalar(|x| Ok(if x == 3.0 { 1.0 } else { bad }), |_| 1.0);
+        let mut x = [3.0];
+        let error = failure(&problem, &mut x, &NewtonSettings::default());
+        assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 1, .. }), "{error:?}");
+        assert_eq!(x, [3.0]);
+        // In the tangent.
+        let error = failure(&scalar(Ok, |_| bad), &mut x, &NewtonSettings::default());
+        assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { source: LinearSolverFailure::Error(_), .. }));
+        // In the magnitude, which would make anything converged.
+        let problem = Problem {
+            residual: |x: &[f64]| Ok(x.to_vec()),
+            magnitude: |_: &[f64]| bad,
+            potential: |_: &[f64]| None,
+            tangent: |_: &[f64]| Dense(vec![vec![1.0]]),
+        };
+        let error = failure(&problem, &mut [1.0], &NewtonSettings::default());
+        assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 0, .. }));
+    }
+}
+
+#[test]
+fn failures_are_told_apart() {
+    let default = NewtonSettings::default();
+    let settings = NewtonSettings { max_iterations: 3, ..default };
+    let mut x = [-1.2, 1.0];
+    let error = failure(&rosenbrock(true), &mut x, &settings);
+    assert!(matches!(error.cause, NewtonFailure::MaxIterations { allowed: 3, .. }));
+    // x is the last accepted iterate: its residual is the last one reported.
+    let mut r = [0.0; 2];
+    rosenbrock(true).residual(&x, &mut r).unwrap();
+    assert_eq!((Some(norm(&r)), error.history.iterations.len()), (error.history.residual(), 3));
+
+    // A tangent without anything in it.
+    let error = failure(&scalar(|x| Ok(x - 1.0), |_| 0.0), &mut [0.0], &default);
+    assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { iteration: 1, .. }), "{error:?}");
+    // A tangent of the wrong sign: the residual rises at every step length.
+    let mut x = [0.0];
+    let error = failure(&scalar(|x| Ok(x - 1.0), |_| -1.0), &mut x, &default);
+    assert!(matches!(error.cause, NewtonFailure::LineSearchFailed { trials: 26, inadmissible: 0, not_finite: 0, .. }));
+    assert_eq!(x, [0.0]);
+    // A tangent a thousand times too stiff: every step is accepted and none helps.
+    let error = failure(&scalar(|x| Ok(x - 1.0), |_| 1000.0), &mut [0.0], &default);
+    assert!(matches!(error.cause, NewtonFailure::Stagnated { iteration: 8, .. }), "{error:?}");
+    // Downhill without end: Π = −½x², and a tangent that is no derivative of it.
+    let downhill = Problem {
+        residual: |x: &[f64]| Ok(vec![-x[0]]),
+        magnitude: |x: &[f64]| x[0].abs(),
+        potential: |x: &[f64]| Some((-0.5 * x[0] * x[0], 0.5 * x[0] * x[0])),
+        tangent: |_: &[f64]| Dense(vec![vec![1.0]]),
+    };
+    let error = failure(&downhill, &mut [1.0], &default);
+    assert!(matches!(error.cause, NewtonFailure::Diverged { residual, .. } if residual > 1e8), "{error:?}");
+    let settings = NewtonSettings { forcing: Forcing::Fixed(0.0), ..default };
+    let error = failure(&downhill, &mut [1.0], &settings);
+    assert!(matches!(error.cause, NewtonFailure::Setting(InvalidSetting { name: "forcing", .. })));
+}
+
+#[test]
+fn round_off_is_convergence_and_other_stagnation_is_not() {
+    let settings = NewtonSettings { relative_tolerance: 0.0, ..NewtonSettings::default() };
+    // x − 1 with a last step that cannot be taken: |R| never falls below `noise`.
+    let noisy = |noise: f64| scalar(move |x| Ok(if (x - 1.0).abs() < noise { noise } else { x - 1.0 }), |_| 1.0);
+    let eps = f64::EPSILON;
+    let mut x = [0.0];
+    // Below the floor 4 eps · 1, below 16 floors, and above.
+    let report = newton(&noisy(3.0 * eps), &mut x, &settings).unwrap();
+    assert_eq!(report.convergence, Convergence::Tolerance);
+    let mut x = [0.0];
+    let report = newton(&noisy(40.0 * eps), &mut x, &settings).unwrap();
+    assert_eq!(report.convergence, Convergence::RoundOff);
+    assert!(report.history.counts.line_search == 0, "no halving where nothing can be gained");
+    let error = failure(&noisy(100.0 * eps), &mut [0.0], &settings);
+    assert!(matches!(error.cause, NewtonFailure::LineSearchFailed { iteration: 2, .. }), "{error:?}");
+    assert_eq!(error.history.counts.magnitudes, 2);
+}
+
+#[test]
+fn nothing_to_do() {
+    let report = solved(&springs(1.0, 1.0, 0.0, 4), &mut [0.0; 4]);
+    assert_eq!((report.convergence, report.history.iterations.len()), (Convergence::Tolerance, 0));
+    // At rest up to round-off: 0.1 + 0.2 − 0.3 of magnitude 0.6.
+    let report = solved(&scalar(|_| Ok(0.1 + 0.2 - 0.3), |_| 1.0), &mut [0.0]);
+    assert_eq!(report.history.counts.linearizations, 0);
+}
+
+#[test]
+fn settings_are_read_from_json_by_name() {
+    let read = |text| serde_json::from_str::<NewtonSettings>(text);
+    assert_eq!(read("{}").unwrap(), NewtonSettings::default());
+    let settings = read(r#"{"krylov": "conjugate_gradient", "forcing": {"fixed": 1e-3}}"#).unwrap();
+    assert_eq!((settings.krylov, settings.forcing), (Krylov::ConjugateGradient, Forcing::Fixed(1e-3)));
+    assert!(read(r#"{"tolerance": 1e-3}"#).is_err());
+}
