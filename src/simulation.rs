@@ -44,6 +44,20 @@ pub struct Settings {
     pub check_tangent: Option<NonZeroU64>,
 }
 
+impl Default for Settings {
+    /// The trapezoidal rule with a lumped mass, Newton from Δφ = 0, walls as in the paper.
+    fn default() -> Self {
+        Self {
+            newmark: Newmark::default(),
+            lumping: 1.0,
+            initial_guess: InitialGuess::default(),
+            wall_update: WallUpdate::default(),
+            newton: NewtonSettings::default(),
+            check_tangent: None,
+        }
+    }
+}
+
 /// An implicit material point simulation in `D` dimensions.
 ///
 /// The fields are the state at the last converged step; [`Simulation::step`] advances it or leaves it untouched.
@@ -78,7 +92,8 @@ pub struct StepReport<const D: usize> {
     pub newton: NewtonReport,
     /// Iterations of the projection (42), 0 for a lumped mass.
     pub projection_iterations: usize,
-    /// Force of each of [`Loads::prescribed`] on the bodies at t_{n+1}.
+    /// Force of each of [`Loads::prescribed`] on the bodies: the reaction at t_{n+1}, and spread over the step the impulse
+    /// with which a wall takes along nodes that do not move with it yet.
     pub reactions: Vec<Vector<f64, D>>,
     /// Seconds by phase.
     pub seconds: Stopwatch,
@@ -143,7 +158,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Newton);
         self.check_tangent(&equilibrium, &dphi)?;
 
-        let (reactions, work) = self.reactions_and_work(&equilibrium, t, &dphi)?;
         let moved = Moved::new(
             &self.particles,
             &supports,
@@ -155,6 +169,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             &dphi,
         );
         self.check_inside(moved.positions())?;
+        let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, moved.impulses())?;
         watch.lap(Phase::Update);
 
         let projection_iterations = projected.iterations;
@@ -207,22 +222,24 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// Reactions at t_{n+1}, summed over each prescribed condition, and the work of the step,
-    /// Σ ½ (f_n + f_{n+1})·Δφ over all external forces, the reactions of moving walls among them.
+    /// Reactions at t_{n+1} and impulses J over Δt, summed over each prescribed condition, and the work of the step,
+    /// Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ over all external forces, the reactions of moving walls among them.
     fn reactions_and_work(
         &self,
         end: &Equilibrium<'_, D, L>,
         t: f64,
+        dt: f64,
         dphi: &[Vector<f64, D>],
+        impulses: &[f64],
     ) -> Result<(Vec<Vector<f64, D>>, f64), StepError> {
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let residual = end.residual::<f64>(dphi, Carry::ALL)?;
-            for dof in end.prescribed {
-                let reaction = residual[dof.node][dof.component];
-                reactions[dof.owner][dof.component] += reaction;
-                work += 0.5 * reaction * dof.step.increment;
+            for (dof, impulse) in end.prescribed.iter().zip(impulses) {
+                let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
+                reactions[dof.owner][dof.component] += reaction + blow;
+                work += (0.5 * reaction + blow) * dof.step.increment;
             }
         }
         // At t_n: a = a_n and Δφ = 0.
@@ -299,6 +316,26 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
         let nodal: Vec<_> = nodes.positions(&self.grid).map(|(_, x)| velocity(&x)).collect();
         self.particles.velocity = supports.values(&nodal);
+        Ok(())
+    }
+
+    /// Gives the particles the acceleration that the loads present at the start ask for, a₀ = (f_ext − f_int)/m_I on the
+    /// nodes, g̈ where the motion is prescribed. Without it they act half a step late.
+    ///
+    /// The lumped mass serves for every ε: it is exact for uniform loads, and of second order in h for others.
+    ///
+    /// # Errors
+    /// A particle without shape functions, or with det F ≤ 0.
+    pub fn set_initial_acceleration(&mut self) -> Result<(), StepError> {
+        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
+        let prescribed = self.prescribed(&nodes);
+        let mut nodal = Nodal::at_rest(&self.particles, &supports, nodes.len());
+        // Δφ, v_n and a_n are zero, and with them the inertia, whatever α is.
+        let alphas = self.settings.newmark.alphas(self.clock.step());
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, self.clock.time());
+        let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration, Carry::ALL)?;
+        nodal.accelerate(&self.particles, &unbalanced);
+        self.particles.acceleration = supports.values(&nodal.with_prescribed(&prescribed).acceleration);
         Ok(())
     }
 }

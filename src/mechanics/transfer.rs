@@ -39,15 +39,14 @@ impl<const D: usize> Nodal<D> {
         count: usize,
         lumping: f64,
     ) -> Result<Self, LinearError> {
-        let mut mass = vec![0.0; count];
-        supports.scatter(&mut mass, |p, n, _| particles.mass[p] * n);
+        let Self { mass, .. } = Self::at_rest(particles, supports, count);
         let right = |field: &[Vector<f64, D>]| {
             let mut out = vec![Vector::zeros(); count];
             supports.scatter(&mut out, |p, n, _| field[p] * (particles.mass[p] * n));
             out
         };
         let (mut velocity, mut acceleration) = (right(&particles.velocity), right(&particles.acceleration));
-        let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+        let light = light(particles);
         let mut iterations = 0;
         if lumping < 1.0 {
             let effective = EffectiveMass::new(particles, supports, &mass, lumping);
@@ -67,6 +66,21 @@ impl<const D: usize> Nodal<D> {
         Ok(Self { mass, velocity, acceleration, iterations })
     }
 
+    /// The lumped mass, and no motion.
+    pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
+        let mut mass = vec![0.0; count];
+        supports.scatter(&mut mass, |p, n, _| particles.mass[p] * n);
+        Self { mass, velocity: vec![Vector::zeros(); count], acceleration: vec![Vector::zeros(); count], iterations: 0 }
+    }
+
+    /// a_I = −R_I / m_I, from the residual of the same state at rest.
+    pub fn accelerate(&mut self, particles: &Particles<D>, unbalanced: &[Vector<f64, D>]) {
+        let light = light(particles);
+        for ((a, r), &m) in self.acceleration.iter_mut().zip(unbalanced).zip(&self.mass) {
+            *a = if m >= light { -r / m } else { Vector::zeros() };
+        }
+    }
+
     /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
     pub fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
         let mut overwritten = self.clone();
@@ -76,6 +90,11 @@ impl<const D: usize> Nodal<D> {
         }
         overwritten
     }
+}
+
+/// The mass below which a node counts as light.
+fn light<const D: usize>(particles: &Particles<D>) -> f64 {
+    LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m))
 }
 
 /// M̃ u = Σ_p (1−ε) m N_I (Σ_J N_J u_J) + ε m_I u_I, with its diagonal as preconditioner.
@@ -143,6 +162,7 @@ pub struct Moved<const D: usize> {
     delta_velocity: Vec<Vector<f64, D>>,
     delta_acceleration: Vec<Vector<f64, D>>,
     displacement_gradient: Vec<Tensor<f64, D>>,
+    impulses: Vec<f64>,
 }
 
 impl<const D: usize> Moved<D> {
@@ -168,9 +188,11 @@ impl<const D: usize> Moved<D> {
             state().map(|(d, v, a)| d * alphas.a1 - v * alphas.a2 - a * (alphas.a3 + 1.0)).collect();
         let mut delta_v: Vec<_> =
             state().map(|(d, v, a)| d * alphas.a4 + v * (alphas.a5 - 1.0) + a * alphas.a6).collect();
+        let mut impulses = Vec::with_capacity(prescribed.len());
         for dof in prescribed {
             let (node, i) = (dof.node, dof.component);
             let literal = !dof.moving && walls == WallUpdate::Literal;
+            let by_forces = delta_v[node][i];
             (delta_v[node][i], delta_a[node][i]) = if literal {
                 (0.0, 0.0)
             } else {
@@ -179,6 +201,7 @@ impl<const D: usize> Moved<D> {
                     dof.step.acceleration_end - projected.acceleration[node][i],
                 )
             };
+            impulses.push(nodal.mass[node] * (delta_v[node][i] - by_forces));
         }
         let moved = supports.interpolate(dphi, |p, delta_x, g| {
             let h = compose(&g, &particles.displacement_gradient[p]);
@@ -193,7 +216,14 @@ impl<const D: usize> Moved<D> {
             delta_velocity: supports.values(&delta_v),
             delta_acceleration: supports.values(&delta_a),
             displacement_gradient,
+            impulses,
         }
+    }
+
+    /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom: the momentum a wall gives beyond the reactions, where
+    /// it finds nodes that do not move with it yet.
+    pub fn impulses(&self) -> &[f64] {
+        &self.impulses
     }
 
     /// The new positions.

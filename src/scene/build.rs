@@ -84,6 +84,12 @@ pub enum BuildError {
         /// The body.
         body: String,
     },
+    /// The loads at t = 0 could not be evaluated.
+    #[error("the acceleration at t = 0 cannot be computed: {source}")]
+    InitialAcceleration {
+        /// What is wrong.
+        source: Box<StepError>,
+    },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
     InitialVelocity {
@@ -124,6 +130,9 @@ impl Scene {
             external_work: 0.0,
         };
         self.set_initial_velocity(&mut simulation)?;
+        simulation
+            .set_initial_acceleration()
+            .map_err(|source| BuildError::InitialAcceleration { source: Box::new(source) })?;
         Ok(simulation)
     }
 

@@ -5,10 +5,8 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::time::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 use serde_json::Value;
@@ -49,10 +47,6 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
             prescribed: vec![wall("left", 0), wall("bottom", 1)],
         },
         settings: Settings {
-            newmark: Newmark::default(),
-            lumping: 1.0,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::Literal,
             // Tight, so that every iterate is that of a direct solver.
             newton: NewtonSettings {
                 relative_tolerance: 3e-14,
@@ -60,6 +54,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
                 ..NewtonSettings::default()
             },
             check_tangent: NonZeroU64::new(1),
+            ..Settings::default()
         },
         clock: Clock::new(number(&reference["dt"]), 0),
         external_work: 0.0,

@@ -69,6 +69,85 @@ fn accelerating_walls_take_the_body_along_and_their_work_is_its_energy() -> Resu
     Ok(())
 }
 
+/// One free body far from every wall.
+fn falling(step: f64, lumping: f64) -> serde_json::Value {
+    json!({
+        "grid": {"size": [4, 4], "spacing": 0.5},
+        "time": {"step": step, "end": 1, "lumping": lumping},
+        "bodies": [{"name": "stone", "shape": {"box": {"min": [1, 2], "max": [2, 3]}}, "density": 1,
+                    "velocity": [0.5, 0], "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}}],
+        "gravity": {"acceleration": [0, -9.81]}
+    })
+}
+
+#[test]
+fn a_load_present_at_the_start_acts_from_the_start() -> Result<(), Failure> {
+    for (step, lumping) in [(0.02, 1.0), (0.005, 1.0), (0.02, 0.5)] {
+        let mut simulation: Simulation<2> = build(&falling(step, lumping))?;
+        let start = simulation.particles.position.clone();
+        while simulation.clock.time() < 0.2 - 1e-9 {
+            simulation.advance()?;
+        }
+        // The trapezoidal rule is exact for a constant acceleration.
+        let t = simulation.clock.time();
+        for (x, x0) in simulation.particles.position.iter().zip(&start) {
+            let fallen = x - x0 - Vector::from([0.5 * t, -0.5 * 9.81 * t * t]);
+            assert!(fallen.amax() < 1e-9, "step {step}, lumping {lumping}: off by {fallen}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Result<(), Failure> {
+    // A body of one cell: every node is prescribed, so that v_p = Σ N V(t_{n+1}) = V(t_{n+1}) exactly.
+    let moving = json!({"velocity": [[0, [0, 0]], [1, [3, 1]]]});
+    let mut simulation: Simulation<2> = build(&json!({
+        "grid": {"size": [1, 1], "spacing": 1}, "time": {"step": 0.01, "end": 1}, "approximation": "linear",
+        "bodies": [{"name": "load", "shape": {"box": {"min": [0.25, 0.25], "max": [0.75, 0.75]}}, "density": 1,
+                    "material": {"neo_hookean": {"lambda": 10, "shear": 10}}}],
+        "boundary": {"left": moving, "right": moving, "bottom": moving, "top": moving}
+    }))?;
+    for _ in 0..10 {
+        simulation.advance()?;
+        let t = simulation.clock.time();
+        for (v, a) in simulation.particles.velocity.iter().zip(&simulation.particles.acceleration) {
+            assert!((v - Vector::from([3.0, 1.0]) * t).amax() < 1e-13, "v = {v} at t = {t}");
+            assert!((a - Vector::from([3.0, 1.0])).amax() < 1e-12, "a = {a} at t = {t}");
+        }
+    }
+    Ok(())
+}
+
+/// (momentum, ∫ reactions dt, energy, work) of a bar between two walls that start at once with the velocity 1.
+fn struck(step: f64) -> Result<[f64; 4], Failure> {
+    let moving = json!({"velocity": [[0, [1]]]});
+    let mut simulation: Simulation<1> = build(&json!({
+        "grid": {"size": [2], "spacing": 0.1}, "time": {"step": step, "end": 0.1},
+        "bodies": [{"name": "bar", "shape": {"box": {"min": [0.1], "max": [1.9]}}, "density": 1,
+                    "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}, "particles_per_cell": 2}],
+        "boundary": {"left": moving, "right": moving}
+    }))?;
+    let mut impulse = 0.0;
+    while simulation.clock.time() < 0.06 - 1e-9 {
+        let report = simulation.advance()?;
+        impulse += report.dt * report.reactions.iter().sum::<Vector<f64, 1>>()[0];
+    }
+    let energy = simulation.particles.kinetic_energy() + simulation.strain_energy();
+    Ok([simulation.particles.momentum()[0], impulse, energy, simulation.external_work])
+}
+
+#[test]
+fn the_blow_of_walls_that_start_at_once_is_in_their_reactions_and_their_work() -> Result<(), Failure> {
+    for step in [2e-3, 5e-4] {
+        let [momentum, impulse, energy, work] = struck(step)?;
+        assert!((impulse - momentum).abs() < 0.02 * momentum, "step {step}: {impulse} for the momentum {momentum}");
+        // The nodes are taken along without a rebound: part of the work is lost, and none is won.
+        assert!(energy < work && work < 4.0 * energy, "step {step}: work {work}, energy {energy}");
+    }
+    Ok(())
+}
+
 /// A ring of radii 1 and 1.5 whose hole is under pressure.
 fn ring(spacing: f64, pressure: f64) -> serde_json::Value {
     json!({

@@ -7,12 +7,9 @@ use bfree::clock::Clock;
 use bfree::grid::{Axis, Grid};
 use bfree::material::{Lame, LameError, Law, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::loads::Loads;
-use bfree::mechanics::time::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
-use bfree::simulation::{InitialGuess, Settings, Simulation};
-use bfree::solver::NewtonSettings;
+use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::{Deformation, Tensor, Vector, contract, scaled};
 use verification::{Report, check_approximation, check_material, check_tangent};
 
@@ -144,14 +141,7 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
         bodies: vec![Body { name: "patch".into(), law, density: 1.0 }],
         particles,
         loads: Loads::default(),
-        settings: Settings {
-            newmark: Newmark::default(),
-            lumping: 0.5,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::Literal,
-            check_tangent: None,
-            newton: NewtonSettings::default(),
-        },
+        settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(0.01, 0),
         external_work: 0.0,
     }

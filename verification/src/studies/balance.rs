@@ -10,8 +10,6 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
-use bfree::mechanics::time::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
@@ -90,16 +88,14 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
         particles,
         loads,
         settings: Settings {
-            newmark: Newmark::default(),
             lumping,
             initial_guess: InitialGuess::Velocity,
-            wall_update: WallUpdate::default(),
-            check_tangent: None,
             newton: NewtonSettings {
                 relative_tolerance: 1e-14,
                 forcing: Forcing::Fixed(1e-6),
                 ..NewtonSettings::default()
             },
+            ..Settings::default()
         },
         clock: Clock::new(STEP, 0),
         external_work: 0.0,

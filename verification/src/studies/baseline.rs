@@ -12,11 +12,9 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
 use bfree::mechanics::residual::{Carry, Equilibrium};
-use bfree::mechanics::time::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{InitialGuess, Settings, Simulation};
-use bfree::solver::{GmresSettings, NewtonSettings, NonlinearProblem, gmres};
+use bfree::simulation::{Settings, Simulation};
+use bfree::solver::{GmresSettings, NonlinearProblem, gmres};
 use bfree::tensor::{Tensor, Vector};
 use std::hint::black_box;
 use std::time::Instant;
@@ -302,14 +300,7 @@ fn strained_block<const D: usize>(approximation: Approximation, law: Material, c
         bodies: vec![Body { name: "block".into(), law, density: 1.0 }],
         particles,
         loads: Loads { gravity: None, surface: Vec::new(), prescribed: vec![floor] },
-        settings: Settings {
-            newmark: Newmark::default(),
-            lumping: 0.5,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::default(),
-            check_tangent: None,
-            newton: NewtonSettings::default(),
-        },
+        settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),
         external_work: 0.0,
     }

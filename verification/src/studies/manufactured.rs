@@ -11,10 +11,9 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{self, Loads, Prescribed, Selection};
-use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 
@@ -152,12 +151,10 @@ fn simulate<P: Problem>(
         particles,
         loads: Loads { gravity: None, surface: Vec::new(), prescribed },
         settings: Settings {
-            newmark: Newmark::default(),
             lumping,
-            initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Consistent,
-            check_tangent: None,
             newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
+            ..Settings::default()
         },
         clock: Clock::new(1.0 / f64::from(steps), 0),
         external_work: 0.0,

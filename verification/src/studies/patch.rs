@@ -255,16 +255,14 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
         particles,
         loads: Loads::default(),
         settings: Settings {
-            newmark: Newmark::default(),
             lumping,
             initial_guess: InitialGuess::Velocity,
-            wall_update: WallUpdate::default(),
-            check_tangent: None,
             newton: NewtonSettings {
                 relative_tolerance: 1e-14,
                 forcing: Forcing::Fixed(1e-6),
                 ..NewtonSettings::default()
             },
+            ..Settings::default()
         },
         clock: Clock::new(dt, 0),
         external_work: 0.0,

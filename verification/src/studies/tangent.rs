@@ -13,12 +13,9 @@ use bfree::material::{Energy, FromEnergy, Lame, LameError, Law, Material, NeoHoo
 use bfree::mechanics::loads::{
     Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
-use bfree::mechanics::time::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
-use bfree::simulation::{InitialGuess, Settings, Simulation};
-use bfree::solver::NewtonSettings;
+use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::{Tensor, Vector, contract, determinant, trace};
 
 pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
@@ -175,14 +172,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
                 motion,
             }],
         },
-        settings: Settings {
-            newmark: Newmark::default(),
-            lumping: 0.5,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::Literal,
-            check_tangent: None,
-            newton: NewtonSettings::default(),
-        },
+        settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(dt, 0),
         external_work: 0.0,
     })
