@@ -16,6 +16,9 @@ const EXHAUSTED: f64 = 8.0 * f64::EPSILON;
 /// A whole cycle that leaves more than this part of the residual is stagnation: a thousand such cycles gain a factor e.
 const STAGNATION: f64 = 0.999;
 
+/// A cycle whose Krylov space holds no better than this part of the residual was too short: the next is twice as long.
+const TOO_SHORT: f64 = 0.9;
+
 /// Settings of [`gmres`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GmresSettings {
@@ -23,7 +26,8 @@ pub struct GmresSettings {
     pub relative_tolerance: f64,
     /// Iterations allowed, over all restarts.
     pub max_iterations: usize,
-    /// Iterations between restarts, at least 1. One vector is kept for each, and one more.
+    /// Iterations between restarts, at least 1. One vector is kept for each, and one more. Where a cycle gains next to
+    /// nothing, the following ones are twice as long.
     pub restart: usize,
 }
 
@@ -40,8 +44,10 @@ impl Default for GmresSettings {
 /// 3. Givens rotations keep H triangular and give the residual norm without x.
 /// 4. After m iterations, or at the tolerance, or when the space is exhausted: x ← x + M⁻¹ V y with H y = ‖r‖ e₁.
 /// 5. The residual is computed anew from x. If it does not meet the tolerance, back to 1.
-/// 6. A cycle that hardly lowers the true residual ends the iteration as [`LinearOutcome::Stagnated`]; one that raises it
-///    is undone.
+/// 6. Where the best of a cycle's whole space is hardly better than x, m is doubled: null modes and clustered small
+///    eigenvalues need a longer memory, and a failed solve costs more than a few vectors.
+/// 7. Otherwise a cycle that hardly lowers the true residual is round-off, or an exhausted space, and ends the iteration as
+///    [`LinearOutcome::Stagnated`]; one that raises it is undone.
 ///
 /// `solution` is overwritten; its former contents do not matter. b = 0 gives x = 0 without iterating.
 ///
@@ -65,7 +71,7 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     }
     let target = settings.relative_tolerance * b_norm;
     // More than n directions are never independent.
-    let restart = settings.restart.min(rhs.len());
+    let mut restart = settings.restart.min(rhs.len());
     let mut r = rhs.to_vec();
     let mut r_norm = b_norm;
     let mut trial = vec![0.0; rhs.len()];
@@ -77,7 +83,7 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
             return Ok(report);
         }
         let length = restart.min(settings.max_iterations - report.iterations);
-        let taken = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
+        let (taken, promised) = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
             .map_err(|error| error.after(report.iterations))?;
         report.iterations += taken;
         report.products += taken + 1;
@@ -86,7 +92,7 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
         finite(norm(&trial), "the norm of the solution", report.iterations)?;
         let trial_norm =
             finite(true_residual(operator, rhs, &trial, &mut r), "the norm of the residual", report.iterations)?;
-        let fell = trial_norm / r_norm;
+        let (before, fell) = (r_norm, trial_norm / r_norm);
         if fell < 1.0 {
             solution.copy_from_slice(&trial);
             r_norm = trial_norm;
@@ -95,7 +101,10 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
         if r_norm <= target {
             return Ok(report);
         }
-        if fell > STAGNATION {
+        let too_short = taken == length && promised > TOO_SHORT * before && length < rhs.len();
+        if too_short {
+            restart = (2 * restart).min(rhs.len());
+        } else if fell > STAGNATION {
             report.outcome = LinearOutcome::Stagnated;
             return Ok(report);
         }
@@ -103,7 +112,7 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
 }
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the
-/// correction of x and returns the iterations taken.
+/// correction of x and returns the iterations taken and the norm the residual should have then.
 fn cycle<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     operator: &A,
     preconditioner: &M,
@@ -112,7 +121,7 @@ fn cycle<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     target: f64,
     length: usize,
     correction: &mut [f64],
-) -> Result<usize, LinearError> {
+) -> Result<(usize, f64), LinearError> {
     let mut v = vec![0.0; r.len()];
     scaled(1.0 / r_norm, r, &mut v);
     // Grows by one vector an iteration: what is not needed is not allocated.
@@ -139,7 +148,7 @@ fn cycle<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
         axpy(*y, v, &mut sum);
     }
     preconditioner.precondition(&sum, correction);
-    Ok(basis.len())
+    Ok((basis.len(), triangle.residual()))
 }
 
 /// Takes out of `w` its parts along the orthonormal `basis`. Returns these parts and the norm of what is left.
@@ -313,19 +322,26 @@ mod tests {
     }
 
     #[test]
-    fn stagnation_is_reported_not_looped_on() {
+    fn cycles_that_gain_nothing_are_followed_by_longer_ones() {
         // The cyclic shift: GMRES(m) makes no progress at all for m < n, and is exact at n.
         let n = 12;
         let shift = Dense::from_fn(n, |i, j| if (i + 1) % n == j { 1.0 } else { 0.0 });
         let mut b = vec![0.0; n];
         b[0] = 1.0;
         let mut x = vec![0.0; n];
-        let report = gmres(&shift, &Identity, &b, &mut x, &GmresSettings { restart: n - 1, ..TIGHT }).unwrap();
-        assert_eq!((report.outcome, report.iterations), (LinearOutcome::Stagnated, n - 1));
-        assert_eq!(report.relative_residual, 1.0);
-        let report = gmres(&shift, &Identity, &b, &mut x, &GmresSettings { restart: n, ..TIGHT }).unwrap();
-        assert!(report.converged() && report.iterations == n);
-        // A tolerance below round-off ends too.
+        for (restart, iterations) in [(n, n), (n - 1, n - 1 + n), (2, 2 + 4 + 8 + n)] {
+            let report = gmres(&shift, &Identity, &b, &mut x, &GmresSettings { restart, ..TIGHT }).unwrap();
+            assert_eq!((report.outcome, report.iterations), (LinearOutcome::Converged, iterations));
+        }
+        let settings = GmresSettings { restart: 2, max_iterations: 20, ..TIGHT };
+        let report = gmres(&shift, &Identity, &b, &mut x, &settings).unwrap();
+        assert_eq!((report.outcome, report.iterations), (LinearOutcome::IterationLimit, 20));
+    }
+
+    #[test]
+    fn round_off_is_reported_not_looped_on() {
+        let n = 12;
+        let mut x = vec![0.0; n];
         let settings = GmresSettings { relative_tolerance: 0.0, ..TIGHT };
         let report = gmres(&nonsymmetric(n), &Identity, &irregular(n), &mut x, &settings).unwrap();
         assert!(report.relative_residual < 1e-14 && report.iterations < 100, "{report:?}");
