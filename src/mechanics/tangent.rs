@@ -49,21 +49,15 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         match term {
             Term::Inertia => {
                 self.add_lumped_inertia(u, &mut out);
-                self.supports.assemble(
-                    u,
-                    &mut out,
-                    |p, u, _| Ok(u * (self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0))),
-                    |q, n, _| q * n,
-                )?;
+                self.supports.assemble(u, &mut out, |p, u, _| {
+                    Ok((u * (self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0)), Tensor::zeros()))
+                })?;
             }
             Term::Geometric | Term::Material => {
                 let states = self.states(dphi)?;
-                self.supports.assemble(
-                    u,
-                    &mut out,
-                    |p, _, l| Ok(self.particle_product(term, p, &states[p], &l)),
-                    |stress, _, grad_n| stress * grad_n,
-                )?;
+                self.supports.assemble(u, &mut out, |p, _, l| {
+                    Ok((Vector::zeros(), self.particle_product(term, p, &states[p], &l)))
+                })?;
             }
             Term::Pressure => {
                 for point in self.frozen_pressures(dphi) {
@@ -207,15 +201,10 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
         let eq = self.equilibrium;
         out.fill(Vector::zeros());
         eq.add_lumped_inertia(u, out);
-        let never_fails = eq.supports.assemble(
-            u,
-            out,
-            |p, u, l| {
-                let inertia = eq.consistent_mass(p).map_or_else(Vector::zeros, |m| u * (eq.alphas.a1 * m));
-                Ok::<_, std::convert::Infallible>((inertia, self.frozen[p].apply(&l)))
-            },
-            |(q, stress), n, grad_n| stress * grad_n + q * n,
-        );
+        let never_fails = eq.supports.assemble(u, out, |p, u, l| {
+            let inertia = eq.consistent_mass(p).map_or_else(Vector::zeros, |m| u * (eq.alphas.a1 * m));
+            Ok::<_, std::convert::Infallible>((inertia, self.frozen[p].apply(&l)))
+        });
         match never_fails {
             Ok(()) => {}
             Err(never) => match never {},

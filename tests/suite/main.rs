@@ -10,3 +10,4 @@ mod rebound;
 mod runs;
 mod scenes;
 mod support;
+mod sweep;
