@@ -6,6 +6,7 @@ mod dynamics;
 mod loads;
 mod output;
 mod points;
+mod program;
 mod rebound;
 mod runs;
 mod scenes;

@@ -5,7 +5,7 @@
 pub(super) enum Check {
     /// A study of this program.
     Study(&'static str),
-    /// A test program of the library.
+    /// A module of the library's test program, by the beginning of its tests' names.
     Test(&'static str),
 }
 
@@ -22,10 +22,10 @@ const TANGENT: Check = Check::Study("tangent");
 const PATCH: Check = Check::Study("patch");
 const BALANCE: Check = Check::Study("balance");
 const DIGITS: Check = Check::Study("digits");
-const DYNAMICS: Check = Check::Test("dynamics");
-const POINTS: Check = Check::Test("points");
-const LOADS: Check = Check::Test("loads");
-const SHAPES: Check = Check::Test("approximation");
+const DYNAMICS: Check = Check::Test("dynamics::");
+const POINTS: Check = Check::Test("points::");
+const LOADS: Check = Check::Test("loads::");
+const SHAPES: Check = Check::Test("approximation::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, DYNAMICS, POINTS, LOADS, SHAPES];
