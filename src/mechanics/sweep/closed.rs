@@ -1,10 +1,10 @@
 //! The product with tangents in closed form, all eight particles of a group at once.
 
-use super::infallible;
-use super::kernel::{Gathered, Quadratic, Terms, pair, scatter_blocks};
-use super::lanes::{LANES, Lanes, WithLanes, widest};
+use super::compiled;
+use super::kernel::{Quadratic, Terms, gather, pair, scatter, scatter_blocks};
+use super::lanes::{LANES, Lanes, WithLanes};
 use super::tiled::{Block, Tiled, first_error, keep_first};
-use super::waves::{self, Stage};
+use super::waves::{self, Scratch};
 use crate::material::ClosedTangent;
 use crate::tensor::{Tensor, Vector};
 
@@ -13,9 +13,9 @@ use crate::tensor::{Tensor, Vector};
 pub struct ClosedTangents<const D: usize> {
     numbers: Vec<[f64; LANES]>,
     /// Whether the laws have the term b L c.
-    both: bool,
+    pub(super) both: bool,
     /// Whether there is a consistent inertia, q = (weight of the particle) u.
-    inertia: bool,
+    pub(super) inertia: bool,
 }
 
 /// Rows of a group: A, B, κ, q, then b and c, then the inertia.
@@ -146,27 +146,18 @@ impl<const D: usize> Tiled<D> {
 
     /// `out_I += Σ_p (δP_p) ∇_n N_I + q_p N_I`, the product of the tangents with `field`.
     pub(super) fn product(&self, frozen: &ClosedTangents<D>, field: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        match (frozen.both, frozen.inertia) {
-            (false, false) => self.product_of(&Product::<D, false, false>(frozen), field, out),
-            (false, true) => self.product_of(&Product::<D, false, true>(frozen), field, out),
-            (true, false) => self.product_of(&Product::<D, true, false>(frozen), field, out),
-            (true, true) => self.product_of(&Product::<D, true, true>(frozen), field, out),
-        }
-    }
-
-    fn product_of<const BOTH: bool, const INERTIA: bool>(
-        &self,
-        stage: &Product<'_, D, BOTH, INERTIA>,
-        field: &[Vector<f64, D>],
-        out: &mut [Vector<f64, D>],
-    ) {
-        infallible(waves::run(self, Some(field), out, stage));
+        let work = |block: &Block<D>, scratch: &mut Scratch<D>, buffer: &mut [f64]| {
+            scratch.fill(block, field);
+            compiled::product(block, frozen, &scratch.nodal, buffer);
+            None::<std::convert::Infallible>
+        };
+        waves::each_block(self, D, out, work, waves::add, |never| match never {});
     }
 
     /// `out_I += Σ_p` the block of I with itself, inertia included.
     pub(super) fn add_blocks(&self, frozen: &ClosedTangents<D>, out: &mut [Tensor<f64, D>]) {
-        let work = |block: &Block<D>, _: &mut Vec<f64>, buffer: &mut [f64]| {
-            widest(DiagonalBlocks { block, frozen, buffer });
+        let work = |block: &Block<D>, _: &mut Scratch<D>, buffer: &mut [f64]| {
+            compiled::diagonal_blocks(block, frozen, buffer);
             None::<std::convert::Infallible>
         };
         let add = |block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Tensor<f64, D>]| {
@@ -184,10 +175,10 @@ impl<const D: usize> Tiled<D> {
 }
 
 /// The diagonal blocks from the particles of one block of cells.
-struct DiagonalBlocks<'a, const D: usize> {
-    block: &'a Block<D>,
-    frozen: &'a ClosedTangents<D>,
-    buffer: &'a mut [f64],
+pub(super) struct DiagonalBlocks<'a, const D: usize> {
+    pub block: &'a Block<D>,
+    pub frozen: &'a ClosedTangents<D>,
+    pub buffer: &'a mut [f64],
 }
 
 impl<const D: usize> WithLanes for DiagonalBlocks<'_, D> {
@@ -220,8 +211,13 @@ impl<const D: usize> WithLanes for DiagonalBlocks<'_, D> {
     }
 }
 
-/// σ = V₀ δP F_nᵀ, q = (inertia) u.
-struct Product<'a, const D: usize, const BOTH: bool, const INERTIA: bool>(&'a ClosedTangents<D>);
+/// Gather, σ = V₀ δP F_nᵀ and q = (inertia) u, and scatter of the groups of one block, one after the other.
+pub(super) struct Product<'a, const D: usize, const BOTH: bool, const INERTIA: bool> {
+    pub block: &'a Block<D>,
+    pub frozen: &'a ClosedTangents<D>,
+    pub nodal: &'a [f64],
+    pub buffer: &'a mut [f64],
+}
 
 impl<const D: usize, const BOTH: bool, const INERTIA: bool> Terms for Product<'_, D, BOTH, INERTIA> {
     const VALUE: bool = INERTIA;
@@ -229,27 +225,26 @@ impl<const D: usize, const BOTH: bool, const INERTIA: bool> Terms for Product<'_
     const MAGNITUDE: bool = false;
 }
 
-impl<const D: usize, const BOTH: bool, const INERTIA: bool> Stage<D> for Product<'_, D, BOTH, INERTIA> {
-    type Error = std::convert::Infallible;
+impl<const D: usize, const BOTH: bool, const INERTIA: bool> WithLanes for Product<'_, D, BOTH, INERTIA> {
+    type Output = ();
 
     #[inline(always)]
-    fn point<S: Lanes>(
-        &self,
-        s: S,
-        group: usize,
-        _particles: &[u32],
-        at: &mut Gathered<S::N, D>,
-    ) -> Result<(), (usize, Self::Error)> {
+    fn run<S: Lanes>(self, s: S) {
         let count = rows(D, BOTH, INERTIA);
-        let numbers = &self.0.numbers[group * count..(group + 1) * count];
-        let tangent: ClosedTangent<S::N, D> = read(BOTH, &mut Rows { s, rows: numbers });
-        at.gradient = tangent.product(s, &at.gradient);
-        if INERTIA {
-            let weight = s.load(&numbers[count - 1]);
-            for value in &mut at.value {
-                *value = s.mul(weight, *value);
+        for group in 0..self.block.groups() {
+            let window = self.block.window(group);
+            let mut at = gather::<S, D, INERTIA>(s, &window, self.nodal);
+            let first = (self.block.first_group + group) * count;
+            let numbers = &self.frozen.numbers[first..first + count];
+            let tangent: ClosedTangent<S::N, D> = read(BOTH, &mut Rows { s, rows: numbers });
+            at.gradient = tangent.product(s, &at.gradient);
+            if INERTIA {
+                let weight = s.load(&numbers[count - 1]);
+                for value in &mut at.value {
+                    *value = s.mul(weight, *value);
+                }
             }
+            scatter::<S, Self, D>(s, &window, &at, self.buffer);
         }
-        Ok(())
     }
 }

@@ -69,9 +69,13 @@ pub(super) struct Stored<const D: usize> {
 }
 
 impl<const D: usize> Stored<D> {
+    pub(super) fn zero() -> Self {
+        Self { value: [[0.0; LANES]; D], gradient: [[[0.0; LANES]; D]; D] }
+    }
+
     #[inline(always)]
     pub(super) fn of<S: Lanes>(s: S, from: &Gathered<S::N, D>) -> Self {
-        let mut stored = Self { value: [[0.0; LANES]; D], gradient: [[[0.0; LANES]; D]; D] };
+        let mut stored = Self::zero();
         for c in 0..D {
             s.store(from.value[c], &mut stored.value[c]);
             for k in 0..D {

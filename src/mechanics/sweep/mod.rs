@@ -7,6 +7,7 @@
 
 mod builder;
 mod closed;
+mod compiled;
 mod kernel;
 mod lanes;
 mod order;

@@ -4,19 +4,19 @@
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
 use super::builder::block;
-use super::kernel::{Gathered, Quadratic, Stored, Terms, Window, pair, scatter_blocks};
-use super::lanes::{LANES, Lanes, WithLanes, widest};
+use super::compiled::{self, Sum};
+use super::kernel::{Quadratic, Window, pair};
+use super::lanes::LANES;
 use super::order::{self, Key};
-use super::waves::{self, Stage};
+use super::waves::{self, Scratch};
 use super::{Magnitude, SupportError, infallible, ordered};
-use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
+use crate::approximation::{self, ApproximationError, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use std::any::TypeId;
-use std::marker::PhantomData;
 use std::ops::AddAssign;
 
 /// Shape functions of all particles, by axis.
@@ -70,8 +70,12 @@ impl<const D: usize> Tiled<D> {
     ) -> Result<(Self, Nodes), SupportError> {
         // The product names the axis that fails; the shape function names the whole position.
         let failure = |particle: usize, source: Option<ApproximationError>| {
-            let whole =
-                approximation.evaluate(grid, &positions[particle], &mut Scratch::default(), &mut Support::default());
+            let whole = approximation.evaluate(
+                grid,
+                &positions[particle],
+                &mut approximation::Scratch::default(),
+                &mut Support::default(),
+            );
             let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             SupportError { particle, source: whole.err().or(source).unwrap_or_else(outside) }
         };
@@ -167,11 +171,21 @@ impl<const D: usize> Tiled<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
         if is_f64::<T>() {
-            let (point, number) = (&point, PhantomData::<fn() -> T>);
-            return match magnitude {
-                Magnitude::No => waves::run(self, Some(field), out, &EachParticle::<_, _, false> { point, number }),
-                Magnitude::Yes => waves::run(self, Some(field), out, &EachParticle::<_, _, true> { point, number }),
+            let sum = match magnitude {
+                Magnitude::No => Sum::All,
+                Magnitude::Yes => Sum::Magnitudes,
             };
+            return waves::run(self, Some(field), out, sum, |block, groups| {
+                let mut failure = None;
+                block.each(|group, lane, p| {
+                    let (value, gradient) = groups[group].of_lane(lane);
+                    match point(p, value, gradient) {
+                        Ok((force, stress)) => groups[group].set_lane(lane, &force, &stress),
+                        Err(error) => keep_first(&mut failure, p, error),
+                    }
+                });
+                failure
+            });
         }
         let buffers = self.in_order(|block| {
             let nodal = block.boxed(field);
@@ -263,7 +277,10 @@ impl<const D: usize> Tiled<D> {
 
     /// `out_I += Σ_p value(p) N_I`
     pub(super) fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
-        infallible(waves::run(self, None, out, &Spread { value }));
+        infallible(waves::run(self, None, out, Sum::Values, |block, groups| {
+            block.each(|group, lane, p| groups[group].set_lane(lane, &value(p), &Tensor::zeros()));
+            None
+        }));
     }
 
     /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I` with B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
@@ -295,10 +312,9 @@ impl<const D: usize> Tiled<D> {
             }
             quadratic
         };
-        let work = |block: &Block<D>, _: &mut Vec<f64>, buffer: &mut [f64]| {
+        let work = |block: &Block<D>, _: &mut Scratch<D>, buffer: &mut [f64]| {
             for group in 0..block.groups() {
-                let from = quadratic(block.particles(group));
-                widest(Blocks { window: block.window(group), from: &from, buffer });
+                compiled::quadratic(&block.window(group), &quadratic(block.particles(group)), buffer);
             }
             None::<std::convert::Infallible>
         };
@@ -471,111 +487,6 @@ impl<const D: usize> Block<D> {
             }
         });
         (value, gradient)
-    }
-}
-
-/// A point function that knows one particle at a time, for numbers that are `f64`.
-struct EachParticle<'a, T, F, const MAGNITUDE: bool> {
-    point: &'a F,
-    number: PhantomData<fn() -> T>,
-}
-
-impl<T, F, const MAGNITUDE: bool> Terms for EachParticle<'_, T, F, MAGNITUDE> {
-    const VALUE: bool = true;
-    const GRADIENT: bool = true;
-    const MAGNITUDE: bool = MAGNITUDE;
-}
-
-impl<T, E, F, const MAGNITUDE: bool, const D: usize> Stage<D> for EachParticle<'_, T, F, MAGNITUDE>
-where
-    T: Real,
-    E: Send,
-    F: Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
-{
-    type Error = E;
-
-    #[inline(always)]
-    fn point<S: Lanes>(
-        &self,
-        s: S,
-        _group: usize,
-        particles: &[u32],
-        at: &mut Gathered<S::N, D>,
-    ) -> Result<(), (usize, E)> {
-        let mut stored = Stored::<D>::of(s, at);
-        one_by_one(self.point, particles, &mut stored)?;
-        *at = stored.load(s);
-        Ok(())
-    }
-}
-
-/// Not inlined: it is better off without the wide instructions of the code around it.
-#[inline(never)]
-fn one_by_one<T: Real, E, const D: usize>(
-    point: &impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E>,
-    particles: &[u32],
-    stored: &mut Stored<D>,
-) -> Result<(), (usize, E)> {
-    let mut failure = None;
-    for (lane, &p) in particles.iter().enumerate() {
-        let (value, gradient) = stored.of_lane(lane);
-        match point(p as usize, value, gradient) {
-            Ok((force, stress)) => stored.set_lane(lane, &force, &stress),
-            Err(error) => keep_first(&mut failure, p as usize, error),
-        }
-    }
-    failure.map_or(Ok(()), Err)
-}
-
-/// q = `value`(p), whatever the field.
-struct Spread<F> {
-    value: F,
-}
-
-impl<F> Terms for Spread<F> {
-    const VALUE: bool = true;
-    const GRADIENT: bool = false;
-    const MAGNITUDE: bool = false;
-}
-
-impl<F: Fn(usize) -> Vector<f64, D> + Sync, const D: usize> Stage<D> for Spread<F> {
-    type Error = std::convert::Infallible;
-
-    #[inline(always)]
-    fn point<S: Lanes>(
-        &self,
-        s: S,
-        _group: usize,
-        particles: &[u32],
-        at: &mut Gathered<S::N, D>,
-    ) -> Result<(), (usize, Self::Error)> {
-        let mut values = [[0.0; LANES]; D];
-        for (lane, &p) in particles.iter().enumerate() {
-            let value = (self.value)(p as usize);
-            for i in 0..D {
-                values[i][lane] = value[i];
-            }
-        }
-        for i in 0..D {
-            at.value[i] = s.load(&values[i]);
-        }
-        Ok(())
-    }
-}
-
-/// The diagonal blocks of one group.
-struct Blocks<'a, const D: usize> {
-    window: Window<'a>,
-    from: &'a Quadratic<D>,
-    buffer: &'a mut [f64],
-}
-
-impl<const D: usize> WithLanes for Blocks<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        scatter_blocks(s, &self.window, self.from, self.buffer);
     }
 }
 

@@ -4,8 +4,9 @@
 //! are added to the nodes in the order of the blocks, every slab of nodes by one thread. Neither the waves nor the order
 //! depend on the number of threads.
 
-use super::kernel::{Gathered, Stored, Terms, gather, scatter};
-use super::lanes::{LANES, Lanes, WithLanes, widest};
+use super::compiled::{self, Groups, Sum};
+use super::kernel::Stored;
+use super::lanes::LANES;
 use super::tiled::{Block, Tiled, keep_first};
 use crate::scalar::Real;
 use crate::tensor::Vector;
@@ -20,49 +21,60 @@ const SLAB: usize = 1024;
 /// Below this number of groups waking the threads costs more than the work.
 const PARALLEL: usize = 256;
 
-/// What is done at the particles of a group between gather and scatter. Of its [`Terms`], those of the scatter; u and L are
-/// gathered alike unless there is no field.
-pub(super) trait Stage<const D: usize>: Terms + Sync {
-    /// What can go wrong at a particle.
-    type Error: Send;
-
-    /// Puts σ in the place of L and q in that of u; on an error names the first particle of the group that failed.
-    fn point<S: Lanes>(
-        &self,
-        s: S,
-        group: usize,
-        particles: &[u32],
-        at: &mut Gathered<S::N, D>,
-    ) -> Result<(), (usize, Self::Error)>;
+/// What the work on a block needs besides: the box of nodal numbers, and u and L of its groups.
+#[derive(Default)]
+pub(super) struct Scratch<const D: usize> {
+    pub nodal: Vec<f64>,
+    pub groups: Groups<D>,
 }
 
-/// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I`; `T` is `f64`. Without a field nothing is gathered.
+impl<const D: usize> Scratch<D> {
+    /// The box of a field on the active nodes.
+    pub(super) fn fill<T: Real>(&mut self, block: &Block<D>, field: &[Vector<T, D>]) {
+        self.nodal.resize(block.box_nodes() * D, 0.0);
+        block.fill(field, &mut self.nodal);
+    }
+}
+
+/// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` (or what `sum` says); `points(block, groups)` puts σ in the place of L and q in that of
+/// u, and names the first particle that failed; `T` is `f64`. Without a field u and L are zero.
 ///
 /// # Errors
 /// That of the particle with the smallest number.
-pub(super) fn run<T: Real, P: Stage<D>, const D: usize>(
+pub(super) fn run<T: Real, E: Send, const D: usize>(
     tiled: &Tiled<D>,
     field: Option<&[Vector<T, D>]>,
     out: &mut [Vector<T, D>],
-    stage: &P,
-) -> Result<(), P::Error> {
+    sum: Sum,
+    points: impl Fn(&Block<D>, &mut [Stored<D>]) -> Option<(usize, E)> + Sync,
+) -> Result<(), E> {
     let mut failure = None;
-    let work = |block: &Block<D>, nodal: &mut Vec<f64>, buffer: &mut [f64]| {
-        if let Some(field) = field {
-            nodal.resize(block.box_nodes() * D, 0.0);
-            block.fill(field, nodal);
-        }
-        widest(OfBlock { block, stage, nodal: field.map(|_| nodal.as_slice()), buffer }).err()
-    };
-    let add = |block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Vector<T, D>]| {
-        block.add(buffer, D, first, out, |sum, numbers| {
-            for (sum, &x) in sum.iter_mut().zip(numbers) {
-                *sum += T::lit(x);
+    let work = |block: &Block<D>, scratch: &mut Scratch<D>, buffer: &mut [f64]| {
+        match field {
+            Some(field) => {
+                scratch.fill(block, field);
+                compiled::gathered(block, &scratch.nodal, &mut scratch.groups);
             }
-        });
+            None => {
+                scratch.groups.0.clear();
+                scratch.groups.0.resize_with(block.groups(), Stored::zero);
+            }
+        }
+        let failed = points(block, &mut scratch.groups.0);
+        compiled::scattered(block, &scratch.groups, sum, buffer);
+        failed
     };
     each_block(tiled, D, out, work, add, |(p, error)| keep_first(&mut failure, p, error));
     failure.map_or(Ok(()), |(_, error)| Err(error))
+}
+
+/// Adds a box of vectors to the active nodes `first ..`.
+pub(super) fn add<T: Real, const D: usize>(block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Vector<T, D>]) {
+    block.add(buffer, D, first, out, |sum, numbers| {
+        for (sum, &x) in sum.iter_mut().zip(numbers) {
+            *sum += T::lit(x);
+        }
+    });
 }
 
 /// The waves: `work(block, scratch, buffer)` fills the buffer of each block, a box of `numbers` numbers a node; then
@@ -71,18 +83,18 @@ pub(super) fn each_block<O: Send, F: Send, const D: usize>(
     tiled: &Tiled<D>,
     numbers: usize,
     out: &mut [O],
-    work: impl Fn(&Block<D>, &mut Vec<f64>, &mut [f64]) -> Option<F> + Sync,
+    work: impl Fn(&Block<D>, &mut Scratch<D>, &mut [f64]) -> Option<F> + Sync,
     add: impl Fn(&Block<D>, &[f64], usize, &mut [O]) + Sync,
     mut failed: impl FnMut(F),
 ) {
     let length = tiled.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + LANES;
     let parallel = rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL;
-    let one = |scratch: &mut Vec<f64>, buffer: &mut [f64], block: &Block<D>| {
+    let one = |scratch: &mut Scratch<D>, buffer: &mut [f64], block: &Block<D>| {
         buffer[..block.box_nodes() * numbers + LANES].fill(0.0);
         work(block, scratch, buffer)
     };
     if !parallel {
-        let (mut scratch, mut buffer) = (Vec::new(), vec![0.0; length]);
+        let (mut scratch, mut buffer) = (Scratch::default(), vec![0.0; length]);
         for block in &tiled.blocks {
             one(&mut scratch, &mut buffer, block).into_iter().for_each(&mut failed);
             add(block, &buffer, 0, out);
@@ -94,7 +106,7 @@ pub(super) fn each_block<O: Send, F: Send, const D: usize>(
         let failures: Vec<F> = buffers
             .par_chunks_mut(length)
             .zip(blocks)
-            .map_init(Vec::new, |scratch, (buffer, block)| one(scratch, buffer, block))
+            .map_init(Scratch::default, |scratch, (buffer, block)| one(scratch, buffer, block))
             .filter_map(|failure| failure)
             .collect();
         failures.into_iter().for_each(&mut failed);
@@ -115,67 +127,15 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
     chunks: Vec<C>,
     visit: impl Fn(&Block<D>, C, &[Stored<D>]) -> R + Sync,
 ) -> Vec<R> {
-    let one = |scratch: &mut (Vec<f64>, Vec<Stored<D>>), (block, chunk): (&Block<D>, C)| {
-        let (nodal, stored) = scratch;
-        nodal.resize(block.box_nodes() * D, 0.0);
-        block.fill(field, nodal);
-        stored.clear();
-        widest(OnlyGather { block, nodal, stored });
-        visit(block, chunk, stored)
+    let one = |scratch: &mut Scratch<D>, (block, chunk): (&Block<D>, C)| {
+        scratch.fill(block, field);
+        compiled::gathered(block, &scratch.nodal, &mut scratch.groups);
+        visit(block, chunk, &scratch.groups.0)
     };
     if rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL {
-        tiled.blocks.par_iter().zip(chunks).map_init(Default::default, one).collect()
+        tiled.blocks.par_iter().zip(chunks).map_init(Scratch::default, one).collect()
     } else {
-        let mut scratch = Default::default();
+        let mut scratch = Scratch::default();
         tiled.blocks.iter().zip(chunks).map(|both| one(&mut scratch, both)).collect()
-    }
-}
-
-/// The gather of one block.
-struct OnlyGather<'a, const D: usize> {
-    block: &'a Block<D>,
-    nodal: &'a [f64],
-    stored: &'a mut Vec<Stored<D>>,
-}
-
-impl<const D: usize> WithLanes for OnlyGather<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        for group in 0..self.block.groups() {
-            self.stored.push(Stored::of(s, &gather::<S, D, true>(s, &self.block.window(group), self.nodal)));
-        }
-    }
-}
-
-/// The sweep over one block.
-struct OfBlock<'a, P, const D: usize> {
-    block: &'a Block<D>,
-    stage: &'a P,
-    nodal: Option<&'a [f64]>,
-    buffer: &'a mut [f64],
-}
-
-impl<P: Stage<D>, const D: usize> WithLanes for OfBlock<'_, P, D> {
-    type Output = Result<(), (usize, P::Error)>;
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) -> Self::Output {
-        let mut failure = None;
-        for group in 0..self.block.groups() {
-            let window = self.block.window(group);
-            let mut at = match self.nodal {
-                Some(nodal) if P::VALUE => gather::<S, D, true>(s, &window, nodal),
-                Some(nodal) => gather::<S, D, false>(s, &window, nodal),
-                None => Gathered { value: [s.zero(); D], gradient: [[s.zero(); D]; D] },
-            };
-            let particles = self.block.particles(group);
-            match self.stage.point(s, self.block.first_group + group, particles, &mut at) {
-                Ok(()) => scatter::<S, P, D>(s, &window, &at, self.buffer),
-                Err((p, error)) => keep_first(&mut failure, p, error),
-            }
-        }
-        failure.map_or(Ok(()), Err)
     }
 }
