@@ -4,6 +4,7 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::time::Newmark;
 use crate::simulation::Simulation;
 use crate::solver::Krylov;
@@ -172,7 +173,7 @@ fn arrays<const D: usize, L: Law, A>(
         array("particles: x, v, a, H, volume, mass, body", particles * (3 * vector + tensor + 2 * 8 + 4)),
         array("particles: state after the step", particles * (3 * vector + tensor)),
         array("shape functions: N, ∇N and their nodes", supports.bytes()),
-        array("frozen tangent", particles * size_of::<L::Frozen<f64, D>>()),
+        array("frozen tangent", frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping)),
         array("preconditioner: diagonal blocks", nodes * tensor),
         array("Krylov vectors", nodes * vector * krylov_vectors),
         array("other nodal fields: v, a, loads, residuals, Δφ", nodes * (12 * vector + 8)),

@@ -6,6 +6,7 @@
 //! the same bits for any number of threads.
 
 mod builder;
+mod closed;
 mod kernel;
 mod lanes;
 mod order;
@@ -13,8 +14,11 @@ mod plain;
 mod tiled;
 mod waves;
 
+pub use closed::ClosedTangents;
+
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
+use crate::material::ClosedTangent;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
@@ -114,6 +118,15 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.particles())
     }
 
+    /// The groups of particles that share a window of nodes in vector lanes: nodes along each axis, and particles; none where the
+    /// sweep has no vector lanes. For counting operations.
+    pub fn windows(&self) -> Vec<([usize; 3], usize)> {
+        match &self.0 {
+            Way::Plain(_) => Vec::new(),
+            Way::Tiled(tiled) => tiled.windows(),
+        }
+    }
+
     /// Bytes of all arrays.
     pub fn bytes(&self) -> usize {
         either!(self, way => way.bytes())
@@ -175,6 +188,70 @@ impl<const D: usize> Supports<D> {
         O: Copy + Zero + AddAssign + Send + Sync,
     {
         either!(self, way => way.scatter(out, scatter));
+    }
+
+    /// `out_I += Σ_p value(p) N_I`
+    pub fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
+        match &self.0 {
+            Way::Plain(plain) => plain.scatter(out, |p, n, _| value(p) * n),
+            Way::Tiled(tiled) => tiled.spread(out, value),
+        }
+    }
+
+    /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I`, with the bilinear form B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
+    pub fn scatter_blocks(
+        &self,
+        out: &mut [Tensor<f64, D>],
+        bilinear: impl Fn(usize, &Vector<f64, D>, &Vector<f64, D>) -> Tensor<f64, D> + Sync,
+        mass: impl Fn(usize) -> f64 + Sync,
+    ) {
+        match &self.0 {
+            Way::Plain(plain) => {
+                plain.scatter(out, |p, n, grad_n| bilinear(p, grad_n, grad_n) + Tensor::identity() * (mass(p) * n * n))
+            }
+            Way::Tiled(tiled) => tiled.scatter_blocks(out, bilinear, mass),
+        }
+    }
+
+    /// The closed tangents `point(p, ∇u_p)` of all particles, `both` telling whether they have the term b L c, with the weights of
+    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes.
+    ///
+    /// # Errors
+    /// The error of the first particle, in their order, whose `point` fails.
+    pub fn closed_tangents<E: Send>(
+        &self,
+        field: &[Vector<f64, D>],
+        both: bool,
+        inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
+        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
+    ) -> Option<Result<ClosedTangents<D>, E>> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => Some(tiled.closed(field, both, inertia, point)),
+        }
+    }
+
+    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with the stress of each tangent under ∇u_p, and q of its inertia under u_p. The
+    /// tangents must be those of these supports.
+    pub fn product(&self, tangents: &ClosedTangents<D>, field: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        if let Way::Tiled(tiled) = &self.0 {
+            tiled.product(tangents, field, out);
+        }
+    }
+
+    /// `out_I += Σ_p K_II` of each tangent and its inertia. The tangents must be those of these supports.
+    pub fn add_blocks(&self, tangents: &ClosedTangents<D>, out: &mut [Tensor<f64, D>]) {
+        if let Way::Tiled(tiled) = &self.0 {
+            tiled.add_blocks(tangents, out);
+        }
+    }
+
+    /// Bytes of [`Self::closed_tangents`]; `None` where the sweep has no vector lanes.
+    pub fn closed_bytes(&self, both: bool, inertia: bool) -> Option<usize> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => Some(tiled.closed_bytes(both, inertia)),
+        }
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in their order.

@@ -4,8 +4,8 @@
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
 use super::builder::block;
-use super::kernel::{Gathered, Stored, Window};
-use super::lanes::{LANES, Lanes};
+use super::kernel::{Gathered, Quadratic, Stored, Terms, Window, pair, scatter_blocks};
+use super::lanes::{LANES, Lanes, WithLanes, widest};
 use super::order::{self, Key};
 use super::waves::{self, Stage};
 use super::{Magnitude, SupportError, infallible, ordered};
@@ -123,6 +123,11 @@ impl<const D: usize> Tiled<D> {
         self.blocks.last().map_or(0, |last| last.first_group + last.groups.len())
     }
 
+    pub(super) fn windows(&self) -> Vec<([usize; 3], usize)> {
+        let groups = self.blocks.iter().flat_map(|block| &block.groups);
+        groups.map(|group| (group.width.map(usize::from), usize::from(group.lanes))).collect()
+    }
+
     pub(super) fn bytes(&self) -> usize {
         let of_block = |block: &Block<D>| {
             size_of_val(block)
@@ -143,11 +148,6 @@ impl<const D: usize> Tiled<D> {
         (block, group - block.first_group, lane)
     }
 
-    /// The slot of a particle: group · 8 + lane.
-    pub(super) fn slot(&self, particle: usize) -> usize {
-        self.slots[particle] as usize
-    }
-
     pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let (block, group, lane) = self.place(particle);
         let mut entries = Vec::new();
@@ -166,8 +166,12 @@ impl<const D: usize> Tiled<D> {
         magnitude: Magnitude,
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        if TypeId::of::<T>() == TypeId::of::<f64>() && magnitude == Magnitude::No {
-            return waves::run(self, field, out, &EachParticle { point: &point, number: PhantomData::<fn() -> T> });
+        if is_f64::<T>() {
+            let (point, number) = (&point, PhantomData::<fn() -> T>);
+            return match magnitude {
+                Magnitude::No => waves::run(self, Some(field), out, &EachParticle::<_, _, false> { point, number }),
+                Magnitude::Yes => waves::run(self, Some(field), out, &EachParticle::<_, _, true> { point, number }),
+            };
         }
         let buffers = self.in_order(|block| {
             let nodal = block.boxed(field);
@@ -208,6 +212,9 @@ impl<const D: usize> Tiled<D> {
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
+        if is_f64::<T>() {
+            return self.interpolate_lanes(field, point);
+        }
         let parts = self.in_order(|block| {
             let nodal = block.boxed(field);
             let mut part = Vec::with_capacity(block.groups.len() * LANES);
@@ -221,25 +228,91 @@ impl<const D: usize> Tiled<D> {
             });
             failure.map_or(Ok(part), Err)
         })?;
+        Ok(self.by_particle(parts))
+    }
+
+    fn interpolate_lanes<T: Real, R: Send, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
+    ) -> Result<Vec<R>, E> {
+        let results = waves::gathered(self, field, vec![(); self.blocks.len()], |block, (), stored| {
+            let mut part = Vec::with_capacity(block.groups.len() * LANES);
+            let mut failure = None;
+            block.each(|group, lane, p| {
+                let (value, gradient) = stored[group].of_lane(lane);
+                match point(p, value, gradient) {
+                    Ok(result) => part.push((p, result)),
+                    Err(error) => keep_first(&mut failure, p, error),
+                }
+            });
+            failure.map_or(Ok(part), Err)
+        });
+        Ok(self.by_particle(first_error(results)?))
+    }
+
+    /// Results of the blocks in the order of the particles.
+    fn by_particle<R>(&self, parts: Vec<Vec<(usize, R)>>) -> Vec<R> {
         let mut results: Vec<Option<R>> = (0..self.particles()).map(|_| None).collect();
         for (p, result) in parts.into_iter().flatten() {
             results[p] = Some(result);
         }
         // Every particle is in one group.
-        Ok(results.into_iter().flatten().collect())
+        results.into_iter().flatten().collect()
+    }
+
+    /// `out_I += Σ_p value(p) N_I`
+    pub(super) fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
+        infallible(waves::run(self, None, out, &Spread { value }));
+    }
+
+    /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I` with B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
+    pub(super) fn scatter_blocks(
+        &self,
+        out: &mut [Tensor<f64, D>],
+        bilinear: impl Fn(usize, &Vector<f64, D>, &Vector<f64, D>) -> Tensor<f64, D> + Sync,
+        mass: impl Fn(usize) -> f64 + Sync,
+    ) {
+        let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+        let quadratic = |particles: &[u32]| {
+            let mut quadratic = Quadratic::<D>::zero();
+            for (lane, &p) in particles.iter().enumerate() {
+                let p = p as usize;
+                quadratic.mass[lane] = mass(p);
+                for l in 0..D {
+                    for k in 0..=l {
+                        let mut block = bilinear(p, &unit(k), &unit(l));
+                        if k < l {
+                            block += bilinear(p, &unit(l), &unit(k));
+                        }
+                        for i in 0..D {
+                            for j in 0..D {
+                                quadratic.bilinear[pair(k, l)][i][j][lane] = block[(i, j)];
+                            }
+                        }
+                    }
+                }
+            }
+            quadratic
+        };
+        let work = |block: &Block<D>, _: &mut Vec<f64>, buffer: &mut [f64]| {
+            for group in 0..block.groups() {
+                let from = quadratic(block.particles(group));
+                widest(Blocks { window: block.window(group), from: &from, buffer });
+            }
+            None::<std::convert::Infallible>
+        };
+        let add = |block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Tensor<f64, D>]| {
+            block.add(buffer, D * D, first, out, |sum, rows| {
+                *sum += Tensor::from_fn(|i, k| rows[i * D + k]);
+            });
+        };
+        waves::each_block(self, D * D, out, work, add, |never| match never {});
     }
 
     /// `f` of every block, in their order; the error is that of the particle with the smallest number.
     fn in_order<R: Send, E: Send>(&self, f: impl Fn(&Block<D>) -> Result<R, (usize, E)> + Sync) -> Result<Vec<R>, E> {
-        let mut failure = None;
-        let mut results = Vec::with_capacity(self.blocks.len());
-        for result in infallible(ordered(self.blocks.len(), |b| Ok(f(&self.blocks[b])))) {
-            match result {
-                Ok(result) => results.push(result),
-                Err((p, error)) => keep_first(&mut failure, p, error),
-            }
-        }
-        failure.map_or(Ok(results), |(_, error)| Err(error))
+        first_error(infallible(ordered(self.blocks.len(), |b| Ok(f(&self.blocks[b])))))
     }
 
     /// Adds the boxes to the nodes, in the order of the blocks.
@@ -250,6 +323,24 @@ impl<const D: usize> Tiled<D> {
             }
         }
     }
+}
+
+/// The results, or the error of the particle with the smallest number.
+pub(super) fn first_error<R, E>(all: Vec<Result<R, (usize, E)>>) -> Result<Vec<R>, E> {
+    let mut failure = None;
+    let mut results = Vec::with_capacity(all.len());
+    for result in all {
+        match result {
+            Ok(result) => results.push(result),
+            Err((p, error)) => keep_first(&mut failure, p, error),
+        }
+    }
+    failure.map_or(Ok(results), |(_, error)| Err(error))
+}
+
+/// Whether `T` is the number the lanes hold.
+fn is_f64<T: Real>() -> bool {
+    TypeId::of::<T>() == TypeId::of::<f64>()
 }
 
 /// Keeps the failure of the smallest particle.
@@ -300,15 +391,20 @@ impl<const D: usize> Block<D> {
         }
     }
 
-    /// Adds the part of the box that lies on the active nodes `first ..` of which `out` holds the sums.
-    pub(super) fn add<T: Real>(&self, buffer: &[f64], first: usize, out: &mut [Vector<T, D>]) {
+    /// Adds the part of the box, `numbers` numbers a node, that lies on the active nodes `first ..` of which `out` holds the sums.
+    pub(super) fn add<O>(
+        &self,
+        buffer: &[f64],
+        numbers: usize,
+        first: usize,
+        out: &mut [O],
+        add: impl Fn(&mut O, &[f64]),
+    ) {
         let start = self.nodes.partition_point(|&node| (node as usize) < first);
         let end = self.nodes.partition_point(|&node| (node as usize) < first + out.len());
         for (&node, &place) in self.nodes[start..end].iter().zip(&self.places[start..end]) {
-            let sum = &mut out[node as usize - first];
-            for c in 0..D {
-                sum[c] += T::lit(buffer[place as usize * D + c]);
-            }
+            let place = place as usize * numbers;
+            add(&mut out[node as usize - first], &buffer[place..place + numbers]);
         }
     }
 
@@ -321,7 +417,7 @@ impl<const D: usize> Block<D> {
     }
 
     /// Calls `visit(group, lane, particle)`.
-    fn each(&self, mut visit: impl FnMut(usize, usize, usize)) {
+    pub(super) fn each(&self, mut visit: impl FnMut(usize, usize, usize)) {
         for group in 0..self.groups.len() {
             for (lane, &p) in self.particles(group).iter().enumerate() {
                 visit(group, lane, p as usize);
@@ -379,19 +475,24 @@ impl<const D: usize> Block<D> {
 }
 
 /// A point function that knows one particle at a time, for numbers that are `f64`.
-struct EachParticle<'a, T, F> {
+struct EachParticle<'a, T, F, const MAGNITUDE: bool> {
     point: &'a F,
     number: PhantomData<fn() -> T>,
 }
 
-impl<T, E, F, const D: usize> Stage<D> for EachParticle<'_, T, F>
+impl<T, F, const MAGNITUDE: bool> Terms for EachParticle<'_, T, F, MAGNITUDE> {
+    const VALUE: bool = true;
+    const GRADIENT: bool = true;
+    const MAGNITUDE: bool = MAGNITUDE;
+}
+
+impl<T, E, F, const MAGNITUDE: bool, const D: usize> Stage<D> for EachParticle<'_, T, F, MAGNITUDE>
 where
     T: Real,
     E: Send,
     F: Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
 {
     type Error = E;
-    const VALUE: bool = true;
 
     #[inline(always)]
     fn point<S: Lanes>(
@@ -399,39 +500,82 @@ where
         s: S,
         _group: usize,
         particles: &[u32],
-        at: &mut Gathered<S::V, D>,
+        at: &mut Gathered<S::N, D>,
     ) -> Result<(), (usize, E)> {
         let mut stored = Stored::<D>::of(s, at);
-        self.one_by_one(particles, &mut stored)?;
+        one_by_one(self.point, particles, &mut stored)?;
         *at = stored.load(s);
         Ok(())
     }
 }
 
-impl<T: Real, F> EachParticle<'_, T, F> {
-    /// Not inlined: it is better off without the wide instructions of the code around it.
-    #[inline(never)]
-    fn one_by_one<E, const D: usize>(&self, particles: &[u32], stored: &mut Stored<D>) -> Result<(), (usize, E)>
-    where
-        F: Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
-    {
-        let mut failure = None;
+/// Not inlined: it is better off without the wide instructions of the code around it.
+#[inline(never)]
+fn one_by_one<T: Real, E, const D: usize>(
+    point: &impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E>,
+    particles: &[u32],
+    stored: &mut Stored<D>,
+) -> Result<(), (usize, E)> {
+    let mut failure = None;
+    for (lane, &p) in particles.iter().enumerate() {
+        let (value, gradient) = stored.of_lane(lane);
+        match point(p as usize, value, gradient) {
+            Ok((force, stress)) => stored.set_lane(lane, &force, &stress),
+            Err(error) => keep_first(&mut failure, p as usize, error),
+        }
+    }
+    failure.map_or(Ok(()), Err)
+}
+
+/// q = `value`(p), whatever the field.
+struct Spread<F> {
+    value: F,
+}
+
+impl<F> Terms for Spread<F> {
+    const VALUE: bool = true;
+    const GRADIENT: bool = false;
+    const MAGNITUDE: bool = false;
+}
+
+impl<F: Fn(usize) -> Vector<f64, D> + Sync, const D: usize> Stage<D> for Spread<F> {
+    type Error = std::convert::Infallible;
+
+    #[inline(always)]
+    fn point<S: Lanes>(
+        &self,
+        s: S,
+        _group: usize,
+        particles: &[u32],
+        at: &mut Gathered<S::N, D>,
+    ) -> Result<(), (usize, Self::Error)> {
+        let mut values = [[0.0; LANES]; D];
         for (lane, &p) in particles.iter().enumerate() {
-            let value = Vector::from_fn(|i, _| T::lit(stored.value[i][lane]));
-            let gradient = Tensor::from_fn(|i, k| T::lit(stored.gradient[i][k][lane]));
-            match (self.point)(p as usize, value, gradient) {
-                Ok((force, stress)) => {
-                    for i in 0..D {
-                        stored.value[i][lane] = force[i].value();
-                        for k in 0..D {
-                            stored.gradient[i][k][lane] = stress[(i, k)].value();
-                        }
-                    }
-                }
-                Err(error) => keep_first(&mut failure, p as usize, error),
+            let value = (self.value)(p as usize);
+            for i in 0..D {
+                values[i][lane] = value[i];
             }
         }
-        failure.map_or(Ok(()), Err)
+        for i in 0..D {
+            at.value[i] = s.load(&values[i]);
+        }
+        Ok(())
+    }
+}
+
+/// The diagonal blocks of one group.
+struct Blocks<'a, const D: usize> {
+    window: Window<'a>,
+    from: &'a Quadratic<D>,
+    buffer: &'a mut [f64],
+}
+
+impl<const D: usize> WithLanes for Blocks<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, s: S) {
+        scatter_blocks(s, &self.window, self.from, self.buffer);
     }
 }
 

@@ -58,4 +58,4 @@ macro_rules! studies {
     };
 }
 
-studies!(tangent, taylor, newton, baseline, patch, balance, digits, manufactured, minimiser, order, mutants);
+studies!(tangent, taylor, newton, baseline, operator, patch, balance, digits, manufactured, minimiser, order, mutants);

@@ -67,6 +67,7 @@ const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
+const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
 const MATERIAL: &str = "src/material/mod.rs";
 const TENSOR: &str = "src/tensor.rs";
@@ -137,8 +138,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "{}",
         Killed(&[TANGENT], &[POINTS])),
     patch("diagonal blocks without the material", PRODUCT,
-        "self.frozen[p].block(grad_n, grad_n) + scaled(&identity(), inertia)",
-        "scaled(&identity(), inertia)",
+        "eq.supports.add_blocks(tangents, &mut blocks)",
+        "()",
         Killed(&[TANGENT], &[POINTS])),
     patch("sign of the pressure's diagonal blocks", PRODUCT,
         "outer(&self.force, &g) - outer(&g, &self.force)",
@@ -157,8 +158,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "determinant(&unit).abs() > 1e-9",
         Equivalent("only the preconditioner of ill-shaped blocks")),
     patch("eps for 1 - eps in the projection", TRANSFER,
-        "at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p] * n)",
-        "at_particles[p] * (self.lumping * self.particles.mass[p] * n)",
+        "at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p])",
+        "at_particles[p] * (self.lumping * self.particles.mass[p])",
         Killed(&[BALANCE], &[DYNAMICS])),
     patch("another diagonal of the projection's mass", TRANSFER,
         "(1.0 - lumping) * particles.mass[p] * n * n",
@@ -232,9 +233,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "Alphas::START",
         "Alphas { a3: 1.0, ..Alphas::START }",
         Killed(&[LOADS], &[DYNAMICS])),
-    patch("sign of q in the frozen neo-Hookean", NEO_HOOKEAN,
-        "scaled(&(a * l.transpose() * a), self.q)",
-        "scaled(&(a * l.transpose() * a), -self.q)",
+    patch("sign of q in the frozen tangent", CLOSED,
+        "with.mul_sub(q_a_lt[j], a[j][k], sum)",
+        "with.mul_add(q_a_lt[j], a[j][k], sum)",
         Killed(&[TANGENT, DYNAMICS], &[POINTS])),
     patch("1/F for its transpose in the frozen neo-Hookean", NEO_HOOKEAN,
         "at.inverse_transpose() * f_n.transpose()",
@@ -260,10 +261,10 @@ pub(super) const PATCHES: &[Patch] = &[
         "scaled(x, T::lit(2.0) * shear)",
         "scaled(x, shear)",
         Killed(&[TANGENT, POINTS], &[DYNAMICS])),
-    patch("blocks without the geometric part", KIRCHHOFF,
-        "scaled(&identity(), v.dot(&(self.stress * b)))",
-        "Tensor::zeros()",
-        Killed(&[TANGENT, POINTS], &[DYNAMICS])),
+    patch("diagonal blocks without the geometric part", CLOSED,
+        "with.add(block[i][i], self.right[k][l])",
+        "block[i][i]",
+        Killed(&[TANGENT], &[POINTS])),
     patch("shear stress of an energy twice as large", FROM_ENERGY,
         "self.0.energy(&seeded(e, &direction(i, k))).eps",
         "self.0.energy(&seeded(e, &direction(i, k))).eps * T::lit(if i == k { 1.0 } else { 2.0 })",
