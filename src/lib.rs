@@ -1,4 +1,133 @@
 //! Implicit finite-strain material point method with a matrix-free, Voigt-free tangent.
+//!
+//! A body is a cloud of particles that carry its state; a Cartesian grid, fresh in every step, carries the unknowns. This page
+//! goes through one step of the method and says where each formula lives. Numbers in parentheses are the equations of Molinos,
+//! Stickle, Navas, Yagüe, Manzanal, Pastor, "Toward a local maximum-entropy material point method at finite strain within a
+//! B-free approach"; where the paper has misprints, the formulas here are the corrected ones.
+//!
+//! # Symbols
+//!
+//! I, J number nodes, p particles; n is the last converged state, n+1 the one sought. D is the dimension: 1 (uniaxial strain),
+//! 2 (plane strain) or 3.
+//!
+//! | symbol | meaning | where |
+//! |---|---|---|
+//! | x, v, a | position, velocity, acceleration of a particle | [`particles::Particles`] |
+//! | m, V₀ | its mass and its reference volume | [`particles::Particles`] |
+//! | F, H = F − I, J = det F | deformation gradient; H is what is stored, so that small strains lose no digits | [`tensor::Deformation`] |
+//! | E = sym H + ½ HᵀH, C = I + 2E | Green–Lagrange and right Cauchy–Green strain | [`tensor::Deformation::green_lagrange`] |
+//! | W, S = ∂W/∂E, ℂ = ∂S/∂E | energy density, second Piola–Kirchhoff stress, its tangent | [`material::Law`] |
+//! | P = F S (7) | first Piola–Kirchhoff stress | [`material::first_piola`] |
+//! | Λ, G | Lamé's constants | [`material::Lame`] |
+//! | h | spacing of the grid | [`grid::Grid`] |
+//! | N, ∇ₙN | shape functions and their gradients at the positions xₙ | [`approximation::ShapeFunction`] |
+//! | ∇N = Fₙᵀ ∇ₙN (47) | gradient in the reference configuration | [`mechanics::tangent`] |
+//! | γ̂, β̂ = γ̂/h² | locality of the max-ent functions | [`approximation::Lme`] |
+//! | Δφ | motion of the nodes over the step: the unknowns | [`mechanics::residual`] |
+//! | M̃ = (1−ε) M + ε lumped(M) (41) | mass matrix, between consistent (ε = 0) and lumped (ε = 1) | [`simulation::Settings::lumping`] |
+//! | β, γ; α₁ … α₆ (19) | Newmark's parameters, and the factors that follow from them and Δt | [`mechanics::time`] |
+//! | R(Δφ) | residual of the nodal equilibrium | [`mechanics::residual::Equilibrium`] |
+//! | K(Δφ) | its derivative, the tangent | [`mechanics::tangent::Tangent`] |
+//! | Π(Δφ) | incremental potential, ∂Π/∂Δφ = R | [`mechanics::residual::Equilibrium::potential`] |
+//!
+//! # One step
+//!
+//! [`simulation::Simulation::step`] is the following, in this order.
+//!
+//! **1. Shape functions.** A particle at xₙ sees the nodes with N ≠ 0 or ∇ₙN ≠ 0, and the nodes that some particle sees are active
+//! ([`nodes::Nodes`]). The paper's local maximum-entropy functions (24)–(28) are, with D = x − x_I,
+//!
+//! ```text
+//! N_I = exp(−β̂ D·D + λ·D) / Z,    λ = argmin log Z,    ∇N_I = −N_I 𝐉⁻¹ D,    𝐉 = Σ_I N_I D ⊗ D
+//! ```
+//!
+//! On a box of nodes they factorise into functions of one coordinate, each one scalar root away ([`approximation::Lme`]); the
+//! paper's circle of nodes is [`approximation::LmeCircle`]. [`approximation::Linear`], [`approximation::Gimp`] and
+//! [`approximation::Bspline`] are there too. At a point on a wall of the box only the nodes of that wall have N ≠ 0, for every family,
+//! so that prescribed motion is nodal.
+//!
+//! **2. To the nodes** ([`mechanics::transfer::Nodal::project`]) (40)–(42):
+//!
+//! ```text
+//! M_IJ = Σ_p m N_I N_J        M̃ v = Σ_p N m v_p        M̃ a = Σ_p N m a_p
+//! ```
+//!
+//! after which ġ and g̈ replace the projected values where the motion g(t) is prescribed ([`mechanics::loads`]).
+//!
+//! **3. Equilibrium.** Newmark's method (19) makes the acceleration a function of the unknowns, and the residual (17), (33) one too
+//! ([`mechanics::residual::Equilibrium::residual`]):
+//!
+//! ```text
+//! a = α₁ Δφ − α₂ vₙ − α₃ aₙ          v = α₄ Δφ + α₅ vₙ + α₆ aₙ
+//! α₁ = 1/(β Δt²)   α₂ = 1/(β Δt)   α₃ = (1−2β)/(2β)   α₄ = γ/(β Δt)   α₅ = 1 − γ/β   α₆ = (1 − γ/(2β)) Δt
+//!
+//! ΔF = I + Σ_I Δφ_I ⊗ ∇ₙN_I          F = ΔF Fₙ                                  (45), (46)
+//!
+//! R_I(Δφ) =   Σ_J M̃_IJ a_J            inertia
+//!           + Σ_p V₀ F S ∇N_I         internal force
+//!           − Σ_p m b N_I             body force
+//!           − Σ_Γ A T N_I             nominal traction T, or follower pressure T = −p J F⁻ᵀ 𝐍
+//! ```
+//!
+//! Where every load has a potential, R is the gradient of
+//!
+//! ```text
+//! Π(Δφ) = a·M̃a / (2 α₁) + Σ_p V₀ W(F) − f_ext·Δφ
+//! ```
+//!
+//! and Π is the merit function of the line search; det F ≤ 0 is refused as Π = +∞.
+//!
+//! **4. Newton's method** ([`solver::newton()`]) solves R = 0 on the free degrees of freedom, and GMRES ([`solver::gmres()`]) the linear
+//! systems K d = −R. The product with K is applied particle by particle and never assembled (30), (34), with δF = Σ_J u_J ⊗ ∇N_J:
+//!
+//! ```text
+//! K u = α₁ M̃ u                        inertia
+//!     + Σ_p V₀ (δF S) ∇N_I            geometric
+//!     + Σ_p V₀ F [ℂ : Fᵀ δF] ∇N_I     material
+//!     + Σ_Γ A p δ(J F⁻ᵀ) 𝐍 N_I        follower pressure
+//! ```
+//!
+//! The blocks of K on its diagonal, inverted, are the preconditioner. They are where the tangent is *B-free* (34), (37), (38): second-order
+//! tensors ℂmat take the place of Voigt's matrices BᵀDB,
+//!
+//! ```text
+//! K_IJ = α₁ M̃_IJ I + Σ_p V₀ { F ℂmat{∇N_I, ∇N_J} Fᵀ + (∇N_I · S ∇N_J) I },      ℂmat{v, b} a = [ℂ : (a ⊗ b)] v
+//! ```
+//!
+//! A law freezes all of this at one state ([`material::FrozenTangent`]). For the paper's law, [`material::NeoHookean::ciarlet`] (39):
+//!
+//! ```text
+//! W = Λ/4 (J² − 1) − (Λ/2 + G) ln J + G tr E          S = Λ/2 (J² − 1) C⁻¹ + G (I − C⁻¹)
+//! ℂmat{v,b} = Λ J² (C⁻¹v ⊗ C⁻¹b) − q (C⁻¹b·v) C⁻¹ − q (C⁻¹b ⊗ C⁻¹v),      q = Λ/2 (J² − 1) − G
+//! ```
+//!
+//! **5. To the particles** ([`mechanics::transfer::Moved`]) (45), (50)–(52):
+//!
+//! ```text
+//! a_p += Σ_I N_I (α₁ Δφ − α₂ vₙ − (α₃+1) aₙ)_I        x_p += Σ_I N_I Δφ_I
+//! v_p += Σ_I N_I (α₄ Δφ + (α₅−1) vₙ + α₆ aₙ)_I        F_p  = ΔF Fₙ
+//! ```
+//!
+//! Up to here nothing has touched the particles: a step that fails leaves them as they were, and
+//! [`simulation::Simulation::advance`] repeats it with half of Δt.
+//!
+//! # The tangent is checked, term by term
+//!
+//! The residual is generic over its number type ([`scalar::Real`]). With dual numbers Δφ + ε u it gives the derivative of R in the
+//! direction u, to rounding, from the code that computes R. [`mechanics::residual::Carry`] says which occurrences of Δφ keep
+//! their ε: the F on the left of F S alone gives the geometric term, the F inside S alone the material term
+//! ([`mechanics::tangent::Term`]). So each formula of K is compared with a derivative that knows nothing of it
+//! ([`mechanics::residual::Equilibrium::check_tangent`], and the package `verification`).
+//!
+//! # Where to begin
+//!
+//! | to | read |
+//! |---|---|
+//! | run a scene from JSON | [`scene::read_file`], [`scene::Scene::build`], [`simulation::Simulation::advance`], [`output::Recorder`] |
+//! | write a law | [`material::Law`], or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
+//! | write a shape function | [`approximation::ShapeFunction`], or [`approximation::Separable`] for a product |
+//! | follow the loop over particles | [`mechanics::sweep`] |
+//! | use the solver for something else | [`solver::NonlinearProblem`], [`solver::LinearOperator`] |
 
 pub mod approximation;
 pub mod causes;

@@ -120,7 +120,7 @@ impl<S: Separable> ShapeFunction for S {
     }
 }
 
-/// The list of families. A word here makes a family known to scenes and to every check.
+/// The list of families. A word here makes a family a variant of [`Approximation`]; CONTRIBUTING.md says what else it touches.
 macro_rules! approximations {
     ($($family:ident),*) => {
         /// Any of the shipped shape functions.

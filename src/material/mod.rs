@@ -123,7 +123,7 @@ pub(crate) fn embed<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, 3> {
     Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { T::zero() })
 }
 
-/// The list of laws. A word here makes a law known to scenes and to every check.
+/// The list of laws. A word here makes a law a variant of [`Material`]; CONTRIBUTING.md says what else a shipped law touches.
 macro_rules! materials {
     ($($law:ident),*) => {
         /// Any of the shipped laws.

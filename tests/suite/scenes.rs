@@ -540,7 +540,7 @@ fn the_schema_is_up_to_date_and_documents_every_key() {
         std::fs::write(&path, serde_json::to_string_pretty(&schema).unwrap() + "\n").unwrap();
     }
     let stored: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-    assert_eq!(stored, schema, "renew it: BFREE_WRITE_SCHEMA=1 cargo test --test scenes schema");
+    assert_eq!(stored, schema, "renew it: BFREE_WRITE_SCHEMA=1 cargo test --release --test suite schema");
 
     let types = schema["$defs"].as_object().unwrap().iter().map(|(name, schema)| (name.as_str(), schema));
     for (name, schema) in types.chain([("Scene", &schema)]) {
