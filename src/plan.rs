@@ -25,11 +25,24 @@ pub struct TermUse {
     pub why: String,
 }
 
+/// When in a step an array lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lifetime {
+    /// All the time.
+    Step,
+    /// While Newton's method runs.
+    Solve,
+    /// While the particles are updated.
+    Update,
+}
+
 /// An array and its bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrayUse {
     /// What it holds.
     pub name: &'static str,
+    /// When it lives.
+    pub lifetime: Lifetime,
     /// Bytes.
     pub bytes: u64,
 }
@@ -96,7 +109,7 @@ pub struct Plan {
     pub unknowns: usize,
     /// Terms of the residual and parts of the step.
     pub terms: Vec<TermUse>,
-    /// The large arrays that live at the same time.
+    /// The large arrays.
     pub arrays: Vec<ArrayUse>,
     /// What was assumed about loaded surfaces.
     pub surfaces: Vec<SurfaceUse>,
@@ -125,9 +138,12 @@ impl Plan {
         })
     }
 
-    /// Bytes of all arrays.
+    /// The most bytes that arrays hold at one time.
     pub fn bytes(&self) -> u64 {
-        self.arrays.iter().map(|array| array.bytes).sum()
+        let of = |lifetime: Lifetime| -> u64 {
+            self.arrays.iter().filter(|array| array.lifetime == lifetime).map(|array| array.bytes).sum()
+        };
+        of(Lifetime::Step) + of(Lifetime::Solve).max(of(Lifetime::Update))
     }
 }
 
@@ -168,15 +184,22 @@ fn arrays<const D: usize, L: Law, A>(
         Krylov::Gmres { restart } => restart + 1,
         Krylov::ConjugateGradient => 4,
     };
-    let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
+    let array = |name, lifetime, bytes: usize| ArrayUse { name, lifetime, bytes: bytes as u64 };
+    let frozen = frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping);
+    // The update interpolates x and H block by block, and then puts them into the order of the particles.
+    let updated = 2 * (vector + tensor + size_of::<usize>());
     vec![
-        array("particles: x, v, a, H, volume, mass, body", particles * (3 * vector + tensor + 2 * 8 + 4)),
-        array("particles: state after the step", particles * (3 * vector + tensor)),
-        array("shape functions: N, ∇N and their nodes", supports.bytes()),
-        array("frozen tangent", frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping)),
-        array("preconditioner: diagonal blocks", nodes * tensor),
-        array("Krylov vectors", nodes * vector * krylov_vectors),
-        array("other nodal fields: v, a, loads, residuals, Δφ", nodes * (12 * vector + 8)),
+        array(
+            "particles: x, v, a, H, volume, mass, body",
+            Lifetime::Step,
+            particles * (3 * vector + tensor + 2 * 8 + 4),
+        ),
+        array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes()),
+        array("nodal fields: v, a, loads, residuals, Δφ", Lifetime::Step, nodes * (12 * vector + 8)),
+        array("frozen tangent", Lifetime::Solve, frozen),
+        array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor),
+        array("Krylov vectors", Lifetime::Solve, nodes * vector * krylov_vectors),
+        array("particles: state after the step", Lifetime::Update, particles * updated),
     ]
 }
 
@@ -206,7 +229,15 @@ impl Display for Plan {
         for surface in &self.surfaces {
             writeln!(f, "  surface: {surface}")?;
         }
-        write!(f, "memory        {}", readable(self.bytes()))?;
-        self.arrays.iter().try_for_each(|array| write!(f, "\n  {:>10}  {}", readable(array.bytes), array.name))
+        write!(f, "memory        {} at most at one time", readable(self.bytes()))?;
+        for array in &self.arrays {
+            let when = match array.lifetime {
+                Lifetime::Step => "",
+                Lifetime::Solve => " (while solving)",
+                Lifetime::Update => " (while updating)",
+            };
+            write!(f, "\n  {:>10}  {}{when}", readable(array.bytes), array.name)?;
+        }
+        Ok(())
     }
 }

@@ -9,9 +9,10 @@ use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
 use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::tangent::frozen_bytes;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{GmresSettings, NonlinearProblem, gmres};
@@ -121,15 +122,9 @@ impl Study {
         let difference = distance(&by_matrix, &free) / norm(&free);
         self.report.push(&["product, matrix - matrix-free", &case], difference, Bound::AtMost(ENTRIES));
 
-        // node, N, ∇N of every pair, and the frozen tangent of every particle
-        let pair = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
         let particles = simulation.particles.len();
-        let frozen = match law {
-            Material::NeoHookean(_) => size_of::<<NeoHookean as Law>::Frozen<f64, D>>(),
-            Material::StVenantKirchhoff(_) => size_of::<<StVenantKirchhoff as Law>::Frozen<f64, D>>(),
-        };
-        let pairs: usize = (0..particles).map(|p| prepared.supports.of(p).count()).sum();
-        let free_bytes = pairs * pair + particles * frozen;
+        let lumping = simulation.settings.lumping;
+        let free_bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, lumping);
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");
         let (spent, saved) = (pattern_seconds + b_free_seconds - freeze_seconds, free_seconds - matrix_seconds);
