@@ -32,7 +32,7 @@ pub(super) fn block<const D: usize>(
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
     keys: &[Key],
-) -> Result<(Block<D>, Vec<bool>), (usize, ApproximationError)> {
+) -> Result<(Block, Vec<bool>), (usize, ApproximationError)> {
     let mut scratch = AxisWeights::default();
     let mut weights: Vec<[f64; 2]> = Vec::new();
     let mut along: Vec<[Along; D]> = Vec::with_capacity(keys.len());
@@ -61,16 +61,18 @@ pub(super) fn block<const D: usize>(
             high[k] = high[k].max(axes[k].end());
         }
     }
-    let mut size = [1; 3];
+    let (mut size, mut origin) = ([1; 3], [0; 3]);
     for k in 0..D {
         size[k] = (high[k] - low[k]) as usize;
+        origin[k] = low[k];
     }
     let mut built = Block {
+        dimension: D,
         first_group: 0,
         groups: Vec::new(),
         weights: Vec::new(),
         particles: Vec::new(),
-        origin: low,
+        origin,
         size,
         nodes: Vec::new(),
         places: Vec::new(),
@@ -114,7 +116,7 @@ fn window<const D: usize>(along: &[[Along; D]], k: usize) -> [u32; 2] {
 
 /// Appends a group and marks the nodes it sees.
 fn push<const D: usize>(
-    block: &mut Block<D>,
+    block: &mut Block,
     keys: &[Key],
     along: &[[Along; D]],
     weights: &[[f64; 2]],
@@ -146,7 +148,7 @@ fn push<const D: usize>(
 }
 
 /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 for some particle of the last group.
-fn mark<const D: usize>(block: &Block<D>, along: &[[Along; D]], weights: &[[f64; 2]], active: &mut [bool]) {
+fn mark<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]], active: &mut [bool]) {
     for (lane, axes) in along.iter().enumerate() {
         let list = |k: usize| &weights[axes[k].start..axes[k].start + axes[k].width as usize];
         let smallest: f64 = (0..D).map(|k| list(k).iter().fold(f64::INFINITY, |low, w| low.min(w[0].abs()))).product();
@@ -165,7 +167,7 @@ fn mark<const D: usize>(block: &Block<D>, along: &[[Along; D]], weights: &[[f64;
                 }
             }
         } else {
-            block.entries(block.groups.len() - 1, lane, |place, _, _| active[place] = true);
+            block.entries::<D>(block.groups.len() - 1, lane, |place, _, _| active[place] = true);
         }
     }
 }

@@ -1,92 +1,100 @@
-//! The product with tangents in closed form, all eight particles of a group at once.
+//! Tangents in closed form, eight particles side by side.
 
-use super::compiled;
-use super::kernel::{Quadratic, Terms, gather, pair, scatter, scatter_blocks};
-use super::lanes::{LANES, Lanes, WithLanes};
+use super::kernel::of_lane;
+use super::lanes::{LANES, Lanes};
+use super::of_block;
 use super::tiled::{Block, Tiled, first_error, keep_first};
-use super::waves::{self, Scratch};
+use super::waves;
 use crate::material::ClosedTangent;
 use crate::tensor::{Tensor, Vector};
 
-/// Tangents of all particles in closed form: for each group its numbers, a row of eight lanes each.
+/// Tangents of all particles in closed form, for the supports they were made with.
 #[derive(Clone, Debug)]
-pub struct ClosedTangents<const D: usize> {
+pub struct ClosedTangents<const D: usize>(Numbers);
+
+/// For each group its numbers, a row of eight lanes each.
+#[derive(Clone, Debug)]
+pub(super) struct Numbers {
     numbers: Vec<[f64; LANES]>,
-    /// Whether the laws have the term b L c.
-    pub(super) both: bool,
-    /// Whether there is a consistent inertia, q = (weight of the particle) u.
-    pub(super) inertia: bool,
+    pub(super) form: Form,
 }
 
-/// Rows of a group: A, B, κ, q, then b and c, then the inertia.
-const fn rows(dimension: usize, both: bool, inertia: bool) -> usize {
-    let symmetric = dimension * (dimension + 1) / 2;
-    dimension * dimension + symmetric + 2 + if both { 2 * symmetric } else { 0 } + inertia as usize
-}
-
-/// Writes the entries of a closed tangent, in the order of the rows.
-fn write<const D: usize>(tangent: &ClosedTangent<f64, D>, both: bool, inertia: Option<f64>, mut put: impl FnMut(f64)) {
-    let upper = |a: &[[f64; D]; D], put: &mut dyn FnMut(f64)| {
-        for k in 0..D {
-            for i in 0..=k {
-                put(a[i][k]);
-            }
-        }
-    };
-    tangent.a.as_flattened().iter().for_each(|&x| put(x));
-    upper(&tangent.right, &mut put);
-    put(tangent.bulk);
-    put(tangent.q);
-    if both {
-        // Beside laws that have the term, those that have not take b = c = 0.
-        let [b, c] = tangent.both.unwrap_or([[[0.0; D]; D]; 2]);
-        upper(&b, &mut put);
-        upper(&c, &mut put);
-    }
-    inertia.into_iter().for_each(put);
-}
-
-/// The rows of a group, read one after the other.
-struct Rows<'a, S> {
-    s: S,
-    rows: &'a [[f64; LANES]],
-}
-
-impl<S: Lanes> Rows<'_, S> {
+impl Numbers {
     #[inline(always)]
-    fn next(&mut self) -> S::N {
-        match self.rows.split_first() {
-            Some((row, behind)) => {
-                self.rows = behind;
-                self.s.load(row)
-            }
-            None => self.s.zero(),
-        }
+    pub(super) fn of_group(&self, group: usize, rows: usize) -> &[[f64; LANES]] {
+        &self.numbers[group * rows..(group + 1) * rows]
     }
 }
 
-/// The tangent from its rows.
-#[inline(always)]
-fn read<S: Lanes, const D: usize>(both: bool, rows: &mut Rows<'_, S>) -> ClosedTangent<S::N, D> {
-    let first = rows.next();
-    let mut a = [[first; D]; D];
-    for at in 1..D * D {
-        a[at / D][at % D] = rows.next();
+/// Which numbers there are: A, B, κ, q, then b and c, then the weight of the inertia.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Form {
+    /// Whether the laws have the term b L c.
+    pub both: bool,
+    /// Whether there is a consistent inertia, q = (weight of the particle) u.
+    pub inertia: bool,
+}
+
+impl Form {
+    /// Rows of a group.
+    pub(super) const fn rows(self, dimension: usize) -> usize {
+        let symmetric = dimension * (dimension + 1) / 2;
+        let both = if self.both { 2 * symmetric } else { 0 };
+        dimension * dimension + symmetric + 2 + both + self.inertia as usize
     }
-    let right = symmetric(first, rows);
-    let (bulk, q) = (rows.next(), rows.next());
-    let both = if both { Some([symmetric(first, rows), symmetric(first, rows)]) } else { None };
-    ClosedTangent { a, right, bulk, q, both }
+
+    /// Puts the entries of a tangent, in the order of the rows.
+    fn write<const D: usize>(self, tangent: &ClosedTangent<f64, D>, weight: f64, mut put: impl FnMut(f64)) {
+        let upper = |a: &[[f64; D]; D], put: &mut dyn FnMut(f64)| {
+            for k in 0..D {
+                for i in 0..=k {
+                    put(a[i][k]);
+                }
+            }
+        };
+        tangent.a.as_flattened().iter().for_each(|&x| put(x));
+        upper(&tangent.right, &mut put);
+        put(tangent.bulk);
+        put(tangent.q);
+        if self.both {
+            // Beside laws that have the term, those that have not take b = c = 0.
+            let [b, c] = tangent.both.unwrap_or([[[0.0; D]; D]; 2]);
+            upper(&b, &mut put);
+            upper(&c, &mut put);
+        }
+        if self.inertia {
+            put(weight);
+        }
+    }
+
+    /// The tangent from the rows of a group.
+    #[inline(always)]
+    pub(super) fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[f64; LANES]]) -> ClosedTangent<S::N, D> {
+        let mut at = 0;
+        let mut a = [[s.zero(); D]; D];
+        for i in 0..D {
+            for k in 0..D {
+                a[i][k] = s.load(&rows[at]);
+                at += 1;
+            }
+        }
+        let right = symmetric(s, rows, &mut at);
+        let (bulk, q) = (s.load(&rows[at]), s.load(&rows[at + 1]));
+        at += 2;
+        let both = if self.both { Some([symmetric(s, rows, &mut at), symmetric(s, rows, &mut at)]) } else { None };
+        ClosedTangent { a, right, bulk, q, both }
+    }
 }
 
 /// A symmetric tensor from its upper triangle, column by column.
 #[inline(always)]
-fn symmetric<S: Lanes, const D: usize>(any: S::N, rows: &mut Rows<'_, S>) -> [[S::N; D]; D] {
-    let mut b = [[any; D]; D];
+fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], at: &mut usize) -> [[S::N; D]; D] {
+    let mut b = [[s.zero(); D]; D];
     for k in 0..D {
         for i in 0..=k {
-            b[i][k] = rows.next();
+            b[i][k] = s.load(&rows[*at]);
             b[k][i] = b[i][k];
+            *at += 1;
         }
     }
     b
@@ -95,12 +103,7 @@ fn symmetric<S: Lanes, const D: usize>(any: S::N, rows: &mut Rows<'_, S>) -> [[S
 impl<const D: usize> ClosedTangents<D> {
     /// Bytes of all arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.numbers.as_slice())
-    }
-
-    /// Rows of a group.
-    fn rows(&self) -> usize {
-        rows(D, self.both, self.inertia)
+        size_of_val(self.0.numbers.as_slice())
     }
 }
 
@@ -113,7 +116,8 @@ impl<const D: usize> Tiled<D> {
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
         point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
     ) -> Result<ClosedTangents<D>, E> {
-        let rows = rows(D, both, inertia.is_some());
+        let form = Form { both, inertia: inertia.is_some() };
+        let rows = form.rows(D);
         let mut numbers = vec![[0.0; LANES]; self.groups() * rows];
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = numbers.as_mut_slice();
@@ -122,14 +126,14 @@ impl<const D: usize> Tiled<D> {
             chunks.push(chunk);
             rest = behind;
         }
-        let results = waves::gathered(self, field, chunks, |block, chunk, stored| {
+        let results = waves::gathered(self, field, chunks, |block, chunk, gathered| {
             let mut failure = None;
             block.each(|group, lane, p| {
-                let (_, gradient) = stored[group].of_lane(lane);
+                let (_, gradient) = of_lane::<f64, D>(&gathered[group], lane);
                 match point(p, gradient) {
                     Ok(tangent) => {
                         let mut places = chunk[group * rows..(group + 1) * rows].iter_mut();
-                        write(&tangent, both, inertia.map(|weight| weight(p)), |x| {
+                        form.write(&tangent, inertia.map_or(0.0, |weight| weight(p)), |x| {
                             if let Some(row) = places.next() {
                                 row[lane] = x;
                             }
@@ -141,110 +145,31 @@ impl<const D: usize> Tiled<D> {
             failure.map_or(Ok(()), Err)
         });
         first_error(results)?;
-        Ok(ClosedTangents { numbers, both, inertia: inertia.is_some() })
+        Ok(ClosedTangents(Numbers { numbers, form }))
     }
 
     /// `out_I += Σ_p (δP_p) ∇_n N_I + q_p N_I`, the product of the tangents with `field`.
     pub(super) fn product(&self, frozen: &ClosedTangents<D>, field: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let work = |block: &Block<D>, scratch: &mut Scratch<D>, buffer: &mut [f64]| {
-            scratch.fill(block, field);
-            compiled::product(block, frozen, &scratch.nodal, buffer);
-            None::<std::convert::Infallible>
-        };
-        waves::each_block(self, D, out, work, waves::add, |never| match never {});
+        waves::run(self, Some(field), out, &|block, nodal, buffer| of_block::product(block, nodal, buffer, &frozen.0));
     }
 
     /// `out_I += Σ_p` the block of I with itself, inertia included.
     pub(super) fn add_blocks(&self, frozen: &ClosedTangents<D>, out: &mut [Tensor<f64, D>]) {
-        let work = |block: &Block<D>, _: &mut Scratch<D>, buffer: &mut [f64]| {
-            compiled::diagonal_blocks(block, frozen, buffer);
-            None::<std::convert::Infallible>
-        };
-        let add = |block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Tensor<f64, D>]| {
+        self.blocks_by(out, &|block, buffer| of_block::diagonal(block, buffer, &frozen.0));
+    }
+
+    /// Adds the boxes of D×D blocks that `sums` fills.
+    pub(super) fn blocks_by(&self, out: &mut [Tensor<f64, D>], sums: &(dyn Fn(&Block, &mut [f64]) + Sync)) {
+        let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [Tensor<f64, D>]| {
             block.add(buffer, D * D, first, out, |sum, rows| {
                 *sum += Tensor::from_fn(|i, k| rows[i * D + k]);
             });
         };
-        waves::each_block(self, D * D, out, work, add, |never| match never {});
+        waves::each_block(self, D * D, out, &|block, _, buffer| sums(block, buffer), &add);
     }
 
     /// Bytes that the tangents of all particles take in closed form.
     pub(super) fn closed_bytes(&self, both: bool, inertia: bool) -> usize {
-        self.groups() * rows(D, both, inertia) * size_of::<[f64; LANES]>()
-    }
-}
-
-/// The diagonal blocks from the particles of one block of cells.
-pub(super) struct DiagonalBlocks<'a, const D: usize> {
-    pub block: &'a Block<D>,
-    pub frozen: &'a ClosedTangents<D>,
-    pub buffer: &'a mut [f64],
-}
-
-impl<const D: usize> WithLanes for DiagonalBlocks<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        let count = self.frozen.rows();
-        let mut quadratic = Quadratic::<D>::zero();
-        for group in 0..self.block.groups() {
-            let first = (self.block.first_group + group) * count;
-            let numbers = &self.frozen.numbers[first..first + count];
-            let tangent: ClosedTangent<S::N, D> = read(self.frozen.both, &mut Rows { s, rows: numbers });
-            for l in 0..D {
-                for k in 0..=l {
-                    let (one, other) = (tangent.unit_block(s, k, l), tangent.unit_block(s, l, k));
-                    for i in 0..D {
-                        for j in 0..D {
-                            let sum = if k < l { s.add(one[i][j], other[i][j]) } else { one[i][j] };
-                            s.store(sum, &mut quadratic.bilinear[pair(k, l)][i][j]);
-                        }
-                    }
-                }
-            }
-            if self.frozen.inertia {
-                quadratic.mass = numbers[count - 1];
-            }
-            scatter_blocks(s, &self.block.window(group), &quadratic, self.buffer);
-        }
-    }
-}
-
-/// Gather, σ = V₀ δP F_nᵀ and q = (inertia) u, and scatter of the groups of one block, one after the other.
-pub(super) struct Product<'a, const D: usize, const BOTH: bool, const INERTIA: bool> {
-    pub block: &'a Block<D>,
-    pub frozen: &'a ClosedTangents<D>,
-    pub nodal: &'a [f64],
-    pub buffer: &'a mut [f64],
-}
-
-impl<const D: usize, const BOTH: bool, const INERTIA: bool> Terms for Product<'_, D, BOTH, INERTIA> {
-    const VALUE: bool = INERTIA;
-    const GRADIENT: bool = true;
-    const MAGNITUDE: bool = false;
-}
-
-impl<const D: usize, const BOTH: bool, const INERTIA: bool> WithLanes for Product<'_, D, BOTH, INERTIA> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        let count = rows(D, BOTH, INERTIA);
-        for group in 0..self.block.groups() {
-            let window = self.block.window(group);
-            let mut at = gather::<S, D, INERTIA>(s, &window, self.nodal);
-            let first = (self.block.first_group + group) * count;
-            let numbers = &self.frozen.numbers[first..first + count];
-            let tangent: ClosedTangent<S::N, D> = read(BOTH, &mut Rows { s, rows: numbers });
-            at.gradient = tangent.product(s, &at.gradient);
-            if INERTIA {
-                let weight = s.load(&numbers[count - 1]);
-                for value in &mut at.value {
-                    *value = s.mul(weight, *value);
-                }
-            }
-            scatter::<S, Self, D>(s, &window, &at, self.buffer);
-        }
+        self.groups() * Form { both, inertia }.rows(D) * size_of::<[f64; LANES]>()
     }
 }

@@ -62,58 +62,53 @@ pub(super) struct Gathered<N, const D: usize> {
     pub gradient: [[N; D]; D],
 }
 
-/// The same in memory, lane after lane.
-pub(super) struct Stored<const D: usize> {
-    pub value: [[f64; LANES]; D],
-    pub gradient: [[[f64; LANES]; D]; D],
+/// u and L of a group in memory: the components of u, then those of L by rows, a lane a particle; the rest is not used.
+pub(super) type Rows = [[f64; LANES]; 12];
+
+/// Writes u and L.
+#[inline(always)]
+pub(super) fn store<S: Lanes, const D: usize>(s: S, from: &Gathered<S::N, D>, rows: &mut Rows) {
+    for c in 0..D {
+        s.store(from.value[c], &mut rows[c]);
+        for k in 0..D {
+            s.store(from.gradient[c][k], &mut rows[D + c * D + k]);
+        }
+    }
 }
 
-impl<const D: usize> Stored<D> {
-    pub(super) fn zero() -> Self {
-        Self { value: [[0.0; LANES]; D], gradient: [[[0.0; LANES]; D]; D] }
-    }
-
-    #[inline(always)]
-    pub(super) fn of<S: Lanes>(s: S, from: &Gathered<S::N, D>) -> Self {
-        let mut stored = Self::zero();
-        for c in 0..D {
-            s.store(from.value[c], &mut stored.value[c]);
-            for k in 0..D {
-                s.store(from.gradient[c][k], &mut stored.gradient[c][k]);
-            }
-        }
-        stored
-    }
-
-    /// u and L of one particle.
-    #[inline(always)]
-    pub(super) fn of_lane<T: Real>(&self, lane: usize) -> (Vector<T, D>, Tensor<T, D>) {
-        let value = Vector::from_fn(|i, _| T::lit(self.value[i][lane]));
-        (value, Tensor::from_fn(|i, k| T::lit(self.gradient[i][k][lane])))
-    }
-
-    /// Sets q and σ of one particle.
-    #[inline(always)]
-    pub(super) fn set_lane<T: Real>(&mut self, lane: usize, value: &Vector<T, D>, gradient: &Tensor<T, D>) {
-        for i in 0..D {
-            self.value[i][lane] = value[i].value();
-            for k in 0..D {
-                self.gradient[i][k][lane] = gradient[(i, k)].value();
-            }
+/// Reads u and L.
+#[inline(always)]
+pub(super) fn load<S: Lanes, const D: usize>(s: S, rows: &Rows) -> Gathered<S::N, D> {
+    let mut loaded = Gathered { value: [s.zero(); D], gradient: [[s.zero(); D]; D] };
+    for c in 0..D {
+        loaded.value[c] = s.load(&rows[c]);
+        for k in 0..D {
+            loaded.gradient[c][k] = s.load(&rows[D + c * D + k]);
         }
     }
+    loaded
+}
 
-    #[inline(always)]
-    pub(super) fn load<S: Lanes>(&self, s: S) -> Gathered<S::N, D> {
-        let zero = s.zero();
-        let mut loaded = Gathered { value: [zero; D], gradient: [[zero; D]; D] };
-        for c in 0..D {
-            loaded.value[c] = s.load(&self.value[c]);
-            for k in 0..D {
-                loaded.gradient[c][k] = s.load(&self.gradient[c][k]);
-            }
+/// u and L of one particle.
+#[inline(always)]
+pub(super) fn of_lane<T: Real, const D: usize>(rows: &Rows, lane: usize) -> (Vector<T, D>, Tensor<T, D>) {
+    let value = Vector::from_fn(|i, _| T::lit(rows[i][lane]));
+    (value, Tensor::from_fn(|i, k| T::lit(rows[D + i * D + k][lane])))
+}
+
+/// Sets q and σ of one particle.
+#[inline(always)]
+pub(super) fn set_lane<T: Real, const D: usize>(
+    rows: &mut Rows,
+    lane: usize,
+    value: &Vector<T, D>,
+    gradient: &Tensor<T, D>,
+) {
+    for i in 0..D {
+        rows[i][lane] = value[i].value();
+        for k in 0..D {
+            rows[D + i * D + k][lane] = gradient[(i, k)].value();
         }
-        loaded
     }
 }
 
@@ -256,7 +251,9 @@ pub(super) fn scatter<S: Lanes, M: Terms, const D: usize>(
     from: &Gathered<S::N, D>,
     out: &mut [f64],
 ) {
-    let from = Stored::of(s, from);
+    let mut rows = [[0.0; LANES]; 12];
+    store(s, from, &mut rows);
+    let from = rows;
     let rows = window.width[1] * window.width[2];
     for chunk in 0..rows.div_ceil(LANES) {
         let pairs = Pairs::<S, D>::new::<M>(s, window, chunk * LANES);
@@ -337,7 +334,7 @@ fn scatter_tile<S: Lanes, M: Terms, const D: usize, const W: usize>(
     window: &Window<'_>,
     start: usize,
     pairs: &Pairs<S, D>,
-    from: &Stored<D>,
+    from: &Rows,
     out: &mut [f64],
 ) {
     let zero = s.zero();
@@ -350,12 +347,12 @@ fn scatter_tile<S: Lanes, M: Terms, const D: usize, const W: usize>(
             // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z
             if M::GRADIENT {
                 for k in 1..D {
-                    across[c] = s.mul_add(s.splat(from.gradient[c][k][p]), pairs.products[k][p], across[c]);
+                    across[c] = s.mul_add(s.splat(from[D + c * D + k][p]), pairs.products[k][p], across[c]);
                 }
-                along[c] = s.mul(s.splat(from.gradient[c][0][p]), pairs.products[0][p]);
+                along[c] = s.mul(s.splat(from[D + c * D][p]), pairs.products[0][p]);
             }
             if M::VALUE {
-                across[c] = s.mul_add(s.splat(from.value[c][p]), pairs.products[0][p], across[c]);
+                across[c] = s.mul_add(s.splat(from[c][p]), pairs.products[0][p], across[c]);
             }
         }
         for x in 0..W {
@@ -375,16 +372,16 @@ fn scatter_tile<S: Lanes, M: Terms, const D: usize, const W: usize>(
 const MOST_PAIRS: usize = 6;
 
 /// The quadratic form of one group: B(∇N, ∇N) + m N² I, a lane a particle.
-pub(super) struct Quadratic<const D: usize> {
-    /// B(e_k, e_l) + B(e_l, e_k) for k < l, B(e_k, e_k) for k = l, by `pair`.
-    pub bilinear: [[[[f64; LANES]; D]; D]; MOST_PAIRS],
+pub(super) struct Quadratic {
+    /// B(e_k, e_l) + B(e_l, e_k) for k < l, B(e_k, e_k) for k = l, by `pair`; the first D rows and columns.
+    pub bilinear: [[[[f64; LANES]; 3]; 3]; MOST_PAIRS],
     /// m
     pub mass: [f64; LANES],
 }
 
-impl<const D: usize> Quadratic<D> {
+impl Quadratic {
     pub(super) fn zero() -> Self {
-        Self { bilinear: [[[[0.0; LANES]; D]; D]; MOST_PAIRS], mass: [0.0; LANES] }
+        Self { bilinear: [[[[0.0; LANES]; 3]; 3]; MOST_PAIRS], mass: [0.0; LANES] }
     }
 }
 
@@ -399,12 +396,7 @@ pub(super) const fn pair(k: usize, l: usize) -> usize {
 /// With ∇N = (N_x' P_x, N_x P_y, N_x P_z), P_x = N_y N_z, …, row i of the block is
 /// N_x'² B_xx P_x P_x + N_x N_x' (B_xy P_x P_y + B_xz P_x P_z) + N_x² (B_yy P_y P_y + B_yz P_y P_z + B_zz P_z P_z + m P_x P_x e_i).
 #[inline(always)]
-pub(super) fn scatter_blocks<S: Lanes, const D: usize>(
-    s: S,
-    window: &Window<'_>,
-    from: &Quadratic<D>,
-    out: &mut [f64],
-) {
+pub(super) fn scatter_blocks<S: Lanes, const D: usize>(s: S, window: &Window<'_>, from: &Quadratic, out: &mut [f64]) {
     let rows = window.width[1] * window.width[2];
     for chunk in 0..rows.div_ceil(LANES) {
         let pairs = Pairs::<S, D>::new::<Signed>(s, window, chunk * LANES);
@@ -432,7 +424,7 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
     window: &Window<'_>,
     start: usize,
     pairs: &Pairs<S, D>,
-    from: &Quadratic<D>,
+    from: &Quadratic,
     out: &mut [f64],
 ) {
     let zero = s.zero();
@@ -503,8 +495,9 @@ mod tests {
             let at = gather::<S, 3, true>(s, &window, self.1);
             let mut out = vec![0.0; self.1.len() + LANES];
             scatter::<S, Signed, 3>(s, &window, &at, &mut out);
-            let stored = Stored::of(s, &at);
-            let gathered = stored.gradient.as_flattened().iter().chain(&stored.value).flatten().copied().collect();
+            let mut rows = [[0.0; LANES]; 12];
+            store(s, &at, &mut rows);
+            let gathered = rows[3..].iter().chain(&rows[..3]).flatten().copied().collect();
             (gathered, out)
         }
     }

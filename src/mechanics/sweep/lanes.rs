@@ -201,7 +201,7 @@ mod x86 {
         }
         #[inline(always)]
         fn transpose(self, rows: [Self::N; LANES]) -> [Self::N; LANES] {
-            let rows: [[f64; LANES]; LANES] = rows.map(|row| cast(row));
+            let rows: [[f64; LANES]; LANES] = rows.map(cast);
             std::array::from_fn(|i| cast(std::array::from_fn::<f64, LANES, _>(|k| rows[k][i])))
         }
         #[inline(always)]

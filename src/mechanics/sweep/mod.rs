@@ -1,15 +1,15 @@
 //! The loop over particles: gather → point → scatter. The only place that knows threads and vector instructions.
 //!
-//! Two ways with one answer: [`plain`] is the specification, and the way of shape functions that are no products;
-//! [`tiled`] is for products, N = Π_k N_k. Both cut the particles into blocks that do not depend on the number of threads.
+//! Two ways with one answer: `plain` is the specification, and the way of shape functions that are no products;
+//! `tiled` is for products, N = Π_k N_k. Both cut the particles into blocks that do not depend on the number of threads.
 //! A block gathers from its own nodes, scatters into its own buffer, and the buffers are added in the order of the blocks:
 //! the same bits for any number of threads.
 
 mod builder;
 mod closed;
-mod compiled;
 mod kernel;
 mod lanes;
+mod of_block;
 mod order;
 mod plain;
 mod tiled;

@@ -59,5 +59,5 @@ pub(super) fn block<const D: usize>(key: &Key) -> u64 {
 
 /// Whether `next` is the cell after `cell` along x in the same row of a block.
 pub(super) fn follows<const D: usize>(cell: &Key, next: &Key) -> bool {
-    next.0 == cell.0 + 1 && next.0 % edge(D) != 0
+    next.0 == cell.0 + 1 && !next.0.is_multiple_of(edge(D))
 }

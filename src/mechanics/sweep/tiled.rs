@@ -4,13 +4,13 @@
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
 use super::builder::block;
-use super::compiled::{self, Sum};
-use super::kernel::{Quadratic, Window, pair};
+use super::kernel::{Quadratic, Rows, Window, of_lane, pair, set_lane};
 use super::lanes::LANES;
+use super::of_block;
 use super::order::{self, Key};
-use super::waves::{self, Scratch};
+use super::waves;
 use super::{Magnitude, SupportError, infallible, ordered};
-use crate::approximation::{self, ApproximationError, Separable, ShapeFunction, Support};
+use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
@@ -18,18 +18,21 @@ use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use std::any::TypeId;
 use std::ops::AddAssign;
+use std::sync::{Mutex, PoisonError};
 
 /// Shape functions of all particles, by axis.
 #[derive(Clone, Debug)]
 pub(super) struct Tiled<const D: usize> {
-    pub(super) blocks: Vec<Block<D>>,
+    pub(super) blocks: Vec<Block>,
     /// Slot of each particle, eight for each group: group · 8 + lane.
     slots: Vec<u32>,
 }
 
 /// A cube of cells: its groups, its box of nodes, and which of them are active.
 #[derive(Clone, Debug)]
-pub(super) struct Block<const D: usize> {
+pub(super) struct Block {
+    /// 1, 2 or 3.
+    pub(super) dimension: usize,
     /// Number of the first group, over all blocks.
     pub(super) first_group: usize,
     pub(super) groups: Vec<Group>,
@@ -38,7 +41,7 @@ pub(super) struct Block<const D: usize> {
     /// Particles of each group; the lanes behind them hold zeros.
     pub(super) particles: Vec<[u32; LANES]>,
     /// Index of the first node of the box along each axis.
-    pub(super) origin: [u32; D],
+    pub(super) origin: [u32; 3],
     /// Nodes of the box along each axis; 1 along axes that do not exist.
     pub(super) size: [usize; 3],
     /// Active numbers of the block's nodes, ascending.
@@ -70,12 +73,8 @@ impl<const D: usize> Tiled<D> {
     ) -> Result<(Self, Nodes), SupportError> {
         // The product names the axis that fails; the shape function names the whole position.
         let failure = |particle: usize, source: Option<ApproximationError>| {
-            let whole = approximation.evaluate(
-                grid,
-                &positions[particle],
-                &mut approximation::Scratch::default(),
-                &mut Support::default(),
-            );
+            let whole =
+                approximation.evaluate(grid, &positions[particle], &mut Scratch::default(), &mut Support::default());
             let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             SupportError { particle, source: whole.err().or(source).unwrap_or_else(outside) }
         };
@@ -133,7 +132,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let of_block = |block: &Block<D>| {
+        let of_block = |block: &Block| {
             size_of_val(block)
                 + size_of_val(block.groups.as_slice())
                 + size_of_val(block.weights.as_slice())
@@ -145,7 +144,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// The group and the lane of a particle: (block, group in the block, lane).
-    fn place(&self, particle: usize) -> (&Block<D>, usize, usize) {
+    fn place(&self, particle: usize) -> (&Block, usize, usize) {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);
         let block = &self.blocks[self.blocks.partition_point(|block| block.first_group <= group) - 1];
@@ -155,7 +154,7 @@ impl<const D: usize> Tiled<D> {
     pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let (block, group, lane) = self.place(particle);
         let mut entries = Vec::new();
-        block.entries(group, lane, |place, n, grad_n| {
+        block.entries::<D>(group, lane, |place, n, grad_n| {
             if let Ok(at) = block.places.binary_search(&(place as u32)) {
                 entries.push((block.nodes[at] as usize, n, grad_n));
             }
@@ -171,21 +170,7 @@ impl<const D: usize> Tiled<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
         if is_f64::<T>() {
-            let sum = match magnitude {
-                Magnitude::No => Sum::All,
-                Magnitude::Yes => Sum::Magnitudes,
-            };
-            return waves::run(self, Some(field), out, sum, |block, groups| {
-                let mut failure = None;
-                block.each(|group, lane, p| {
-                    let (value, gradient) = groups[group].of_lane(lane);
-                    match point(p, value, gradient) {
-                        Ok((force, stress)) => groups[group].set_lane(lane, &force, &stress),
-                        Err(error) => keep_first(&mut failure, p, error),
-                    }
-                });
-                failure
-            });
+            return self.assemble_lanes(field, out, magnitude, point);
         }
         let buffers = self.in_order(|block| {
             let nodal = block.boxed(field);
@@ -194,7 +179,7 @@ impl<const D: usize> Tiled<D> {
             block.each(|group, lane, p| {
                 let (value, gradient) = block.gather(group, lane, &nodal);
                 match point(p, value, gradient) {
-                    Ok((force, stress)) => block.entries(group, lane, |place, n, grad_n| {
+                    Ok((force, stress)) => block.entries::<D>(group, lane, |place, n, grad_n| {
                         let (n, grad_n) = magnitude.of(n, grad_n);
                         buffer[place] += stress * grad_n.map(T::lit) + force * T::lit(n);
                     }),
@@ -207,6 +192,34 @@ impl<const D: usize> Tiled<D> {
         Ok(())
     }
 
+    fn assemble_lanes<T: Real, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+        magnitude: Magnitude,
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+    ) -> Result<(), E> {
+        let failure = Mutex::new(None);
+        let one_by_one = |particles: &[u32], rows: &mut Rows| {
+            for (lane, &p) in particles.iter().enumerate() {
+                let (value, gradient) = of_lane(rows, lane);
+                match point(p as usize, value, gradient) {
+                    Ok((force, stress)) => set_lane(rows, lane, &force, &stress),
+                    Err(error) => {
+                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
+                        keep_first(&mut first, p as usize, error);
+                    }
+                }
+            }
+        };
+        waves::run(self, Some(field), out, &|block, nodal, buffer| match magnitude {
+            Magnitude::No => of_block::each(block, nodal, buffer, &one_by_one),
+            Magnitude::Yes => of_block::magnitudes(block, nodal, buffer, &one_by_one),
+        });
+        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        failure.map_or(Ok(()), |(_, error)| Err(error))
+    }
+
     pub(super) fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)
     where
         O: Copy + Zero + AddAssign + Send + Sync,
@@ -214,7 +227,7 @@ impl<const D: usize> Tiled<D> {
         let buffers = infallible(self.in_order(|block| {
             let mut buffer = vec![O::zero(); block.box_nodes()];
             block.each(|group, lane, p| {
-                block.entries(group, lane, |place, n, grad_n| buffer[place] += scatter(p, n, &grad_n));
+                block.entries::<D>(group, lane, |place, n, grad_n| buffer[place] += scatter(p, n, &grad_n));
             });
             Ok(buffer)
         }));
@@ -250,11 +263,11 @@ impl<const D: usize> Tiled<D> {
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
-        let results = waves::gathered(self, field, vec![(); self.blocks.len()], |block, (), stored| {
+        let results = waves::gathered(self, field, vec![(); self.blocks.len()], |block, (), gathered| {
             let mut part = Vec::with_capacity(block.groups.len() * LANES);
             let mut failure = None;
             block.each(|group, lane, p| {
-                let (value, gradient) = stored[group].of_lane(lane);
+                let (value, gradient) = of_lane(&gathered[group], lane);
                 match point(p, value, gradient) {
                     Ok(result) => part.push((p, result)),
                     Err(error) => keep_first(&mut failure, p, error),
@@ -277,10 +290,15 @@ impl<const D: usize> Tiled<D> {
 
     /// `out_I += Σ_p value(p) N_I`
     pub(super) fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
-        infallible(waves::run(self, None, out, Sum::Values, |block, groups| {
-            block.each(|group, lane, p| groups[group].set_lane(lane, &value(p), &Tensor::zeros()));
-            None
-        }));
+        let point = |particles: &[u32], rows: &mut Rows| {
+            for (lane, &p) in particles.iter().enumerate() {
+                let value = value(p as usize);
+                for i in 0..D {
+                    rows[i][lane] = value[i];
+                }
+            }
+        };
+        waves::run(self, None, out, &|block, _, buffer| of_block::spread(block, buffer, &point));
     }
 
     /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I` with B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
@@ -292,7 +310,7 @@ impl<const D: usize> Tiled<D> {
     ) {
         let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
         let quadratic = |particles: &[u32]| {
-            let mut quadratic = Quadratic::<D>::zero();
+            let mut quadratic = Quadratic::zero();
             for (lane, &p) in particles.iter().enumerate() {
                 let p = p as usize;
                 quadratic.mass[lane] = mass(p);
@@ -312,22 +330,11 @@ impl<const D: usize> Tiled<D> {
             }
             quadratic
         };
-        let work = |block: &Block<D>, _: &mut Scratch<D>, buffer: &mut [f64]| {
-            for group in 0..block.groups() {
-                compiled::quadratic(&block.window(group), &quadratic(block.particles(group)), buffer);
-            }
-            None::<std::convert::Infallible>
-        };
-        let add = |block: &Block<D>, buffer: &[f64], first: usize, out: &mut [Tensor<f64, D>]| {
-            block.add(buffer, D * D, first, out, |sum, rows| {
-                *sum += Tensor::from_fn(|i, k| rows[i * D + k]);
-            });
-        };
-        waves::each_block(self, D * D, out, work, add, |never| match never {});
+        self.blocks_by(out, &|block, buffer| of_block::quadratics(block, buffer, &quadratic));
     }
 
     /// `f` of every block, in their order; the error is that of the particle with the smallest number.
-    fn in_order<R: Send, E: Send>(&self, f: impl Fn(&Block<D>) -> Result<R, (usize, E)> + Sync) -> Result<Vec<R>, E> {
+    fn in_order<R: Send, E: Send>(&self, f: impl Fn(&Block) -> Result<R, (usize, E)> + Sync) -> Result<Vec<R>, E> {
         first_error(infallible(ordered(self.blocks.len(), |b| Ok(f(&self.blocks[b])))))
     }
 
@@ -366,7 +373,7 @@ pub(super) fn keep_first<E>(first: &mut Option<(usize, E)>, p: usize, error: E) 
     }
 }
 
-impl<const D: usize> Block<D> {
+impl Block {
     pub(super) fn groups(&self) -> usize {
         self.groups.len()
     }
@@ -387,7 +394,7 @@ impl<const D: usize> Block<D> {
     pub(super) fn window(&self, group: usize) -> Window<'_> {
         let Group { weights, first, width, lanes } = self.groups[group];
         let width = width.map(usize::from);
-        let rows = 2 * width[..D].iter().sum::<usize>();
+        let rows = 2 * width[..self.dimension].iter().sum::<usize>();
         Window {
             width,
             weights: &self.weights[weights as usize..weights as usize + rows],
@@ -398,7 +405,7 @@ impl<const D: usize> Block<D> {
     }
 
     /// Fills the box from a field on the active nodes; zero at the others.
-    pub(super) fn fill<T: Real>(&self, field: &[Vector<T, D>], nodal: &mut [f64]) {
+    pub(super) fn fill<T: Real, const D: usize>(&self, field: &[Vector<T, D>], nodal: &mut [f64]) {
         nodal.fill(0.0);
         for (&node, &place) in self.nodes.iter().zip(&self.places) {
             for c in 0..D {
@@ -424,7 +431,7 @@ impl<const D: usize> Block<D> {
         }
     }
 
-    fn boxed<T: Real>(&self, field: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
+    fn boxed<T: Real, const D: usize>(&self, field: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
         let mut nodal = vec![Vector::zeros(); self.box_nodes()];
         for (&node, &place) in self.nodes.iter().zip(&self.places) {
             nodal[place as usize] = field[node as usize];
@@ -443,7 +450,12 @@ impl<const D: usize> Block<D> {
 
     /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
     #[inline(always)]
-    pub(super) fn entries(&self, group: usize, lane: usize, mut visit: impl FnMut(usize, f64, Vector<f64, D>)) {
+    pub(super) fn entries<const D: usize>(
+        &self,
+        group: usize,
+        lane: usize,
+        mut visit: impl FnMut(usize, f64, Vector<f64, D>),
+    ) {
         let window = self.window(group);
         let weights = |k: usize, at: usize| {
             let (n, dn) = window.axis(k);
@@ -475,9 +487,14 @@ impl<const D: usize> Block<D> {
 
     /// (Σ u_I N_I, Σ u_I ⊗ ∇_n N_I)
     #[inline(always)]
-    fn gather<T: Real>(&self, group: usize, lane: usize, nodal: &[Vector<T, D>]) -> (Vector<T, D>, Tensor<T, D>) {
+    fn gather<T: Real, const D: usize>(
+        &self,
+        group: usize,
+        lane: usize,
+        nodal: &[Vector<T, D>],
+    ) -> (Vector<T, D>, Tensor<T, D>) {
         let (mut value, mut gradient) = (Vector::<T, D>::zeros(), Tensor::<T, D>::zeros());
-        self.entries(group, lane, |place, n, grad_n| {
+        self.entries::<D>(group, lane, |place, n, grad_n| {
             let (u, n) = (&nodal[place], T::lit(n));
             for i in 0..D {
                 value[i] += u[i] * n;
@@ -492,7 +509,7 @@ impl<const D: usize> Block<D> {
 
 /// Numbers the active nodes in the order of the grid, and gives each block those of its box. `active` marks them in the
 /// boxes.
-fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block<D>], active: &[Vec<bool>]) -> Nodes {
+fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], active: &[Vec<bool>]) -> Nodes {
     /// A row of a box along x, by the grid number of the row's node at x = 0.
     struct Row {
         start: u64,
@@ -507,12 +524,7 @@ fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block<D>], active: &[Vec
         let [nx, ny, nz] = block.size;
         for z in 0..nz {
             for y in 0..ny {
-                let mut index = block.origin;
-                for (k, offset) in [(1, y), (2, z)] {
-                    if k < D {
-                        index[k] += offset as u32;
-                    }
-                }
+                let mut index: [u32; D] = std::array::from_fn(|k| block.origin[k] + [0, y, z][k] as u32);
                 let x = index[0] as usize;
                 index[0] = 0;
                 let place = (z * ny + y) * nx;

@@ -272,7 +272,8 @@ const IN_A_STEP: &[Mutant] = &[
         &[red("whole product", INCREMENTS), red("diagonal blocks", INCREMENTS)],
     ),
     ("blocks without the material part, in a step", ciarlet, Fault::BlockWithoutMaterial, &[red("diagonal blocks", INCREMENTS)]),
-    ("misprint (B6), in a step: the same where I = J", ciarlet, Fault::BlockSecondGradient, &[]),
+    // The same where I = J, but a step sums its blocks from those of unit gradients, e_k and e_l.
+    ("misprint (B6), in a step", ciarlet, Fault::BlockSecondGradient, &[red("diagonal blocks", INCREMENTS)]),
     ("v and b swapped in Cmat, in a step: not called by it", kirchhoff, Fault::DensitySwapped, &[]),
 ];
 
