@@ -9,4 +9,5 @@ mod points;
 mod rebound;
 mod runs;
 mod scenes;
+mod smoothing;
 mod support;
