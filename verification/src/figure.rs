@@ -1,6 +1,5 @@
 //! A line chart as SVG.
 
-use crate::report::short;
 use plotters::prelude::*;
 use std::ops::Range;
 
@@ -25,13 +24,39 @@ impl Axis {
     }
 
     /// Where `value` stands on the axis.
-    fn place(&self, value: f64) -> Option<f64> {
+    pub(crate) fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic { value.log10() } else { value };
         place.is_finite().then_some(place)
     }
 
-    fn tick(&self, place: f64) -> String {
-        if self.logarithmic { short(10.0_f64.powf(place)) } else { format!("{place}") }
+    pub(crate) fn tick(&self, place: f64) -> String {
+        let value = if self.logarithmic { 10.0_f64.powf(place) } else { place };
+        // Without the round-off of its place.
+        let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
+        if (1e-4..1e5).contains(&rounded.abs()) || rounded.abs() < 1e-12 {
+            format!("{}", if rounded.abs() < 1e-12 { 0.0 } else { rounded })
+        } else {
+            format!("{rounded:e}")
+        }
+    }
+
+    /// Places of the labels within `range`: 1, 2 and 5 times powers of ten.
+    pub(crate) fn ticks(&self, range: &Range<f64>) -> Vec<f64> {
+        let (low, high) = (range.start, range.end);
+        if self.logarithmic {
+            let digits: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+            let decades = low.floor() as i32..=high.ceil() as i32;
+            return decades
+                .flat_map(|decade| digits.iter().map(move |digit| f64::from(decade) + digit.log10()))
+                .filter(|place| (low..=high).contains(place))
+                .collect();
+        }
+        let least = (high - low) / 8.0;
+        let power = 10.0_f64.powf(least.log10().floor());
+        let step =
+            [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= least).unwrap_or(least);
+        let first = (low / step).ceil() as i64;
+        (0..=20).map(|k| (first + k) as f64 * step).take_while(|&place| place <= high).collect()
     }
 }
 
@@ -60,7 +85,7 @@ pub struct Figure {
 }
 
 /// The range of the values, a little wider.
-fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if low > high {
         return 0.0..1.0;
@@ -73,6 +98,12 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 #[derive(Debug, thiserror::Error)]
 #[error("the figure cannot be drawn: {0}")]
 pub struct FigureError(String);
+
+impl FigureError {
+    pub(crate) fn new(error: &dyn std::error::Error) -> Self {
+        Self(error.to_string())
+    }
+}
 
 impl Figure {
     /// The picture.
