@@ -115,10 +115,16 @@ fn with_a_lumped_mass_pic_gives_particles_the_velocity_of_their_nodes() -> Resul
     let (supports, nodes) = Supports::new(&before.approximation, &before.grid, &before.particles.position)?;
     let nodal = Nodal::project(&before.particles, &supports, nodes.len(), 1.0)?;
     let at_start = supports.values(&nodal.velocity);
+    let accelerated = supports.values(&nodal.acceleration);
+    let largest = accelerated.iter().map(Vector::norm).fold(0.0, f64::max);
+    assert!(largest > 0.0);
     for p in 0..before.particles.len() {
         // v_p = Σ N (v_n + Δv), and FLIP is v_p + Σ N Δv.
         let expected = at_start[p] + (flip.particles.velocity[p] - before.particles.velocity[p]);
         assert!((pic.particles.velocity[p] - expected).norm() < 1e-9, "particle {p}");
+        // The same for the acceleration.
+        let expected = accelerated[p] + (flip.particles.acceleration[p] - before.particles.acceleration[p]);
+        assert!((pic.particles.acceleration[p] - expected).norm() < 1e-9 * largest, "particle {p}");
     }
     Ok(())
 }

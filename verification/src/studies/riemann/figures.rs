@@ -55,7 +55,7 @@ fn profiles(runs: &Runs) -> Result<Sheet, StudyError> {
         let mut curves = vec![exact(Jump::PAPER, 37.0, 63.0)?];
         for (color, gamma) in GAMMAS.into_iter().enumerate() {
             let profile = runs.of(case(gamma))?.profile.clone();
-            curves.push(Curve::new(format!("gamma = {gamma}"), color + 1, Mark::Line, profile));
+            curves.push(Curve::new(format!("γ = {gamma}"), color + 1, Mark::Line, profile));
         }
         panels.push(Panel {
             title: name.into(),

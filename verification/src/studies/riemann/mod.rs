@@ -132,13 +132,19 @@ impl Plan {
         }
     }
 
+    /// The spacings of one jump. At -100 m/s the wave is nearly linear, the mirror of that at 100: without the finest.
+    fn spacings(&self, jump: Jump) -> &[f64] {
+        let all = self.spacings.len();
+        if jump == Jump::of(-100.0) { &self.spacings[..all - 1] } else { &self.spacings }
+    }
+
     fn cases(&self) -> Vec<Case> {
         let mut cases = Vec::new();
         for &(method, h, courant, _) in &REFERENCE[..self.references] {
             cases.push(Case::particles(method, Jump::PAPER, h, courant));
         }
         for &jump in &self.jumps {
-            for &h in &self.spacings {
+            for &h in self.spacings(jump) {
                 cases.push(Case::particles(Method::RECOMMENDED, jump, h, COURANT));
                 cases.push(Case::particles(SMOOTH, jump, h, 1.0));
             }
@@ -187,7 +193,7 @@ fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
     for &jump in &plan.jumps {
         let name = jump.name();
         let mut before: Option<(f64, f64)> = None;
-        let mut points: Vec<(f64, f64)> = plan.spacings.iter().map(|&h| (h, COURANT)).collect();
+        let mut points: Vec<(f64, f64)> = plan.spacings(jump).iter().map(|&h| (h, COURANT)).collect();
         points.extend(plan.courants.iter().filter(|&&c| c != COURANT).map(|&c| (plan.spacings[0], c)));
         let mut least = f64::INFINITY;
         for (k, &(h, courant)) in points.iter().enumerate() {
@@ -200,7 +206,7 @@ fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
             push("plateau error / jump", found.plateau, Bound::AtMost(0.01));
             let undissipated = runs.particles(SMOOTH, jump, h, 1.0)?;
             push("width / undissipated", found.width / undissipated.width, Bound::AtMost(1.5));
-            if k < plan.spacings.len() {
+            if k < plan.spacings(jump).len() {
                 if let Some((h_before, error)) = before {
                     let order = (error / found.particles).ln() / (h_before / h).ln();
                     push("order of L2 in h", order, Bound::AtLeast(0.3));
@@ -222,4 +228,23 @@ fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-const REMARKS: [&str; 1] = [""];
+const REMARKS: [&str; 5] = [
+    "The paper's case, 10 m/s with E = 1e10 Pa. As in its Figs. 5 to 7: linear functions ring and do not converge under refinement, LME and uGIMP do, at the \
+     order 1/3 that a front of the width (h² ct)^(1/3) allows, and the time step hardly matters. Unlike the paper's, our profiles with LME still \
+     overshoot, by some 14 % of the jump, and the elements show that this is the ringing of the undamped method.",
+    "Strong jumps, E = 5e10 Pa. An independent program found that errors of linear functions and of LME 4 grow under refinement there, and so they do: see \
+     the table. The causes, one change at a time: (1) Cell crossing. Functions too narrow for the cells a particle crosses are the reason for the growth: \
+     with LME 1.8 and wider, or cubic B-splines, it is gone, and nothing else removes it: neither the transfer (PIC, FMPM), nor damping (blend, gamma \
+     0.6), nor more particles do so with LME 4. (2) The null space of the particle velocity, which FMPM of a high order removes, is innocent \
+     once the functions are smooth. (3) The projection with a lumped mass slows short waves; eps near 0 makes fronts narrower by a third. (4) Newmark's \
+     rule slows them too, by (omega dt)²/12; Courant 0.5 is enough to be rid of that. What is left is the ringing of an undamped dispersive method, \
+     14 % of the jump for 100 m/s and growing towards a dispersive shock for 1000 m/s: that needs dissipation, and one that does not depend on dt.",
+    "The recommended setting (scenes/riemann_jump.json): LME 1.4, eps = 0.02, trapezoidal rule, Courant 0.5, and particles that follow the lumped \
+     projection of their own velocities at the rate κ = 1.2 (c/h)(h/L)^(1/4), with c the speed of sound and L the distance travelled. It acts like a \
+     viscosity κ h². To keep pace with dispersion, a linear front needs an exponent 1/3, to keep a steady shock monotone 0; 1/4 serves both.",
+    "Tried outside this program, with a one-dimensional code of the same method (it agrees to three digits), and not adopted because nothing was gained: \
+     generalised-alpha with a spectral radius of 0.5 (overshoot of 100 m/s with LME 1.8: 12.9 % against 13.1 %), nodal acceleration, a_p = Σ N a_I (it halves the \
+     error of the plateau of the undamped scheme, and changes nothing beside the blend).",
+    "Not met: fronts are judged against the paper's scheme with the same functions. Beside the recommended setting without its blend, whose fronts \
+     are narrower still but ring, they are wider by more than 1.5.",
+];

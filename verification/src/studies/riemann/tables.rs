@@ -3,8 +3,11 @@
 use super::*;
 use crate::table::Table;
 
-/// Spacings of the searches.
+/// Spacings of the tables.
 const COARSE: [f64; 3] = [0.1, 0.05, 0.025];
+
+/// Spacings of the search for causes.
+const COARSEST: [f64; 2] = [0.1, 0.05];
 
 /// The paper's scheme for strong jumps, and what is put in its place.
 const STRONG: [(Method, f64); 4] = [(LINEAR, 1.0), (LME, 1.0), (SMOOTH, 1.0), (Method::RECOMMENDED, COURANT)];
@@ -50,10 +53,12 @@ const CAUSES: [Jump; 2] = [Jump::of(100.0), Jump::of(1000.0)];
 
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for h in COARSE {
+    for h in COARSEST {
         for (_, method, courant) in changes() {
             cases.extend(CAUSES.map(|jump| Case::particles(method, jump, h, courant)));
         }
+    }
+    for h in COARSE {
         for (method, courant) in STRONG {
             cases.extend(strong_jumps().map(|jump| Case::particles(method, jump, h, courant)));
         }
@@ -135,8 +140,14 @@ fn by_gamma(runs: &Runs) -> Result<Table, StudyError> {
 }
 
 /// `a, b, c` over the spacings.
-fn over(runs: &Runs, method: Method, jump: Jump, courant: f64, value: impl Fn(&Measured) -> String) -> String {
-    COARSE.map(|h| shown(runs.particles(method, jump, h, courant), &value)).join(", ")
+fn over(
+    runs: &Runs,
+    spacings: &[f64],
+    (method, jump, courant): (Method, Jump, f64),
+    value: impl Fn(f64, &Measured) -> String,
+) -> String {
+    let shown = |&h: &f64| shown(runs.particles(method, jump, h, courant), |found| value(h, found));
+    spacings.iter().map(shown).collect::<Vec<_>>().join(", ")
 }
 
 fn strong(runs: &Runs) -> Table {
@@ -146,17 +157,14 @@ fn strong(runs: &Runs) -> Table {
     );
     for jump in strong_jumps() {
         for (method, courant) in STRONG {
-            let over = |value: &dyn Fn(&Measured) -> String| over(runs, method, jump, courant, value);
-            let widths = COARSE.map(|h| {
-                shown(runs.particles(method, jump, h, courant), |found| format!("{:.1}", found.width / h))
-            });
+            let over = |value: &dyn Fn(f64, &Measured) -> String| over(runs, &COARSE, (method, jump, courant), value);
             table.push([
                 format!("{}", jump.left - jump.right),
                 method.name.into(),
-                over(&|found| format!("{:.1}", found.particles)),
-                over(&|found| format!("{:.1}", 100.0 * found.overshoot)),
-                over(&|found| format!("{:.1}", 100.0 * found.plateau)),
-                widths.join(", "),
+                over(&|_, found| format!("{:.1}", found.particles)),
+                over(&|_, found| format!("{:.1}", 100.0 * found.overshoot)),
+                over(&|_, found| format!("{:.1}", 100.0 * found.plateau)),
+                over(&|h, found| format!("{:.1}", found.width / h)),
             ]);
         }
     }
@@ -165,17 +173,18 @@ fn strong(runs: &Runs) -> Table {
 
 fn causes(runs: &Runs, jump: Jump) -> Table {
     let mut table = Table::new(
-        format!("what matters, {}: one change at a time; h = 0.1, 0.05, 0.025 m", jump.name()),
-        ["change", "L2 (m^1.5/s)", "overshoot (%)", "plateau (%)", "energy lost (%)"],
+        format!("what matters, {}: one change at a time; h = 0.1, 0.05 m", jump.name()),
+        ["change", "L2 (m^1.5/s)", "overshoot (%)", "plateau (%)", "width 10-90 % (h)", "energy lost (%)"],
     );
     for (change, method, courant) in changes() {
-        let over = |value: &dyn Fn(&Measured) -> String| over(runs, method, jump, courant, value);
+        let over = |value: &dyn Fn(f64, &Measured) -> String| over(runs, &COARSEST, (method, jump, courant), value);
         table.push([
             change.to_owned(),
-            over(&|found| format!("{:.1}", found.particles)),
-            over(&|found| format!("{:.1}", 100.0 * found.overshoot)),
-            over(&|found| format!("{:.1}", 100.0 * found.plateau)),
-            over(&|found| format!("{:.2}", 100.0 * found.lost)),
+            over(&|_, found| format!("{:.1}", found.particles)),
+            over(&|_, found| format!("{:.1}", 100.0 * found.overshoot)),
+            over(&|_, found| format!("{:.1}", 100.0 * found.plateau)),
+            over(&|h, found| format!("{:.1}", found.width / h)),
+            over(&|_, found| format!("{:.2}", 100.0 * found.lost)),
         ]);
     }
     table
@@ -200,7 +209,7 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
         ],
     );
     for &jump in &plan.jumps {
-        let by_h = plan.spacings.iter().map(|&h| (h, COURANT));
+        let by_h = plan.spacings(jump).iter().map(|&h| (h, COURANT));
         let by_step = plan.courants.iter().skip(1).map(|&courant| (plan.spacings[0], courant));
         for (h, courant) in by_h.chain(by_step) {
             let found = runs.particles(Method::RECOMMENDED, jump, h, courant)?;
