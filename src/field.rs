@@ -100,4 +100,16 @@ impl Field {
             }
         }
     }
+
+    /// The columns of a table in `dimension` dimensions that hold the field under the name `name`: `name` itself for a scalar,
+    /// `name_x`, … for as many components of a vector as there are dimensions, `name_xx`, … for all components of a tensor.
+    pub fn columns(self, name: &str, dimension: usize) -> Vec<String> {
+        let kind = self.kind();
+        let count = if kind == Kind::Vector { dimension } else { usize::MAX };
+        let column = |component: &&str| match *component {
+            "" => name.to_owned(),
+            component => format!("{name}_{component}"),
+        };
+        kind.components().iter().take(count).map(column).collect()
+    }
 }

@@ -1,6 +1,7 @@
 //! Implicit finite-strain material point method with a matrix-free, Voigt-free tangent.
 
 pub mod approximation;
+pub mod causes;
 pub mod clock;
 pub mod field;
 pub mod grid;

@@ -22,6 +22,11 @@ impl Nodes {
         Self { ids }
     }
 
+    /// From grid numbers that ascend already.
+    pub(crate) fn ascending(ids: Vec<u64>) -> Self {
+        Self { ids }
+    }
+
     /// Number of active nodes.
     pub fn len(&self) -> usize {
         self.ids.len()

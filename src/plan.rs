@@ -2,12 +2,15 @@
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::loads::{Motion, Pressing};
+use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::time::Newmark;
 use crate::simulation::Simulation;
 use crate::solver::Krylov;
 use crate::tensor::{Tensor, Vector};
+use serde::Serialize;
+use std::collections::HashSet;
 use std::fmt::{Display, Formatter};
 use std::mem::size_of;
 
@@ -31,6 +34,53 @@ pub struct ArrayUse {
     pub bytes: u64,
 }
 
+/// The particles that stand for a loaded surface.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SurfaceUse {
+    /// The load.
+    pub load: &'static str,
+    /// Loaded particles.
+    pub particles: usize,
+    /// Faces they carry; in edges and corners a particle carries more than one.
+    pub faces: usize,
+    /// Reference area of all faces.
+    pub area: f64,
+    /// The least distance of a loaded particle below the true surface.
+    pub least_offset: f64,
+    /// The greatest one.
+    pub greatest_offset: f64,
+}
+
+impl SurfaceUse {
+    /// Of each surface load of a simulation.
+    pub fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<Self> {
+        let describe = |load: &SurfaceLoad<D>| {
+            let particles: HashSet<usize> = load.points.iter().map(|point| point.particle).collect();
+            let offsets = || load.points.iter().map(|point| point.offset);
+            Self {
+                load: match load.pressing {
+                    Pressing::Traction(_) => "traction",
+                    Pressing::Pressure(_) => "follower pressure",
+                },
+                particles: particles.len(),
+                faces: load.points.len(),
+                area: load.points.iter().map(|point| point.area).sum(),
+                least_offset: offsets().fold(f64::INFINITY, f64::min),
+                greatest_offset: offsets().fold(f64::NEG_INFINITY, f64::max),
+            }
+        };
+        simulation.loads.surface.iter().map(describe).collect()
+    }
+}
+
+impl Display for SurfaceUse {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Self { load, particles, faces, area, least_offset, greatest_offset } = self;
+        write!(f, "{load} on {particles} particles with {faces} faces, area {area:.6} in all, ")?;
+        write!(f, "{least_offset:.4} to {greatest_offset:.4} below the true surface")
+    }
+}
+
 /// What a run of a simulation requires, at its present state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -48,8 +98,8 @@ pub struct Plan {
     pub terms: Vec<TermUse>,
     /// The large arrays that live at the same time.
     pub arrays: Vec<ArrayUse>,
-    /// What was assumed about loaded surfaces, a line each.
-    pub surfaces: Vec<String>,
+    /// What was assumed about loaded surfaces.
+    pub surfaces: Vec<SurfaceUse>,
 }
 
 impl Plan {
@@ -71,7 +121,7 @@ impl Plan {
             unknowns: D * nodes.len() - prescribed.len(),
             terms: terms(simulation),
             arrays: arrays(simulation, &supports, nodes.len()),
-            surfaces: surfaces(simulation),
+            surfaces: SurfaceUse::of(simulation),
         })
     }
 
@@ -87,7 +137,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> Vec<Ter
     let Newmark { beta, gamma } = simulation.settings.newmark;
     let surface = |pressure: bool| {
         let of_kind = loads.surface.iter().filter(|load| matches!(load.pressing, Pressing::Pressure(_)) == pressure);
-        of_kind.map(|load| load.points.len()).sum::<usize>()
+        of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
     };
     let (tractions, pressures) = (surface(false), surface(true));
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
@@ -123,27 +173,11 @@ fn arrays<const D: usize, L: Law, A>(
         array("particles: x, v, a, H, volume, mass, body", particles * (3 * vector + tensor + 2 * 8 + 4)),
         array("particles: state after the step", particles * (3 * vector + tensor)),
         array("shape functions: N, ∇N and their nodes", supports.bytes()),
-        array("frozen tangent", particles * size_of::<L::Frozen<f64, D>>()),
+        array("frozen tangent", frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping)),
         array("preconditioner: diagonal blocks", nodes * tensor),
         array("Krylov vectors", nodes * vector * krylov_vectors),
         array("other nodal fields: v, a, loads, residuals, Δφ", nodes * (12 * vector + 8)),
     ]
-}
-
-fn surfaces<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<String> {
-    let describe = |load: &crate::mechanics::loads::SurfaceLoad<D>| {
-        let kind = match load.pressing {
-            Pressing::Traction(_) => "traction",
-            Pressing::Pressure(_) => "follower pressure",
-        };
-        let count = load.points.len();
-        let area: f64 = load.points.iter().map(|point| point.area).sum();
-        let offsets = || load.points.iter().map(|point| point.offset);
-        let (low, high) =
-            offsets().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        format!("{kind} on {count} particles, area {area:.6} in all, {low:.4} to {high:.4} below the true surface")
-    };
-    simulation.loads.surface.iter().map(describe).collect()
 }
 
 /// Bytes in a unit that suits them.
@@ -172,10 +206,7 @@ impl Display for Plan {
         for surface in &self.surfaces {
             writeln!(f, "  surface: {surface}")?;
         }
-        writeln!(f, "memory        {}", readable(self.bytes()))?;
-        for array in &self.arrays {
-            writeln!(f, "  {:>10}  {}", readable(array.bytes), array.name)?;
-        }
-        Ok(())
+        write!(f, "memory        {}", readable(self.bytes()))?;
+        self.arrays.iter().try_for_each(|array| write!(f, "\n  {:>10}  {}", readable(array.bytes), array.name))
     }
 }

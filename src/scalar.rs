@@ -36,3 +36,53 @@ impl<T: DualNumCopy> Real for T {
         DualStruct::re(&self).to_f64().unwrap_or(f64::NAN)
     }
 }
+
+/// Sums and products of one kind of number, so that a formula written once serves single numbers and vector lanes.
+pub trait Arithmetic: Copy {
+    /// The number, or the lanes.
+    type N: Copy;
+    /// 0
+    fn zero(self) -> Self::N;
+    /// a + b
+    fn add(self, a: Self::N, b: Self::N) -> Self::N;
+    /// a b
+    fn mul(self, a: Self::N, b: Self::N) -> Self::N;
+    /// a b + c
+    fn mul_add(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N;
+    /// c − a b
+    fn mul_sub(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N;
+}
+
+/// The arithmetic of single numbers, every operation rounded.
+#[derive(Clone, Copy, Debug)]
+pub struct Single<T>(std::marker::PhantomData<T>);
+
+impl<T> Default for Single<T> {
+    fn default() -> Self {
+        Self(std::marker::PhantomData)
+    }
+}
+
+impl<T: Real> Arithmetic for Single<T> {
+    type N = T;
+    #[inline(always)]
+    fn zero(self) -> T {
+        T::zero()
+    }
+    #[inline(always)]
+    fn add(self, a: T, b: T) -> T {
+        a + b
+    }
+    #[inline(always)]
+    fn mul(self, a: T, b: T) -> T {
+        a * b
+    }
+    #[inline(always)]
+    fn mul_add(self, a: T, b: T, c: T) -> T {
+        a * b + c
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: T, b: T, c: T) -> T {
+        c - a * b
+    }
+}

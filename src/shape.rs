@@ -99,6 +99,53 @@ impl<const D: usize> Shape<D> {
         }
     }
 
+    /// The pieces of surface that a point `x` of the solid lies less than `depth` below: none deep inside, one below a face,
+    /// several in an edge or a corner. Each with its signed distance −`depth` < d ≤ 0 and its outward unit normal n; the foot
+    /// x − d n lies on the surface.
+    pub fn faces(&self, x: &Vector<f64, D>, depth: f64) -> Vec<(f64, Vector<f64, D>)> {
+        let mut candidates = Vec::new();
+        self.primitive_faces(x, 1.0, &mut candidates);
+        let hair = 1e-6 * depth;
+        let mut faces: Vec<(f64, Vector<f64, D>)> = Vec::new();
+        for (d, n) in candidates {
+            if d > hair || d <= -depth * (1.0 - 1e-9) {
+                continue;
+            }
+            let foot = x - n * d;
+            // A face of a part counts where the whole ends: not inside another part, nor where two parts touch.
+            let ends = !self.contains(&(foot + n * hair)) && self.contains(&(foot - n * hair));
+            // Parts may share a face.
+            let known = faces.iter().any(|(e, m)| (e - d).abs() <= hair && (m - n).norm() <= 1e-6);
+            if ends && !known {
+                faces.push((d.min(0.0), n));
+            }
+        }
+        faces
+    }
+
+    /// Signed distance and outward normal of every face of every primitive, as if each face were unbounded; `sign` is −1 in a hole.
+    fn primitive_faces(&self, x: &Vector<f64, D>, sign: f64, faces: &mut Vec<(f64, Vector<f64, D>)>) {
+        match self {
+            Self::Box { min, max } => {
+                for k in 0..D {
+                    faces.push((sign * (min[k] - x[k]), axis(k, -sign)));
+                    faces.push((sign * (x[k] - max[k]), axis(k, sign)));
+                }
+            }
+            Self::Ball { .. } | Self::HalfSpace { .. } => {
+                let (d, n) = self.distance_and_normal(x);
+                faces.push((sign * d, n * sign));
+            }
+            Self::Union(parts) | Self::Intersection(parts) => {
+                parts.iter().for_each(|part| part.primitive_faces(x, sign, faces));
+            }
+            Self::Difference { of, minus } => {
+                of.primitive_faces(x, sign, faces);
+                minus.primitive_faces(x, -sign, faces);
+            }
+        }
+    }
+
     /// A box `(min, max)` that holds the solid: infinite for half-spaces, with `min > max` where nothing is left.
     ///
     /// Tight for the primitives (for a half-space if its plane is axis-parallel), for unions of them, and an upper bound for
@@ -390,6 +437,28 @@ mod tests {
         assert!((ring.normal(&vector([1.2, 0.0])) - vector([-1.0, 0.0])).norm() < 1e-15);
         assert!((ring.normal(&vector([0.0, 1.9])) - vector([0.0, 1.0])).norm() < 1e-15);
         assert!((ring.signed_distance(&vector([1.2, 0.0])) + 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_corner_lies_below_all_its_faces_and_an_inner_face_below_none() {
+        let unit = block([0.0; 3], [1.0; 3]);
+        assert!(unit.faces(&vector([0.5; 3]), 0.1).is_empty());
+        assert_eq!(unit.faces(&vector([0.5, 0.98, 0.5]), 0.1), [(0.98 - 1.0, vector([0.0, 1.0, 0.0]))]);
+        let edge: Vec<_> = unit.faces(&vector([0.98, 0.02, 0.5]), 0.1).iter().map(|face| face.1).collect();
+        assert_eq!(edge, [vector([1.0, 0.0, 0.0]), vector([0.0, -1.0, 0.0])]);
+        assert_eq!(unit.faces(&vector([0.02; 3]), 0.1).len(), 3);
+        // two blocks that touch at x = 1, and two that overlap: their common bottom counts once, what lies inside not at all
+        for other in [block([1.0, 0.0], [2.0, 1.0]), block([0.5, 0.0], [2.0, 1.0])] {
+            let long = Shape::Union(vec![block([0.0, 0.0], [1.0, 1.0]), other]);
+            assert!(long.faces(&vector([0.99, 0.5]), 0.1).is_empty());
+            assert_eq!(long.faces(&vector([0.99, 0.01]), 0.1), [(-0.01, vector([0.0, -1.0]))]);
+            assert_eq!(long.faces(&vector([1.99, 0.01]), 0.1).len(), 2);
+        }
+        // beside a square hole: its faces point into it, and off its corner there is none
+        let hole = block([0.4, 0.4], [0.6, 0.6]);
+        let frame = Shape::Difference { of: Box::new(block([0.0, 0.0], [1.0, 1.0])), minus: Box::new(hole) };
+        assert_eq!(frame.faces(&vector([0.39, 0.5]), 0.1), [(0.39 - 0.4, vector([1.0, 0.0]))]);
+        assert!(frame.faces(&vector([0.39, 0.39]), 0.1).is_empty());
     }
 
     #[test]

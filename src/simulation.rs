@@ -1,6 +1,7 @@
 //! The step on one page: the paper's Algorithm 1.
 
 use crate::approximation::{Approximation, ShapeFunction};
+use crate::causes;
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{Law, Material};
@@ -14,7 +15,7 @@ use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
 use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
-use crate::solver::{LinearError, NewtonError, NewtonReport, NewtonSettings, newton};
+use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, newton};
 use crate::tensor::{Deformation, Vector};
 use std::num::NonZeroU64;
 
@@ -101,8 +102,29 @@ pub struct StepReport<const D: usize> {
     pub reactions: Vec<Vector<f64, D>>,
     /// Seconds by phase.
     pub seconds: Stopwatch,
-    /// How often the step was halved before it succeeded.
-    pub halvings: u32,
+    /// The attempts before it, each of which failed and was repeated with half of its length.
+    pub failed: Vec<FailedAttempt>,
+}
+
+/// An attempt at a step that failed.
+#[derive(Clone, Debug)]
+pub struct FailedAttempt {
+    /// Its length.
+    pub dt: f64,
+    /// Why it failed, on one line.
+    pub why: String,
+    /// What Newton's method did; empty if it was not reached.
+    pub newton: NewtonHistory,
+}
+
+impl FailedAttempt {
+    fn new(dt: f64, error: &StepError) -> Self {
+        let newton = match error {
+            StepError::Newton(error) => (*error.history).clone(),
+            _ => NewtonHistory::default(),
+        };
+        Self { dt, why: causes::on_one_line(error), newton }
+    }
 }
 
 /// Why a step failed. The particles are untouched.
@@ -133,6 +155,21 @@ pub enum StepError {
         /// Where it would be.
         position: Vec<f64>,
     },
+}
+
+/// The simulation cannot go on. The particles are as after the last good step.
+#[derive(Debug, thiserror::Error)]
+#[error("the step from t = {time} failed, the last time with dt = {dt:e} (attempts: {})", failed.len())]
+pub struct AdvanceError {
+    /// t_n
+    pub time: f64,
+    /// Δt of the last attempt.
+    pub dt: f64,
+    /// Why the last attempt failed.
+    #[source]
+    pub cause: Box<StepError>,
+    /// All attempts, the last one included.
+    pub failed: Vec<FailedAttempt>,
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -184,20 +221,32 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.external_work += work;
         self.clock.advance();
         let active_nodes = nodes.len();
-        Ok(StepReport { dt, active_nodes, newton, projection_iterations, reactions, seconds: watch, halvings: 0 })
+        Ok(StepReport {
+            dt,
+            active_nodes,
+            newton,
+            projection_iterations,
+            reactions,
+            seconds: watch,
+            failed: Vec::new(),
+        })
     }
 
     /// As [`Self::step`], halving Δt while Newton fails, down to the clock's limit; Δt grows back afterwards.
     ///
     /// # Errors
     /// The last failure, once Δt cannot be halved further, or a failure that a shorter step does not mend.
-    pub fn advance(&mut self) -> Result<StepReport<D>, StepError> {
-        let mut halvings = 0;
+    pub fn advance(&mut self) -> Result<StepReport<D>, AdvanceError> {
+        let mut failed = Vec::new();
         loop {
-            match self.step() {
-                Ok(report) => return Ok(StepReport { halvings, ..report }),
-                Err(StepError::Newton(_)) if self.clock.halve() => halvings += 1,
-                Err(error) => return Err(error),
+            let (time, dt) = (self.clock.time(), self.clock.step());
+            let cause = match self.step() {
+                Ok(report) => return Ok(StepReport { failed, ..report }),
+                Err(cause) => cause,
+            };
+            failed.push(FailedAttempt::new(dt, &cause));
+            if !(matches!(cause, StepError::Newton(_)) && self.clock.halve()) {
+                return Err(AdvanceError { time, dt, cause: Box::new(cause), failed });
             }
         }
     }

@@ -5,17 +5,19 @@
 //! formed in one place only, [`first_piola`], from F on the left and F inside S given separately: that is what lets
 //! dual numbers check the geometric and the material tangent term by term.
 
+mod closed_tangent;
 mod from_energy;
 mod frozen_general;
 mod lame;
 mod neo_hookean;
 mod st_venant_kirchhoff;
 
+pub use closed_tangent::ClosedTangent;
 pub use from_energy::{Energy, FromEnergy};
 pub use frozen_general::FrozenGeneral;
 pub use lame::{Lame, LameError};
-pub use neo_hookean::{FrozenNeoHookean, NeoHookean, Volumetric};
-pub use st_venant_kirchhoff::{FrozenStVenantKirchhoff, StVenantKirchhoff};
+pub use neo_hookean::{NeoHookean, Volumetric};
+pub use st_venant_kirchhoff::StVenantKirchhoff;
 
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, outer};
@@ -88,6 +90,11 @@ pub trait FrozenTangent<T: Real, const D: usize>: Clone + Send + Sync {
 
     /// The block `V₀ { F ℂmat{∇N_I, ∇N_J} Fᵀ + (∇N_I · S ∇N_J) I }` (eqs. 34, 38), from gradients in the configuration n.
     fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D>;
+
+    /// The same in closed form, which the vectorised product is made for; `None` if there is none.
+    fn closed(&self) -> Option<ClosedTangent<T, D>> {
+        None
+    }
 }
 
 /// Checks det F > 0, on J and never on J²; refuses NaN.
@@ -139,6 +146,10 @@ macro_rules! materials {
             #[inline(always)]
             fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
                 match self { $(Self::$law(frozen) => frozen.block(grad_i, grad_j)),* }
+            }
+            #[inline(always)]
+            fn closed(&self) -> Option<ClosedTangent<T, D>> {
+                match self { $(Self::$law(frozen) => frozen.closed()),* }
             }
         }
 

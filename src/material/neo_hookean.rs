@@ -1,6 +1,7 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
-use super::{FrozenTangent, Lame, Law};
+use super::closed_tangent::rows;
+use super::{ClosedTangent, Lame, Law};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled};
 
@@ -53,7 +54,7 @@ impl NeoHookean {
 }
 
 impl Law for NeoHookean {
-    type Frozen<T: Real, const D: usize> = FrozenNeoHookean<T, D>;
+    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
 
     /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
     #[inline(always)]
@@ -103,48 +104,22 @@ impl Law for NeoHookean {
             - scaled(&outer(&cb, &cv), q)
     }
 
+    /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_nᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
+    /// forward to the configuration n.
+    #[inline(always)]
     fn freeze<T: Real, const D: usize>(
         &self,
         f_n: &Tensor<T, D>,
         at: &Deformation<T, D>,
         volume: T,
-    ) -> FrozenNeoHookean<T, D> {
+    ) -> ClosedTangent<T, D> {
         let shear = T::lit(self.lame.shear);
-        FrozenNeoHookean {
-            df_inv_t: at.inverse_transpose() * f_n.transpose(),
-            shear_b_n: scaled(&(f_n * f_n.transpose()), shear * volume),
+        ClosedTangent {
+            a: rows(&(at.inverse_transpose() * f_n.transpose())),
+            right: rows(&scaled(&(f_n * f_n.transpose()), shear * volume)),
             bulk: self.volumetric_stiffness(at) * volume,
             q: (self.volumetric_stress(at) - shear) * volume,
+            both: None,
         }
-    }
-}
-
-/// δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ, pushed forward to the configuration n and times V₀.
-#[derive(Clone, Copy, Debug)]
-pub struct FrozenNeoHookean<T: Real, const D: usize> {
-    /// ΔF⁻ᵀ = F⁻ᵀ F_nᵀ
-    df_inv_t: Tensor<T, D>,
-    /// V₀ G F_n F_nᵀ
-    shear_b_n: Tensor<T, D>,
-    /// V₀ ΛJ²
-    bulk: T,
-    /// V₀ q
-    q: T,
-}
-
-impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenNeoHookean<T, D> {
-    /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ
-    #[inline(always)]
-    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
-        let a = &self.df_inv_t;
-        l * self.shear_b_n + scaled(a, self.bulk * contract(a, l)) - scaled(&(a * l.transpose() * a), self.q)
-    }
-
-    /// V₀ [ ΛJ² g_I ⊗ g_J − q g_J ⊗ g_I + G (∇N_I·∇N_J) I ],  g = F⁻ᵀ∇N = A ∇_n N
-    #[inline(always)]
-    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
-        let (g_i, g_j) = (self.df_inv_t * grad_i, self.df_inv_t * grad_j);
-        scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
-            + scaled(&identity(), grad_i.dot(&(self.shear_b_n * grad_j)))
     }
 }

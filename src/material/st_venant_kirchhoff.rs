@@ -1,6 +1,7 @@
 //! St. Venant–Kirchhoff solid (the paper's appendix B.2).
 
-use super::{FrozenTangent, Lame, Law};
+use super::closed_tangent::rows;
+use super::{ClosedTangent, Lame, Law};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
@@ -18,7 +19,7 @@ fn hooke<T: Real, const D: usize>(lambda: T, shear: T, x: &Tensor<T, D>) -> Tens
 }
 
 impl Law for StVenantKirchhoff {
-    type Frozen<T: Real, const D: usize> = FrozenStVenantKirchhoff<T, D>;
+    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
 
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
@@ -52,47 +53,22 @@ impl Law for StVenantKirchhoff {
             + scaled(&outer(b, v), shear)
     }
 
+    /// V₀ [ L F_n S F_nᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_n ],  M = F F_nᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_n, pushed
+    /// forward to the configuration n.
+    #[inline(always)]
     fn freeze<T: Real, const D: usize>(
         &self,
         f_n: &Tensor<T, D>,
         at: &Deformation<T, D>,
         volume: T,
-    ) -> FrozenStVenantKirchhoff<T, D> {
-        FrozenStVenantKirchhoff {
-            f_n: *f_n,
-            f: at.f,
-            stress: scaled(&self.stress(at), volume),
-            lambda: T::lit(self.lame.lambda) * volume,
-            shear: T::lit(self.lame.shear) * volume,
+    ) -> ClosedTangent<T, D> {
+        let shear = T::lit(self.lame.shear) * volume;
+        ClosedTangent {
+            a: rows(&(at.f * f_n.transpose())),
+            right: rows(&scaled(&(f_n * self.stress(at) * f_n.transpose()), volume)),
+            bulk: T::lit(self.lame.lambda) * volume,
+            q: -shear,
+            both: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_n * f_n.transpose()), shear))]),
         }
-    }
-}
-
-/// F_n, F and V₀ times S, Λ and G.
-#[derive(Clone, Copy, Debug)]
-pub struct FrozenStVenantKirchhoff<T: Real, const D: usize> {
-    f_n: Tensor<T, D>,
-    f: Tensor<T, D>,
-    stress: Tensor<T, D>,
-    lambda: T,
-    shear: T,
-}
-
-impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenStVenantKirchhoff<T, D> {
-    #[inline(always)]
-    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
-        let delta_f = l * self.f_n;
-        let delta_s = hooke(self.lambda, self.shear, &symmetric(&(self.f.transpose() * delta_f)));
-        (delta_f * self.stress + self.f * delta_s) * self.f_n.transpose()
-    }
-
-    #[inline(always)]
-    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
-        let (v, b) = (self.f_n.transpose() * grad_i, self.f_n.transpose() * grad_j);
-        let (fv, fb) = (self.f * v, self.f * b);
-        scaled(&outer(&fv, &fb), self.lambda)
-            + scaled(&(self.f * self.f.transpose()), self.shear * v.dot(&b))
-            + scaled(&outer(&fb, &fv), self.shear)
-            + scaled(&identity(), v.dot(&(self.stress * b)))
     }
 }

@@ -175,14 +175,9 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 a * T::lit(self.lumping * self.nodal.mass[node]) - self.dead_load[node].map(T::lit)
             })
             .collect();
-        self.supports.assemble(
-            dphi,
-            &mut out,
-            |p, u, g| {
-                Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
-            },
-            |(q, stress), n, grad_n| stress * grad_n.map(T::lit) + q * T::lit(n),
-        )?;
+        self.supports.assemble(dphi, &mut out, |p, u, g| {
+            Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
+        })?;
         self.add_pressure(dphi, carry, &mut out);
         Ok(out)
     }
@@ -210,12 +205,9 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 (dphi.abs() * a1 + v * a2 + a * a3.abs()) * self.nodal.mass[node] + self.dead_load[node].abs()
             })
             .collect();
-        self.supports.assemble(
-            dphi,
-            &mut out,
-            |p, _, g| self.internal(p, &g, Carry::ALL),
-            |stress, _, grad_n| stress.abs() * grad_n.abs(),
-        )?;
+        self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
+            Ok((Vector::zeros(), self.internal(p, &g, Carry::ALL)?.abs()))
+        })?;
         for point in &self.pressures {
             for (node, n, _) in self.supports.of(point.particle) {
                 out[node] += point.force.abs() * n.abs();

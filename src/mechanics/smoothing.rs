@@ -42,7 +42,7 @@ impl Smoothing {
         let theta = self.share(dt);
         let lumped_projection = |field: &[Vector<f64, D>]| {
             let mut out = vec![Vector::zeros(); mass.len()];
-            supports.scatter(&mut out, |p, n, _| field[p] * (particles.mass[p] * n));
+            supports.spread(&mut out, |p| field[p] * particles.mass[p]);
             for (w, &m) in out.iter_mut().zip(mass) {
                 // A node without mass weighs nothing in what follows either.
                 *w = if m > 0.0 { *w / m } else { Vector::zeros() };

@@ -2,6 +2,8 @@
 
 use crate::material::{FrozenTangent, Law, admissible};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
+use crate::mechanics::sweep::{ClosedTangents, Supports};
+use crate::particles::Body;
 use crate::solver::{LinearOperator, NonlinearProblem, Preconditioner};
 use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
 use num_dual::Dual64;
@@ -49,21 +51,15 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         match term {
             Term::Inertia => {
                 self.add_lumped_inertia(u, &mut out);
-                self.supports.assemble(
-                    u,
-                    &mut out,
-                    |p, u, _| Ok(u * (self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0))),
-                    |q, n, _| q * n,
-                )?;
+                self.supports.assemble(u, &mut out, |p, u, _| {
+                    Ok((u * (self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0)), Tensor::zeros()))
+                })?;
             }
             Term::Geometric | Term::Material => {
                 let states = self.states(dphi)?;
-                self.supports.assemble(
-                    u,
-                    &mut out,
-                    |p, _, l| Ok(self.particle_product(term, p, &states[p], &l)),
-                    |stress, _, grad_n| stress * grad_n,
-                )?;
+                self.supports.assemble(u, &mut out, |p, _, l| {
+                    Ok((Vector::zeros(), self.particle_product(term, p, &states[p], &l)))
+                })?;
             }
             Term::Pressure => {
                 for point in self.frozen_pressures(dphi) {
@@ -154,16 +150,64 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D, L>, Inadmissible> {
-        let frozen = self.supports.interpolate(dphi, |p, _, g| {
-            let at = admissible(compose(&g, &self.particles.displacement_gradient[p]))
-                .map_err(|source| Inadmissible { particle: p, source })?;
-            Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
-        })?;
-        let mut tangent =
-            Tangent { equilibrium: self, frozen, pressures: self.frozen_pressures(dphi), inverse_blocks: Vec::new() };
-        tangent.inverse_blocks = tangent.diagonal_blocks().iter().map(invert_block).collect();
+        let mut tangent = Tangent {
+            equilibrium: self,
+            frozen: self.freeze(dphi)?,
+            pressures: self.frozen_pressures(dphi),
+            inverse_blocks: Vec::new(),
+        };
+        tangent.inverse_blocks = tangent.diagonal_blocks();
+        for block in &mut tangent.inverse_blocks {
+            *block = invert_block(block);
+        }
         Ok(tangent)
     }
+
+    fn freeze(&self, dphi: &[Vector<f64, D>]) -> Result<Frozen<D, L>, Inadmissible> {
+        let freeze = |p: usize, g: &Tensor<f64, D>| {
+            let at = admissible(compose(g, &self.particles.displacement_gradient[p]))
+                .map_err(|source| Inadmissible { particle: p, source })?;
+            Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
+        };
+        if let Some(both) = closed_form::<D, L>(self.bodies) {
+            let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
+            let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
+            let closed = self.supports.closed_tangents(dphi, both, inertia, |p, g| {
+                let closed = freeze(p, &g).map_err(Some)?.closed();
+                closed.filter(|form| both || form.both.is_none()).ok_or(None)
+            });
+            match closed {
+                Some(Ok(closed)) => return Ok(Frozen::Closed(closed)),
+                Some(Err(Some(inadmissible))) => return Err(inadmissible),
+                // No vector lanes, or a law that has its closed form at some states only.
+                Some(Err(None)) | None => {}
+            }
+        }
+        Ok(Frozen::Each(self.supports.interpolate(dphi, |p, _, g| freeze(p, &g))?))
+    }
+}
+
+/// The point tangents of all particles.
+enum Frozen<const D: usize, L: Law> {
+    /// In vector lanes, for laws with a closed form.
+    Closed(ClosedTangents<D>),
+    /// One after the other.
+    Each(Vec<L::Frozen<f64, D>>),
+}
+
+/// Whether all laws have a closed form, and if so, whether one of them has the term b L c. It does not depend on the state.
+fn closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> Option<bool> {
+    let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
+    let forms = bodies.iter().map(|body| body.law.freeze(&identity(), &at_rest, 1.0).closed());
+    let forms: Option<Vec<_>> = forms.collect();
+    forms.map(|forms| forms.iter().any(|form| form.both.is_some()))
+}
+
+/// Bytes of the frozen tangent of all particles.
+pub fn frozen_bytes<const D: usize, L: Law>(bodies: &[Body<L>], supports: &Supports<D>, lumping: f64) -> usize {
+    closed_form::<D, L>(bodies)
+        .and_then(|both| supports.closed_bytes(both, lumping < 1.0))
+        .unwrap_or(supports.particles() * size_of::<L::Frozen<f64, D>>())
 }
 
 /// Follower pressure frozen at one state: δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
@@ -196,7 +240,7 @@ impl<const D: usize> FrozenPressure<D> {
 /// K(Δφ), frozen: an operator, with its d×d diagonal blocks as preconditioner.
 pub struct Tangent<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
-    frozen: Vec<L::Frozen<f64, D>>,
+    frozen: Frozen<D, L>,
     pressures: Vec<FrozenPressure<D>>,
     inverse_blocks: Vec<Tensor<f64, D>>,
 }
@@ -207,18 +251,18 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
         let eq = self.equilibrium;
         out.fill(Vector::zeros());
         eq.add_lumped_inertia(u, out);
-        let never_fails = eq.supports.assemble(
-            u,
-            out,
-            |p, u, l| {
-                let inertia = eq.consistent_mass(p).map_or_else(Vector::zeros, |m| u * (eq.alphas.a1 * m));
-                Ok::<_, std::convert::Infallible>((inertia, self.frozen[p].apply(&l)))
-            },
-            |(q, stress), n, grad_n| stress * grad_n + q * n,
-        );
-        match never_fails {
-            Ok(()) => {}
-            Err(never) => match never {},
+        match &self.frozen {
+            Frozen::Closed(tangents) => eq.supports.product(tangents, u, out),
+            Frozen::Each(tangents) => {
+                let never_fails = eq.supports.assemble(u, out, |p, u, l| {
+                    let inertia = eq.consistent_mass(p).map_or_else(Vector::zeros, |m| u * (eq.alphas.a1 * m));
+                    Ok::<_, std::convert::Infallible>((inertia, tangents[p].apply(&l)))
+                });
+                match never_fails {
+                    Ok(()) => {}
+                    Err(never) => match never {},
+                }
+            }
         }
         for point in &self.pressures {
             point.add_product(eq, u, out);
@@ -231,10 +275,14 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
         let eq = self.equilibrium;
         let mut blocks: Vec<Tensor<f64, D>> =
             eq.nodal.mass.iter().map(|&m| scaled(&identity(), eq.alphas.a1 * eq.lumping * m)).collect();
-        eq.supports.scatter(&mut blocks, |p, n, grad_n| {
-            let inertia = eq.consistent_mass(p).map_or(0.0, |m| eq.alphas.a1 * m * n * n);
-            self.frozen[p].block(grad_n, grad_n) + scaled(&identity(), inertia)
-        });
+        match &self.frozen {
+            Frozen::Closed(tangents) => eq.supports.add_blocks(tangents, &mut blocks),
+            Frozen::Each(tangents) => eq.supports.scatter_blocks(
+                &mut blocks,
+                |p, a, b| tangents[p].block(a, b),
+                |p| eq.consistent_mass(p).map_or(0.0, |m| eq.alphas.a1 * m),
+            ),
+        }
         for point in &self.pressures {
             point.add_blocks(eq, &mut blocks);
         }

@@ -43,7 +43,7 @@ impl<const D: usize> Nodal<D> {
         let Self { mass, .. } = Self::at_rest(particles, supports, count);
         let right = |field: &[Vector<f64, D>]| {
             let mut out = vec![Vector::zeros(); count];
-            supports.scatter(&mut out, |p, n, _| field[p] * (particles.mass[p] * n));
+            supports.spread(&mut out, |p| field[p] * particles.mass[p]);
             out
         };
         let (mut velocity, mut acceleration) = (right(&particles.velocity), right(&particles.acceleration));
@@ -69,8 +69,9 @@ impl<const D: usize> Nodal<D> {
 
     /// The lumped mass, and no motion.
     pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let mut mass = vec![0.0; count];
-        supports.scatter(&mut mass, |p, n, _| particles.mass[p] * n);
+        let mut mass = vec![Vector::<f64, D>::zeros(); count];
+        supports.spread(&mut mass, |p| Vector::from_fn(|i, _| if i == 0 { particles.mass[p] } else { 0.0 }));
+        let mass = mass.iter().map(|m| m[0]).collect();
         Self { mass, velocity: vec![Vector::zeros(); count], acceleration: vec![Vector::zeros(); count], iterations: 0 }
     }
 
@@ -135,7 +136,7 @@ impl<const D: usize> LinearOperator for EffectiveMass<'_, D> {
             *y = x * (self.lumping * m);
         }
         let at_particles = self.supports.values(x);
-        self.supports.scatter(y, |p, n, _| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p] * n));
+        self.supports.spread(y, |p| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p]));
     }
 }
 

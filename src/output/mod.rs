@@ -8,8 +8,8 @@
 //! | `reactions.csv` | force of every prescribed condition on the bodies, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
-//! | `newton.jsonl` | Newton residuals, one line a step; becomes part of `report.json` at the end |
-//! | `report.json` | settings, outcome, counts, seconds by phase, Newton residuals |
+//! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end |
+//! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step |
 //!
 //! [`plot::plot_run`] draws pictures of a directory. Floats in text files have as many digits as it takes to read the same bits back.
 
@@ -34,4 +34,5 @@ pub use error::OutputError;
 pub use probes::{Place, Probe, nearest};
 pub use recorder::{OutputSettings, Recorder};
 pub use reference::Reference;
+pub use report::Outcome;
 pub use summary::Summary;

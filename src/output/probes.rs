@@ -2,7 +2,7 @@
 
 use super::csv::{Row, Table};
 use super::{OutputError, Reference};
-use crate::field::{Field, Kind};
+use crate::field::Field;
 use crate::material::Law;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
@@ -20,6 +20,8 @@ pub enum Place<const D: usize> {
         point: Vector<f64, D>,
         /// Look at the particles of this body only.
         body: Option<u32>,
+        /// A nearest particle farther away than this does not count: the values are then NaN.
+        within: f64,
     },
 }
 
@@ -35,38 +37,35 @@ pub struct Probe<const D: usize> {
 }
 
 impl<const D: usize> Probe<D> {
-    /// The components worth a column: vectors have `D`, tensors all.
-    fn components(&self) -> &'static [&'static str] {
-        let kind = self.field.kind();
-        let all = kind.components();
-        if kind == Kind::Vector { all.get(..D).unwrap_or(all) } else { all }
-    }
-
-    /// The particle looked at now.
-    fn particle(&self, particles: &Particles<D>) -> Result<usize, OutputError> {
+    /// The particle looked at now; `None` if none is near enough.
+    fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
         let name = || self.name.clone();
         match self.place {
-            Place::Particle(particle) if particle < particles.len() => Ok(particle),
+            Place::Particle(particle) if particle < particles.len() => Ok(Some(particle)),
             Place::Particle(particle) => {
                 Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
             }
-            Place::Nearest { point, body } => {
-                let nearest = nearest(particles, &point, body);
-                nearest.ok_or_else(|| OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() })
-            }
+            Place::Nearest { point, body, within } => match nearest(particles, &point, body) {
+                Some((particle, distance)) => Ok((distance <= within).then_some(particle)),
+                None => Err(OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() }),
+            },
         }
     }
 }
 
-/// The particle nearest to `point`, among those of `body` if one is given; of equally near ones, the first.
-pub fn nearest<const D: usize>(particles: &Particles<D>, point: &Vector<f64, D>, body: Option<u32>) -> Option<usize> {
+/// The particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near ones, the first.
+pub fn nearest<const D: usize>(
+    particles: &Particles<D>,
+    point: &Vector<f64, D>,
+    body: Option<u32>,
+) -> Option<(usize, f64)> {
     let candidates = particles.position.iter().zip(&particles.body).enumerate();
     candidates
         .filter(|(_, (_, of))| body.is_none_or(|body| body == **of))
         .map(|(particle, (x, _))| (particle, (x - point).norm_squared()))
         .filter(|(_, distance)| distance.is_finite())
         .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(particle, _)| particle)
+        .map(|(particle, square)| (particle, square.sqrt()))
 }
 
 /// Writes `probes.csv`.
@@ -81,10 +80,7 @@ impl<const D: usize> Probes<D> {
     pub(crate) fn create(path: PathBuf, probes: Vec<Probe<D>>) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for probe in &probes {
-            columns.extend(probe.components().iter().map(|component| match *component {
-                "" => probe.name.clone(),
-                component => format!("{}_{component}", probe.name),
-            }));
+            columns.extend(probe.field.columns(&probe.name, D));
         }
         Ok(Self { probes, table: Table::create(path, &columns)? })
     }
@@ -101,8 +97,12 @@ impl<const D: usize> Probes<D> {
         let mut values = Vec::new();
         for probe in &self.probes {
             values.clear();
-            probe.field.append(simulation, reference, probe.particle(&simulation.particles)?, &mut values)?;
-            row.extend(values.iter().copied().take(probe.components().len()));
+            let columns = probe.field.columns(&probe.name, D).len();
+            match probe.particle(&simulation.particles)? {
+                Some(particle) => probe.field.append(simulation, reference, particle, &mut values)?,
+                None => values.resize(columns, f64::NAN),
+            }
+            row.extend(values.iter().copied().take(columns));
         }
         self.table.row(&row)
     }

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::VecDeque;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 /// The pace is that of the last so many seconds.
@@ -107,7 +107,8 @@ impl Progress {
                 bar.set_message(text);
             }
             Display::Lines { last } if last.elapsed() >= LINE_INTERVAL => {
-                eprintln!("{text}");
+                // Nobody may be listening; the run goes on.
+                let _ = writeln!(std::io::stderr(), "{text}");
                 *last = Instant::now();
             }
             Display::Lines { .. } | Display::Silent => {}

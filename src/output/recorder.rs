@@ -4,14 +4,14 @@ use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
 use super::progress::{Progress, Shown};
 use super::reactions::Reactions;
-use super::report::{Counts, NewtonLog, Report, Seconds};
+use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
 use super::snapshots::{SERIES, Snapshots};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
 use crate::simulation::{Simulation, StepReport};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -36,7 +36,7 @@ pub struct OutputSettings<const D: usize> {
 /// Writes a run: [`Recorder::start`], then [`Recorder::record`] after every step, then [`Recorder::finish`], also after a failure.
 ///
 /// ```no_run
-/// # use bfree::{output::{OutputSettings, Recorder, Reference}, simulation::Simulation};
+/// # use bfree::{output::{Outcome, OutputSettings, Recorder, Reference}, simulation::Simulation};
 /// # fn run(mut simulation: Simulation<2>, settings: OutputSettings<2>) -> Result<(), Box<dyn std::error::Error>> {
 /// let reference = Reference::of(&simulation);
 /// let mut recorder = Recorder::start(settings, &simulation, reference)?;
@@ -44,7 +44,7 @@ pub struct OutputSettings<const D: usize> {
 ///     let step = simulation.advance()?;
 ///     recorder.record(&simulation, &step)?;
 /// }
-/// println!("{}", recorder.finish(&simulation, &serde_json::Value::Null, None)?);
+/// println!("{}", recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?);
 /// # Ok(())
 /// # }
 /// ```
@@ -117,7 +117,7 @@ impl<const D: usize> Recorder<D> {
     ) -> Result<(), OutputError> {
         self.counts.add(step);
         self.seconds.add(step);
-        self.newton.write(step)?;
+        self.newton.write(simulation.clock.time(), step)?;
         if let Some(reactions) = &mut self.reactions {
             reactions.write(simulation.clock.time(), &step.reactions)?;
         }
@@ -129,16 +129,20 @@ impl<const D: usize> Recorder<D> {
         Ok(())
     }
 
-    /// Writes the last snapshot and the report. `settings` are those the run used; `failure` says why it ended early, if it did.
+    /// Writes the last snapshot and the report, with `asked` among its entries: what the caller knows of the run, such as the scene
+    /// and the command line.
     ///
     /// # Errors
     /// The system refuses.
     pub fn finish<L: Law, A: ShapeFunction>(
         mut self,
         simulation: &Simulation<D, L, A>,
-        settings: &Value,
-        failure: Option<&str>,
+        asked: &Map<String, Value>,
+        outcome: Outcome<'_>,
     ) -> Result<Summary, OutputError> {
+        if let Outcome::Failed(error) = outcome {
+            self.counts.add_failed(&error.failed);
+        }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write(simulation, &self.reference)?;
         }
@@ -147,7 +151,7 @@ impl<const D: usize> Recorder<D> {
         let (counts, time) = (self.counts, simulation.clock.time());
         let seconds = Seconds { total: self.since.elapsed().as_secs_f64(), ..self.seconds };
         let energies = Energies::of(simulation, &self.reference);
-        let report = Report { settings, failure, time, energies, counts, seconds };
+        let report = Report { asked, outcome, time, energies, counts, seconds };
         report.write(&self.directory.join("report.json"), self.newton)?;
         let particles = &simulation.particles;
         Ok(Summary {

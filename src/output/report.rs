@@ -1,17 +1,44 @@
-//! `report.json`: what was asked for, how it ended, what it cost, and the Newton residuals of every step.
+//! `report.json`: what was asked for, how it ended, what it cost, and what Newton's method did in every step.
 
 use super::OutputError;
 use super::files::{Stream, write_atomically};
 use super::history::Energies;
+use crate::causes;
 use crate::phases::Phase;
-use crate::simulation::StepReport;
+use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
+use crate::solver::NewtonHistory;
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
-/// What was done, summed over all steps.
+/// How a run ended.
+#[derive(Clone, Copy, Debug)]
+pub enum Outcome<'a> {
+    /// It reached its end.
+    Finished,
+    /// It was asked to stop, and did so after a whole step.
+    Interrupted,
+    /// A step failed.
+    Failed(&'a AdvanceError),
+}
+
+impl Outcome<'_> {
+    /// The outcome in one word, and in a sentence about a run that reached `time`.
+    fn words(&self, time: f64) -> (&'static str, String) {
+        match self {
+            Self::Finished => ("finished", format!("reached t = {time}")),
+            Self::Interrupted => (
+                "interrupted",
+                format!("stopped on request at t = {time}, after a whole step; all files are complete up to it"),
+            ),
+            Self::Failed(error) => ("failed", causes::on_one_line(*error)),
+        }
+    }
+}
+
+/// What was done, summed over all steps. Iterations, residuals and products of failed attempts at a step are counted too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Particles.
@@ -20,11 +47,11 @@ pub struct Counts {
     pub max_active_nodes: usize,
     /// Steps taken.
     pub steps: u64,
-    /// How often a step was halved.
-    pub halvings: u64,
-    /// Newton iterations; those of failed attempts at a step are not counted, here and below.
+    /// Attempts at a step that failed: it was repeated with half of its length, or the run ended.
+    pub failed_attempts: u64,
+    /// Newton iterations.
     pub newton_iterations: u64,
-    /// The most Newton iterations of a step.
+    /// The most Newton iterations of a step that succeeded.
     pub max_newton_iterations: usize,
     /// Krylov iterations.
     pub krylov_iterations: u64,
@@ -32,7 +59,7 @@ pub struct Counts {
     pub residual_evaluations: u64,
     /// Products with the tangent.
     pub tangent_products: u64,
-    /// Iterations of the projection onto the nodes.
+    /// Iterations of the projection onto the nodes, of steps that succeeded.
     pub projection_iterations: u64,
 }
 
@@ -42,13 +69,23 @@ impl Counts {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
-        self.halvings += u64::from(step.halvings);
-        self.newton_iterations += newton.iterations.len() as u64;
         self.max_newton_iterations = self.max_newton_iterations.max(newton.iterations.len());
+        self.projection_iterations += step.projection_iterations as u64;
+        self.add_newton(newton);
+        self.add_failed(&step.failed);
+    }
+
+    /// Adds attempts that failed.
+    pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
+        self.failed_attempts += attempts.len() as u64;
+        attempts.iter().for_each(|attempt| self.add_newton(&attempt.newton));
+    }
+
+    fn add_newton(&mut self, newton: &NewtonHistory) {
+        self.newton_iterations += newton.iterations.len() as u64;
         self.krylov_iterations += newton.counts.krylov_iterations as u64;
         self.residual_evaluations += newton.counts.residuals as u64;
         self.tangent_products += newton.counts.tangent_products as u64;
-        self.projection_iterations += step.projection_iterations as u64;
     }
 }
 
@@ -86,7 +123,62 @@ impl Serialize for Number {
     }
 }
 
-/// `newton.jsonl`: the residual norms of a step on a line, while the run goes on.
+/// What the report says of Newton's method in one step or attempt.
+#[derive(Debug, Serialize)]
+struct NewtonLine {
+    /// ‖R‖ at the initial guess and after each iteration.
+    newton_residuals: Vec<Number>,
+    /// Krylov iterations that gave each Newton iteration.
+    krylov_iterations: Vec<usize>,
+    /// The true relative residual of the linear system that each of them reached.
+    krylov_residuals: Vec<Number>,
+    /// Krylov iterations in all, those of linear systems that gave no step included.
+    krylov_total: usize,
+}
+
+impl NewtonLine {
+    fn new(history: &NewtonHistory) -> Self {
+        let iterations = &history.iterations;
+        let residuals = history.first_residual.into_iter().chain(iterations.iter().map(|one| one.residual));
+        Self {
+            newton_residuals: residuals.map(Number).collect(),
+            krylov_iterations: iterations.iter().map(|one| one.krylov.iterations).collect(),
+            krylov_residuals: iterations.iter().map(|one| Number(one.krylov.relative_residual)).collect(),
+            krylov_total: history.counts.krylov_iterations,
+        }
+    }
+}
+
+/// What the report says of an attempt that failed.
+#[derive(Debug, Serialize)]
+struct AttemptLine<'a> {
+    dt: Number,
+    why: &'a str,
+    #[serde(flatten)]
+    newton: NewtonLine,
+}
+
+impl<'a> AttemptLine<'a> {
+    fn all(attempts: &'a [FailedAttempt]) -> Vec<Self> {
+        let line =
+            |one: &'a FailedAttempt| Self { dt: Number(one.dt), why: &one.why, newton: NewtonLine::new(&one.newton) };
+        attempts.iter().map(line).collect()
+    }
+}
+
+/// What the report says of a step.
+#[derive(Debug, Serialize)]
+struct StepLine<'a> {
+    /// t_{n+1}
+    time: Number,
+    dt: Number,
+    #[serde(flatten)]
+    newton: NewtonLine,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    failed_attempts: Vec<AttemptLine<'a>>,
+}
+
+/// `newton.jsonl`: what Newton's method did in a step on a line, while the run goes on.
 #[derive(Debug)]
 pub(crate) struct NewtonLog(Stream);
 
@@ -96,12 +188,15 @@ impl NewtonLog {
         Stream::create(path).map(Self)
     }
 
-    /// Appends ‖R‖ at the initial guess and after each iteration.
-    pub(crate) fn write<const D: usize>(&mut self, step: &StepReport<D>) -> Result<(), OutputError> {
-        let history = &step.newton.history;
-        let residuals = history.first_residual.into_iter().chain(history.iterations.iter().map(|one| one.residual));
-        let line = serde_json::to_string(&residuals.map(Number).collect::<Vec<_>>());
-        self.0.line(&line.map_err(json(self.0.path()))?)
+    /// Appends a step that ended at `time`.
+    pub(crate) fn write<const D: usize>(&mut self, time: f64, step: &StepReport<D>) -> Result<(), OutputError> {
+        let line = StepLine {
+            time: Number(time),
+            dt: Number(step.dt),
+            newton: NewtonLine::new(&step.newton.history),
+            failed_attempts: AttemptLine::all(&step.failed),
+        };
+        self.0.line(&serde_json::to_string(&line).map_err(json(self.0.path()))?)
     }
 
     /// Hands everything to the system.
@@ -117,10 +212,10 @@ fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
 /// The report of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Report<'a> {
-    /// The settings used.
-    pub settings: &'a Value,
-    /// Why the run ended early, if it did.
-    pub failure: Option<&'a str>,
+    /// What the caller adds.
+    pub asked: &'a Map<String, Value>,
+    /// How the run ended.
+    pub outcome: Outcome<'a>,
     /// Time reached.
     pub time: f64,
     /// Energies at the end.
@@ -132,7 +227,7 @@ pub(crate) struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Writes the report, all or nothing; the residuals move from `log` into it line by line, then `log` is removed.
+    /// Writes the report, all or nothing; the steps move from `log` into it line by line, then `log` is removed.
     pub(crate) fn write(&self, path: &Path, mut log: NewtonLog) -> Result<(), OutputError> {
         log.flush()?;
         let log = log.0.path();
@@ -140,7 +235,7 @@ impl Report<'_> {
         let lines = BufReader::new(File::open(log).map_err(OutputError::io("read", log))?).lines();
         write_atomically(path, |file| {
             // The object is left open for one more key.
-            write!(file, "{},\n  \"newton_residuals\": [", head.strip_suffix("\n}").unwrap_or(&head))?;
+            write!(file, "{},\n  \"steps\": [", head.strip_suffix("\n}").unwrap_or(&head))?;
             for (k, line) in lines.enumerate() {
                 write!(file, "{}\n    {}", if k == 0 { "" } else { "," }, line?)?;
             }
@@ -164,9 +259,14 @@ impl Report<'_> {
         }
         let mut head = Map::new();
         head.insert("program".to_owned(), concat!("bfree ", env!("CARGO_PKG_VERSION")).into());
-        head.insert("outcome".to_owned(), if self.failure.is_some() { "failed" } else { "finished" }.into());
-        head.insert("failure".to_owned(), self.failure.into());
-        head.insert("settings".to_owned(), self.settings.clone());
+        let (outcome, message) = self.outcome.words(self.time);
+        head.insert("outcome".to_owned(), outcome.into());
+        head.insert("message".to_owned(), message.into());
+        if let Outcome::Failed(error) = self.outcome {
+            let attempts = serde_json::to_value(AttemptLine::all(&error.failed)).map_err(json(path))?;
+            head.insert("failed_attempts".to_owned(), attempts);
+        }
+        head.extend(self.asked.clone());
         head.insert("time".to_owned(), value(self.time)?);
         head.insert("energies".to_owned(), energies.into());
         head.insert("counts".to_owned(), serde_json::to_value(self.counts).map_err(json(path))?);
@@ -180,14 +280,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_residuals_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>>
-    {
+    fn the_lines_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
         let energies = Energies { kinetic: f64::NAN, strain: 0.1, external: 0.0, total: f64::INFINITY, balance: 0.0 };
         let settings = serde_json::json!({"nested": {"deep": {}}});
         let report = Report {
-            settings: &settings,
-            failure: None,
+            asked: &Map::from_iter([("settings".to_owned(), settings.clone())]),
+            outcome: Outcome::Finished,
             time: 0.1 + 0.2,
             energies,
             counts: Counts::default(),
@@ -201,7 +300,7 @@ mod tests {
             let read: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
             let residuals: Vec<Value> =
                 lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;
-            assert_eq!(read["newton_residuals"], Value::from(residuals));
+            assert_eq!(read["steps"], Value::from(residuals));
             assert_eq!((&read["settings"], &read["outcome"]), (&settings, &"finished".into()));
             assert_eq!((&read["energies"]["kinetic"], &read["energies"]["total"]), (&"NaN".into(), &"inf".into()));
             assert_eq!(read["time"], 0.1 + 0.2);

@@ -27,8 +27,8 @@ impl Display for Summary {
         let mean = |sum: u64| sum as f64 / counts.steps.max(1) as f64;
         writeln!(
             f,
-            "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} halvings",
-            counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.halvings
+            "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} failed attempts",
+            counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.failed_attempts
         )?;
         writeln!(
             f,

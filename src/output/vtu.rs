@@ -7,7 +7,6 @@ use super::OutputError;
 use super::files::write_atomically;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
-use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::{Read, Write as _};
 use std::path::{Path, PathBuf};
@@ -102,7 +101,7 @@ impl Appended {
     /// Appends `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the compressed blocks; returns the offset.
     fn push(&mut self, bytes: &[u8]) -> usize {
         let offset = self.0.len();
-        let blocks: Vec<Vec<u8>> = bytes.par_chunks(BLOCK).map(compressed).collect();
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
         let mut header = vec![blocks.len() as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
         header.extend(blocks.iter().map(|block| block.len() as u64));
         self.0.extend(header.iter().flat_map(|word| word.to_le_bytes()));

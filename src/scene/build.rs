@@ -5,7 +5,7 @@ use super::boundary::{Face, Table};
 use super::particle_file::{self, ParticleFileError};
 use super::solver::{Forcing, Method};
 use super::transfer::Transfer;
-use super::{Scene, approximation, load, time};
+use super::{Scene, approximation, load, scale, time};
 use crate::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -92,6 +92,33 @@ pub enum BuildError {
         /// What is wrong.
         source: Box<StepError>,
     },
+    /// A number too large or too small to compute with.
+    #[error(
+        "{path}: {what} is {value:e}; it must lie between {least:e} and {most:e}, or its products are not numbers: choose other \
+         units, or other values"
+    )]
+    Scale {
+        /// The key.
+        path: String,
+        /// The quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least allowed.
+        least: f64,
+        /// The most allowed.
+        most: f64,
+    },
+    /// Velocities from a file and from `initial_velocity`.
+    #[error(
+        "{path}: {file} gives velocities, and so does initial_velocity; remove its columns vx, … or the key initial_velocity"
+    )]
+    TwoVelocities {
+        /// The key.
+        path: String,
+        /// The file.
+        file: String,
+    },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
     InitialVelocity {
@@ -117,7 +144,7 @@ impl Scene {
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
             let path = format!("bodies[{i}]");
-            body.fill(&path, folder, &grid, i as u32, &mut particles)?;
+            body.fill(&path, folder, &grid, i as u32, &mut particles, self.initial_velocity.is_some())?;
             bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
         }
         let loads = self.loads(&grid, &particles)?;
@@ -132,6 +159,7 @@ impl Scene {
             external_work: 0.0,
         };
         self.set_initial_velocity(&mut simulation)?;
+        scale::check(self, &simulation)?;
         simulation
             .set_initial_acceleration()
             .map_err(|source| BuildError::InitialAcceleration { source: Box::new(source) })?;
@@ -239,7 +267,8 @@ impl Scene {
     }
 
     /// The particles of a body that stand for its surface: those less than one particle spacing s below it, each for the area
-    /// V₀/s, with the normal of the nearest point of the surface.
+    /// V₀/s of every loaded face it lies below, so that the particles of an edge or a corner carry each of its faces. A
+    /// particle outside its shape (a filled cell may lead beyond it) stands for the nearest face.
     fn surface<const D: usize>(
         &self,
         path: &str,
@@ -264,22 +293,32 @@ impl Scene {
         };
         let mut points = Vec::new();
         for particle in 0..particles.len() {
-            let x = &particles.position[particle];
-            let elsewhere = region.as_ref().is_some_and(|region| !region.contains(x));
-            if particles.body[particle] as usize != number || elsewhere {
+            if particles.body[particle] as usize != number {
                 continue;
             }
+            let x = &particles.position[particle];
             let near = shape.as_ref().map(|shape| shape.distance_and_normal(x));
-            let too_deep = near.is_some_and(|(distance, _)| distance <= -spacing * (1.0 - 1e-9));
-            let offset = near.map_or(0.0, |(distance, _)| -distance);
-            match (given, near) {
-                _ if too_deep => {}
-                (Some((normal, area)), _) => points.push(SurfacePoint { particle, normal, area, offset }),
-                (None, Some((_, normal))) => {
-                    let area = particles.volume[particle] / spacing;
+            if let Some((normal, area)) = given {
+                let too_deep = near.is_some_and(|(distance, _)| distance <= -spacing * (1.0 - 1e-9));
+                if !too_deep && region.as_ref().is_none_or(|region| region.contains(x)) {
+                    let offset = near.map_or(0.0, |(distance, _)| -distance);
                     points.push(SurfacePoint { particle, normal, area, offset });
                 }
-                (None, None) => {}
+                continue;
+            }
+            let faces = match (&shape, near) {
+                (Some(_), Some(outside)) if outside.0 > 0.0 => vec![outside],
+                (Some(shape), _) => shape.faces(x, spacing),
+                (None, _) => Vec::new(),
+            };
+            for (distance, normal) in faces {
+                // The region says which part of the surface is loaded: the foot of the particle is on it. Round-off must not
+                // put the foot outside a region that ends on the surface.
+                let foot = x - normal * distance;
+                if region.as_ref().is_none_or(|region| region.signed_distance(&foot) <= 1e-9 * spacing) {
+                    let area = particles.volume[particle] / spacing;
+                    points.push(SurfacePoint { particle, normal, area, offset: -distance });
+                }
             }
         }
         if points.is_empty() {
@@ -306,7 +345,7 @@ impl Scene {
 }
 
 /// Names of the faces, lower and upper, along each axis.
-const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+pub(super) const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
 
 /// Which surface a load acts on.
 struct SurfaceOf<'a> {
@@ -336,6 +375,7 @@ impl Body {
         grid: &Grid<D>,
         number: u32,
         particles: &mut Particles<D>,
+        velocity_on_nodes: bool,
     ) -> Result<(), BuildError> {
         let common = match &self.velocity {
             Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
@@ -359,6 +399,9 @@ impl Body {
                 file: place.display().to_string(),
                 source: Box::new(source),
             })?;
+            if velocity_on_nodes && read.velocities.is_some() {
+                return Err(BuildError::TwoVelocities { path, file: place.display().to_string() });
+            }
             for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
                 if !grid.contains(x) {
                     let position = x.iter().copied().collect();

@@ -12,11 +12,15 @@ const MAX_CELLS: f64 = 1e6;
 /// How far, relative to itself, the number of cells of an axis may be from a whole number.
 const WHOLE: f64 = 1e-9;
 
+/// How well neighbouring nodes must be told apart, relative to their distance.
+const DISTINCT: f64 = 1e-6;
+
 /// The box in which everything happens, and the spacing of its background nodes. Nothing exists outside of it.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridBox {
-    /// The lower corner of the box (length). Default: zeros.
+    /// The lower corner of the box (length), at most 4e9 spacings from zero: farther away numbers are too coarse to tell nodes
+    /// apart. Default: zeros.
     pub origin: Option<Vec<f64>>,
     /// The edges of the box (length), each > 0. One, two or three numbers: they set the dimension of the scene (uniaxial
     /// strain, plane strain, or three dimensions).
@@ -55,8 +59,14 @@ impl GridBox {
     /// The cells along each axis; `None` unless the section is valid.
     pub fn cells(&self) -> Option<Vec<u32>> {
         let origin = self.origin();
-        let sound = origin.len() == self.size.len() && origin.iter().all(|&x| sensible(x));
+        let sound =
+            origin.len() == self.size.len() && origin.iter().all(|&x| sensible(x) && x.abs() <= self.farthest());
         sound.then(|| self.size.iter().map(|&size| self.cells_along(size)).collect())?
+    }
+
+    /// How far from zero nodes can be told apart: numbers near x are |x| ε apart.
+    fn farthest(&self) -> f64 {
+        DISTINCT * self.spacing / f64::EPSILON
     }
 
     /// How many cells fill an edge, if they fill it.
@@ -93,6 +103,15 @@ impl GridBox {
                 format!("must be a multiple of the spacing {}, such as {}", Number(self.spacing), Number(whole))
             };
             problems.refuse(&path, Number(size), allowed);
+        }
+        let farthest = self.farthest();
+        for (k, &x) in self.origin.iter().flatten().enumerate().filter(|_| spacing_ok) {
+            let allowed = format!(
+                "numbers of that size are too coarse to tell nodes {} apart; at most {farthest:e} in size",
+                Number(self.spacing)
+            );
+            let far = sensible(x) && x.abs() > farthest;
+            problems.require(!far, &format!("grid.origin[{k}]"), Number(x), allowed);
         }
     }
 }

@@ -23,13 +23,15 @@ pub struct Gravity {
     pub curve: Option<Curve>,
 }
 
-/// A force per reference area that keeps its direction, on the particles within one particle spacing of a body's surface.
+/// A force per reference area that keeps its direction, on the particles less than one particle spacing below a body's surface.
+/// A particle in an edge or a corner carries the area of each loaded face.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded. Default: all of it.
+    /// The part of the surface that is loaded: what of it lies in this region. (Where `surface` is given, the particles that do.)
+    /// Default: all of it.
     pub region: Option<Shape>,
     /// The force per reference area (stress).
     pub traction: Vec<f64>,
@@ -39,13 +41,15 @@ pub struct Traction {
     pub surface: Option<Surface>,
 }
 
-/// A pressure that follows the surface, on the particles within one particle spacing of a body's surface.
+/// A pressure that follows the surface, on the particles less than one particle spacing below a body's surface. A particle in an
+/// edge or a corner carries the area of each loaded face.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pressure {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded. Default: all of it.
+    /// The part of the surface that is loaded: what of it lies in this region. (Where `surface` is given, the particles that do.)
+    /// Default: all of it.
     pub region: Option<Shape>,
     /// The pressure on the deformed surface (stress); positive pushes inwards.
     pub pressure: f64,

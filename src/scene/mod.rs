@@ -21,6 +21,7 @@ pub mod transfer;
 mod build;
 mod overrides;
 mod read;
+mod scale;
 mod suggest;
 
 pub use build::BuildError;
@@ -65,7 +66,7 @@ pub struct Scene {
     /// Pressures on surfaces.
     #[serde(default)]
     pub pressures: Vec<load::Pressure>,
-    /// Velocities at the start, given to nodes instead of bodies.
+    /// Velocities at the start, given to nodes. Bodies and particle files must then give none.
     pub initial_velocity: Option<InitialVelocity>,
     /// How the equations of a step are solved.
     #[serde(default)]
@@ -75,7 +76,7 @@ pub struct Scene {
     pub output: output::Output,
 }
 
-/// Velocities given to nodes at the start, and interpolated once to the particles, in place of the bodies' velocities.
+/// Velocities given to nodes at the start, and interpolated once to the particles. No body may then have a velocity of its own.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitialVelocity {
@@ -134,6 +135,14 @@ impl Scene {
                 "an empty list",
                 "must have at least one region",
             );
+            for (i, body) in self.bodies.iter().enumerate().filter(|(_, body)| body.velocity.is_some()) {
+                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
+                problems.refuse(
+                    &format!("bodies[{i}].velocity"),
+                    format_args!("{:?}", body.velocity.iter().flatten().collect::<Vec<_>>()),
+                    allowed,
+                );
+            }
             for (i, node) in problems.few("initial_velocity.nodes", regions).iter().enumerate() {
                 let path = format!("initial_velocity.nodes[{i}]");
                 node.region.check(&mut problems, &format!("{path}.region"), dimension);

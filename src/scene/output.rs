@@ -7,6 +7,7 @@ use super::load::check_body;
 use crate::field::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 
 /// What a run writes.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -50,7 +51,8 @@ pub struct Probe {
 pub enum At {
     /// The particle that is nearest to this point at t = 0, wherever it goes.
     Particle(Vec<f64>),
-    /// This point, whatever is there.
+    /// This point, fixed in space: at each time the particle nearest to it then, of equally near ones the first. No field is
+    /// interpolated; while no particle is within one grid spacing, the value is NaN.
     Point(Vec<f64>),
 }
 
@@ -72,11 +74,20 @@ impl Output {
                 "must be listed once",
             );
         }
+        let mut columns = HashSet::from(["time".to_owned()]);
         for (i, probe) in problems.few("output.probes", &self.probes).iter().enumerate() {
             probe.check(problems, &format!("output.probes[{i}]"), bodies, grid);
             let again = self.probes.iter().take(i).any(|earlier| earlier.name == probe.name);
+            let path = format!("output.probes[{i}].name");
             let allowed = "must differ from the names of the probes before";
-            problems.require(!again, &format!("output.probes[{i}].name"), format_args!("{:?}", probe.name), allowed);
+            problems.require(!again, &path, format_args!("{:?}", probe.name), allowed);
+            for column in probe.field.columns(&probe.name, grid.dimension()) {
+                if !again && columns.contains(&column) {
+                    let allowed = format!("probes.csv already has a column {column:?}: choose another name");
+                    problems.refuse(&path, format_args!("{:?}", probe.name), allowed);
+                }
+                columns.insert(column);
+            }
         }
     }
 }

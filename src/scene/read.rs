@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 /// The longest scene that is read, in bytes. Particles by the million belong into a CSV file.
 pub const MAX_BYTES: u64 = 16 << 20;
 
+/// What a scene is, for those who give something else.
+const SHAPE: &str = "a scene is an object: { \"grid\": …, \"time\": …, \"bodies\": … }";
+
 /// A scene that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -57,7 +60,10 @@ pub struct Malformed {
 impl Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let separator = if self.path.is_empty() { "" } else { ": " };
-        write!(f, "{}{separator}{}", self.path, self.message)?;
+        // A path through a hundred brackets helps nobody.
+        let path: String = self.path.chars().take(PATH).collect();
+        let more = if path.len() < self.path.len() { "…" } else { "" };
+        write!(f, "{path}{more}{separator}{}", self.message)?;
         self.place.iter().try_for_each(|place| write!(f, "\n{place}"))
     }
 }
@@ -90,13 +96,18 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         return Err(SceneError::TooLong);
     }
     let text = text.trim_start_matches('\u{feff}');
+    if text.trim().is_empty() {
+        let message = format!("the text is empty; {SHAPE}");
+        return Err(Malformed { path: String::new(), message, place: None }.into());
+    }
     let mut json = parse(text)?;
     for replaced in overrides {
         replaced.apply(&mut json)?;
     }
     if !json.is_object() {
-        let message = "a scene is an object: { \"grid\": …, \"time\": …, \"bodies\": … }".to_owned();
-        return Err(Malformed { path: String::new(), message, place: Some(Place::at(text, 0)) }.into());
+        return Err(
+            Malformed { path: String::new(), message: SHAPE.to_owned(), place: Some(Place::at(text, 0)) }.into()
+        );
     }
 
     let place = |steps: &[Step]| find(steps, text, overrides);
@@ -193,6 +204,9 @@ fn segments(path: &serde_path_to_error::Path) -> Vec<Step> {
         })
         .collect()
 }
+
+/// Characters of a path; the longest in a real scene is about half of it.
+const PATH: usize = 160;
 
 /// Characters of a message; it quotes what stands in the text.
 const MESSAGE: usize = 600;

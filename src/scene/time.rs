@@ -1,11 +1,12 @@
 //! Time stepping.
 
 use super::check::{Number, Problems};
+use crate::clock::MAX_HALVINGS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Time steps of one run, at most.
-const MAX_STEPS: f64 = 1e9;
+pub const MAX_STEPS: f64 = 1e9;
 
 /// The time steps and Newmark's constants.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -35,9 +36,9 @@ pub struct Time {
     /// How particles see prescribed nodes in their update.
     #[serde(default)]
     pub wall_update: WallUpdate,
-    /// How often a step that fails may be halved, 0 to 30. Default 10.
+    /// How often a step that fails may be halved, 0 to 20. Default 10.
     #[serde(default = "Time::default_max_halvings")]
-    #[schemars(range(min = 0, max = 30))]
+    #[schemars(range(min = 0, max = MAX_HALVINGS))]
     pub max_halvings: u32,
 }
 
@@ -80,6 +81,22 @@ impl Time {
         10
     }
 
+    /// The same with the end that the command line asks for, by the option `option`.
+    ///
+    /// # Errors
+    /// What the scene's own `end` may not be either.
+    pub fn until(&self, end: f64, option: &str) -> Result<Self, Problems> {
+        let time = Self { end, ..self.clone() };
+        let mut problems = Problems::default();
+        time.check(&mut problems);
+        for problem in &mut problems.list {
+            // Whatever is wrong now was right with the scene's own end.
+            problem.path = option.to_owned();
+            problem.value = Number(end).to_string();
+        }
+        if problems.is_empty() { Ok(time) } else { Err(problems) }
+    }
+
     pub(super) fn check(&self, problems: &mut Problems) {
         let step_ok = problems.positive("time.step", self.step);
         if problems.positive("time.end", self.end) && step_ok {
@@ -114,6 +131,6 @@ impl Time {
             format_args!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)"),
         );
         problems.between("time.lumping", self.lumping, 0.0, 1.0);
-        problems.whole("time.max_halvings", self.max_halvings, 0, 30);
+        problems.whole("time.max_halvings", self.max_halvings, 0, MAX_HALVINGS);
     }
 }

@@ -1,8 +1,8 @@
 //! Operations on long vectors whose results do not depend on the number of threads.
 //!
 //! A reduction is cut into chunks of fixed length; the sums of the chunks are added in their order, whichever thread made
-//! them. Every function takes vectors of one length (the shorter one counts if they differ). Squares are formed as they
-//! are: entries should lie between 1e-150 and 1e150 in magnitude, or be zero.
+//! them. Every function takes vectors of one length (the shorter one counts if they differ). Products are formed as they
+//! are: in [`dot`], entries should lie between 1e-150 and 1e150 in magnitude, or be zero; [`norm`] takes any.
 
 use rayon::prelude::*;
 
@@ -35,9 +35,25 @@ fn dot_chunk(x: &[f64], y: &[f64]) -> f64 {
     lanes.iter().sum()
 }
 
+/// A sum of squares that is smaller may have lost digits, or all, to underflow.
+const SAFE_SQUARE: f64 = 1e-280;
+
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
 pub fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
+    let square = dot(x, x);
+    if (SAFE_SQUARE..=f64::MAX).contains(&square) {
+        return square.sqrt();
+    }
+    // Squares under- or overflow, all entries are zero, or one is not finite.
+    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest == 0.0 || !largest.is_finite() || square.is_nan() {
+        return square.sqrt();
+    }
+    // ‖x‖ = 2ᵏ ‖x/2ᵏ‖ with 2ᵏ near the largest entry: exact. 2ᵏ in two factors, neither of which over- or underflows.
+    let k = largest.log2() as i32;
+    let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
+    let scaled: Vec<f64> = x.iter().map(|x| x * half * rest).collect();
+    dot(&scaled, &scaled).sqrt() / half / rest
 }
 
 /// `y ← a x + y`
@@ -115,5 +131,22 @@ mod tests {
         let mut x = x;
         x[7777] = f64::NAN;
         assert!(norm(&x).is_nan());
+        x[7777] = f64::INFINITY;
+        assert_eq!(norm(&x), f64::INFINITY);
+        assert_eq!(norm(&[0.0, -0.0]), 0.0);
+    }
+
+    #[test]
+    fn the_norm_neither_under_nor_overflows_where_its_value_does_not() {
+        let x = irregular(1000);
+        for exponent in [-960, -540, -500, 500, 540, 1000] {
+            let factor = 2.0_f64.powi(exponent);
+            let scaled: Vec<f64> = x.iter().map(|x| factor * x).collect();
+            assert_eq!(norm(&scaled).to_bits(), (factor * norm(&x)).to_bits(), "2^{exponent}");
+        }
+        // 3-4-5 among the smallest and the largest numbers there are
+        let tiny = f64::from_bits(1);
+        assert_eq!(norm(&[3.0 * tiny, 4.0 * tiny]), 5.0 * tiny);
+        assert_eq!(norm(&[0.6 * f64::MAX, 0.8 * f64::MAX]).log2(), f64::MAX.log2());
     }
 }

@@ -10,12 +10,12 @@ use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::output::plot::plot_run;
 use bfree::output::vtu::{Snapshot, Values};
-use bfree::output::{OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
+use bfree::output::{Outcome, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::simulation::{AdvanceError, InitialGuess, Settings, Simulation, StepError};
 use bfree::solver::NewtonSettings;
 use bfree::tensor::{Tensor, Vector};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
 type Failure = Box<dyn std::error::Error>;
@@ -143,10 +143,13 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
     let mut simulation = falling()?;
     let initial = simulation.clone();
     let reference = Reference::of(&simulation);
-    let corner = Vector::from([2.0, 2.0]);
+    // The nearest particle starts at (0.71875, 0.46875).
+    let corner = Vector::from([1.0, 0.875]);
+    let at_point = |within| Place::Nearest { point: corner, body: None, within };
     let probes = vec![
         Probe { name: "top".into(), field: Field::Displacement, place: Place::Particle(63) },
-        Probe { name: "near".into(), field: Field::Jacobian, place: Place::Nearest { point: corner, body: None } },
+        Probe { name: "near".into(), field: Field::Jacobian, place: at_point(2.0) },
+        Probe { name: "far".into(), field: Field::Velocity, place: at_point(0.4) },
     ];
     let mut recorder =
         Recorder::start(OutputSettings { probes, ..settings(directory.path()) }, &simulation, reference.clone())?;
@@ -159,7 +162,11 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
         floor.push(step.reactions[0][1]);
         tops.push(simulation.particles.position[63][1] - initial.particles.position[63][1]);
     }
-    let summary = recorder.finish(&simulation, &json!({"scene": "falling"}), None)?;
+    let summary = recorder.finish(
+        &simulation,
+        &Map::from_iter([("settings".into(), json!({"scene": "falling"}))]),
+        Outcome::Finished,
+    )?;
 
     let history = file("history.csv");
     let header = "step,time,dt,kinetic,strain,external,total,balance,momentum_x,momentum_y,newton,krylov";
@@ -176,12 +183,22 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
     assert_eq!(newton_column[1..], newton);
     assert_eq!(column(&file("reactions.csv"), "floor_y")?, floor);
     assert_eq!(column(&file("probes.csv"), "top_y")?[1..], tops);
-    assert_eq!(column(&file("probes.csv"), "near")?.len(), 21);
+    let near = column(&file("probes.csv"), "near")?;
+    assert!(near.len() == 21 && near.iter().all(|x| x.is_finite()), "{near:?}");
+    assert!(column(&file("probes.csv"), "far_y")?.iter().all(|x| x.is_nan()), "no particle is that near");
 
     let report: Value = serde_json::from_slice(&std::fs::read(file("report.json"))?)?;
-    let residuals = report["newton_residuals"].as_array().ok_or("no residuals")?;
-    let lengths: Vec<_> = residuals.iter().map(|step| step.as_array().map_or(0, Vec::len)).collect();
-    assert_eq!(lengths, newton.iter().map(|n| n + 1).collect::<Vec<_>>());
+    let steps = report["steps"].as_array().ok_or("no steps")?;
+    let lengths = |key: &str| steps.iter().map(|step| step[key].as_array().map_or(0, Vec::len)).collect::<Vec<_>>();
+    assert_eq!(lengths("newton_residuals"), newton.iter().map(|n| n + 1).collect::<Vec<_>>());
+    assert_eq!((lengths("krylov_iterations"), lengths("krylov_residuals")), (newton.clone(), newton.clone()));
+    for (k, step) in steps.iter().enumerate() {
+        assert_eq!((&step["time"], &step["dt"]), (&json!(column(&history, "time")?[k + 1]), &json!(0.01)));
+        let krylov: u64 = step["krylov_iterations"].as_array().into_iter().flatten().filter_map(Value::as_u64).sum();
+        assert_eq!((json!(krylov), column(&history, "krylov")?[k + 1]), (step["krylov_total"].clone(), krylov as f64));
+        let reached = step["krylov_residuals"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+        assert!(reached.into_iter().all(|x| x <= 1e-8), "{step}");
+    }
     assert_eq!(report["counts"]["newton_iterations"], newton.iter().sum::<usize>());
     assert_eq!(report["counts"]["steps"], 20);
     assert_eq!(report["settings"]["scene"], "falling");
@@ -233,9 +250,13 @@ fn one_and_three_dimensions_are_drawn_too() -> Result<(), Failure> {
         let directory = tempfile::tempdir()?;
         let simulation = single(Tensor::<f64, D>::zeros())?;
         let recorder = Recorder::start(settings(directory.path()), &simulation, Reference::of(&simulation))?;
-        recorder.finish(&simulation, &Value::Null, Some("nothing to do"))?;
+        let cause = Box::new(StepError::LeftGrid { particle: 0, position: vec![7.0] });
+        let error = AdvanceError { time: 0.0, dt: 0.01, cause, failed: Vec::new() };
+        recorder.finish(&simulation, &Map::new(), Outcome::Failed(&error))?;
         let report: Value = serde_json::from_slice(&std::fs::read(directory.path().join("report.json"))?)?;
-        assert_eq!((&report["outcome"], &report["failure"]), (&json!("failed"), &json!("nothing to do")));
+        assert_eq!(report["outcome"], "failed");
+        let message = report["message"].as_str().unwrap_or_default();
+        assert!(message.contains("from t = 0") && message.contains("particle 0 leaves the grid at [7.0]"), "{message}");
         Ok(plot_run(directory.path())?.len())
     }
     assert_eq!((run::<1>()?, run::<3>()?), (6, 6));
@@ -254,7 +275,7 @@ fn settings_that_make_no_sense_are_refused_with_their_numbers() -> Result<(), Fa
     let probe = |place| Probe { name: "p".into(), field: Field::Velocity, place };
     let missing = start(&|settings| settings.probes = vec![probe(Place::Particle(64))]);
     assert!(matches!(missing, Some(OutputError::ProbeParticle { particle: 64, particles: 64, .. })), "{missing:?}");
-    let nowhere = Place::Nearest { point: Vector::from([f64::NAN, 0.0]), body: None };
+    let nowhere = Place::Nearest { point: Vector::from([f64::NAN, 0.0]), body: None, within: 1.0 };
     let nowhere = start(&|settings| settings.probes = vec![probe(nowhere)]);
     assert!(matches!(nowhere, Some(OutputError::ProbePoint { .. })), "{nowhere:?}");
     let twice = start(&|settings| settings.probes = vec![probe(Place::Particle(0)), probe(Place::Particle(1))]);
@@ -275,8 +296,9 @@ fn the_nearest_particle_is_looked_for_in_its_body() -> Result<(), Failure> {
     let mut particles = falling()?.particles;
     particles.body[0] = 1;
     let far = Vector::from([1.0, 1.0]);
-    assert_eq!(nearest(&particles, &far, None), Some(63));
-    assert_eq!(nearest(&particles, &far, Some(1)), Some(0));
+    let distance = |p: usize| (particles.position[p] - far).norm();
+    assert_eq!(nearest(&particles, &far, None), Some((63, distance(63))));
+    assert_eq!(nearest(&particles, &far, Some(1)), Some((0, distance(0))));
     assert_eq!(nearest(&particles, &far, Some(2)), None);
     Ok(())
 }

@@ -50,7 +50,7 @@ fn free_flight_keeps_energy_and_momentum_and_impacts_take_few_iterations() -> Re
         let report = simulation.advance()?;
         let iterations = report.newton.history.iterations.len();
         assert!(iterations <= 3, "{iterations} Newton iterations at t = {}", simulation.clock.time());
-        assert_eq!(report.halvings, 0);
+        assert!(report.failed.is_empty());
         // The body feels the wall from about t = 20.3 on.
         if simulation.clock.time() < 20.01 {
             let (energy, momentum) = (total(&simulation), simulation.particles.momentum());

@@ -1,7 +1,7 @@
 //! Facts about whole runs: units, threads, failures.
 
 use crate::support::{Failure, scene};
-use bfree::simulation::{Simulation, StepError};
+use bfree::simulation::{AdvanceError, Simulation, StepError};
 use bfree::solver::NewtonSettings;
 
 /// Everything a particle carries, as bits.
@@ -74,6 +74,7 @@ fn a_step_that_fails_is_halved_and_leaves_the_particles_alone() -> Result<(), Fa
     // Three Newton iterations are too few for a whole step of the hard impact, but not for a short one.
     let mut simulation = scene::<2>("rebound_fast.json", &["time.step=0.2", "solver.newton.max_iterations=3"])?;
     let mut halvings = 0;
+    let bound = simulation.settings.newton.max_iterations;
     while simulation.clock.time() < 6.0 {
         let before = bits(&simulation);
         let time = simulation.clock.time();
@@ -82,7 +83,17 @@ fn a_step_that_fails_is_halved_and_leaves_the_particles_alone() -> Result<(), Fa
             assert_eq!(bits(&attempt), before);
             assert_eq!(attempt.clock.time(), time);
         }
-        halvings += simulation.advance()?.halvings;
+        let dt = simulation.clock.step();
+        let report = simulation.advance()?;
+        halvings += report.failed.len();
+        // Every attempt is half as long as the one before, says why it failed, and its work is known.
+        for (k, failed) in report.failed.iter().enumerate() {
+            assert_eq!(failed.dt, dt * 0.5_f64.powi(k as i32));
+            assert!(failed.why.contains("after the 3 allowed iterations"), "{}", failed.why);
+            assert_eq!(failed.newton.iterations.len(), bound);
+            assert!(failed.newton.counts.krylov_iterations > 0);
+        }
+        assert_eq!(report.dt, dt * 0.5_f64.powi(report.failed.len() as i32));
     }
     assert!(halvings > 0, "the test is meant to see a failing step");
     Ok(())
@@ -93,7 +104,9 @@ fn a_run_that_cannot_go_on_says_why() -> Result<(), Failure> {
     let mut simulation = scene::<2>("rebound_fast.json", &["time.max_halvings=2"])?;
     simulation.settings.newton = NewtonSettings { max_iterations: 0, ..simulation.settings.newton };
     let before = bits(&simulation);
-    assert!(matches!(simulation.advance(), Err(StepError::Newton(_))));
+    let Err(AdvanceError { cause, failed, time, dt }) = simulation.advance() else { return Err("it can".into()) };
+    assert!(matches!(*cause, StepError::Newton(_)));
+    assert_eq!((time, dt, failed.len()), (0.0, 0.25 * simulation.clock.nominal(), 3));
     assert_eq!(bits(&simulation), before);
     Ok(())
 }
@@ -107,7 +120,7 @@ fn a_particle_that_leaves_the_grid_is_named() -> Result<(), Failure> {
             break error;
         }
     };
-    let StepError::LeftGrid { particle, position } = &error else { return Err(error.into()) };
+    let StepError::LeftGrid { particle, position } = &*error.cause else { return Err(error.into()) };
     assert!(*particle < 112 && position[0] < 0.0, "{error}");
     assert!(simulation.particles.position.iter().all(|x| simulation.grid.contains(x)));
     Ok(())

@@ -2,6 +2,7 @@
 
 use bfree::scene::{self, Override, Place, Scene, SceneError};
 use bfree::shape::{Fill, fill};
+use bfree::simulation::Simulation;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -24,10 +25,15 @@ const GOOD: &str = r#"{
   "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]] },
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
-  "initial_velocity": { "nodes": [{ "region": { "box": { "min": [0, 0], "max": [1, 1] } }, "velocity": [10, 0] }] },
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
   "output": { "every": 0.1, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
 }"#;
+
+/// The same with velocities given to nodes, which then no body may have.
+fn good_on_nodes() -> String {
+    let nodes = r#""initial_velocity": { "nodes": [{ "region": { "box": { "min": [0, 0], "max": [1, 1] } }, "velocity": [10, 0] }] }"#;
+    GOOD.replace(r#""velocity": [1, 0], "#, "").replace(r#""solver""#, &format!(r#"{nodes}, "solver""#))
+}
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -85,7 +91,9 @@ fn shipped_scenes_have_the_published_sizes() {
 
 #[test]
 fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
-    scene::read(GOOD, &[]).unwrap_or_else(|error| panic!("{error}"));
+    for good in [GOOD.to_owned(), good_on_nodes()] {
+        scene::read(&good, &[]).unwrap_or_else(|error| panic!("{error}"));
+    }
     let least = r#"{"grid": {"size": [1], "spacing": 0.1}, "time": {"step": 1, "end": 1},
         "bodies": [{"name": "a", "shape": {"half_space": {"point": [0.5], "normal": [1]}},
                     "material": {"neo_hookean": {"bulk": 1, "shear": 1}}, "density": 1}]}"#;
@@ -113,6 +121,12 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     ("[4, 2]", "[1e7, 2]", "grid.size[0]", &["1e7 is not", "at a spacing of 0.5", "2e7 cells", "at most 1e6"]),
     (r#""origin": [0, 0]"#, r#""origin": [0]"#, "grid.origin", &["length 1", "2 components"]),
     (r#""origin": [0, 0]"#, r#""origin": [0, -1e300]"#, "grid.origin[1]", &["-1e300", "1e100"]),
+    (
+        r#""origin": [0, 0]"#,
+        r#""origin": [0, 1e16]"#,
+        "grid.origin[1]",
+        &["1e16", "too coarse to tell nodes 0.5 apart", "at most 2.25"],
+    ),
     (r#""gamma": 3"#, r#""gamma": 11.1"#, "approximation.lme.gamma", &["11.1", "less than 11.0524"]),
     (r#""gamma": 3"#, r#""gamma": 0"#, "approximation.lme.gamma", &["0 is not", "between 0.1 and 1000"]),
     (
@@ -147,7 +161,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
         "transfer.pic.order",
         &["21", "1 to 20"],
     ),
-    (r#""max_halvings": 3"#, r#""max_halvings": 31"#, "time.max_halvings", &["31", "0 to 30"]),
+    (r#""max_halvings": 3"#, r#""max_halvings": 21"#, "time.max_halvings", &["21", "0 to 20"]),
     (r#""name": "stiff""#, r#""name": """#, "bodies[1].name", &["empty"]),
     (r#""name": "stiff""#, r#""name": "soft""#, "bodies[1].name", &["soft", "differ"]),
     (r#""density": 2"#, r#""density": -4"#, "bodies[0].density", &["-4", "finite and > 0"]),
@@ -246,6 +260,25 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
     (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
+    // tip is a stress: its columns are tip_xx, tip_yy, …
+    (
+        r#""name": "mid", "field": "velocity""#,
+        r#""name": "tip_xx", "field": "jacobian""#,
+        "output.probes[1].name",
+        &["tip_xx", "already has a column"],
+    ),
+    (
+        r#""name": "mid", "field": "velocity""#,
+        r#""name": "time", "field": "jacobian""#,
+        "output.probes[1].name",
+        &["already has a column \"time\""],
+    ),
+    (
+        r#""solver":"#,
+        r#""initial_velocity": { "nodes": [{ "region": { "ball": { "center": [1, 1], "radius": 1 } }, "velocity": [10, 0] }] }, "solver":"#,
+        "bodies[0].velocity",
+        &["[1.0, 0.0]", "initial_velocity", "remove one"],
+    ),
     (r#""name": "mid""#, r#""name": "../mid""#, "output.probes[1].name", &["file name"]),
     (
         r#""point": [2, 1]"#,
@@ -295,8 +328,9 @@ const WRONG_TEXT: &[(&str, &str, &str, &[&str])] = &[
 ];
 
 fn mutated(from: &str, to: &str) -> String {
-    assert!(GOOD.contains(from), "the good scene has no {from}");
-    GOOD.replacen(from, to, 1)
+    let good = if GOOD.contains(from) { GOOD.to_owned() } else { good_on_nodes() };
+    assert!(good.contains(from), "the good scene has no {from}");
+    good.replacen(from, to, 1)
 }
 
 #[test]
@@ -344,6 +378,102 @@ fn the_message_shows_line_column_and_caret() {
     assert!(message.starts_with(expected), "{message}");
     let lines: Vec<&str> = message.lines().collect();
     assert_eq!(lines[2].find("\"density\""), lines[3].find('^'), "{message}");
+}
+
+/// A unit block in a box of 2 × 2 (× 2), with cells of ½, everything in multiples of `length`.
+fn block(dimension: usize, length: f64, change: impl Fn(&mut Value)) -> Value {
+    let corner = |x: f64| vec![x * length; dimension];
+    let mut scene = json!({
+        "grid": {"size": corner(2.0), "spacing": 0.5 * length},
+        "time": {"step": 1, "end": 1},
+        "bodies": [{"name": "block", "shape": {"box": {"min": corner(0.5), "max": corner(1.5)}}, "density": 1,
+                    "material": {"neo_hookean": {"young": 1000, "poisson": 0.25}}}]
+    });
+    change(&mut scene);
+    scene
+}
+
+fn built<const D: usize>(scene: &Value) -> Result<Simulation<D>, Box<dyn std::error::Error>> {
+    Ok(scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
+}
+
+#[test]
+fn scenes_whose_numbers_do_not_fit_are_refused_with_the_number() {
+    let refused = |scene: Value, words: &[&str]| {
+        let error = built::<3>(&scene).expect_err(&scene.to_string()).to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{error}");
+    };
+    let set =
+        |path: &'static str, value: Value| move |scene: &mut Value| *scene.pointer_mut(path).unwrap() = value.clone();
+    let add = |key: &'static str, value: Value| move |scene: &mut Value| scene["bodies"][0][key] = value.clone();
+    built::<3>(&block(3, 1.0, |_| {})).unwrap();
+    // Λ V / h of 1e-80 in size, squared by the norm of the residual, vanishes: everything would be in equilibrium.
+    refused(block(3, 1e-80, |_| {}), &["bodies[0]: the smallest force that resists", "1e-120"]);
+    refused(block(3, 1e-75, set("/bodies/0/density", json!(1e-99))), &["bodies[0]: the smallest particle mass is 0e0"]);
+    refused(block(3, 1e40, set("/time/step", json!(1e-9))), &["in one step", "1e120"]);
+    refused(block(3, 1.0, add("velocity", json!([0, 1e70, 0]))), &["kinetic energy", "1e120"]);
+    let gravity = |scene: &mut Value| scene["gravity"] = json!({"acceleration": [0, 1e99, 0], "curve": [[0, 1e50]]});
+    refused(block(3, 1.0, gravity), &["gravity: the weight of a particle", "e147"]);
+    let push = |scene: &mut Value| {
+        scene["boundary"] = json!({"top": {"velocity": [[0, [null, 1e99, null]], [1, [null, 1e99, null]]]}})
+    };
+    let dense = |scene: &mut Value| scene["bodies"][0]["density"] = json!(1e30);
+    let both = |scene: &mut Value| {
+        push(scene);
+        dense(scene);
+    };
+    refused(block(3, 1.0, both), &["boundary.top: the force that moves"]);
+    let pull = |scene: &mut Value| {
+        scene["tractions"] = json!([{"body": "block", "traction": [0, 1, 0]}, {"body": "block", "traction": [0, 1e90, 0], "curve": [[0, -1e50]]}]);
+    };
+    refused(block(3, 1.0, pull), &["tractions[1]: the force on a particle"]);
+}
+
+#[test]
+fn every_face_of_a_box_is_loaded_with_its_whole_area() -> Result<(), Box<dyn std::error::Error>> {
+    let pressed = |region: Option<Value>| {
+        move |scene: &mut Value| {
+            scene["pressures"] = json!([{"body": "block", "pressure": 1}]);
+            if let Some(region) = &region {
+                scene["pressures"][0]["region"] = region.clone();
+            }
+        }
+    };
+    // all of the surface: the perimeter of the unit square, 2 particles a cell and 4 along each side
+    let points = built::<2>(&block(2, 1.0, pressed(None)))?.loads.surface.remove(0).points;
+    assert_eq!(points.len(), 4 * 4);
+    assert_eq!(points.iter().map(|point| point.area).sum::<f64>(), 4.0);
+    assert!(points.iter().all(|point| point.offset == 0.125 && point.normal.amax() == 1.0));
+    let points = built::<3>(&block(3, 1.0, pressed(None)))?.loads.surface.remove(0).points;
+    assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (6 * 16, 6.0));
+    // the top alone, by a region that ends on it: the corner particles carry the top and not the sides
+    let top = json!({"box": {"min": [0, 1.4], "max": [2, 1.5]}});
+    let points = built::<2>(&block(2, 1.0, pressed(Some(top))))?.loads.surface.remove(0).points;
+    assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (4, 1.0));
+    assert!(points.iter().all(|point| point.normal[1] == 1.0));
+    Ok(())
+}
+
+#[test]
+fn velocities_of_a_file_and_of_nodes_exclude_each_other() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let mut scene = block(2, 1.0, |scene| {
+        scene["initial_velocity"] =
+            json!({"nodes": [{"region": {"half_space": {"point": [9, 9], "normal": [1, 0]}}, "velocity": [1, 0]}]});
+    });
+    if let Some(body) = scene["bodies"][0].as_object_mut() {
+        body.remove("shape");
+    }
+    scene["bodies"][0]["particles"] = json!({"file": "p.csv"});
+    let build = |scene: &Value| {
+        scene::read(&scene.to_string(), &[])?.build::<2>(folder.path()).map_err(Box::<dyn std::error::Error>::from)
+    };
+    std::fs::write(folder.path().join("p.csv"), "x,y,volume\n1,1,0.1\n")?;
+    assert!((build(&scene)?.particles.velocity[0][0] - 1.0).abs() < 1e-12);
+    std::fs::write(folder.path().join("p.csv"), "x,y,volume,vx,vy\n1,1,0.1,3,4\n")?;
+    let error = build(&scene).expect_err("two velocities").to_string();
+    assert!(error.contains("bodies[0].particles.file") && error.contains("initial_velocity"), "{error}");
+    Ok(())
 }
 
 #[test]

@@ -1,7 +1,29 @@
 //! A line chart as SVG.
 
+use crate::report::short;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
+
+/// Colours that people with any colour vision tell apart (Okabe and Ito, 2008), the yellow left out: too pale for a line.
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 0, 0),
+];
+
+/// Width of a line; each one is thinner than those below it, so that lines that coincide are all seen.
+fn width(line: usize, lines: usize) -> u32 {
+    2 + 2 * (lines - 1 - line).min(3) as u32
+}
+
+/// Height of a line of the legend, and room for its letters.
+const LEGEND: (i32, i32) = (22, 8);
 
 /// One axis.
 #[derive(Clone, Debug)]
@@ -30,35 +52,59 @@ impl Axis {
     }
 
     pub(crate) fn tick(&self, place: f64) -> String {
-        let value = if self.logarithmic { 10.0_f64.powf(place) } else { place };
-        // Without the round-off of its place.
-        let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
-        if (1e-4..1e5).contains(&rounded.abs()) || rounded.abs() < 1e-12 {
-            format!("{}", if rounded.abs() < 1e-12 { 0.0 } else { rounded })
+        if self.logarithmic {
+            short(10.0_f64.powf(place))
         } else {
-            format!("{rounded:e}")
+            // without the round-off of a multiple
+            format!("{}", (place * 1e9).round() / 1e9)
         }
     }
 
-    /// Places of the labels within `range`: 1, 2 and 5 times powers of ten.
+    /// Where the axis has ticks: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5.
     pub(crate) fn ticks(&self, range: &Range<f64>) -> Vec<f64> {
-        let (low, high) = (range.start, range.end);
+        let span = range.end - range.start;
         if self.logarithmic {
-            let digits: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
-            let decades = low.floor() as i32..=high.ceil() as i32;
-            return decades
-                .flat_map(|decade| digits.iter().map(move |digit| f64::from(decade) + digit.log10()))
-                .filter(|place| (low..=high).contains(place))
-                .collect();
+            let every = (span / 8.0).ceil().max(1.0) as usize;
+            let digits: &[f64] = if span < 3.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+            let decades = (range.start.floor() as i64..=range.end.ceil() as i64).filter(|d| d % every as i64 == 0);
+            decades
+                .flat_map(|d| digits.iter().map(move |m| d as f64 + m.log10()))
+                .filter(|t| range.contains(t))
+                .collect()
+        } else {
+            let rough = span / 8.0;
+            let decade = 10.0_f64.powf(rough.log10().floor());
+            let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|&s| s >= rough).unwrap_or(rough);
+            let (first, last) = ((range.start / step).ceil() as i64, (range.end / step).floor() as i64);
+            (first..=last).map(|k| k as f64 * step).collect()
         }
-        let least = (high - low) / 8.0;
-        let power = 10.0_f64.powf(least.log10().floor());
-        let step =
-            [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= least).unwrap_or(least);
-        let first = (low / step).ceil() as i64;
-        (0..=20).map(|k| (first + k) as f64 * step).take_while(|&place| place <= high).collect()
     }
 }
+
+/// A range with its ticks: the plotting library would cut the logarithms into tenths.
+struct Ticked {
+    range: Range<f64>,
+    ticks: Vec<f64>,
+}
+
+impl Ranged for Ticked {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        RangedCoordf64::from(self.range.clone()).map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+impl ValueFormatter<f64> for Ticked {}
 
 /// A line with its points.
 #[derive(Clone, Debug)]
@@ -124,14 +170,19 @@ impl Figure {
             })
             .collect();
         let all = || placed.iter().flat_map(|(_, _, points)| points.iter());
-        let root = SVGBackend::with_string(text, (900, 560)).into_drawing_area();
+        let root = SVGBackend::with_string(text, (1000, 560)).into_drawing_area();
         root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&root)
+        let longest = self.lines.iter().map(|line| line.name.chars().count()).max().unwrap_or(0) as i32;
+        // The legend stands beside the chart, where it hides nothing.
+        let (area, legend) = root.split_horizontally(1000 - (LEGEND.1 * longest + 60).min(400));
+        let (x, y) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
+        let (x_ticks, y_ticks) = (self.x.ticks(&x), self.y.ticks(&y));
+        let mut chart = ChartBuilder::on(&area)
             .caption(&self.title, ("sans-serif", 18))
             .margin(12)
             .x_label_area_size(42)
             .y_label_area_size(64)
-            .build_cartesian_2d(range(all().map(|p| p.0)), range(all().map(|p| p.1)))?;
+            .build_cartesian_2d(Ticked { range: x, ticks: x_ticks }, Ticked { range: y, ticks: y_ticks })?;
         chart
             .configure_mesh()
             .light_line_style(WHITE)
@@ -141,22 +192,33 @@ impl Figure {
             .y_label_formatter(&|&y| self.y.tick(y))
             .draw()?;
         for (k, line, points) in &placed {
-            let color = Palette99::pick(*k).to_rgba();
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
-                .label(&line.name)
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], color.stroke_width(2)));
-            chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, color.filled())))?;
+            let (color, width) = (COLORS[k % COLORS.len()].to_rgba(), width(*k, self.lines.len()));
+            chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(width)))?;
+            let dot = 2 + width / 2;
+            chart.draw_series(points.iter().map(|&point| Circle::new(point, dot, color.filled())))?;
+            let height = 60 + LEGEND.0 * *k as i32;
+            legend.draw(&PathElement::new(vec![(4, height), (30, height)], color.stroke_width(width)))?;
+            legend.draw(&Text::new(line.name.clone(), (38, height - 7), ("sans-serif", 14)))?;
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
         root.present()?;
         drop(chart);
         drop(root);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers_inside_the_range() {
+        let axis = Axis::logarithmic("h");
+        let labels = |axis: &Axis, range: Range<f64>| -> Vec<String> {
+            axis.ticks(&range).into_iter().map(|place| axis.tick(place)).collect()
+        };
+        assert_eq!(labels(&axis, 0.9..1.6), ["10", "20"]);
+        assert_eq!(axis.ticks(&(-16.5..0.5)), [-15.0, -12.0, -9.0, -6.0, -3.0, 0.0]);
+        assert_eq!(labels(&Axis::linear("t"), -0.1..0.52), ["-0.1", "0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
     }
 }

@@ -69,6 +69,7 @@ studies!(
     taylor,
     newton,
     baseline,
+    operator,
     patch,
     balance,
     digits,

@@ -5,7 +5,7 @@
 pub(super) enum Check {
     /// A study of this program.
     Study(&'static str),
-    /// A test program of the library.
+    /// A module of the library's test program, by the beginning of its tests' names.
     Test(&'static str),
 }
 
@@ -22,11 +22,11 @@ const TANGENT: Check = Check::Study("tangent");
 const PATCH: Check = Check::Study("patch");
 const BALANCE: Check = Check::Study("balance");
 const DIGITS: Check = Check::Study("digits");
-const DYNAMICS: Check = Check::Test("dynamics");
-const POINTS: Check = Check::Test("points");
-const LOADS: Check = Check::Test("loads");
-const SHAPES: Check = Check::Test("approximation");
-const SMOOTH: Check = Check::Test("smoothing");
+const DYNAMICS: Check = Check::Test("dynamics::");
+const POINTS: Check = Check::Test("points::");
+const LOADS: Check = Check::Test("loads::");
+const SHAPES: Check = Check::Test("approximation::");
+const SMOOTH: Check = Check::Test("smoothing::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH];
@@ -69,6 +69,7 @@ const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
+const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
 const MATERIAL: &str = "src/material/mod.rs";
 const TENSOR: &str = "src/tensor.rs";
@@ -139,8 +140,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "{}",
         Killed(&[TANGENT], &[POINTS])),
     patch("diagonal blocks without the material", PRODUCT,
-        "self.frozen[p].block(grad_n, grad_n) + scaled(&identity(), inertia)",
-        "scaled(&identity(), inertia)",
+        "eq.supports.add_blocks(tangents, &mut blocks)",
+        "()",
         Killed(&[TANGENT], &[POINTS])),
     patch("sign of the pressure's diagonal blocks", PRODUCT,
         "outer(&self.force, &g) - outer(&g, &self.force)",
@@ -159,8 +160,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "determinant(&unit).abs() > 1e-9",
         Equivalent("only the preconditioner of ill-shaped blocks")),
     patch("eps for 1 - eps in the projection", TRANSFER,
-        "at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p] * n)",
-        "at_particles[p] * (self.lumping * self.particles.mass[p] * n)",
+        "at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p])",
+        "at_particles[p] * (self.lumping * self.particles.mass[p])",
         Killed(&[BALANCE], &[DYNAMICS])),
     patch("another diagonal of the projection's mass", TRANSFER,
         "(1.0 - lumping) * particles.mass[p] * n * n",
@@ -203,8 +204,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "(self.rate * dt).min(1.0)",
         Killed(&[SMOOTH], &[DYNAMICS])),
     patch("smoothing towards a sum that is no mean", SMOOTHING,
-        "field[p] * (particles.mass[p] * n)",
-        "field[p] * n",
+        "field[p] * particles.mass[p]",
+        "field[p]",
         Killed(&[SMOOTH], &[DYNAMICS])),
     patch("smoothing forgets the acceleration", TRANSFER,
         "(&mut self.delta_acceleration, &particles.acceleration),",
@@ -246,9 +247,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "Alphas::START",
         "Alphas { a3: 1.0, ..Alphas::START }",
         Killed(&[LOADS], &[DYNAMICS])),
-    patch("sign of q in the frozen neo-Hookean", NEO_HOOKEAN,
-        "scaled(&(a * l.transpose() * a), self.q)",
-        "scaled(&(a * l.transpose() * a), -self.q)",
+    patch("sign of q in the frozen tangent", CLOSED,
+        "with.mul_sub(q_a_lt[j], a[j][k], sum)",
+        "with.mul_add(q_a_lt[j], a[j][k], sum)",
         Killed(&[TANGENT, DYNAMICS], &[POINTS])),
     patch("1/F for its transpose in the frozen neo-Hookean", NEO_HOOKEAN,
         "at.inverse_transpose() * f_n.transpose()",
@@ -274,10 +275,10 @@ pub(super) const PATCHES: &[Patch] = &[
         "scaled(x, T::lit(2.0) * shear)",
         "scaled(x, shear)",
         Killed(&[TANGENT, POINTS], &[DYNAMICS])),
-    patch("blocks without the geometric part", KIRCHHOFF,
-        "scaled(&identity(), v.dot(&(self.stress * b)))",
-        "Tensor::zeros()",
-        Killed(&[TANGENT, POINTS], &[DYNAMICS])),
+    patch("diagonal blocks without the geometric part", CLOSED,
+        "with.add(block[i][i], self.right[k][l])",
+        "block[i][i]",
+        Killed(&[TANGENT], &[POINTS])),
     patch("shear stress of an energy twice as large", FROM_ENERGY,
         "self.0.energy(&seeded(e, &direction(i, k))).eps",
         "self.0.energy(&seeded(e, &direction(i, k))).eps * T::lit(if i == k { 1.0 } else { 2.0 })",

@@ -153,15 +153,14 @@ type Programs = HashMap<String, PathBuf>;
 /// The program that runs studies.
 const STUDIES: &str = "verification";
 
+/// The test program of the library.
+const SUITE: &str = "suite";
+
 fn build(source: &Path, target: &Path) -> Result<Programs, ShippedFaultError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--locked", "--message-format", "json", "-p", "bfree", "-p", STUDIES, "--bin", STUDIES]);
-    for check in CHECKS {
-        if let Check::Test(name) = check {
-            command.args(["--test", name]);
-        }
-    }
+    command.args(["build", "--release", "--locked", "--message-format", "json"]);
+    command.args(["-p", "bfree", "-p", STUDIES, "--bin", STUDIES, "--test", SUITE]);
     let messages = output(command.arg("--target-dir").arg(target).current_dir(source))?;
     let artifacts = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
     Ok(artifacts
@@ -197,7 +196,7 @@ enum Verdict {
 fn attempt(programs: &Programs, source: &Path, check: Check, number: usize) -> Result<Verdict, ShippedFaultError> {
     let (name, arguments): (&'static str, &[&str]) = match check {
         Check::Study(study) => (STUDIES, &[study]),
-        Check::Test(test) => (test, &["--quiet"]),
+        Check::Test(module) => (SUITE, &[module, "--quiet"]),
     };
     let program = programs.get(name).ok_or(ShippedFaultError::NotBuilt { name })?;
     let mut command = Command::new(program);

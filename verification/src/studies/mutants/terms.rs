@@ -147,9 +147,8 @@ fn product<const D: usize, L: Law>(
                         Term::Geometric => l * law.stress(at),
                         _ => at.f * law.elasticity(at, &(at.f.transpose() * l)),
                     };
-                    Ok::<_, Inadmissible>(delta_piola * eq.particles.volume[p])
+                    Ok::<_, Inadmissible>((Vector::zeros(), delta_piola * eq.particles.volume[p]))
                 },
-                |stress, _, grad_n| stress * grad_n,
             )?;
             out
         }

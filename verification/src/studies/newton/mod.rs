@@ -11,7 +11,7 @@ use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
-use bfree::simulation::{Simulation, StepError};
+use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
     Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
 };
@@ -106,7 +106,7 @@ fn rebound(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyEr
 }
 
 /// Runs to the start of a step.
-fn reach(simulation: &mut Simulation<2, Material>, step: u64) -> Result<(), StepError> {
+fn reach(simulation: &mut Simulation<2, Material>, step: u64) -> Result<(), AdvanceError> {
     while simulation.clock.nominal_steps() < step {
         simulation.advance()?;
     }

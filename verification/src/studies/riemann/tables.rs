@@ -210,7 +210,7 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
     );
     for &jump in &plan.jumps {
         let by_h = plan.spacings(jump).iter().map(|&h| (h, COURANT));
-        let by_step = plan.courants.iter().skip(1).map(|&courant| (plan.spacings[0], courant));
+        let by_step = plan.courants(jump).iter().skip(1).map(|&courant| (plan.spacings[0], courant));
         for (h, courant) in by_h.chain(by_step) {
             let found = runs.particles(Method::RECOMMENDED, jump, h, courant)?;
             let undissipated = runs.particles(SMOOTH, jump, h, 1.0)?;

@@ -1,24 +1,18 @@
-//! The loop over particles: gather → point → scatter. The only place that knows threads.
-//!
-//! Particles are split into blocks of fixed size, whatever the number of threads. A block gathers from its own
-//! nodes, scatters into its own buffer, and the buffers are added in the order of the blocks: the same bits for any
-//! number of threads.
+//! The sweep written down plainly, one list of (node, N, ∇N) a particle: the specification, and the way of shape functions
+//! that are no products.
 
-use crate::approximation::{ApproximationError, Scratch, ShapeFunction, Support};
+use super::{BLOCK, Magnitude, SupportError, infallible, ordered};
+use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
-use rayon::prelude::*;
 use std::ops::{AddAssign, Range};
-
-/// Particles per block: large enough to pay for a task, small enough to keep a block's nodes in cache.
-const BLOCK: usize = 256;
 
 /// Shape functions of all particles at the last converged positions, and the active nodes they name.
 #[derive(Clone, Debug)]
-pub struct Supports<const D: usize> {
+pub(super) struct Plain<const D: usize> {
     blocks: Vec<Block<D>>,
     particles: usize,
 }
@@ -40,22 +34,12 @@ struct Block<const D: usize> {
     gradients: Vec<Vector<f64, D>>,
 }
 
-/// The shape functions of a particle could not be evaluated.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("particle {particle} has no shape functions")]
-pub struct SupportError {
-    /// Number of the particle.
-    pub particle: usize,
-    /// What went wrong.
-    pub source: ApproximationError,
-}
-
-impl<const D: usize> Supports<D> {
+impl<const D: usize> Plain<D> {
     /// Evaluates the shape functions at all positions and numbers the active nodes.
     ///
     /// # Errors
     /// The first particle, in their order, that lies outside the grid or whose shape functions do not exist.
-    pub fn new<A: ShapeFunction>(
+    pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
@@ -77,12 +61,12 @@ impl<const D: usize> Supports<D> {
     }
 
     /// Number of particles.
-    pub fn particles(&self) -> usize {
+    pub(super) fn particles(&self) -> usize {
         self.particles
     }
 
     /// Bytes of all arrays.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         let entry = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
         let of_block = |block: &Block<D>| {
             block.values.len() * entry + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
@@ -91,53 +75,32 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The entries (active node, N, ∇_n N) of one particle.
-    pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, &Vector<f64, D>)> {
+    pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
         block
             .entries(particle)
-            .map(move |e| (block.nodes[block.local[e] as usize] as usize, block.values[e], &block.gradients[e]))
+            .map(move |e| (block.nodes[block.local[e] as usize] as usize, block.values[e], block.gradients[e]))
     }
 
-    /// Σ u_I ⊗ ∇_n N_I at one particle.
-    pub fn gradient_at<T: Real>(&self, particle: usize, field: &[Vector<T, D>]) -> Tensor<T, D> {
-        let mut gradient = Tensor::<T, D>::zeros();
-        for (node, _, grad_n) in self.of(particle) {
-            gradient += field[node] * grad_n.map(T::lit).transpose();
-        }
-        gradient
-    }
-
-    /// Σ u_I N_I at every particle.
-    pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        infallible(self.interpolate(field, |_, value, _| Ok(value)))
-    }
-
-    /// `out_I += Σ_p scatter(point(p, u_p, ∇u_p), N_I, ∇_n N_I)` with u_p = Σ u_I N_I and ∇u_p = Σ u_I ⊗ ∇_n N_I.
-    ///
-    /// # Errors
-    /// The error of the first particle, in their order, whose `point` fails.
-    pub fn assemble<T, R, O, E>(
+    /// See [`super::Supports::assemble`] and [`super::Supports::assemble_magnitudes`].
+    pub(super) fn assemble<T: Real, E: Send>(
         &self,
         field: &[Vector<T, D>],
-        out: &mut [O],
-        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
-        scatter: impl Fn(&R, f64, &Vector<f64, D>) -> O + Sync,
-    ) -> Result<(), E>
-    where
-        T: Real,
-        O: Copy + Zero + AddAssign + Send,
-        E: Send,
-    {
+        out: &mut [Vector<T, D>],
+        magnitude: Magnitude,
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+    ) -> Result<(), E> {
         let buffers = ordered(self.blocks.len(), |b| {
             let block = &self.blocks[b];
             let nodal: Vec<Vector<T, D>> = block.nodes.iter().map(|&n| field[n as usize]).collect();
-            let mut buffer = vec![O::zero(); block.nodes.len()];
+            let mut buffer = vec![Vector::zeros(); block.nodes.len()];
             for p in block.particles.clone() {
                 let entries = block.entries(p);
                 let (value, gradient) = block.gather(&nodal, entries.clone());
-                let result = point(p, value, gradient)?;
+                let (force, stress) = point(p, value, gradient)?;
                 for e in entries {
-                    buffer[block.local[e] as usize] += scatter(&result, block.values[e], &block.gradients[e]);
+                    let (n, grad_n) = magnitude.of(block.values[e], block.gradients[e]);
+                    buffer[block.local[e] as usize] += stress * grad_n.map(T::lit) + force * T::lit(n);
                 }
             }
             Ok(buffer)
@@ -151,7 +114,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// `out_I += Σ_p scatter(p, N_I, ∇_n N_I)`: nothing is gathered.
-    pub fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)
+    pub(super) fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)
     where
         O: Copy + Zero + AddAssign + Send,
     {
@@ -176,7 +139,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle, in their order, whose `point` fails.
-    pub fn interpolate<T: Real, R: Send, E: Send>(
+    pub(super) fn interpolate<T: Real, R: Send, E: Send>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
@@ -249,22 +212,5 @@ impl<const D: usize> Block<D> {
             }
         }
         (value, gradient)
-    }
-}
-
-/// `f(0), …, f(count − 1)`, on all cores; the error is that of the smallest index.
-fn ordered<R: Send, E: Send>(count: usize, f: impl Fn(usize) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
-    if count <= 1 {
-        return (0..count).map(f).collect();
-    }
-    // Collect first: rayon's own short-circuit would return whichever error came first in time.
-    let results: Vec<Result<R, E>> = (0..count).into_par_iter().map(&f).collect();
-    results.into_iter().collect()
-}
-
-fn infallible<R>(result: Result<R, std::convert::Infallible>) -> R {
-    match result {
-        Ok(value) => value,
-        Err(never) => match never {},
     }
 }

@@ -1,0 +1,49 @@
+//! What an error says and what its causes say, each once.
+
+use std::error::Error;
+
+/// The messages of an error and of its causes, outermost first. A message that already ends with its cause, as "cannot write
+/// a.csv: disk full" does, is not followed by it.
+pub fn messages(error: &dyn Error) -> Vec<String> {
+    let mut messages = vec![error.to_string()];
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let message = error.to_string();
+        if !messages.iter().any(|told| told.ends_with(&message)) {
+            messages.push(message);
+        }
+        cause = error.source();
+    }
+    messages
+}
+
+/// All of them on one line.
+pub fn on_one_line(error: &dyn Error) -> String {
+    messages(error).join(": ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, thiserror::Error)]
+    enum Nested {
+        #[error("{text}{}", source.as_ref().filter(|_| *telling).map_or(String::new(), |source| format!(": {source}")))]
+        Level { text: &'static str, telling: bool, source: Option<Box<Nested>> },
+    }
+
+    fn level(text: &'static str, telling: bool, source: Option<Nested>) -> Nested {
+        Nested::Level { text, telling, source: source.map(Box::new) }
+    }
+
+    #[test]
+    fn every_cause_is_told_once_whether_or_not_the_message_holds_it() {
+        for telling in [true, false] {
+            let chain =
+                level("cannot build", false, Some(level("cannot read a", telling, Some(level("gone", true, None)))));
+            assert_eq!(on_one_line(&chain), "cannot build: cannot read a: gone");
+        }
+        let inner = level("cannot read a", true, Some(level("gone", true, None)));
+        assert_eq!(messages(&level("cannot build", true, Some(inner))), ["cannot build: cannot read a: gone"]);
+    }
+}

@@ -1,0 +1,127 @@
+//! The frozen tangent in closed form: what isotropic laws without history need, from a handful of numbers.
+
+use super::FrozenTangent;
+use crate::scalar::{Arithmetic, Real, Single};
+use crate::tensor::{Tensor, Vector, identity, outer, scaled};
+
+/// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N; B, b and c symmetric.
+///
+/// `N` is a number, or a whole vector of lanes with a particle in each.
+#[derive(Clone, Copy, Debug)]
+pub struct ClosedTangent<N, const D: usize> {
+    /// A: ΔF⁻ᵀ of the neo-Hookean solids, F F_nᵀ of St. Venant and Kirchhoff's.
+    pub a: [[N; D]; D],
+    /// B, times V₀.
+    pub right: [[N; D]; D],
+    /// κ, times V₀.
+    pub bulk: N,
+    /// q, times V₀.
+    pub q: N,
+    /// b and V₀ c, for laws that have the term; the same for all states of a law.
+    pub both: Option<[[[N; D]; D]; 2]>,
+}
+
+impl<N: Copy, const D: usize> ClosedTangent<N, D> {
+    /// V₀ δP F_nᵀ from L.
+    #[inline(always)]
+    pub fn product<A: Arithmetic<N = N>>(&self, with: A, l: &[[N; D]; D]) -> [[N; D]; D] {
+        let (zero, a) = (with.zero(), &self.a);
+        let mut contracted = zero;
+        for i in 0..D {
+            for k in 0..D {
+                contracted = with.mul_add(a[i][k], l[i][k], contracted);
+            }
+        }
+        let bulk = with.mul(self.bulk, contracted);
+        let mut out = [[zero; D]; D];
+        for i in 0..D {
+            // q A Lᵀ, row i
+            let mut q_a_lt = [zero; D];
+            for k in 0..D {
+                for j in 0..D {
+                    q_a_lt[k] = with.mul_add(a[i][j], l[k][j], q_a_lt[k]);
+                }
+                q_a_lt[k] = with.mul(self.q, q_a_lt[k]);
+            }
+            for k in 0..D {
+                let mut sum = with.mul(bulk, a[i][k]);
+                for j in 0..D {
+                    sum = with.mul_add(l[i][j], self.right[j][k], sum);
+                    sum = with.mul_sub(q_a_lt[j], a[j][k], sum);
+                }
+                out[i][k] = sum;
+            }
+        }
+        if let Some([b, c]) = &self.both {
+            for i in 0..D {
+                let mut b_l = [zero; D];
+                for k in 0..D {
+                    for j in 0..D {
+                        b_l[k] = with.mul_add(b[i][j], l[j][k], b_l[k]);
+                    }
+                }
+                for k in 0..D {
+                    for j in 0..D {
+                        out[i][k] = with.mul_add(b_l[j], c[j][k], out[i][k]);
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+impl<N: Copy, const D: usize> ClosedTangent<N, D> {
+    /// The block of the unit gradients e_k and e_l: κ A e_k ⊗ A e_l − q A e_l ⊗ A e_k + B_kl I + c_kl b.
+    #[inline(always)]
+    pub fn unit_block<A: Arithmetic<N = N>>(&self, with: A, k: usize, l: usize) -> [[N; D]; D] {
+        let a = &self.a;
+        let mut block = [[with.zero(); D]; D];
+        for i in 0..D {
+            let (bulk_a, q_a) = (with.mul(self.bulk, a[i][k]), with.mul(self.q, a[i][l]));
+            for j in 0..D {
+                block[i][j] = with.mul_sub(q_a, a[j][k], with.mul(bulk_a, a[j][l]));
+                if let Some([b, c]) = &self.both {
+                    block[i][j] = with.mul_add(c[k][l], b[i][j], block[i][j]);
+                }
+            }
+            block[i][i] = with.add(block[i][i], self.right[k][l]);
+        }
+        block
+    }
+}
+
+/// A tensor by rows.
+pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
+    std::array::from_fn(|i| std::array::from_fn(|k| a[(i, k)]))
+}
+
+/// A tensor from its rows.
+#[inline(always)]
+fn tensor<T: Real, const D: usize>(a: &[[T; D]; D]) -> Tensor<T, D> {
+    Tensor::from_fn(|i, k| a[i][k])
+}
+
+impl<T: Real, const D: usize> FrozenTangent<T, D> for ClosedTangent<T, D> {
+    #[inline(always)]
+    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
+        tensor(&self.product(Single::<T>::default(), &rows(l)))
+    }
+
+    /// κ g_I ⊗ g_J − q g_J ⊗ g_I + (∇N_I·B ∇N_J) I + (∇N_I·c ∇N_J) b,  g = A ∇_n N
+    #[inline(always)]
+    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
+        let a = tensor(&self.a);
+        let (g_i, g_j) = (a * grad_i, a * grad_j);
+        let block = scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
+            + scaled(&identity(), grad_i.dot(&(tensor(&self.right) * grad_j)));
+        match &self.both {
+            Some([b, c]) => block + scaled(&tensor(b), grad_i.dot(&(tensor(c) * grad_j))),
+            None => block,
+        }
+    }
+
+    fn closed(&self) -> Option<ClosedTangent<T, D>> {
+        Some(*self)
+    }
+}

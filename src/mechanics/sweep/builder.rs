@@ -1,0 +1,171 @@
+//! One block of the tiled sweep: shape functions of its particles, and their groups.
+
+use super::kernel::TILE;
+use super::lanes::LANES;
+use super::order::{Key, follows};
+use super::tiled::{Block, Group};
+use crate::approximation::{ApproximationError, AxisWeights, Separable};
+use crate::grid::Grid;
+use crate::tensor::Vector;
+
+/// The weights of one particle along one axis: its nodes, and where N and dN/dx of each are.
+#[derive(Clone, Copy, Default)]
+struct Along {
+    first: u32,
+    width: u32,
+    start: usize,
+}
+
+impl Along {
+    fn end(&self) -> u32 {
+        self.first + self.width
+    }
+}
+
+/// The block of the particles `keys`, without its number of groups before it and its node numbers; and which nodes of its
+/// box are active.
+///
+/// # Errors
+/// The smallest particle whose functions do not exist.
+pub(super) fn block<const D: usize>(
+    product: &dyn Separable,
+    grid: &Grid<D>,
+    positions: &[Vector<f64, D>],
+    keys: &[Key],
+) -> Result<(Block<D>, Vec<bool>), (usize, ApproximationError)> {
+    let mut scratch = AxisWeights::default();
+    let mut weights: Vec<[f64; 2]> = Vec::new();
+    let mut along: Vec<[Along; D]> = Vec::with_capacity(keys.len());
+    let mut failure = None;
+    for &(_, p) in keys {
+        let mut axes = [Along::default(); D];
+        for k in 0..D {
+            if let Err(error) = product.axis(&grid.axis(k), positions[p as usize][k], &mut scratch) {
+                super::tiled::keep_first(&mut failure, p as usize, error);
+                break;
+            }
+            axes[k] = Along { first: scratch.first, width: scratch.values.len() as u32, start: weights.len() };
+            weights.extend(scratch.values.iter().zip(&scratch.derivatives).map(|(&n, &dn)| [n, dn]));
+        }
+        along.push(axes);
+    }
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+
+    let mut low = [u32::MAX; D];
+    let mut high = [0; D];
+    for axes in &along {
+        for k in 0..D {
+            low[k] = low[k].min(axes[k].first);
+            high[k] = high[k].max(axes[k].end());
+        }
+    }
+    let mut size = [1; 3];
+    for k in 0..D {
+        size[k] = (high[k] - low[k]) as usize;
+    }
+    let mut built = Block {
+        first_group: 0,
+        groups: Vec::new(),
+        weights: Vec::new(),
+        particles: Vec::new(),
+        origin: low,
+        size,
+        nodes: Vec::new(),
+        places: Vec::new(),
+    };
+    let mut active = vec![false; size.iter().product()];
+    let mut start = 0;
+    while start < keys.len() {
+        let end = group_end(keys, &along, start);
+        push(&mut built, &keys[start..end], &along[start..end], &weights, &mut active);
+        start = end;
+    }
+    built.groups.shrink_to_fit();
+    built.weights.shrink_to_fit();
+    built.particles.shrink_to_fit();
+    Ok((built, active))
+}
+
+/// Where the group that begins at `start` ends: eight particles of a cell, or whole neighbouring cells along x while all
+/// fit into the lanes and their window along x into a tile.
+fn group_end<const D: usize>(keys: &[Key], along: &[[Along; D]], start: usize) -> usize {
+    let cell_end = |from: usize| from + keys[from..].partition_point(|key| key.0 == keys[from].0);
+    let mut end = cell_end(start);
+    if end - start > LANES {
+        return start + LANES;
+    }
+    while end < keys.len() && follows::<D>(&keys[end - 1], &keys[end]) {
+        let next = cell_end(end);
+        let [low, high] = window(&along[start..next], 0);
+        if next - start > LANES || (high - low) as usize > TILE {
+            break;
+        }
+        end = next;
+    }
+    end
+}
+
+/// First node and end of the common window along axis `k`.
+fn window<const D: usize>(along: &[[Along; D]], k: usize) -> [u32; 2] {
+    along.iter().fold([u32::MAX, 0], |[low, high], axes| [low.min(axes[k].first), high.max(axes[k].end())])
+}
+
+/// Appends a group and marks the nodes it sees.
+fn push<const D: usize>(
+    block: &mut Block<D>,
+    keys: &[Key],
+    along: &[[Along; D]],
+    weights: &[[f64; 2]],
+    active: &mut [bool],
+) {
+    let windows: [[u32; 2]; D] = std::array::from_fn(|k| window(along, k));
+    let mut width = [1; 3];
+    let mut first = 0;
+    for k in (0..D).rev() {
+        width[k] = (windows[k][1] - windows[k][0]) as u8;
+        first = first * block.size[k] + (windows[k][0] - block.origin[k]) as usize;
+    }
+    let group = Group { weights: block.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
+    for k in 0..D {
+        let start = block.weights.len();
+        let nodes = usize::from(width[k]);
+        block.weights.resize(start + 2 * nodes, [0.0; LANES]);
+        for (lane, axes) in along.iter().enumerate() {
+            let at = start + (axes[k].first - windows[k][0]) as usize;
+            for (i, [n, dn]) in weights[axes[k].start..axes[k].start + axes[k].width as usize].iter().enumerate() {
+                block.weights[at + i][lane] = *n;
+                block.weights[at + nodes + i][lane] = *dn;
+            }
+        }
+    }
+    block.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
+    block.groups.push(group);
+    mark(block, along, weights, active);
+}
+
+/// Marks the nodes with N ≠ 0 or ∇N ≠ 0 for some particle of the last group.
+fn mark<const D: usize>(block: &Block<D>, along: &[[Along; D]], weights: &[[f64; 2]], active: &mut [bool]) {
+    for (lane, axes) in along.iter().enumerate() {
+        let list = |k: usize| &weights[axes[k].start..axes[k].start + axes[k].width as usize];
+        let smallest: f64 = (0..D).map(|k| list(k).iter().fold(f64::INFINITY, |low, w| low.min(w[0].abs()))).product();
+        if smallest > 0.0 {
+            // No N vanishes, nor underflows: the whole of the particle's window.
+            let mut begin = [0; 3];
+            let mut width = [1; 3];
+            for k in 0..D {
+                begin[k] = (axes[k].first - block.origin[k]) as usize;
+                width[k] = axes[k].width as usize;
+            }
+            for z in begin[2]..begin[2] + width[2] {
+                for y in begin[1]..begin[1] + width[1] {
+                    let row = (z * block.size[1] + y) * block.size[0] + begin[0];
+                    active[row..row + width[0]].fill(true);
+                }
+            }
+        } else {
+            block.entries(block.groups.len() - 1, lane, |place, _, _| active[place] = true);
+        }
+    }
+}

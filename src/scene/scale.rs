@@ -1,0 +1,130 @@
+//! Whether the numbers that a step forms fit into floating point: forces are squared for norms, moduli multiplied by volumes.
+
+use super::Scene;
+use super::boundary::{Face, Table};
+use super::build::{BuildError, FACES};
+use super::load::Curve;
+use crate::mechanics::loads::Pressing;
+use crate::simulation::Simulation;
+
+/// No force may be larger: its square is summed over all nodes.
+const MOST: f64 = 1e120;
+
+/// Of the forces that resist a motion at least one must be larger: Newton's method lowers them by another 1e-15, and squares them.
+const LEAST: f64 = 1e-120;
+
+/// A quantity, its value, and the least and the most it may be.
+type Quantity = (&'static str, f64, f64, f64);
+
+/// Refuses a simulation whose masses, volumes, forces or energies are not representable.
+pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Result<(), BuildError> {
+    let alphas = simulation.settings.newmark.alphas(simulation.clock.nominal());
+    let (particles, h) = (&simulation.particles, simulation.grid.spacing);
+    let mut heaviest: f64 = 0.0;
+    for (i, body) in scene.bodies.iter().enumerate() {
+        let mut extremes = Extremes::default();
+        for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i) {
+            extremes.add(particles.volume[p], particles.mass[p], particles.velocity[p].amax());
+        }
+        let Extremes { volume, mass, speed } = extremes;
+        heaviest = heaviest.max(mass.1);
+        let modulus = match body.material.constants().lame() {
+            Some(Ok(lame)) => lame.lambda.abs() + 2.0 * lame.shear,
+            // Refused before.
+            _ => continue,
+        };
+        let normal = (f64::MIN_POSITIVE, f64::MAX);
+        let resistance = (alphas.a1 * mass.0 * h).max(modulus * volume.0 / h);
+        let quantities: [Quantity; 8] = [
+            ("the smallest particle volume", volume.0, normal.0, normal.1),
+            ("the smallest particle mass", mass.0, normal.0, normal.1),
+            (
+                "the force that moves a particle by a cell in one step, mass spacing / (beta step²),",
+                alphas.a1 * mass.1 * h,
+                0.0,
+                MOST,
+            ),
+            ("the stiffness force of a particle, modulus volume / spacing,", modulus * volume.1 / h, 0.0, MOST),
+            ("the energy of a particle, modulus volume,", modulus * volume.1, 0.0, MOST),
+            (
+                "the force that stops a particle in one step, mass speed / (beta step),",
+                alphas.a2 * mass.1 * speed,
+                0.0,
+                MOST,
+            ),
+            ("the kinetic energy of a particle, mass speed²,", mass.1 * speed * speed, 0.0, MOST),
+            ("the smallest force that resists a motion by a cell (inertia or stiffness)", resistance, LEAST, MOST),
+        ];
+        require(&format!("bodies[{i}]"), &quantities)?;
+    }
+    if let Some(gravity) = &scene.gravity {
+        let largest = gravity.acceleration.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let weight = heaviest * largest * factor(gravity.curve.as_ref());
+        require("gravity", &[("the weight of a particle", weight, 0.0, MOST)])?;
+    }
+    let driven = |path: &str, displacement: Option<&Table>, velocity: Option<&Table>| {
+        let largest = |table: Option<&Table>| {
+            let entries = table.into_iter().flat_map(|table| &table.0).flat_map(|row| row.1.iter().flatten());
+            entries.fold(0.0, |most: f64, x| most.max(x.abs()))
+        };
+        let force = heaviest * (alphas.a1 * largest(displacement) + alphas.a2 * largest(velocity));
+        require(path, &[("the force that moves a particle so in one step", force, 0.0, MOST)])
+    };
+    for (axis, names) in FACES.iter().enumerate().take(D) {
+        for (name, upper) in names.iter().zip([false, true]) {
+            match scene.boundary.face(axis, upper) {
+                Face::Displacement(table) => driven(&format!("boundary.{name}"), Some(table), None)?,
+                Face::Velocity(table) => driven(&format!("boundary.{name}"), None, Some(table))?,
+                Face::Free | Face::Sliding | Face::Fixed | Face::Held(_) => {}
+            }
+        }
+    }
+    for (i, motion) in scene.prescribed.iter().enumerate() {
+        driven(&format!("prescribed[{i}]"), motion.displacement.as_ref(), motion.velocity.as_ref())?;
+    }
+    let curves = scene.tractions.iter().map(|load| &load.curve).chain(scene.pressures.iter().map(|load| &load.curve));
+    for ((k, load), curve) in simulation.loads.surface.iter().enumerate().zip(curves) {
+        let (path, stress) = match load.pressing {
+            Pressing::Traction(traction) => (format!("tractions[{k}]"), traction.amax()),
+            Pressing::Pressure(pressure) => (format!("pressures[{}]", k - scene.tractions.len()), pressure.abs()),
+        };
+        let area = load.points.iter().fold(0.0, |most: f64, point| most.max(point.area));
+        require(&path, &[("the force on a particle", stress * area * factor(curve.as_ref()), 0.0, MOST)])?;
+    }
+    Ok(())
+}
+
+/// The least and the most of volume and mass, and the most of the speed.
+struct Extremes {
+    volume: (f64, f64),
+    mass: (f64, f64),
+    speed: f64,
+}
+
+impl Default for Extremes {
+    fn default() -> Self {
+        Self { volume: (f64::INFINITY, 0.0), mass: (f64::INFINITY, 0.0), speed: 0.0 }
+    }
+}
+
+impl Extremes {
+    fn add(&mut self, volume: f64, mass: f64, speed: f64) {
+        let widened = |(least, most): (f64, f64), x: f64| (least.min(x), most.max(x));
+        (self.volume, self.mass, self.speed) =
+            (widened(self.volume, volume), widened(self.mass, mass), self.speed.max(speed));
+    }
+}
+
+/// The largest factor of a curve in size, 1 without one.
+fn factor(curve: Option<&Curve>) -> f64 {
+    curve.map_or(1.0, |curve| curve.0.iter().fold(0.0, |most: f64, row| most.max(row[1].abs())))
+}
+
+fn require(path: &str, quantities: &[Quantity]) -> Result<(), BuildError> {
+    for &(what, value, least, most) in quantities {
+        if !(least..=most).contains(&value) {
+            return Err(BuildError::Scale { path: path.to_owned(), what, value, least, most });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! The program as its user meets it: exit codes, messages, signals, closed pipes.
+
+use crate::support::Failure;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+}
+
+fn program() -> Command {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    program.stdin(Stdio::null());
+    program
+}
+
+/// Runs the rebound with further arguments into `directory`.
+fn rebound(directory: &Path, arguments: &[&str]) -> Result<Output, Failure> {
+    Ok(program().arg("run").arg(scene("rebound.json")).arg("--out").arg(directory).args(arguments).output()?)
+}
+
+fn report(directory: &Path) -> Result<Value, Failure> {
+    Ok(serde_json::from_slice(&std::fs::read(directory.join("report.json"))?)?)
+}
+
+#[test]
+fn a_reader_who_has_seen_enough_is_no_failure() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let out = directory.path().join("run");
+    rebound(&out, &["--steps", "2", "--quiet"])?;
+    let (run, rebound) = (out.display().to_string(), scene("rebound.json").display().to_string());
+    let commands: [&[&str]; 4] =
+        [&["check", &rebound], &["schema"], &["plot", &run], &["run", &rebound, "--steps", "1", "--out", &run]];
+    for arguments in commands {
+        // Both pipes are closed before the program starts, so that its first line meets a broken one.
+        let (_, out) = std::io::pipe()?;
+        let (_, err) = std::io::pipe()?;
+        let status = program().args(arguments).stdout(out).stderr(err).status()?;
+        assert!(status.success(), "{arguments:?}: {status}");
+    }
+    Ok(())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_standard_output_is_a_failure_with_its_cause() -> Result<(), Failure> {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full")?;
+    let output = program().arg("schema").stdout(full).stderr(Stdio::piped()).spawn()?.wait_with_output()?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("standard output") && message.contains("No space left"), "{message}");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_the_run_after_a_step_with_everything_written() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let run = program()
+        .arg("run")
+        .arg(scene("rebound.json"))
+        .arg("--out")
+        .arg(directory.path())
+        // Longer than any machine needs to send the signal.
+        .args(["--until", "1e6"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let history = directory.path().join("history.csv");
+    let rows = || std::fs::read_to_string(&history).map_or(0, |text| text.lines().count());
+    let start = Instant::now();
+    while rows() < 5 && start.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &run.id().to_string()]).status()?.success());
+    let output = run.wait_with_output()?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(130), "{message}");
+
+    let report = report(directory.path())?;
+    let text = std::fs::read_to_string(&history)?;
+    let last = text.lines().last().unwrap_or_default();
+    let time: f64 = last.split(',').nth(1).unwrap_or_default().parse()?;
+    assert_eq!(report["outcome"], "interrupted");
+    assert_eq!(report["time"].as_f64(), Some(time));
+    assert!(
+        report["message"]
+            .as_str()
+            .is_some_and(|words| words.contains(&format!("t = {time},")) && words.contains("complete")),
+        "{report}"
+    );
+    assert!(message.contains(&format!("interrupted at t = {time}")), "{message}");
+    let steps = report["steps"].as_array().map_or(0, Vec::len);
+    assert!(steps > 0 && time < 1e6, "{steps} steps");
+    assert_eq!(text.lines().count(), steps + 2, "a header, the initial state and a row a step");
+    Ok(())
+}
+
+#[test]
+fn options_are_judged_like_the_scene() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let out = directory.path().join("run");
+    for (option, value, allowed) in [
+        ("--until", "nan", "finite and > 0"),
+        ("--until", "inf", "between 1e-100 and 1e100"),
+        ("--until", "-5", "finite and > 0"),
+        ("--until", "0", "finite and > 0"),
+        ("--until", "0.01", "at least one step, 0.05"),
+        ("--until", "1e300", "1e100"),
+        ("--until", "1e12", "at most 1e9"),
+        ("--until", "soon", "must be a number"),
+        ("--steps", "-1", "from 0 to 1000000000"),
+        ("--steps", "1e3", "from 0 to 1000000000"),
+        ("--threads", "0", "from 1 to 1024"),
+        ("--threads", "-1", "from 1 to 1024"),
+        ("--threads", "100000", "from 1 to 1024"),
+        ("--check-tangent", "0", "from 1 to 1000000000"),
+    ] {
+        let output = rebound(&out, &[option, value])?;
+        let message = String::from_utf8(output.stderr)?;
+        assert_eq!(output.status.code(), Some(2), "{option} {value}: {message}");
+        for word in [option, allowed] {
+            assert!(message.contains(word), "{option} {value}: no {word:?} in\n{message}");
+        }
+        assert!(!out.exists(), "{option} {value} wrote something");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}},
+                               {"name": "near", "field": "velocity", "at": {"particle": [2.5, 2.5]}}]"#;
+    let arguments =
+        ["--set", far, "--until", "0.3", "--steps", "4", "--threads", "1", "--check-tangent", "3", "--quiet"];
+    let output = rebound(directory.path(), &arguments)?;
+    let message = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{message}");
+    assert!(
+        message.starts_with("warning: probe \"far\": the nearest particle") && message.contains("spacing 2.500e-1;"),
+        "{message}"
+    );
+    assert_eq!(message.lines().count(), 1, "{message}");
+    let report = report(directory.path())?;
+    let command = &report["command"];
+    assert_eq!((&command["until"], &command["steps"], &command["threads"]), (&0.3.into(), &4.into(), &1.into()));
+    assert_eq!((&command["check_tangent"], &command["set"][0]), (&3.into(), &far.into()));
+    assert_eq!(report["settings"]["time"]["end"], 0.3);
+    assert_eq!(report["steps"].as_array().map(Vec::len), Some(4));
+    assert_eq!((&report["outcome"], &report["surfaces"]), (&"finished".into(), &Value::Array(Vec::new())));
+    // 3 spacings beyond the disc of radius 1.5 around (2.5, 2.5), and half a diagonal of ¼ from its centre
+    assert!(report["probes"][0]["distance"].as_f64().is_some_and(|distance| distance > 10.0), "{report}");
+    assert_eq!(report["probes"][1]["distance"].as_f64(), Some(0.125 * 2.0_f64.sqrt()));
+    assert_eq!(report["probes"][1]["warning"], Value::Null);
+    let probes = std::fs::read_to_string(directory.path().join("probes.csv"))?;
+    assert!(probes.lines().skip(1).all(|row| row.split(',').nth(1) == Some("NaN")), "{probes}");
+    Ok(())
+}
+
+#[test]
+fn a_failed_run_reports_every_attempt_and_its_work() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    // One iteration never suffices, and the step is halved twice.
+    let few = ["--set", "solver.newton.max_iterations=1", "--set", "time.max_halvings=2", "--steps", "400", "--quiet"];
+    let output = rebound(directory.path(), &[&few[..], &["--set", "solver.newton.tolerance=1e-14"]].concat())?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(message.matches("allowed iterations").count(), 1, "{message}");
+    let report = report(directory.path())?;
+    let sum = |key: &str| {
+        let steps = report["steps"].as_array().into_iter().flatten();
+        let attempts = report["failed_attempts"].as_array().into_iter().flatten();
+        let within = steps.clone().flat_map(|step| step["failed_attempts"].as_array().into_iter().flatten());
+        steps.chain(attempts).chain(within).map(|line| line[key].as_array().map_or(0, Vec::len)).sum::<usize>()
+    };
+    let attempts = report["failed_attempts"].as_array().ok_or("no attempts")?;
+    assert_eq!(attempts.len(), 3, "{report}");
+    for (k, attempt) in attempts.iter().enumerate() {
+        assert_eq!(attempt["dt"].as_f64(), Some(0.05 * 0.5_f64.powi(k as i32)));
+        assert!(attempt["why"].as_str().is_some_and(|why| why.contains("after the 1 allowed iterations")), "{attempt}");
+    }
+    assert_eq!(report["outcome"], "failed");
+    assert_eq!(report["counts"]["newton_iterations"], sum("krylov_iterations"));
+    assert!(report["counts"]["failed_attempts"].as_u64().is_some_and(|count| count >= 3));
+    Ok(())
+}
+
+#[test]
+fn every_refusal_names_the_file() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let deep = "[".repeat(100_000);
+    let cases: [(&str, &[u8], &str); 6] = [
+        ("empty.json", b" \n", "the text is empty; a scene is an object"),
+        ("bytes.json", b"{\xff", "not UTF-8"),
+        ("deep.json", deep.as_bytes(), "recursion limit"),
+        ("twice.json", b"{\"grid\": 1, \"grid\": 2}", "`grid` is given twice"),
+        ("words.json", b"hello", "expected value"),
+        ("none.json", b"{}", "missing field `grid`"),
+    ];
+    for (name, content, allowed) in cases {
+        let path = directory.path().join(name);
+        std::fs::write(&path, content)?;
+        for command in ["check", "run"] {
+            let output = program().arg(command).arg(&path).output()?;
+            let message = String::from_utf8(output.stderr)?;
+            assert_eq!(output.status.code(), Some(2), "{name}: {message}");
+            assert!(message.contains(name) && message.contains(allowed), "{name}: {message}");
+            assert!(message.len() < 1000, "{name}: {message}");
+        }
+    }
+    for absent in [directory.path().to_owned(), directory.path().join("nowhere.json")] {
+        let output = program().arg("run").arg(&absent).output()?;
+        let message = String::from_utf8(output.stderr)?;
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(&format!("cannot read {}", absent.display())), "{message}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_cause_is_told_once() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let file = directory.path().join("file");
+    std::fs::write(&file, "")?;
+    let output = rebound(&file.join("run"), &[])?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("cannot create") && message.contains("file/run"), "{message}");
+    assert_eq!(message.matches("os error").count(), 1, "{message}");
+    Ok(())
+}

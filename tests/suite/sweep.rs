@@ -1,0 +1,199 @@
+//! The fast sweep against the plain one, which is its specification.
+
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
+use bfree::grid::Grid;
+use bfree::mechanics::sweep::Supports;
+use bfree::nodes::Nodes;
+use bfree::tensor::{Tensor, Vector};
+use num_dual::Dual64;
+use std::convert::Infallible;
+
+/// Numbers without pattern in (−1, 1): the golden-ratio sequence.
+struct Irregular(u32);
+
+impl Irregular {
+    fn number(&mut self) -> f64 {
+        self.0 += 1;
+        2.0 * (f64::from(self.0) * 0.618_033_988_749_894_9).fract() - 1.0
+    }
+
+    fn vector<const D: usize>(&mut self) -> Vector<f64, D> {
+        Vector::from_fn(|_, _| self.number())
+    }
+}
+
+fn shapes() -> Vec<Approximation> {
+    vec![
+        Linear.into(),
+        Gimp { half_width: 0.25 }.into(),
+        Bspline::Quadratic.into(),
+        Bspline::Cubic.into(),
+        Lme::new(3.0, 1e-6).into(),
+        // Nine nodes an axis: wider than a tile.
+        Lme::new(0.8, 1e-6).into(),
+        // Weights that underflow in a product.
+        Lme::new(40.0, 1e-100).into(),
+    ]
+}
+
+/// A small box with a block of jittered particles in it, some on walls, faces and nodes, some crowded, some alone.
+fn case<const D: usize>() -> (Grid<D>, Vec<Vector<f64, D>>) {
+    let cells: [u32; D] = std::array::from_fn(|k| [23, 11, 7][k]);
+    let grid = Grid { origin: Vector::repeat(-0.3), spacing: 0.1, cells };
+    let upper: Vector<f64, D> = grid.position(cells);
+    let mut random = Irregular(0);
+    let mut positions = Vec::new();
+    let inside = |x: Vector<f64, D>| x.zip_map(&grid.origin, f64::max).zip_map(&upper, f64::min);
+    // Eight a cell in 3D, moderately jittered; the order of the particles is not that of the cells.
+    let side: [usize; D] = std::array::from_fn(|k| if D == 3 { [14, 12, 8][k] } else { [30, 14, 1][k] });
+    let count: usize = side.iter().product();
+    for i in 0..count {
+        let mut rest = (i * 7919) % count;
+        let x = Vector::from_fn(|k, _| {
+            let at = rest % side[k];
+            rest /= side[k];
+            grid.origin[k] + 0.1 + 0.05 * at as f64 + 0.025
+        });
+        positions.push(inside(x + random.vector() * 0.02));
+    }
+    // Anywhere, many a cell, and a crowd in one cell.
+    for i in 0..60 {
+        let scale = if i < 30 { 0.35 } else { 0.049 };
+        positions.push(inside(grid.origin + Vector::repeat(0.35) + random.vector() * scale));
+    }
+    // On nodes, walls, edges and faces.
+    positions.push(grid.origin);
+    positions.push(upper);
+    for k in 0..D {
+        let mut on_wall: Vector<f64, D> = grid.origin + Vector::repeat(0.234);
+        on_wall[k] = upper[k];
+        positions.push(on_wall);
+        on_wall[k] = grid.position([3; D])[k];
+        positions.push(on_wall);
+    }
+    positions.push(grid.position([2; D]));
+    (grid, positions)
+}
+
+/// A point function without symmetry, that names particle and state.
+fn point<const D: usize>(
+    p: usize,
+    u: Vector<f64, D>,
+    l: Tensor<f64, D>,
+) -> Result<(Vector<f64, D>, Tensor<f64, D>), Infallible> {
+    let a = Tensor::from_fn(|i, k| 1.0 + 0.3 * (i as f64) - 0.7 * (k as f64) + 1e-3 * p as f64);
+    Ok((u * 2.0 + l * u, l * a + a * l.transpose() + a))
+}
+
+fn field<const D: usize>(nodes: &Nodes) -> Vec<Vector<f64, D>> {
+    let mut random = Irregular(1000);
+    (0..nodes.len()).map(|_| random.vector()).collect()
+}
+
+/// Largest difference over largest value.
+fn difference<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = b.iter().map(|x| x.amax()).fold(0.0, f64::max);
+    a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, |worst, d| if d <= worst { worst } else { d }) / largest
+}
+
+fn compare<const D: usize>() {
+    let (grid, positions) = case::<D>();
+    for shape in shapes() {
+        let (fast, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
+        let (plain, expected) = Supports::plain(&shape, &grid, &positions).unwrap();
+        assert_eq!(nodes, expected, "{shape:?}");
+        assert_eq!(fast.particles(), positions.len());
+        for p in 0..positions.len() {
+            let (a, b): (Vec<_>, Vec<_>) = (fast.of(p).collect(), plain.of(p).collect());
+            assert_eq!(a, b, "{shape:?} at {:?}", positions[p]);
+        }
+        let u = field::<D>(&nodes);
+        let zeros = vec![Vector::zeros(); u.len()];
+        let assembled = |supports: &Supports<D>| {
+            let mut out = zeros.clone();
+            supports.assemble(&u, &mut out, point).unwrap();
+            out
+        };
+        let worst = difference(&assembled(&fast), &assembled(&plain));
+        assert!(worst < 1e-12, "{D}D {shape:?}: assembled {worst:e}");
+        let magnitudes = |supports: &Supports<D>| {
+            let mut out = zeros.clone();
+            supports.assemble_magnitudes(&u, &mut out, point).unwrap();
+            out
+        };
+        let worst = difference(&magnitudes(&fast), &magnitudes(&plain));
+        assert!(worst < 1e-12, "{D}D {shape:?}: magnitudes {worst:e}");
+        let worst = difference(&fast.values(&u), &plain.values(&u));
+        assert!(worst < 1e-12, "{D}D {shape:?}: values {worst:e}");
+        let squares = |supports: &Supports<D>| {
+            let mut out = zeros.clone();
+            supports.scatter(&mut out, |p, n, grad_n| grad_n * (n * n + 1e-3 * p as f64));
+            out
+        };
+        let worst = difference(&squares(&fast), &squares(&plain));
+        assert!(worst < 1e-12, "{D}D {shape:?}: scatter {worst:e}");
+        // Dual numbers take the plain loops over the fast storage.
+        let seeded: Vec<Vector<Dual64, D>> = u.iter().map(|u| u.map(|x| Dual64::new(x, 0.5 - x))).collect();
+        let duals = |supports: &Supports<D>| {
+            let mut out = vec![Vector::<Dual64, D>::zeros(); u.len()];
+            let square = |_, u: Vector<Dual64, D>, l: Tensor<Dual64, D>| Ok::<_, Infallible>((l * u, l * l));
+            supports.assemble(&seeded, &mut out, square).unwrap();
+            out.iter().map(|x| x.map(|x| x.eps)).collect::<Vec<_>>()
+        };
+        let worst = difference(&duals(&fast), &duals(&plain));
+        assert!(worst < 1e-12, "{D}D {shape:?}: dual numbers {worst:e}");
+    }
+}
+
+#[test]
+fn the_fast_sweep_gives_the_answer_of_the_plain_one() {
+    compare::<1>();
+    compare::<2>();
+    compare::<3>();
+}
+
+#[test]
+fn any_number_of_threads_sums_the_same_bits() {
+    let (grid, positions) = case::<3>();
+    for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
+        let sums = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let (supports, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
+                let u = field::<3>(&nodes);
+                let mut out = vec![Vector::zeros(); u.len()];
+                supports.assemble(&u, &mut out, point).unwrap();
+                out
+            })
+        };
+        let one = sums(1);
+        for threads in [2, 5] {
+            let many = sums(threads);
+            let same =
+                one.iter().zip(&many).all(|(a, b)| a.iter().zip(b.iter()).all(|(a, b)| a.to_bits() == b.to_bits()));
+            assert!(same, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn the_first_particle_that_fails_is_named() {
+    let (grid, mut positions) = case::<2>();
+    for shape in shapes() {
+        let (fast, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
+        let u = field::<2>(&nodes);
+        let mut out = vec![Vector::zeros(); u.len()];
+        let fails = |p: usize, u, l| if p % 100 == 77 { Err(p) } else { Ok((u, l)) };
+        assert_eq!(fast.assemble(&u, &mut out, fails), Err(77));
+        assert_eq!(fast.interpolate(&u, |p, _, _: Tensor<f64, 2>| if p > 99 { Err(p) } else { Ok(()) }), Err(100));
+    }
+    positions[300][1] = f64::NAN;
+    positions[200][0] = 17.0;
+    for shape in shapes() {
+        let fast = Supports::new(&shape, &grid, &positions).map(|_| ()).unwrap_err();
+        let plain = Supports::plain(&shape, &grid, &positions).map(|_| ()).unwrap_err();
+        assert_eq!((fast.particle, fast.source), (plain.particle, plain.source));
+        assert_eq!(plain.particle, 200);
+    }
+}

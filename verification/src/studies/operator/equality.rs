@@ -1,0 +1,77 @@
+//! The same answer from the fast and the plain sweep, for every law, shape function and D.
+
+use super::block::{block, lame};
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use crate::studies::StudyError;
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
+use bfree::material::{Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::residual::Carry;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::solver::NonlinearProblem;
+use bfree::tensor::{Tensor, Vector};
+
+const SAME: f64 = 1e-12;
+
+/// What is compared, in this order.
+const QUANTITIES: [&str; 5] = ["tangent product", "residual", "magnitude", "diagonal blocks", "projected velocity"];
+
+/// Compares a strained, jittered block of `cells`ᴰ cells; half the mass is consistent.
+pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(), StudyError> {
+    let lame = lame()?;
+    let laws = [
+        ("Ciarlet", Material::from(NeoHookean::ciarlet(lame))),
+        ("logarithmic", NeoHookean::logarithmic(lame).into()),
+        ("St. Venant-Kirchhoff", StVenantKirchhoff { lame }.into()),
+    ];
+    let shapes = [
+        ("linear", Approximation::from(Linear)),
+        ("gimp", Gimp::particles_per_axis(2).into()),
+        ("quadratic", Bspline::Quadratic.into()),
+        ("cubic", Bspline::Cubic.into()),
+        ("lme 0.8", Lme::new(0.8, 1e-6).into()),
+        ("lme 3", Lme::new(3.0, 1e-6).into()),
+    ];
+    for (law_name, law) in &laws {
+        for (shape_name, shape) in &shapes {
+            let mut simulation = block::<D>(shape.clone(), Some(law.clone()), cells, 0.24, 0.5)?;
+            let mut random = Random::new(7);
+            for (h, v) in simulation.particles.displacement_gradient.iter_mut().zip(&mut simulation.particles.velocity) {
+                *h = Tensor::from_fn(|_, _| 0.15 * random.signed());
+                *v = random.vector();
+            }
+            let (grid, positions) = (&simulation.grid, &simulation.particles.position);
+            let (fast, nodes) = Supports::new(shape, grid, positions)?;
+            let (plain, _) = Supports::plain(shape, grid, positions)?;
+            let prescribed = simulation.prescribed(&nodes);
+            let count = nodes.len();
+            let dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * 0.01).collect();
+            let u: Vec<Vector<f64, D>> = random.field(count);
+            let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
+                let nodal = Nodal::project(&simulation.particles, supports, count, 0.5)?;
+                let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
+                let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
+                let tangent = equilibrium.tangent(&dphi)?;
+                let mut product = vec![Vector::zeros(); count];
+                tangent.product(&u, &mut product);
+                let flat = |field: &[Vector<f64, D>]| bytemuck::cast_slice(field).to_vec();
+                Ok([
+                    flat(&product),
+                    flat(&equilibrium.residual::<f64>(&dphi, Carry::ALL)?),
+                    vec![NonlinearProblem::magnitude(&equilibrium, bytemuck::cast_slice(&dphi))?],
+                    tangent.diagonal_blocks().iter().flat_map(|block| block.iter().copied().collect::<Vec<_>>()).collect(),
+                    flat(&nodal.velocity),
+                ])
+            };
+            let (a, b) = (by(&fast)?, by(&plain)?);
+            for (quantity, (a, b)) in QUANTITIES.iter().zip(a.iter().zip(&b)) {
+                let largest = b.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+                // Written so that NaN is the largest difference.
+                let difference = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |worst, d| if d <= worst { worst } else { d });
+                report.push(&[quantity, &D.to_string(), law_name, shape_name], difference / largest, Bound::AtMost(SAME));
+            }
+        }
+    }
+    Ok(())
+}

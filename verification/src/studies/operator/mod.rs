@@ -1,0 +1,30 @@
+//! The tangent product near the machine's limit: the fast sweep against the plain one, and what everything costs.
+//!
+//! Short effort compares answers and counts operations. Full effort measures as well: times are tables, never verdicts.
+
+mod block;
+mod equality;
+mod machine;
+mod timing;
+mod work;
+
+use super::{Effort, Outcome, StudyError};
+use crate::report::Report;
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "the fast sweep against the plain one; operations, bytes, rates and seconds a step (full effort)";
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut report = Report::new("fast sweep - plain sweep, relative to the largest entry", &["quantity", "D", "law", "shape"]);
+    equality::judge::<1>(&mut report, 9)?;
+    equality::judge::<2>(&mut report, 7)?;
+    equality::judge::<3>(&mut report, 4)?;
+    let mut outcome = Outcome { reports: vec![report], tables: vec![work::table()?], ..Outcome::default() };
+    if *effort == Effort::Full {
+        timing::measure(&mut outcome)?;
+    } else {
+        outcome.remarks.push("Full effort measures rates, steps, memory and assembled matrices beside them.".into());
+    }
+    Ok(outcome)
+}
