@@ -8,6 +8,7 @@ use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
+use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::time::{Alphas, Newmark};
 use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
@@ -39,6 +40,8 @@ pub struct Settings {
     pub initial_guess: InitialGuess,
     /// What resting walls do to particle velocities.
     pub wall_update: WallUpdate,
+    /// What is taken from the particles beside the increments of eqs. 50 and 51; nothing in the paper.
+    pub smoothing: Option<Smoothing>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
     /// Compare the tangent with dual numbers at the end of every so many steps.
@@ -53,6 +56,7 @@ impl Default for Settings {
             lumping: 1.0,
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
+            smoothing: None,
             newton: NewtonSettings::default(),
             check_tangent: None,
         }
@@ -195,7 +199,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Newton);
         self.check_tangent(&equilibrium, &dphi)?;
 
-        let moved = Moved::new(
+        let mut moved = Moved::new(
             &self.particles,
             &supports,
             &alphas,
@@ -205,6 +209,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.settings.wall_update,
             &dphi,
         );
+        if let Some(smoothing) = &self.settings.smoothing {
+            moved.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
+        }
         self.check_inside(moved.positions())?;
         let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, moved.impulses())?;
         watch.lap(Phase::Update);

@@ -3,6 +3,7 @@
 pub mod check;
 pub mod loads;
 pub mod residual;
+pub mod smoothing;
 pub mod sweep;
 pub mod tangent;
 pub mod time;

@@ -2,6 +2,7 @@
 
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::compose;
+use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
 use crate::particles::Particles;
@@ -218,6 +219,24 @@ impl<const D: usize> Moved<D> {
             delta_acceleration: supports.values(&delta_a),
             displacement_gradient,
             impulses,
+        }
+    }
+
+    /// Adds to both increments what `smoothing` makes of the fields they start from; `mass` is the lumped one of the nodes.
+    pub fn smooth(
+        &mut self,
+        smoothing: &Smoothing,
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        mass: &[f64],
+        dt: f64,
+    ) {
+        let fields =
+            [(&mut self.delta_velocity, &particles.velocity), (&mut self.delta_acceleration, &particles.acceleration)];
+        for (delta, field) in fields {
+            for (delta, change) in delta.iter_mut().zip(smoothing.change(particles, supports, mass, field, dt)) {
+                *delta += change;
+            }
         }
     }
 

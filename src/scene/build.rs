@@ -4,6 +4,7 @@ use super::body::{Body, Material};
 use super::boundary::{Face, Table};
 use super::particle_file::{self, ParticleFileError};
 use super::solver::{Forcing, Method};
+use super::transfer::Transfer;
 use super::{Scene, approximation, load, scale, time};
 use crate::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
 use crate::clock::Clock;
@@ -12,6 +13,7 @@ use crate::material::{LameError, NeoHookean, StVenantKirchhoff};
 use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
+use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::time::Newmark;
 use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
@@ -191,6 +193,11 @@ impl Scene {
             wall_update: match self.time.wall_update {
                 time::WallUpdate::Literal => WallUpdate::Literal,
                 time::WallUpdate::Consistent => WallUpdate::Consistent,
+            },
+            smoothing: match &self.transfer {
+                Transfer::Flip => None,
+                Transfer::Pic(pic) => Some(Smoothing { order: pic.order, rate: f64::INFINITY }),
+                Transfer::Blend(blend) => Some(Smoothing { order: blend.order, rate: blend.rate }),
             },
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,

@@ -16,6 +16,7 @@ pub mod place;
 pub mod shape;
 pub mod solver;
 pub mod time;
+pub mod transfer;
 
 mod build;
 mod overrides;
@@ -45,6 +46,9 @@ pub struct Scene {
     pub approximation: approximation::Approximation,
     /// Time stepping.
     pub time: time::Time,
+    /// From nodes to particles. Default: `"flip"`, as in the paper.
+    #[serde(default)]
+    pub transfer: transfer::Transfer,
     /// The bodies, at least one.
     #[schemars(length(min = 1))]
     pub bodies: Vec<body::Body>,
@@ -108,6 +112,7 @@ impl Scene {
         }
         self.approximation.check(&mut problems, dimension);
         self.time.check(&mut problems);
+        self.transfer.check(&mut problems);
         self.check_bodies(&mut problems);
         self.boundary.check(&mut problems, dimension);
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {

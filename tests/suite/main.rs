@@ -10,5 +10,6 @@ mod program;
 mod rebound;
 mod runs;
 mod scenes;
+mod smoothing;
 mod support;
 mod sweep;

@@ -43,6 +43,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
             lumping: 1.0,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,
+            smoothing: None,
             check_tangent: None,
             newton: NewtonSettings::default(),
         },

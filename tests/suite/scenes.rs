@@ -12,7 +12,7 @@ const GOOD: &str = r#"{
   "title": "two blocks",
   "grid": { "origin": [0, 0], "size": [4, 2], "spacing": 0.5 },
   "approximation": { "lme": { "gamma": 3, "tolerance": 1e-6, "support": "circle" } },
-  "time": { "step": 0.01, "end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 0.5, "initial_guess": "velocity", "wall_update": "consistent", "max_halvings": 3 },
+  "time": { "step": 0.01, "end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 0.5, "initial_guess": "velocity", "wall_update": "consistent", "max_halvings": 3 }, "transfer": { "blend": { "order": 2, "rate": 5 } },
   "bodies": [
     { "name": "soft", "shape": { "difference": { "of": { "box": { "min": [0, 0], "max": [1, 1] } }, "minus": { "ball": { "center": [0.5, 0.5], "radius": 0.2 } } } },
       "material": { "neo_hookean": { "young": 100, "poisson": 0.3 } }, "density": 2, "velocity": [1, 0], "particles_per_cell": 3, "fill": "cells" },
@@ -58,7 +58,10 @@ fn shipped_scenes_are_sound() {
         names.push(path.file_stem().unwrap().to_string_lossy().into_owned());
     }
     names.sort();
-    assert_eq!(names, ["ball_drop", "compaction", "compaction_confined", "rebound", "rebound_fast", "riemann"]);
+    assert_eq!(
+        names,
+        ["ball_drop", "compaction", "compaction_confined", "rebound", "rebound_fast", "riemann", "riemann_jump"]
+    );
 }
 
 /// Grid and number of particles of the first body of a shipped scene.
@@ -96,7 +99,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
                     "material": {"neo_hookean": {"bulk": 1, "shear": 1}}, "density": 1}]}"#;
     let scene = scene::read(least, &[]).unwrap_or_else(|error| panic!("{error}"));
     let all = least.replacen('{', r#"{"approximation": {"lme": {"gamma": 3, "tolerance": 1e-6, "support": "separable"}},
-        "boundary": {}, "prescribed": [], "tractions": [], "pressures": [],
+        "transfer": "flip", "boundary": {}, "prescribed": [], "tractions": [], "pressures": [],
         "solver": {"newton": {"tolerance": 1e-9, "max_iterations": 30},
                    "krylov": {"method": {"gmres": {"restart": 30}}, "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
         "output": {"fields": ["displacement", "velocity", "stress", "jacobian"], "probes": []}, "#, 1)
@@ -150,6 +153,14 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""beta": 0.25"#, r#""beta": 0.2"#, "time.beta", &["0.2", "gamma/2 = 0.25"]),
     (r#""gamma": 0.5"#, r#""gamma": 0.4"#, "time.gamma", &["0.4", "between 0.5"]),
     (r#""lumping": 0.5"#, r#""lumping": 1.5"#, "time.lumping", &["1.5", "between 0 and 1"]),
+    (r#""rate": 5"#, r#""rate": 0"#, "transfer.blend.rate", &["0 is not", "> 0"]),
+    (r#""order": 2"#, r#""order": 0"#, "transfer.blend.order", &["0 is not", "1 to 20"]),
+    (
+        r#"{ "blend": { "order": 2, "rate": 5 } }"#,
+        r#"{ "pic": { "order": 21 } }"#,
+        "transfer.pic.order",
+        &["21", "1 to 20"],
+    ),
     (r#""max_halvings": 3"#, r#""max_halvings": 21"#, "time.max_halvings", &["21", "0 to 20"]),
     (r#""name": "stiff""#, r#""name": """#, "bodies[1].name", &["empty"]),
     (r#""name": "stiff""#, r#""name": "soft""#, "bodies[1].name", &["soft", "differ"]),

@@ -46,12 +46,12 @@ impl Axis {
     }
 
     /// Where `value` stands on the axis.
-    fn place(&self, value: f64) -> Option<f64> {
+    pub(crate) fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic { value.log10() } else { value };
         place.is_finite().then_some(place)
     }
 
-    fn tick(&self, place: f64) -> String {
+    pub(crate) fn tick(&self, place: f64) -> String {
         if self.logarithmic {
             short(10.0_f64.powf(place))
         } else {
@@ -61,7 +61,7 @@ impl Axis {
     }
 
     /// Where the axis has ticks: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5.
-    fn ticks(&self, range: &Range<f64>) -> Vec<f64> {
+    pub(crate) fn ticks(&self, range: &Range<f64>) -> Vec<f64> {
         let span = range.end - range.start;
         if self.logarithmic {
             let every = (span / 8.0).ceil().max(1.0) as usize;
@@ -131,7 +131,7 @@ pub struct Figure {
 }
 
 /// The range of the values, a little wider.
-fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if low > high {
         return 0.0..1.0;
@@ -144,6 +144,12 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 #[derive(Debug, thiserror::Error)]
 #[error("the figure cannot be drawn: {0}")]
 pub struct FigureError(String);
+
+impl FigureError {
+    pub(crate) fn new(error: &dyn std::error::Error) -> Self {
+        Self(error.to_string())
+    }
+}
 
 impl Figure {
     /// The picture.

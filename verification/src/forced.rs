@@ -53,7 +53,10 @@ pub fn step<const D: usize, L: Law, A: ShapeFunction>(
     let report = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
 
     let walls = settings.wall_update;
-    let moved = Moved::new(particles, &supports, &alphas, &projected, &nodal, &prescribed, walls, &dphi);
+    let mut moved = Moved::new(particles, &supports, &alphas, &projected, &nodal, &prescribed, walls, &dphi);
+    if let Some(smoothing) = &settings.smoothing {
+        moved.smooth(smoothing, particles, &supports, &nodal.mass, dt);
+    }
     moved.commit(&mut simulation.particles);
     simulation.clock.advance();
     Ok(report)

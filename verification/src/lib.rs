@@ -11,12 +11,15 @@
 
 pub mod baseline;
 mod check;
+pub mod elements;
 pub mod figure;
 pub mod forced;
 pub mod manufactured;
 pub mod prepared;
 pub mod random;
 pub mod report;
+pub mod riemann;
+pub mod sheet;
 pub mod shipped;
 pub mod studies;
 pub mod table;

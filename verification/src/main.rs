@@ -8,14 +8,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime};
 use verification::report::chain;
-use verification::studies::{Effort, Outcome, STUDIES, Study, StudyError};
+use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 
 /// Everything that judges bfree.
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
     /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps, kept in
-    /// verification/RESULTS.md
+    /// verification/FULL.md, `results` the studies of the paper with their tables and pictures, kept in
+    /// verification/RESULTS.md and verification/results
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
     /// How much each study does; `full` as a study asks for full effort
@@ -57,6 +58,10 @@ fn selected(arguments: &Arguments) -> Result<(Vec<&'static Study>, Effort), Stri
                 effort = Effort::Full;
                 STUDIES.iter().collect()
             }
+            "results" => {
+                effort = Effort::Full;
+                STUDIES.iter().filter(|study| PAPER.contains(&study.name)).collect()
+            }
             name => vec![STUDIES.iter().find(|study| study.name == name).ok_or_else(|| word.clone())?],
         };
         for study in named {
@@ -73,7 +78,7 @@ fn main() -> ExitCode {
     let (studies, effort) = match selected(&arguments) {
         Ok(selected) => selected,
         Err(word) => {
-            eprintln!("error: there is no study `{word}`\n\n{}\n\nor `all`, or `full`", studies_list());
+            eprintln!("error: there is no study `{word}`\n\n{}\n\nor `all`, `full` or `results`", studies_list());
             return ExitCode::from(2);
         }
     };
@@ -106,6 +111,7 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
     let mut results = Vec::new();
     let mut verdicts = Vec::new();
     let mut documents = Vec::new();
+    let mut chapters = Vec::new();
     for study in studies {
         let start = Instant::now();
         let result = (study.run)(&effort);
@@ -117,6 +123,10 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
         if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
             write_files(directory, study.name, outcome)?;
         }
+        chapters.push(chapter(study, &result, seconds));
+        if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
+            draw(&results_folder(), outcome)?;
+        }
         documents.push(document(study, &result, passed, seconds));
         verdicts.push((study.name, passed, seconds));
     }
@@ -124,8 +134,11 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
     let before = results.len();
     summary(&mut results, &verdicts).map_err(writing("the results"))?;
     out.write_all(&results[before..]).map_err(writing("to standard output"))?;
-    if arguments.studies.iter().any(|word| word == "full") {
+    if asked_for(arguments, "full") {
         keep(&results)?;
+    }
+    if asked_for(arguments, "results") {
+        keep_paper(&chapters)?;
     }
     if let Some(path) = &arguments.json {
         let text = format!("{:#}\n", json!({ "passed": passed, "studies": documents }));
@@ -136,11 +149,68 @@ fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool
 
 /// Leaves the result of `full` in the repository, with its date and the command that makes it.
 fn keep(results: &[u8]) -> Result<(), Failure> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("RESULTS.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("FULL.md");
     let date = humantime::format_rfc3339_seconds(SystemTime::now());
     let header = format!("# The last full verification\n\n`cargo verify full`, {date}\n\n```text");
     let text = [header.as_bytes(), results, b"```\n"].concat();
     fs::write(&path, text).map_err(writing(path.display().to_string()))
+}
+
+fn asked_for(arguments: &Arguments, word: &str) -> bool {
+    arguments.studies.iter().any(|one| one == word)
+}
+
+/// Where the pictures of the paper's studies are kept.
+fn results_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("results")
+}
+
+/// Leaves the results of the paper's studies in the repository.
+fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("RESULTS.md");
+    let date = humantime::format_rfc3339_seconds(SystemTime::now());
+    let header = format!(
+        "# The paper's results, and ours\n\nEvery table and figure of section 4. Written by `cargo verify results`, {date}; nothing is \
+         edited by hand.\n"
+    );
+    fs::write(&path, header + &chapters.concat()).map_err(writing(path.display().to_string()))
+}
+
+/// A study as a chapter in Markdown, with its pictures by reference.
+fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) -> String {
+    let mut text = format!("\n## {}: {}\n\n", study.name, study.about);
+    match result {
+        Ok(outcome) => {
+            for remark in &outcome.remarks {
+                text += &format!("{remark}\n\n");
+            }
+            for sheet in &outcome.sheets {
+                text += &format!("![{}](results/{}.png)\n\n{}\n\n", sheet.name, sheet.name, sheet.caption);
+            }
+            for table in &outcome.tables {
+                text += &format!("{}\n", table.markdown());
+            }
+            for report in &outcome.reports {
+                text += &format!("{}\n", report.markdown());
+            }
+        }
+        Err(error) => text += &format!("FAIL: the study could not be finished: {}\n\n", chain(error.as_ref())),
+    }
+    text + &format!("({seconds:.0} s)\n")
+}
+
+/// The pictures for print, as SVG and PNG.
+fn draw(directory: &Path, outcome: &Outcome) -> Result<(), Failure> {
+    fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
+    for sheet in &outcome.sheets {
+        let place = directory.join(sheet.name);
+        let failed = |error| Failure { place: place.display().to_string(), source: error };
+        let svg = sheet.svg().map_err(|error| failed(io::Error::other(error)))?;
+        let png = sheet.png(&svg).map_err(|error| failed(io::Error::other(error)))?;
+        fs::write(place.with_extension("svg"), svg).map_err(failed)?;
+        fs::write(place.with_extension("png"), png).map_err(failed)?;
+    }
+    Ok(())
 }
 
 fn print(out: &mut impl Write, study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) -> io::Result<()> {
@@ -200,6 +270,7 @@ fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), F
     for report in &outcome.reports {
         write(&|bytes| report.write_csv(bytes))?;
     }
+    draw(directory, outcome)?;
     for figure in &outcome.figures {
         let path = directory.join(format!("{}.svg", figure.name));
         let written = figure.svg().map_err(io::Error::other).and_then(|svg| fs::write(&path, svg));

@@ -222,6 +222,12 @@ impl Report {
         Ok(())
     }
 
+    /// Every cell in a table as Markdown, the notes, and the verdict.
+    pub fn markdown(&self) -> String {
+        let notes: String = self.notes.iter().map(|note| format!("{note}\n\n")).collect();
+        format!("{}\n{notes}{}\n", self.list(&self.title, self.cells.iter()).markdown(), self.verdict())
+    }
+
     fn list<'a>(&'a self, title: &str, cells: impl Iterator<Item = &'a Cell>) -> Table {
         let header = self.columns.iter().map(String::as_str).chain(["value", "bound", "verdict"]);
         let mut table = Table::new(title, header);

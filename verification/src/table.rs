@@ -28,6 +28,15 @@ impl Table {
         &self.title
     }
 
+    /// As Markdown, the title in bold above it.
+    pub fn markdown(&self) -> String {
+        let escaped =
+            |row: &[String]| row.iter().map(|field| field.replace('|', "\\|")).collect::<Vec<_>>().join(" | ");
+        let rule = vec!["---"; self.header.len()].join(" | ");
+        let rows: String = self.rows.iter().map(|row| format!("| {} |\n", escaped(row))).collect();
+        format!("**{}**\n\n| {} |\n| {rule} |\n{rows}", self.title, escaped(&self.header))
+    }
+
     /// Comma-separated values, with a header.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 mod chart;
 mod palette;
 mod particles;
-mod png;
+pub mod png;
 mod table;
 
 use super::files::write_atomically;

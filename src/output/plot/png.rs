@@ -9,8 +9,11 @@ const SCALE: f32 = 2.0;
 /// The family of the embedded font.
 const FAMILY: &str = "DejaVu Sans";
 
-/// Renders an SVG on white.
-pub(super) fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
+/// Renders an SVG on white, two pixels to its unit; `name` is for the error.
+///
+/// # Errors
+/// An SVG that cannot be read or drawn.
+pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
     let fail = |reason: String| PlotError::Draw { name, reason };
     let mut options = usvg::Options::default();
     let fonts = options.fontdb_mut();

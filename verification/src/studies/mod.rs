@@ -2,6 +2,7 @@
 
 use crate::figure::Figure;
 use crate::report::Report;
+use crate::sheet::Sheet;
 use crate::table::Table;
 
 /// How much a study does.
@@ -24,6 +25,8 @@ pub struct Outcome {
     pub remarks: Vec<String>,
     /// Pictures.
     pub figures: Vec<Figure>,
+    /// Pictures for print.
+    pub sheets: Vec<Sheet>,
 }
 
 impl Outcome {
@@ -47,6 +50,9 @@ pub struct Study {
     pub run: fn(&Effort) -> Result<Outcome, StudyError>,
 }
 
+/// The studies that repeat section 4 of the paper, for `cargo verify results`.
+pub const PAPER: &[&str] = &["riemann", "compaction", "rebound"];
+
 /// The list of studies. A word here makes a study known to the program.
 macro_rules! studies {
     ($($study:ident),* $(,)?) => {
@@ -58,4 +64,20 @@ macro_rules! studies {
     };
 }
 
-studies!(tangent, taylor, newton, baseline, operator, patch, balance, digits, manufactured, minimiser, order, mutants);
+studies!(
+    tangent,
+    taylor,
+    newton,
+    baseline,
+    operator,
+    patch,
+    balance,
+    digits,
+    manufactured,
+    minimiser,
+    order,
+    riemann,
+    compaction,
+    rebound,
+    mutants
+);

@@ -154,5 +154,5 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
          from the particles at once, an error in space. Both fall with eps and h."
             .into(),
     ];
-    Ok(Outcome { reports: vec![report], tables, remarks, figures: vec![figure] })
+    Ok(Outcome { reports: vec![report], tables, remarks, figures: vec![figure], ..Outcome::default() })
 }

@@ -26,9 +26,10 @@ const DYNAMICS: Check = Check::Test("dynamics::");
 const POINTS: Check = Check::Test("points::");
 const LOADS: Check = Check::Test("loads::");
 const SHAPES: Check = Check::Test("approximation::");
+const SMOOTH: Check = Check::Test("smoothing::");
 
 /// All checks that a patch can name.
-pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, DYNAMICS, POINTS, LOADS, SHAPES];
+pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH];
 
 /// What is to become of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -62,6 +63,7 @@ const fn patch(
 const RESIDUAL: &str = "src/mechanics/residual.rs";
 const PRODUCT: &str = "src/mechanics/tangent.rs";
 const TRANSFER: &str = "src/mechanics/transfer.rs";
+const SMOOTHING: &str = "src/mechanics/smoothing.rs";
 const NEWMARK: &str = "src/mechanics/time.rs";
 const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
@@ -197,6 +199,18 @@ pub(super) const PATCHES: &[Patch] = &[
         "-r / m",
         "r / m",
         Killed(&[LOADS], &[DYNAMICS])),
+    patch("smoothing by a share of the step, not at a rate", SMOOTHING,
+        "-(-self.rate * dt).exp_m1()",
+        "(self.rate * dt).min(1.0)",
+        Killed(&[SMOOTH], &[DYNAMICS])),
+    patch("smoothing towards a sum that is no mean", SMOOTHING,
+        "field[p] * particles.mass[p]",
+        "field[p]",
+        Killed(&[SMOOTH], &[DYNAMICS])),
+    patch("smoothing forgets the acceleration", TRANSFER,
+        "(&mut self.delta_acceleration, &particles.acceleration),",
+        "",
+        Killed(&[SMOOTH], &[DYNAMICS])),
     patch("particles move backwards", TRANSFER,
         "particles.position[p] + delta_x",
         "particles.position[p] - delta_x",

@@ -377,6 +377,7 @@ impl Study {
             reports: vec![self.reference, self.converged, self.orders],
             remarks,
             figures: self.figures,
+            ..Outcome::default()
         }
     }
 }

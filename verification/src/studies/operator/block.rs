@@ -61,6 +61,7 @@ pub(super) fn block<const D: usize>(
             lumping,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::default(),
+            smoothing: None,
             check_tangent: None,
             newton: NewtonSettings {
                 relative_tolerance: 1e-8,

@@ -1,0 +1,152 @@
+//! Smoothing of the particles: what it keeps, what it takes, and its limits.
+
+use crate::support::{Failure, scene};
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
+use bfree::grid::Grid;
+use bfree::mechanics::smoothing::Smoothing;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::Particles;
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+
+fn families() -> [Approximation; 5] {
+    let gimp = Gimp::particles_per_axis(2);
+    [Linear.into(), gimp.into(), Bspline::Quadratic.into(), Bspline::Cubic.into(), Lme::new(1.4, 1e-6).into()]
+}
+
+/// Particles of different mass without any symmetry, in [0.2, 0.8]^D of a box of edge 1.
+fn cloud<const D: usize>() -> (Grid<D>, Particles<D>) {
+    let mut particles = Particles::default();
+    for p in 1..=90 {
+        let along = |k: usize| (f64::from(p) * [0.618_034, 0.414_214, 0.732_051][k]).fract();
+        let velocity = Vector::from_fn(|k, _| (f64::from(p) * (1.7 + k as f64)).sin());
+        particles.push(Vector::from_fn(|k, _| 0.2 + 0.6 * along(k)), velocity, 0.01, 0.01 * (1.0 + along(0)), 0);
+    }
+    (Grid { origin: Vector::zeros(), spacing: 0.125, cells: [8; D] }, particles)
+}
+
+/// Momentum and kinetic energy of the particles with the velocities `v + change`.
+fn after<const D: usize>(particles: &Particles<D>, change: &[Vector<f64, D>]) -> (Vector<f64, D>, f64) {
+    let mut changed = particles.clone();
+    changed.velocity.iter_mut().zip(change).for_each(|(v, change)| *v += change);
+    (changed.momentum(), changed.kinetic_energy())
+}
+
+fn keeps_momentum_and_gains_no_energy<const D: usize>() -> Result<(), Failure> {
+    let (grid, particles) = cloud::<D>();
+    let scale: f64 = particles.mass.iter().zip(&particles.velocity).map(|(m, v)| m * v.norm()).sum();
+    for family in families() {
+        let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+        let mut energy_before = 0.0;
+        for order in [1, 2, 5, 20] {
+            for rate in [3.0, f64::INFINITY] {
+                let smoothing = Smoothing { order, rate };
+                let change = smoothing.change(&particles, &supports, &nodal.mass, &particles.velocity, 0.1);
+                let (momentum, energy) = after(&particles, &change);
+                assert!((momentum - particles.momentum()).norm() < 1e-14 * scale, "{family:?} {smoothing:?}");
+                // M_L − M has no negative eigenvalue, so each term takes energy, and the more terms the less.
+                assert!(energy < particles.kinetic_energy(), "{family:?} {smoothing:?}");
+                if rate == f64::INFINITY {
+                    assert!(energy > energy_before, "{family:?} {smoothing:?}");
+                    energy_before = energy;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn smoothing_keeps_momentum_and_gains_no_energy() -> Result<(), Failure> {
+    keeps_momentum_and_gains_no_energy::<1>()?;
+    keeps_momentum_and_gains_no_energy::<2>()?;
+    keeps_momentum_and_gains_no_energy::<3>()
+}
+
+#[test]
+fn a_common_velocity_is_kept_and_two_half_steps_are_one_step() -> Result<(), Failure> {
+    let (grid, mut particles) = cloud::<2>();
+    let smoothing = Smoothing { order: 2, rate: 4.0 };
+    let (supports, nodes) = Supports::new(&families()[4], &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    // 1 − θ(Δt) is exponential in Δt.
+    let left = |dt: f64| 1.0 - smoothing.share(dt);
+    assert!((left(0.2) - left(0.1) * left(0.1)).abs() < 1e-15);
+    assert_eq!((smoothing.share(0.0), Smoothing { rate: f64::INFINITY, ..smoothing }.share(0.1)), (0.0, 1.0));
+    particles.velocity.fill(Vector::from([3.0, -2.0]));
+    let change = smoothing.change(&particles, &supports, &nodal.mass, &particles.velocity, 0.2);
+    assert!(change.iter().all(|change| change.norm() < 1e-14), "{change:?}");
+    Ok(())
+}
+
+#[test]
+fn many_terms_keep_what_the_nodes_can_represent() -> Result<(), Failure> {
+    let (grid, particles) = cloud::<1>();
+    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    let field: Vec<_> = nodes.positions(&grid).map(|(_, x)| x.map(|x| (7.0 * x).sin())).collect();
+    let represented = supports.values(&field);
+    let size = |field: &[Vector<f64, 1>]| field.iter().map(Vector::norm_squared).sum::<f64>().sqrt();
+    let lost = |order| {
+        let smoothing = Smoothing { order, rate: f64::INFINITY };
+        size(&smoothing.change(&particles, &supports, &nodal.mass, &represented, 0.1)) / size(&represented)
+    };
+    assert!(lost(1) > 0.05 && lost(4) < 0.25 * lost(1) && lost(400) < 1e-4, "{} {} {}", lost(1), lost(4), lost(400));
+    Ok(())
+}
+
+/// The shipped bar, cut short.
+fn bar(transfer: &str) -> Result<Simulation<1>, Failure> {
+    let overrides = ["bodies.0.shape.box.min=[48]", "bodies.0.shape.box.max=[52]", "time.lumping=1", transfer];
+    scene("riemann_jump.json", &overrides)
+}
+
+#[test]
+fn with_a_lumped_mass_pic_gives_particles_the_velocity_of_their_nodes() -> Result<(), Failure> {
+    let mut pic = bar(r#"transfer={"pic":{}}"#)?;
+    pic.step()?;
+    let before = pic.clone();
+    pic.step()?;
+    let mut flip = before.clone();
+    flip.settings.smoothing = None;
+    flip.step()?;
+    let (supports, nodes) = Supports::new(&before.approximation, &before.grid, &before.particles.position)?;
+    let nodal = Nodal::project(&before.particles, &supports, nodes.len(), 1.0)?;
+    let at_start = supports.values(&nodal.velocity);
+    let accelerated = supports.values(&nodal.acceleration);
+    let largest = accelerated.iter().map(Vector::norm).fold(0.0, f64::max);
+    assert!(largest > 0.0);
+    for p in 0..before.particles.len() {
+        // v_p = Σ N (v_n + Δv), and FLIP is v_p + Σ N Δv.
+        let expected = at_start[p] + (flip.particles.velocity[p] - before.particles.velocity[p]);
+        assert!((pic.particles.velocity[p] - expected).norm() < 1e-9, "particle {p}");
+        // The same for the acceleration.
+        let expected = accelerated[p] + (flip.particles.acceleration[p] - before.particles.acceleration[p]);
+        assert!((pic.particles.acceleration[p] - expected).norm() < 1e-9 * largest, "particle {p}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_bar_keeps_its_momentum_and_loses_as_much_energy_in_two_half_steps_as_in_one() -> Result<(), Failure> {
+    let run = |step: f64, steps: u32| -> Result<Simulation<1>, Failure> {
+        let mut bar = bar(r#"transfer={"blend":{"rate":17300}}"#)?;
+        bar.clock = bfree::clock::Clock::new(step, 0);
+        for _ in 0..steps {
+            bar.step()?;
+        }
+        Ok(bar)
+    };
+    let start = bar(r#"transfer="flip""#)?.particles.momentum();
+    let energy = |bar: &Simulation<1>| bar.particles.kinetic_energy() + bar.strain_energy();
+    let (long, short) = (run(4e-6, 20)?, run(2e-6, 40)?);
+    for bar in [&long, &short] {
+        assert!((bar.particles.momentum() - start).norm() < 1e-12 * start.norm());
+    }
+    let total = bar(r#"transfer="flip""#)?.particles.kinetic_energy();
+    let (by_long, by_short) = (total - energy(&long), total - energy(&short));
+    assert!(by_long > 1e-4 * total && (by_short / by_long - 1.0).abs() < 0.1, "{by_long} {by_short} of {total}");
+    Ok(())
+}

@@ -1,0 +1,251 @@
+//! Charts side by side in one picture, for print.
+
+use crate::figure::{Axis, FigureError};
+use bfree::output::plot::{PlotError, png};
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::prelude::*;
+use std::ops::Range;
+
+/// Okabe and Ito's colours, distinct to colour-blind readers: black, blue, vermillion, green, purple, orange, sky.
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 0, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+
+/// Plotters rounds places to whole units: drawn this much larger, and shown smaller, lines are smooth.
+const FINE: u32 = 4;
+
+const LABEL: (&str, u32) = ("sans-serif", 14 * FINE);
+
+/// How the points of a curve are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// A line.
+    Line,
+    /// A thin broken line.
+    Dashed,
+    /// Dots.
+    Dots,
+    /// A line with its points.
+    Joined,
+}
+
+/// One curve.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Its name in the legend; without one it is not listed.
+    pub name: String,
+    /// Number of its colour; 0 is black.
+    pub color: usize,
+    /// How it is shown.
+    pub mark: Mark,
+    /// The points (x, y).
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// A curve of the given name, colour and mark.
+    pub fn new(name: impl Into<String>, color: usize, mark: Mark, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), color, mark, points }
+    }
+}
+
+/// One chart.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// The line above it.
+    pub title: String,
+    /// The horizontal axis.
+    pub x: Axis,
+    /// The vertical axis.
+    pub y: Axis,
+    /// Ends of both axes; without them all points are shown.
+    pub window: Option<[(f64, f64); 2]>,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// Where the legend stands, if there is one.
+    pub legend: Option<SeriesLabelPosition>,
+}
+
+/// A picture of one or more charts.
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    /// Name of the files, without extension.
+    pub name: &'static str,
+    /// What it shows, as its caption.
+    pub caption: String,
+    /// Charts in a row.
+    pub columns: usize,
+    /// Width and height of one chart, in units of the SVG.
+    pub size: (u32, u32),
+    /// The charts, row by row.
+    pub panels: Vec<Panel>,
+}
+
+impl Sheet {
+    /// The picture as SVG.
+    ///
+    /// # Errors
+    /// Those of the plotting library.
+    pub fn svg(&self) -> Result<String, FigureError> {
+        let mut text = String::new();
+        self.draw(&mut text).map_err(|error| FigureError::new(&*error))?;
+        let (width, height) = self.extent();
+        let drawn = format!(r#"width="{}" height="{}" viewBox"#, width * FINE, height * FINE);
+        Ok(text.replacen(&drawn, &format!(r#"width="{width}" height="{height}" viewBox"#), 1))
+    }
+
+    /// An SVG of this picture as PNG.
+    ///
+    /// # Errors
+    /// Those of the rendering library.
+    pub fn png(&self, svg: &str) -> Result<Vec<u8>, PlotError> {
+        png::from_svg(self.name, svg)
+    }
+
+    fn rows(&self) -> usize {
+        self.panels.len().div_ceil(self.columns.max(1))
+    }
+
+    /// Width and height of the whole.
+    fn extent(&self) -> (u32, u32) {
+        (self.size.0 * self.columns as u32, self.size.1 * self.rows() as u32)
+    }
+
+    fn draw(&self, text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+        let (width, height) = self.extent();
+        let root = SVGBackend::with_string(text, (width * FINE, height * FINE)).into_drawing_area();
+        root.fill(&WHITE)?;
+        for (area, panel) in root.split_evenly((self.rows(), self.columns)).iter().zip(&self.panels) {
+            panel.draw(area)?;
+        }
+        root.present()?;
+        Ok(())
+    }
+}
+
+/// Whether `value` lies in `range`, ends included.
+fn within(range: &Range<f64>, value: f64) -> bool {
+    (range.start..=range.end).contains(&value)
+}
+
+/// An axis labelled where it is told to be.
+struct Scale {
+    range: Range<f64>,
+    ticks: Vec<f64>,
+}
+
+impl Ranged for Scale {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (start, end): (i32, i32)) -> i32 {
+        let share = (value - self.range.start) / (self.range.end - self.range.start);
+        // `as` saturates, also for what lies far outside.
+        start + (f64::from(end - start) * share).round() as i32
+    }
+
+    fn key_points<H: KeyPointHint>(&self, _hint: H) -> Vec<f64> {
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+impl Panel {
+    fn draw(
+        &self,
+        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let placed: Vec<Vec<(f64, f64)>> = (self.curves.iter())
+            .map(|curve| {
+                let place = |&(x, y): &(f64, f64)| Some((self.x.place(x)?, self.y.place(y)?));
+                curve.points.iter().filter_map(place).collect()
+            })
+            .collect();
+        let all = || placed.iter().flatten();
+        let window = self.window.map(|ends| {
+            let [x, y] = [(&self.x, ends[0]), (&self.y, ends[1])]
+                .map(|(axis, (low, high))| axis.place(low).unwrap_or(0.0)..axis.place(high).unwrap_or(1.0));
+            (x, y)
+        });
+        let (x, y) = window
+            .unwrap_or_else(|| (crate::figure::range(all().map(|p| p.0)), crate::figure::range(all().map(|p| p.1))));
+        let (ticks_x, ticks_y) = (self.x.ticks(&x), self.y.ticks(&y));
+        let mut chart = ChartBuilder::on(area)
+            .caption(&self.title, ("sans-serif", 16 * FINE))
+            .margin(8 * FINE)
+            .margin_right(18 * FINE)
+            .x_label_area_size(44 * FINE)
+            .y_label_area_size(66 * FINE)
+            .build_cartesian_2d(
+                Scale { range: x.clone(), ticks: ticks_x },
+                Scale { range: y.clone(), ticks: ticks_y },
+            )?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(BLACK.mix(0.12).stroke_width(FINE))
+            .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .label_style(LABEL)
+            .axis_desc_style(LABEL)
+            .x_label_formatter(&|&x| self.x.tick(x))
+            .y_label_formatter(&|&y| self.y.tick(y))
+            .draw()?;
+        for (curve, points) in self.curves.iter().zip(placed) {
+            let color = COLORS[curve.color % COLORS.len()];
+            let inside: Vec<_> = (points.iter().copied())
+                .filter(|point| within(&x, point.0) && (within(&y, point.1) || curve.mark != Mark::Dots))
+                .collect();
+            let dots = || inside.iter().map(|&point| Circle::new(point, 3 * FINE, color.filled())).collect::<Vec<_>>();
+            let series = match curve.mark {
+                Mark::Line | Mark::Joined => {
+                    chart.draw_series(LineSeries::new(inside.clone(), color.stroke_width(3 * FINE / 2)))?
+                }
+                Mark::Dashed => chart.draw_series(DashedLineSeries::new(
+                    inside.clone(),
+                    6 * FINE,
+                    4 * FINE,
+                    color.stroke_width(3 * FINE / 2),
+                ))?,
+                Mark::Dots => {
+                    let dots = inside.iter().map(|&point| Circle::new(point, 5 * FINE / 2, color.filled()));
+                    chart.draw_series(dots.collect::<Vec<_>>())?
+                }
+            };
+            if !curve.name.is_empty() {
+                let length = 20 * FINE as i32;
+                let (start, width) = if curve.mark == Mark::Dots { (length / 2, 5 * FINE) } else { (0, 2 * FINE) };
+                let end = if curve.mark == Mark::Dots { start + width as i32 } else { length };
+                series
+                    .label(&curve.name)
+                    .legend(move |(x, y)| PathElement::new([(x + start, y), (x + end, y)], color.stroke_width(width)));
+            }
+            if curve.mark == Mark::Joined {
+                chart.draw_series(dots())?;
+            }
+        }
+        if let Some(position) = &self.legend {
+            chart
+                .configure_series_labels()
+                .position(position.clone())
+                .label_font(LABEL)
+                .margin(6 * FINE)
+                .legend_area_size(28 * FINE)
+                .background_style(WHITE.mix(0.85))
+                .border_style(BLACK.mix(0.3).stroke_width(FINE))
+                .draw()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,294 @@
+//! One run of the bar, by particles or by elements, and what is measured of it.
+
+use crate::elements::Elements;
+use crate::riemann::{PSystem, Riemann, State};
+use crate::shipped;
+use crate::studies::StudyError;
+use bfree::clock::Clock;
+use bfree::material::{Lame, Material, NeoHookean};
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::Body;
+use bfree::simulation::Simulation;
+use bfree::solver::Forcing;
+use bfree::tensor::Vector;
+use std::time::Instant;
+
+const DENSITY: f64 = 2600.0;
+const POISSON: f64 = 0.3;
+/// When the profiles are compared.
+const END: f64 = 3e-3;
+/// Where the jump is at the start.
+const MIDDLE: f64 = 50.0;
+
+/// A jump of velocity in a bar of a given stiffness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    pub young: f64,
+    pub left: f64,
+    pub right: f64,
+}
+
+impl Jump {
+    /// The paper's.
+    pub const PAPER: Self = Self { young: 1e10, left: 10.0, right: 0.0 };
+
+    /// A jump of the given size in the stiffer bar, > 0 compressive, < 0 expansive.
+    pub const fn of(size: f64) -> Self {
+        if size > 0.0 {
+            Self { young: 5e10, left: size, right: 0.0 }
+        } else {
+            Self { young: 5e10, left: 0.0, right: -size }
+        }
+    }
+
+    pub fn size(&self) -> f64 {
+        (self.left - self.right).abs()
+    }
+
+    pub fn name(&self) -> String {
+        format!("{} m/s, E = {:e} Pa", self.left - self.right, self.young)
+    }
+
+    pub fn lame(&self) -> Result<Lame, StudyError> {
+        Ok(Lame::from_young_poisson(self.young, POISSON)?)
+    }
+
+    pub fn exact(&self) -> Result<Riemann, StudyError> {
+        let lame = self.lame()?;
+        let system = PSystem { modulus: 0.5 * lame.lambda + lame.shear, density: DENSITY };
+        let side = |velocity| State { stretch: 1.0, velocity };
+        Ok(system.solve(side(self.left), side(self.right))?)
+    }
+
+    /// √(E/ρ) · 1.02, the speed that the paper's Courant number refers to.
+    fn courant_speed(&self) -> f64 {
+        (self.young / DENSITY).sqrt() / 0.9806
+    }
+}
+
+/// How particles are run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Method {
+    pub name: &'static str,
+    /// The shape functions, as in scenes.
+    pub shape: &'static str,
+    pub particles_per_cell: u32,
+    pub lumping: f64,
+    /// Newmark's γ; β = (γ + ½)²/4.
+    pub gamma: f64,
+    pub transfer: Transfer,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transfer {
+    Flip,
+    Pic(u32),
+    /// The recommended rate times a factor.
+    Blend(u32, f64),
+}
+
+impl Method {
+    /// The paper's scheme with the given shape functions.
+    pub const fn paper(name: &'static str, shape: &'static str) -> Self {
+        Self { name, shape, particles_per_cell: 4, lumping: 0.8, gamma: 0.5, transfer: Transfer::Flip }
+    }
+
+    /// What `scenes/riemann_jump.json` recommends.
+    pub const RECOMMENDED: Self = Self {
+        name: "recommended",
+        shape: r#"{"lme":{"gamma":1.4}}"#,
+        particles_per_cell: 4,
+        lumping: 0.02,
+        gamma: 0.5,
+        transfer: Transfer::Blend(1, 1.0),
+    };
+}
+
+/// Discretisation in space and time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mesh {
+    pub h: f64,
+    pub courant: f64,
+}
+
+/// What is measured of a profile at 3 ms.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// (Σ V₀ (v_p − v)²)^½ over the particles (Gauss points).
+    pub particles: f64,
+    /// (Σ h (v_I − v)²)^½ over the nodes.
+    pub nodes: f64,
+    /// Largest excess over the two states that bound a front, in parts of the jump.
+    pub overshoot: f64,
+    /// Largest |v − v*| between the fronts, in parts of the jump.
+    pub plateau: f64,
+    /// From 10 % to 90 % of the front to the right, in metres.
+    pub width: f64,
+    /// Energy lost, in parts of the energy at the start, in the frame of the middle state.
+    pub lost: f64,
+    /// What the exact solution loses in its shocks, in the same parts.
+    pub lost_by_shocks: f64,
+    pub seconds: f64,
+    pub steps: u64,
+    /// (X, v)
+    pub profile: Vec<(f64, f64)>,
+}
+
+/// Half the length of the bar: the waves, and room before its ends.
+fn half_length(exact: &Riemann) -> f64 {
+    exact.waves[1].edges().1 * END + 2.0
+}
+
+fn steps(jump: &Jump, mesh: &Mesh) -> u64 {
+    (END * jump.courant_speed() / (mesh.courant * mesh.h)).round() as u64
+}
+
+/// Runs particles up to 3 ms.
+pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyError> {
+    let exact = jump.exact()?;
+    let (h, count) = (mesh.h, (half_length(&exact) / mesh.h).round());
+    let (inner, outer) = (count * h, (count + (4.0 / h).round()) * h);
+    let lame = jump.lame()?;
+    let speed = (lame.p_wave_modulus() / DENSITY).sqrt();
+    let steps = steps(jump, mesh);
+    let transfer = match method.transfer {
+        Transfer::Flip => r#""flip""#.to_owned(),
+        Transfer::Pic(order) => format!(r#"{{"pic":{{"order":{order}}}}}"#),
+        Transfer::Blend(order, factor) => {
+            let rate = factor * 1.2 * speed / h * (h / (speed * END)).powf(0.25);
+            format!(r#"{{"blend":{{"order":{order},"rate":{rate}}}}}"#)
+        }
+    };
+    let beta = 0.25 * (method.gamma + 0.5).powi(2);
+    let overrides = [
+        format!(r#"grid={{"origin":[{}],"size":[{}],"spacing":{h}}}"#, MIDDLE - outer, 2.0 * outer),
+        format!("bodies.0.shape.box.min=[{}]", MIDDLE - inner),
+        format!("bodies.0.shape.box.max=[{}]", MIDDLE + inner),
+        format!("bodies.0.material.neo_hookean.young={}", jump.young),
+        format!("bodies.0.particles_per_cell={}", method.particles_per_cell),
+        format!("approximation={}", method.shape),
+        format!("time.step={}", END / steps as f64),
+        format!("time.gamma={}", method.gamma),
+        format!("time.beta={beta}"),
+        format!("time.lumping={}", method.lumping),
+        format!("transfer={transfer}"),
+        "solver.newton.tolerance=1e-8".to_owned(),
+        r#"solver.krylov.forcing="eisenstat_walker""#.to_owned(),
+    ];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let mut simulation: Simulation<1> = shipped::scene("riemann", &overrides)?.build(&shipped::folder())?;
+    let side = |x: f64| if x <= MIDDLE + 1e-6 * h { jump.left } else { jump.right };
+    simulation.set_velocity_on_nodes(|x| x.map(side))?;
+    let reference: Vec<f64> = simulation.particles.position.iter().map(|x| x[0]).collect();
+    let before = energy(&simulation, exact.states[1].velocity);
+    let start = Instant::now();
+    for _ in 0..steps {
+        simulation.advance()?;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+
+    // At the nodes: the projected velocity, at the projected X.
+    let mut carrier = simulation.particles.clone();
+    carrier.acceleration = reference.iter().map(|&x| Vector::from([x])).collect();
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &carrier.position)?;
+    let lumped = Nodal::project(&carrier, &supports, nodes.len(), 1.0)?;
+    let effective = Nodal::project(&simulation.particles, &supports, nodes.len(), method.lumping)?;
+    let at_nodes = lumped.acceleration.iter().zip(&effective.velocity).map(|(x, v)| (x[0], h, v[0]));
+    let inside = |x: f64| (x - MIDDLE).abs() < inner - 1.0;
+    let nodal = distance(&exact, at_nodes.filter(|node| inside(node.0)));
+
+    let particles = &simulation.particles;
+    let profile: Vec<(f64, f64)> =
+        reference.iter().zip(&particles.velocity).filter(|at| inside(*at.0)).map(|(&x, v)| (x, v[0])).collect();
+    let volume = particles.volume.first().copied().unwrap_or(0.0);
+    let lost = 1.0 - energy(&simulation, exact.states[1].velocity) / before;
+    Ok(measure(jump, &exact, profile, volume, nodal, lost, seconds, steps))
+}
+
+/// Runs Lagrangian elements of edge h, three nodes each, up to 3 ms.
+pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyError> {
+    let exact = jump.exact()?;
+    let count = (half_length(&exact) / mesh.h).round();
+    let law = Material::from(NeoHookean::ciarlet(jump.lame()?));
+    let body = Body { name: "bar".into(), law, density: DENSITY };
+    let steps = steps(jump, mesh);
+    let clock = Clock::new(END / steps as f64, 0);
+    let origin = Vector::from([MIDDLE - count * mesh.h]);
+    let mut bar = Elements::new(origin, mesh.h, [2 * count as u32], body, clock)?;
+    bar.newmark = Newmark { beta: 0.25 * (gamma + 0.5).powi(2), gamma };
+    bar.newton.relative_tolerance = 1e-8;
+    bar.newton.forcing = Forcing::EisenstatWalker;
+    bar.set_velocity(|x| x.map(|x| if x <= MIDDLE + 1e-6 * mesh.h { jump.left } else { jump.right }));
+    let middle = exact.states[1].velocity;
+    let before = bar.energy(&Vector::from([middle]))?;
+    let start = Instant::now();
+    for _ in 0..steps {
+        bar.step()?;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let inside = |x: f64| (x - MIDDLE).abs() < (count * mesh.h) - 1.0;
+    let at_nodes = bar.node_positions().into_iter().zip(&bar.velocity).map(|(x, v)| (x[0], 0.5 * mesh.h, v[0]));
+    let nodal = distance(&exact, at_nodes.filter(|node| inside(node.0)));
+    let velocity = bar.point_velocity();
+    let profile: Vec<(f64, f64)> =
+        (bar.points().position.iter().zip(&velocity)).filter(|(x, _)| inside(x[0])).map(|(x, v)| (x[0], v[0])).collect();
+    let lost = 1.0 - bar.energy(&Vector::from([middle]))? / before;
+    let mean = 2.0 * count * mesh.h / bar.points().len() as f64;
+    let mut measured = measure(jump, &exact, profile, mean, nodal, lost, seconds, steps);
+    // Gauss points differ in weight.
+    let weighted = (bar.points().position.iter().zip(&bar.points().volume).zip(&velocity)).map(|((x, &w), v)| (x[0], w, v[0]));
+    measured.particles = distance(&exact, weighted.filter(|point| inside(point.0)));
+    Ok(measured)
+}
+
+/// Kinetic energy in the frame that moves with `middle`, and strain energy.
+fn energy(simulation: &Simulation<1>, middle: f64) -> f64 {
+    let particles = &simulation.particles;
+    let kinetic = particles.mass.iter().zip(&particles.velocity).map(|(m, v)| 0.5 * m * (v[0] - middle).powi(2));
+    kinetic.sum::<f64>() + simulation.strain_energy()
+}
+
+/// (Σ w (v − v_exact)²)^½ over points (X, w, v).
+fn distance(exact: &Riemann, points: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
+    points.map(|(x, w, v)| w * (v - exact.at((x - MIDDLE) / END).velocity).powi(2)).sum::<f64>().sqrt()
+}
+
+#[allow(clippy::too_many_arguments)] // the results of one run
+fn measure(
+    jump: &Jump,
+    exact: &Riemann,
+    profile: Vec<(f64, f64)>,
+    volume: f64,
+    nodes: f64,
+    lost: f64,
+    seconds: f64,
+    steps: u64,
+) -> Measured {
+    let [left, star, right] = exact.states.map(|state| state.velocity);
+    let (mut overshoot, mut plateau): (f64, f64) = (0.0, 0.0);
+    let inner_edge = exact.waves[1].edges().0 * END;
+    for &(x, v) in &profile {
+        let outer = if x < MIDDLE { left } else { right };
+        let excess = (v - outer.max(star)).max(outer.min(star) - v);
+        overshoot = overshoot.max(excess / jump.size());
+        if (x - MIDDLE).abs() < 0.85 * inner_edge {
+            plateau = plateau.max((v - star).abs() / jump.size());
+        }
+    }
+    // The outermost place where the front to the right passes a level.
+    let crossing = |level: f64| {
+        let part = |v: f64| (v - right) / (star - right);
+        let pairs = profile.windows(2).rev();
+        let found = pairs.into_iter().find(|pair| part(pair[0].1) >= level && part(pair[1].1) < level);
+        found.map_or(f64::NAN, |pair| {
+            let share = (part(pair[0].1) - level) / (part(pair[0].1) - part(pair[1].1));
+            pair[0].0 + share * (pair[1].0 - pair[0].0)
+        })
+    };
+    let width = crossing(0.1) - crossing(0.9);
+    let particles = distance(exact, profile.iter().map(|&(x, v)| (x, volume, v)));
+    let lost_by_shocks = exact.dissipation() * END / (2.0 * half_length(exact) * DENSITY * 0.125 * jump.size().powi(2));
+    Measured { particles, nodes, overshoot, plateau, width, lost, lost_by_shocks, seconds, steps, profile }
+}

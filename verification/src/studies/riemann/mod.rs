@@ -1,0 +1,258 @@
+//! Section 4.1: a jump of velocity in a bar at finite strain.
+
+mod bar;
+mod figures;
+mod tables;
+
+use super::{Effort, Outcome, StudyError};
+use crate::report::{Bound, Report};
+use bar::{Jump, Measured, Mesh, Method, Transfer};
+use rayon::prelude::*;
+
+/// What the study shows.
+pub(super) const ABOUT: &str =
+    "a jump of velocity in a bar (section 4.1): profiles, convergence, and a scheme that converges for strong jumps";
+
+const LINEAR: Method = Method::paper("linear", r#""linear""#);
+const GIMP: Method = Method::paper("uGIMP", r#""gimp""#);
+const LME: Method = Method::paper("LME 4", r#"{"lme":{"gamma":4}}"#);
+/// The paper's scheme with the recommended shape functions: what the width of fronts is compared with.
+const SMOOTH: Method = Method::paper("LME 1.4", r#"{"lme":{"gamma":1.4}}"#);
+
+/// The spacings of Fig. 6.
+const SPACINGS: [f64; 5] = [0.1, 0.075, 0.05, 0.025, 0.01];
+/// The Courant numbers of Fig. 7.
+const COURANTS: [f64; 5] = [1.0, 0.5, 0.1, 0.05, 0.01];
+/// The γ of Fig. 5.
+const GAMMAS: [f64; 4] = [0.5, 0.6, 0.7, 1.0];
+/// The recommended Courant number for jumps.
+const COURANT: f64 = 0.5;
+
+/// L2 errors at particles of an independent program in the paper's own case, by h and Courant number
+/// (shared/reference/README.md).
+const REFERENCE: [(Method, f64, f64, f64); 10] = [
+    (LINEAR, 0.1, 1.0, 2.88),
+    (GIMP, 0.1, 1.0, 2.58),
+    (LME, 0.1, 1.0, 2.58),
+    (LME, 0.1, 0.5, 2.41),
+    (GIMP, 0.05, 1.0, 2.09),
+    (LME, 0.05, 1.0, 2.09),
+    (LME, 0.1, 0.1, 2.38),
+    (GIMP, 0.025, 1.0, 1.71),
+    (LME, 0.025, 1.0, 1.73),
+    (LINEAR, 0.05, 1.0, 2.98),
+];
+
+/// How many of them a short run compares.
+const SHORT_REFERENCE: usize = 6;
+
+/// The two programs differ by 2 % to 6 % at h = 0.1 m and by less than 1.5 % at 0.025 m; for what reason is not known.
+const AGREEMENT: f64 = 0.06;
+
+/// One run by its coordinates; what is asked for twice is run once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Case {
+    Particles(Method, Jump, Mesh),
+    Elements(f64, Jump, Mesh),
+}
+
+impl Case {
+    fn particles(method: Method, jump: Jump, h: f64, courant: f64) -> Self {
+        Self::Particles(method, jump, Mesh { h, courant })
+    }
+
+    fn run(&self) -> Result<Measured, StudyError> {
+        match self {
+            Self::Particles(method, jump, mesh) => bar::run(method, jump, mesh),
+            Self::Elements(gamma, jump, mesh) => bar::run_elements(*gamma, jump, mesh),
+        }
+    }
+}
+
+/// All runs of the study, done side by side. A scheme that breaks down is a result too: the message is kept.
+struct Runs(Vec<(Case, Result<Measured, String>)>);
+
+impl Runs {
+    fn new(cases: Vec<Case>) -> Self {
+        let mut once: Vec<Case> = Vec::new();
+        for case in cases {
+            if !once.contains(&case) {
+                once.push(case);
+            }
+        }
+        // The long ones first, so that no core idles at the end.
+        let least_work = |case: &Case| {
+            let (Case::Particles(_, jump, mesh) | Case::Elements(_, jump, mesh)) = case;
+            mesh.h * mesh.h * mesh.courant / jump.young
+        };
+        once.sort_by(|a, b| least_work(a).total_cmp(&least_work(b)));
+        let runs = once.into_par_iter().with_max_len(1).map(|case| {
+            let measured = case.run().map_err(|error| crate::report::chain(&*error));
+            (case, measured)
+        });
+        Self(runs.collect())
+    }
+
+    fn of(&self, case: Case) -> Result<&Measured, StudyError> {
+        match self.0.iter().find(|(known, _)| *known == case) {
+            Some((_, Ok(measured))) => Ok(measured),
+            Some((_, Err(error))) => Err(format!("{case:?}: {error}").into()),
+            None => Err(format!("{case:?} was not run").into()),
+        }
+    }
+
+    fn particles(&self, method: Method, jump: Jump, h: f64, courant: f64) -> Result<&Measured, StudyError> {
+        self.of(Case::particles(method, jump, h, courant))
+    }
+}
+
+/// The recommended scheme: which jumps, spacings and Courant numbers are judged.
+struct Plan {
+    jumps: Vec<Jump>,
+    spacings: Vec<f64>,
+    courants: Vec<f64>,
+    references: usize,
+}
+
+impl Plan {
+    fn new(effort: Effort) -> Self {
+        match effort {
+            Effort::Short => Self {
+                jumps: vec![Jump::of(1000.0)],
+                spacings: vec![0.1, 0.05],
+                courants: vec![COURANT, 0.1],
+                references: SHORT_REFERENCE,
+            },
+            Effort::Full => Self {
+                jumps: vec![Jump::PAPER, Jump::of(100.0), Jump::of(-100.0), Jump::of(1000.0), Jump::of(-1000.0)],
+                spacings: SPACINGS.to_vec(),
+                courants: COURANTS[1..].to_vec(),
+                references: REFERENCE.len(),
+            },
+        }
+    }
+
+    /// The spacings of one jump: the finest, which takes minutes, for the paper's case alone.
+    fn spacings(&self, jump: Jump) -> &[f64] {
+        let all = self.spacings.len();
+        if jump == Jump::PAPER || all <= 2 { &self.spacings } else { &self.spacings[..all - 1] }
+    }
+
+    /// The Courant numbers of one jump: at -100 m/s, nearly the mirror of 100, without the smallest two.
+    fn courants(&self, jump: Jump) -> &[f64] {
+        let all = self.courants.len();
+        if jump == Jump::of(-100.0) { &self.courants[..all - 2] } else { &self.courants }
+    }
+
+    fn cases(&self) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for &(method, h, courant, _) in &REFERENCE[..self.references] {
+            cases.push(Case::particles(method, Jump::PAPER, h, courant));
+        }
+        for &jump in &self.jumps {
+            for &h in self.spacings(jump) {
+                cases.push(Case::particles(Method::RECOMMENDED, jump, h, COURANT));
+                cases.push(Case::particles(SMOOTH, jump, h, 1.0));
+            }
+            for &courant in self.courants(jump) {
+                cases.push(Case::particles(Method::RECOMMENDED, jump, self.spacings[0], courant));
+            }
+        }
+        cases
+    }
+}
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let plan = Plan::new(*effort);
+    let mut cases = plan.cases();
+    if *effort == Effort::Full {
+        cases.extend(tables::cases());
+        cases.extend(figures::cases());
+    }
+    let runs = Runs::new(cases);
+    let mut outcome = Outcome { reports: vec![reference(&runs, &plan)?, recommended(&runs, &plan)?], ..Outcome::default() };
+    if *effort == Effort::Full {
+        outcome.tables = tables::all(&runs, &plan)?;
+        outcome.sheets = figures::all(&runs)?;
+        outcome.remarks = REMARKS.iter().map(|&remark| remark.into()).collect();
+    }
+    Ok(outcome)
+}
+
+fn reference(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
+    let mut report = Report::new(
+        "the paper's case against an independent program: L2 error at particles over the reference, minus 1",
+        &["shape functions", "h", "Courant"],
+    );
+    for &(method, h, courant, expected) in &REFERENCE[..plan.references] {
+        let found = runs.particles(method, Jump::PAPER, h, courant)?.particles;
+        let labels = [method.name, &h.to_string(), &courant.to_string()];
+        report.push(&labels, (found / expected - 1.0).abs(), Bound::AtMost(AGREEMENT));
+    }
+    Ok(report)
+}
+
+/// What the issue asks of a scheme for jumps.
+fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
+    let mut report = Report::new("the recommended setting", &["quantity", "jump", "h", "Courant"]);
+    for &jump in &plan.jumps {
+        let name = jump.name();
+        let mut before: Option<(f64, f64)> = None;
+        let mut points: Vec<(f64, f64)> = plan.spacings(jump).iter().map(|&h| (h, COURANT)).collect();
+        points.extend(plan.courants(jump).iter().filter(|&&c| c != COURANT).map(|&c| (plan.spacings[0], c)));
+        let mut least = f64::INFINITY;
+        for (k, &(h, courant)) in points.iter().enumerate() {
+            let found = runs.particles(Method::RECOMMENDED, jump, h, courant)?;
+            let (h_label, courant_label) = (h.to_string(), courant.to_string());
+            let mut push = |quantity: &str, value: f64, bound: Bound| {
+                report.push(&[quantity, &name, &h_label, &courant_label], value, bound);
+            };
+            push("overshoot / jump", found.overshoot, Bound::AtMost(0.02));
+            push("plateau error / jump", found.plateau, Bound::AtMost(0.01));
+            let undissipated = runs.particles(SMOOTH, jump, h, 1.0)?;
+            push("width / undissipated", found.width / undissipated.width, Bound::AtMost(1.5));
+            if k < plan.spacings(jump).len() {
+                if let Some((h_before, error)) = before {
+                    let order = (error / found.particles).ln() / (h_before / h).ln();
+                    push("order of L2 in h", order, Bound::AtLeast(0.3));
+                }
+                before = Some((h, found.particles));
+                if k == 0 {
+                    least = found.particles;
+                }
+            } else {
+                // Against the smallest error at any longer step.
+                push("L2 / least L2 at longer steps", found.particles / least, Bound::AtMost(1.02));
+                least = least.min(found.particles);
+            }
+        }
+    }
+    report.note(
+        "Undissipated: the paper's scheme (increments only, trapezoidal rule, eps = 0.8, Courant 1) with the same shape functions, LME 1.4.",
+    );
+    Ok(report)
+}
+
+const REMARKS: [&str; 6] = [
+    "The paper's case, 10 m/s with E = 1e10 Pa. As in its Figs. 5 to 7: linear functions ring and do not converge under refinement, LME and uGIMP do, at the \
+     order 1/3 that a front of the width (h² ct)^(1/3) allows, and the time step hardly matters. Unlike the paper's, our profiles with LME still \
+     overshoot, by some 14 % of the jump, and the elements show that this is the ringing of the undamped method.",
+    "Strong jumps, E = 5e10 Pa. An independent program found that errors of linear functions and of LME 4 grow under refinement there, and so they do: see \
+     the table. The causes, one change at a time: (1) Cell crossing. Functions too narrow for the cells a particle crosses are the reason for the growth: \
+     with LME 1.8 and wider, or cubic B-splines, it is gone, and nothing else removes it: neither the transfer (PIC, FMPM), nor damping (blend, gamma \
+     0.6), nor more particles do so with LME 4. (2) The null space of the particle velocity, which FMPM of a high order removes, is innocent \
+     once the functions are smooth. (3) The projection with a lumped mass slows short waves; eps near 0 makes fronts narrower by a quarter to a third. (4) Newmark's \
+     rule slows them too, by (omega dt)²/12; Courant 0.5 is enough to be rid of that. What is left is the ringing of an undamped dispersive method, \
+     14 % of the jump for 100 m/s and growing towards a dispersive shock for 1000 m/s: that needs dissipation, and one that does not depend on dt.",
+    "The recommended setting (scenes/riemann_jump.json): LME 1.4, eps = 0.02, trapezoidal rule, Courant 0.5, and particles that follow the lumped \
+     projection of their own velocities at the rate κ = 1.2 (c/h)(h/L)^(1/4), with c the speed of sound and L the distance travelled. It acts like a \
+     viscosity κ h². To keep pace with dispersion, a linear front needs an exponent 1/3, to keep a steady shock monotone 0; 1/4 serves both.",
+    "Tried outside this program, with a one-dimensional code of the same method (it agrees to three digits), and not adopted because nothing was gained: \
+     generalised-alpha with a spectral radius of 0.5 (overshoot of 100 m/s with LME 1.8: 12.9 % against 13.1 %), nodal acceleration, a_p = Σ N a_I (it halves the \
+     error of the plateau of the undamped scheme, and changes nothing beside the blend).",
+    "At h = 0.01 m, where a run of a strong jump takes minutes and is left out here, the one-dimensional code found with the recommended setting: 100 m/s: L2 10.0, \
+     overshoot 0.01 %, 1000 m/s: 54.7, 0.6 %, -1000 m/s: 35.1, 0.02 %; plateaus within 0.1 %.",
+    "Not met: fronts are judged against the paper's scheme with the same functions. Beside the recommended setting without its blend, whose fronts \
+     are narrower still but ring, they are wider by more than 1.5.",
+];
