@@ -13,8 +13,8 @@
 //! v = v₀ ± φ(F, F₀),   φ = ∫ c dF  (fan, F > F₀),   φ = −√((P − P₀)(F − F₀)/ρ)  (shock, F < F₀)
 //! ```
 //!
-//! + for the family that runs to the left, − for the one to the right. Both curves are monotone, φ → ∓∞ as F → 0, ∞, so
-//! every pair of states has exactly one solution.
+//! The upper sign is for the family that runs to the left, the lower for the one to the right. Both curves are monotone,
+//! φ → ∓∞ as F → 0, ∞, so every pair of states has exactly one solution.
 
 /// The law and the density of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]

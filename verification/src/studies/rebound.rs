@@ -282,7 +282,10 @@ fn seconds(report: &mut Report) -> Result<Table, StudyError> {
     Ok(table)
 }
 
-fn energies(cases: &[((&str, &str), (&str, [&str; 2]))], runs: &[Run]) -> Sheet {
+/// The name and the setting of a shape function, and the name and the settings of a time integrator.
+type RunCase<'a> = ((&'a str, &'a str), (&'a str, [&'a str; 2]));
+
+fn energies(cases: &[RunCase<'_>], runs: &[Run]) -> Sheet {
     let mut panels = Vec::new();
     for (k, ((shape, rule), run)) in cases.iter().zip(runs).enumerate() {
         let line = |value: &dyn Fn(&(f64, f64, f64)) -> f64| run.energies.iter().map(|at| (at.0, value(at))).collect();

@@ -8,8 +8,11 @@ use plotters::prelude::SeriesLabelPosition;
 /// Spacings shown of the paper's scheme for strong jumps.
 const STRONG_SPACING: f64 = 0.05;
 
+/// A name, and the case of a number: γ, h or Δt.
+type Family = (&'static str, fn(f64) -> Case);
+
 /// The discretisations of Fig. 5, as functions of γ.
-pub(super) fn discretisations() -> [(&'static str, fn(f64) -> Case); 4] {
+pub(super) fn discretisations() -> [Family; 4] {
     const MESH: Mesh = Mesh { h: 0.1, courant: 1.0 };
     [
         ("Q8 elements", |gamma| Case::Elements(gamma, Jump::PAPER, MESH)),
@@ -76,22 +79,22 @@ fn profiles(runs: &Runs) -> Result<Sheet, StudyError> {
 }
 
 fn convergence(runs: &Runs) -> Result<Sheet, StudyError> {
-    let errors = |case: &dyn Fn(f64) -> Case, value: fn(&Measured) -> f64| -> Result<Vec<(f64, f64)>, StudyError> {
+    type Value = fn(&Measured) -> f64;
+    let errors = |case: fn(f64) -> Case, value: Value| -> Result<Vec<(f64, f64)>, StudyError> {
         SPACINGS.iter().map(|&h| Ok((h, value(runs.of(case(h))?)))).collect()
     };
-    let lines: [(&str, usize, &dyn Fn(f64) -> Case); 5] = [
-        ("linear", 2, &|h| Case::particles(LINEAR, Jump::PAPER, h, 1.0)),
-        ("uGIMP", 3, &|h| Case::particles(GIMP, Jump::PAPER, h, 1.0)),
-        ("LME 4", 1, &|h| Case::particles(LME, Jump::PAPER, h, 1.0)),
-        ("Q8 elements", 0, &|h| Case::Elements(0.5, Jump::PAPER, Mesh { h, courant: 1.0 })),
-        ("recommended", 4, &|h| Case::particles(Method::RECOMMENDED, Jump::PAPER, h, COURANT)),
+    let lines: [(Family, usize); 5] = [
+        (("linear", |h| Case::particles(LINEAR, Jump::PAPER, h, 1.0)), 2),
+        (("uGIMP", |h| Case::particles(GIMP, Jump::PAPER, h, 1.0)), 3),
+        (("LME 4", |h| Case::particles(LME, Jump::PAPER, h, 1.0)), 1),
+        (("Q8 elements", |h| Case::Elements(0.5, Jump::PAPER, Mesh { h, courant: 1.0 })), 0),
+        (("recommended", |h| Case::particles(Method::RECOMMENDED, Jump::PAPER, h, COURANT)), 4),
     ];
-    let values: [(&str, fn(&Measured) -> f64); 2] =
-        [("at particles", |found| found.particles), ("at nodes", |found| found.nodes)];
+    let values: [(&str, Value); 2] = [("at particles", |found| found.particles), ("at nodes", |found| found.nodes)];
     let mut panels = Vec::new();
     for (k, (title, value)) in values.into_iter().enumerate() {
         let mut curves = Vec::new();
-        for (name, color, case) in lines {
+        for ((name, case), color) in lines {
             curves.push(Curve::new(name, color, Mark::Joined, errors(case, value)?));
         }
         panels.push(Panel {
