@@ -21,7 +21,7 @@ pub enum Krylov {
     ConjugateGradient,
 }
 
-/// Settings of [`newton`].
+/// Settings of [`newton()`](crate::solver::newton()).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewtonSettings {
