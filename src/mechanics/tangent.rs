@@ -110,12 +110,15 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         identity::<f64, D>() + self.particles.displacement_gradient[p]
     }
 
-    /// The deformation of every particle at Δφ.
+    /// The deformation of every particle at Δφ, gathered node after node as dual numbers are: a nearly incompressible law
+    /// makes much of the last bit of F, and formula and derivative are to be compared at the same F.
     pub(crate) fn states(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
-        self.supports.interpolate(dphi, |p, _, g| {
+        let state = |p| {
+            let g = self.supports.gradient_at(p, dphi);
             admissible(compose(&g, &self.particles.displacement_gradient[p]))
                 .map_err(|source| Inadmissible { particle: p, source })
-        })
+        };
+        (0..self.supports.particles()).map(state).collect()
     }
 
     /// out += α₁ ε m_I u_I
