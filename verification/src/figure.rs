@@ -7,14 +7,15 @@ use plotters::prelude::*;
 use std::ops::Range;
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito, 2008), the yellow left out: too pale for a line.
-const COLORS: [RGBColor; 7] = [
+/// Black, blue, vermillion, green, purple, orange, sky.
+pub(crate) const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
+    RGBColor(86, 180, 233),
 ];
 
 /// Width of a line; each one is thinner than those below it, so that lines that coincide are all seen.
@@ -192,7 +193,7 @@ impl Figure {
             .y_label_formatter(&|&y| self.y.tick(y))
             .draw()?;
         for (k, line, points) in &placed {
-            let (color, width) = (COLORS[k % COLORS.len()].to_rgba(), width(*k, self.lines.len()));
+            let (color, width) = (COLORS[(k + 1) % COLORS.len()].to_rgba(), width(*k, self.lines.len()));
             chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(width)))?;
             let dot = 2 + width / 2;
             chart.draw_series(points.iter().map(|&point| Circle::new(point, dot, color.filled())))?;

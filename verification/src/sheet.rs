@@ -1,21 +1,10 @@
 //! Charts side by side in one picture, for print.
 
-use crate::figure::{Axis, FigureError};
+use crate::figure::{Axis, COLORS, FigureError};
 use bfree::output::plot::{PlotError, png};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::prelude::*;
 use std::ops::Range;
-
-/// Okabe and Ito's colours, distinct to colour-blind readers: black, blue, vermillion, green, purple, orange, sky.
-const COLORS: [RGBColor; 7] = [
-    RGBColor(0, 0, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-];
 
 /// Plotters rounds places to whole units: drawn this much larger, and shown smaller, lines are smooth.
 const FINE: u32 = 4;

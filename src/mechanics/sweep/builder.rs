@@ -1,11 +1,12 @@
-//! One block of the tiled sweep: shape functions of its particles, and their groups.
+//! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
 
+use super::block::{Block, Group};
 use super::kernel::TILE;
 use super::lanes::LANES;
 use super::order::{Key, follows};
-use super::tiled::{Block, Group};
 use crate::approximation::{ApproximationError, AxisWeights, Separable};
 use crate::grid::Grid;
+use crate::nodes::Nodes;
 use crate::tensor::Vector;
 
 /// The weights of one particle along one axis: its nodes, and where N and dN/dx of each are.
@@ -170,4 +171,57 @@ fn mark<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]
             block.entries::<D>(block.groups.len() - 1, lane, |place, _, _| active[place] = true);
         }
     }
+}
+
+/// Numbers the active nodes in the order of the grid, and gives each block those of its box. `active` marks them in the
+/// boxes.
+pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], active: &[Vec<bool>]) -> Nodes {
+    /// A row of a box along x, by the grid number of the row's node at x = 0.
+    struct Row {
+        start: u64,
+        x: usize,
+        block: usize,
+        /// Its first node in the box, and the end of the row.
+        place: usize,
+        end: usize,
+    }
+    let mut rows = Vec::new();
+    for (b, block) in blocks.iter().enumerate() {
+        let [nx, ny, nz] = block.size;
+        for z in 0..nz {
+            for y in 0..ny {
+                let mut index: [u32; D] = std::array::from_fn(|k| block.origin[k] + [0, y, z][k] as u32);
+                let x = index[0] as usize;
+                index[0] = 0;
+                let place = (z * ny + y) * nx;
+                rows.push(Row { start: grid.id(index), x, block: b, place, end: place + nx });
+            }
+        }
+    }
+    rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
+    let mut ids = Vec::new();
+    let mut numbers: Vec<u32> = Vec::new();
+    for same in rows.chunk_by(|a, b| a.start == b.start) {
+        let low = same[0].x;
+        numbers.clear();
+        for row in same {
+            let active = &active[row.block][row.place..row.end];
+            numbers.resize(numbers.len().max(row.x - low + active.len()), u32::MAX);
+            for (number, _) in numbers[row.x - low..].iter_mut().zip(active).filter(|(_, active)| **active) {
+                *number = 0;
+            }
+        }
+        for (x, number) in numbers.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
+            *number = ids.len() as u32;
+            ids.push(same[0].start + (low + x) as u64);
+        }
+        for row in same {
+            let block = &mut blocks[row.block];
+            for place in (row.place..row.end).filter(|&place| active[row.block][place]) {
+                block.nodes.push(numbers[row.x - low + place - row.place]);
+                block.places.push(place as u32);
+            }
+        }
+    }
+    Nodes::ascending(ids)
 }

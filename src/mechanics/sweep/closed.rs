@@ -1,9 +1,10 @@
 //! Tangents in closed form, eight particles side by side.
 
+use super::block::Block;
 use super::kernel::of_lane;
 use super::lanes::{LANES, Lanes};
 use super::of_block;
-use super::tiled::{Block, Tiled, first_error, keep_first};
+use super::tiled::{Tiled, first_error, keep_first};
 use super::waves;
 use crate::material::ClosedTangent;
 use crate::tensor::{Tensor, Vector};

@@ -5,6 +5,7 @@
 //! A block gathers from its own nodes, scatters into its own buffer, and the buffers are added in the order of the blocks:
 //! the same bits for any number of threads.
 
+mod block;
 mod builder;
 mod closed;
 mod kernel;

@@ -3,10 +3,10 @@
 //! These functions are not generic, so that the kernels are compiled once, here, for every dimension and instruction set, and
 //! not again for every point function: what a particle does comes in by reference.
 
+use super::block::Block;
 use super::closed::{Form, Numbers};
 use super::kernel::{Quadratic, Rows, Signed, Terms, gather, load, pair, scatter, scatter_blocks, store};
 use super::lanes::{LANES, Lanes, WithLanes, widest};
-use super::tiled::Block;
 use crate::material::ClosedTangent;
 
 /// What is done at the particles of a group: puts q in the place of u and σ in that of L.

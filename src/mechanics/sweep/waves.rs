@@ -4,10 +4,11 @@
 //! are added to the nodes in the order of the blocks, every slab of nodes by one thread. Neither the waves nor the order
 //! depend on the number of threads.
 
+use super::block::Block;
 use super::kernel::Rows;
 use super::lanes::LANES;
 use super::of_block;
-use super::tiled::{Block, Tiled};
+use super::tiled::Tiled;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use rayon::prelude::*;
