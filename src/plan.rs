@@ -207,8 +207,8 @@ fn arrays<const D: usize, L: Law, A>(
     let precision = precision_used(simulation, supports);
     let frozen = frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
-    // The update interpolates x and H block by block, and then puts them into the order of the particles.
-    let updated = 2 * (vector + tensor + size_of::<usize>());
+    // Δx and H, and the increments of v and a.
+    let updated = 3 * vector + tensor;
     vec![
         array(
             "particles: x, v, a, H, volume, mass, body",

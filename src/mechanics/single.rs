@@ -19,7 +19,6 @@ pub struct Single<'a, const D: usize, L: Law> {
     pressures: Vec<FrozenPressure<D>>,
     /// α₁ ε m_I / s
     lumped: Vec<f32>,
-    inverse_blocks: Vec<Tensor<f32, D>>,
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
@@ -45,17 +44,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         };
         let lumped: Vec<f32> =
             self.nodal.mass.iter().map(|m| (self.alphas.a1 * self.lumping * m / scale) as f32).collect();
-        let mut single = Single {
-            equilibrium: self,
-            scale,
-            frozen,
-            pressures: self.frozen_pressures(dphi),
-            lumped,
-            inverse_blocks: Vec::new(),
-        };
-        single.inverse_blocks =
-            single.diagonal_blocks().iter().map(|block| invert_block(block).map(|x| x as f32)).collect();
-        Ok(Some(single))
+        Ok(Some(Single { equilibrium: self, scale, frozen, pressures: self.frozen_pressures(dphi), lumped }))
     }
 
     /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.
@@ -111,7 +100,9 @@ impl<const D: usize, L: Law> LinearOperator<f32> for Single<'_, D, L> {
 impl<const D: usize, L: Law> Preconditioner<f32> for Single<'_, D, L> {
     fn precondition(&self, r: &[f32], z: &mut [f32]) {
         let (r, z): (&[Vector<f32, D>], &mut [Vector<f32, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverse_blocks) {
+        let invert = || self.diagonal_blocks().iter().map(|block| invert_block(block).map(|x| x as f32)).collect();
+        let inverse_blocks: &Vec<_> = self.equilibrium.single_inverse_blocks.get_or_init(invert);
+        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
             *z = inverse * r;
         }
     }

@@ -166,17 +166,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D, L>, Inadmissible> {
-        let mut tangent = Tangent {
-            equilibrium: self,
-            frozen: self.freeze(dphi)?,
-            pressures: self.frozen_pressures(dphi),
-            inverse_blocks: Vec::new(),
-        };
-        tangent.inverse_blocks = tangent.diagonal_blocks();
-        for block in &mut tangent.inverse_blocks {
-            *block = invert_block(block);
-        }
-        Ok(tangent)
+        Ok(Tangent { equilibrium: self, frozen: self.freeze(dphi)?, pressures: self.frozen_pressures(dphi) })
     }
 
     /// The law of particle `p` frozen at ∇u_p = `g`.
@@ -272,12 +262,12 @@ impl<const D: usize> FrozenPressure<D> {
     }
 }
 
-/// K(Δφ), frozen: an operator, with its d×d diagonal blocks as preconditioner.
+/// K(Δφ), frozen: an operator, with d×d diagonal blocks as preconditioner, those of the first tangent frozen in the step: making
+/// them costs as much as a few products, and a step changes them little.
 pub struct Tangent<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
     frozen: Frozen<D, L>,
     pressures: Vec<FrozenPressure<D>>,
-    inverse_blocks: Vec<Tensor<f64, D>>,
 }
 
 impl<const D: usize, L: Law> Tangent<'_, D, L> {
@@ -353,7 +343,9 @@ impl<const D: usize, L: Law> LinearOperator for Tangent<'_, D, L> {
 impl<const D: usize, L: Law> Preconditioner for Tangent<'_, D, L> {
     fn precondition(&self, r: &[f64], z: &mut [f64]) {
         let (r, z): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverse_blocks) {
+        let invert = || self.diagonal_blocks().iter().map(invert_block).collect();
+        let inverse_blocks: &Vec<_> = self.equilibrium.inverse_blocks.get_or_init(invert);
+        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
             *z = inverse * r;
         }
     }

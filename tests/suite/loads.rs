@@ -108,9 +108,14 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
                     "material": {"neo_hookean": {"lambda": 10, "shear": 10}}}],
         "boundary": {"left": moving, "right": moving, "bottom": moving, "top": moving}
     }))?;
+    let start = simulation.particles.position.clone();
     for _ in 0..10 {
         simulation.advance()?;
         let t = simulation.clock.time();
+        // The walls have moved by the integral of their velocity, whatever the step.
+        for (x, x0) in simulation.particles.position.iter().zip(&start) {
+            assert!((x - x0 - Vector::from([1.5, 0.5]) * t * t).amax() < 1e-13, "x = {x} at t = {t}");
+        }
         for (v, a) in simulation.particles.velocity.iter().zip(&simulation.particles.acceleration) {
             assert!((v - Vector::from([3.0, 1.0]) * t).amax() < 1e-13, "v = {v} at t = {t}");
             assert!((a - Vector::from([3.0, 1.0])).amax() < 1e-12, "a = {a} at t = {t}");

@@ -51,13 +51,14 @@ impl Form {
 
     /// Puts the entries of a tangent, in the order of the rows.
     fn write<const D: usize>(self, tangent: &ClosedTangent<f64, D>, weight: f64, mut put: impl FnMut(f64)) {
-        let upper = |a: &[[f64; D]; D], put: &mut dyn FnMut(f64)| {
+        #[inline(always)]
+        fn upper<const D: usize>(a: &[[f64; D]; D], put: &mut impl FnMut(f64)) {
             for k in 0..D {
                 for i in 0..=k {
                     put(a[i][k]);
                 }
             }
-        };
+        }
         tangent.a.as_flattened().iter().for_each(|&x| put(x));
         upper(&tangent.right, &mut put);
         put(tangent.bulk);

@@ -169,7 +169,25 @@ impl<const D: usize> Supports<D> {
 
     /// Σ u_I N_I at every particle.
     pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        infallible(self.interpolate(field, |_, value, _| Ok(value)))
+        let mut values = vec![Vector::zeros(); self.particles()];
+        self.each_particle(field, |_, value, _| value, |p, value| values[p] = value);
+        values
+    }
+
+    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
+    pub fn each_particle<R: Send>(
+        &self,
+        field: &[Vector<f64, D>],
+        point: impl Fn(usize, Vector<f64, D>, Tensor<f64, D>) -> R + Sync,
+        mut take: impl FnMut(usize, R),
+    ) {
+        match &self.0 {
+            Way::Plain(plain) => {
+                let results = infallible(plain.interpolate(field, |p, value, gradient| Ok(point(p, value, gradient))));
+                results.into_iter().enumerate().for_each(|(p, result)| take(p, result));
+            }
+            Way::Tiled(tiled) => waves::each_particle(tiled, field, point, take),
+        }
     }
 
     /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and

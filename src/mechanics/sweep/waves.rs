@@ -5,12 +5,12 @@
 //! depend on the number of threads.
 
 use super::block::Block;
-use super::kernel::Rows;
+use super::kernel::{Rows, of_lane};
 use super::lanes::{LANES, SINGLE_LANES};
 use super::of_block;
 use super::tiled::Tiled;
 use crate::scalar::Real;
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector};
 use rayon::prelude::*;
 
 /// Blocks of a wave: their buffers stay in the second-level caches.
@@ -93,6 +93,56 @@ pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
     }
 }
 
+/// `take(p, point(p, u_p, ∇u_p))` of every particle, in the order of the blocks; no more results wait to be taken than those of a
+/// wave.
+pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
+    tiled: &Tiled<D>,
+    field: &[Vector<T, D>],
+    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
+    mut take: impl FnMut(usize, R),
+) {
+    let gather = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block, take: &mut dyn FnMut(usize, R)| {
+        let (nodal, rows) = scratch;
+        gather_block(block, field, nodal, rows);
+        block.groups.each(|group, lane, p| {
+            let (value, gradient) = of_lane(&rows[group], lane);
+            take(p, point(p, value, gradient));
+        });
+    };
+    if rayon::current_num_threads() == 1 || tiled.groups() < PARALLEL {
+        let mut scratch = Default::default();
+        for block in &tiled.blocks {
+            gather(&mut scratch, block, &mut take);
+        }
+        return;
+    }
+    for blocks in tiled.blocks.chunks(WAVE) {
+        let part = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block| {
+            let mut part = Vec::with_capacity(block.groups.len() * LANES);
+            gather(scratch, block, &mut |p, result| part.push((p, result)));
+            part
+        };
+        let parts: Vec<Vec<(usize, R)>> = blocks.par_iter().map_init(Default::default, part).collect();
+        for (p, result) in parts.into_iter().flatten() {
+            take(p, result);
+        }
+    }
+}
+
+/// u and L of each group of a block.
+fn gather_block<T: Real, const D: usize>(
+    block: &Block,
+    field: &[Vector<T, D>],
+    nodal: &mut Vec<f64>,
+    rows: &mut Vec<Rows>,
+) {
+    nodal.resize(block.box_nodes() * D, 0.0);
+    block.fill(field, nodal);
+    rows.clear();
+    rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
+    of_block::gather_all(&block.groups, nodal, rows);
+}
+
 /// `visit(block, chunk, u and L of each group)` of every block; `chunks` hands out a part of the result to each.
 pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
     tiled: &Tiled<D>,
@@ -102,11 +152,7 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
 ) -> Vec<R> {
     let one = |scratch: &mut (Vec<f64>, Vec<Rows>), (block, chunk): (&Block, C)| {
         let (nodal, rows) = scratch;
-        nodal.resize(block.box_nodes() * D, 0.0);
-        block.fill(field, nodal);
-        rows.clear();
-        rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
-        of_block::gather_all(&block.groups, nodal, rows);
+        gather_block(block, field, nodal, rows);
         visit(block, chunk, rows)
     };
     if rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL {
