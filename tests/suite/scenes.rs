@@ -26,7 +26,7 @@ const GOOD: &str = r#"{
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
-  "output": { "every": 0.1, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
+  "output": { "every": 0.1, "checkpoint": 0.2, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
 }"#;
 
 /// The same with velocities given to nodes, which then no body may have.
@@ -258,6 +258,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#"{ "gmres": { "restart": 50 } }"#, r#""conjugate_gradient""#, "solver.krylov.method", &["pressures", "gmres"]),
     (r#""fixed": 1e-7"#, r#""fixed": 1"#, "solver.krylov.forcing.fixed", &["1 is not", "0.9"]),
     (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
+    (r#""checkpoint": 0.2"#, r#""checkpoint": 0"#, "output.checkpoint", &["0 is not", "> 0"]),
     (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
     // tip is a stress: its columns are tip_xx, tip_yy, …
