@@ -6,7 +6,7 @@ use bfree::causes;
 use bfree::output::plot::plot_run;
 use bfree::scene;
 use clap::{Parser, Subcommand};
-use program::{Failure, INTERRUPTED, Run, SceneArguments, print, tell};
+use program::{Failure, INTERRUPTED, New, Run, SceneArguments, print, tell};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -24,6 +24,8 @@ enum Command {
     Run(Run),
     /// Validate a scene and print what it requires.
     Check(SceneArguments),
+    /// Write a scene to start from, and explain its keys; without a problem, list them.
+    New(New),
     /// Draw energies, iterations and particles of a run as SVG and PNG.
     Plot {
         /// The directory of the run's results.
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
+        Command::New(new) => new.execute(),
         Command::Plot { directory } => plot(&directory),
         Command::Schema => print_schema(),
     };

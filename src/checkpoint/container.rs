@@ -251,7 +251,7 @@ mod tests {
         fn a_flipped_bit_is_seen_wherever_it_is(place in any::<prop::sample::Index>(), bit in 0..8) {
             let mut bytes = written(&[5, 0, 300]);
             let at = place.index(bytes.len());
-            bytes[at] ^= 1 << bit;
+            bytes[at] ^= 1_u8 << bit;
             prop_assert!(parsed(&bytes).is_err(), "byte {at}");
         }
 

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 /// Keys that say how long a run is, what it is called, and when it is saved: they change no step of it.
-const FREE: [&str; 3] = ["title", "time.end", "output.checkpoint"];
+const FREE: [&str; 4] = ["$schema", "title", "time.end", "output.checkpoint"];
 
 /// A key with different values; `None` stands for an absent one.
 #[derive(Clone, Debug, PartialEq)]

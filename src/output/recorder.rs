@@ -3,10 +3,11 @@
 use super::files::TEMPORARY;
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
-use super::progress::{Progress, Shown};
+use super::progress::{Audience, Progress, Shown};
 use super::reactions::Reactions;
 use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
 use super::snapshots::{SERIES, SnapshotMark, Snapshots};
+use super::warnings::{Watch, Watched};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
@@ -32,8 +33,8 @@ pub struct OutputSettings<const D: usize> {
     pub probes: Vec<Probe<D>>,
     /// Time at which the run will end, for the progress bar.
     pub end_time: f64,
-    /// Show no progress.
-    pub quiet: bool,
+    /// For whom progress is shown.
+    pub audience: Audience,
 }
 
 /// Writes a run: [`Recorder::start`], then [`Recorder::record`] after every step, then [`Recorder::finish`], also after a failure.
@@ -61,6 +62,7 @@ pub struct Recorder<const D: usize> {
     snapshots: Option<Snapshots>,
     newton: NewtonLog,
     progress: Progress,
+    watch: Watch,
     counts: Counts,
     /// Of all steps; the total is that of what was done before `since`.
     seconds: Seconds,
@@ -76,6 +78,7 @@ pub struct Mark {
     /// Bytes of each file that grows.
     lengths: BTreeMap<String, u64>,
     snapshots: Option<SnapshotMark>,
+    watch: Watch,
     counts: Counts,
     seconds: Seconds,
 }
@@ -135,7 +138,7 @@ impl<const D: usize> Recorder<D> {
         mark: Option<&Mark>,
     ) -> Result<Self, OutputError> {
         reference.check(simulation)?;
-        let OutputSettings { directory, fields, snapshot_every, probes, end_time, quiet } = settings;
+        let OutputSettings { directory, fields, snapshot_every, probes, end_time, audience } = settings;
         std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
         remove_later_files(&directory, mark)?;
         let at = |name: &str| directory.join(name);
@@ -161,7 +164,8 @@ impl<const D: usize> Recorder<D> {
                 }
             },
             newton: NewtonLog::open(at("newton.jsonl"), kept("newton.jsonl"))?,
-            progress: Progress::new(simulation.clock.time(), end_time, quiet),
+            progress: Progress::new(simulation.clock.time(), end_time, audience),
+            watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),
             counts: mark.map_or(begun, |mark| mark.counts),
             seconds: mark.map_or_else(Seconds::default, |mark| mark.seconds),
             since: Instant::now(),
@@ -182,7 +186,8 @@ impl<const D: usize> Recorder<D> {
         lengths.extend(self.reactions.as_mut().map(Reactions::mark).transpose()?);
         lengths.extend(self.probes.as_mut().map(Probes::mark).transpose()?);
         let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
-        Ok(Mark { lengths, snapshots, counts: self.counts, seconds: self.seconds_so_far() })
+        let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
+        Ok(Mark { lengths, snapshots, watch, counts, seconds })
     }
 
     fn seconds_so_far(&self) -> Seconds {
@@ -206,9 +211,13 @@ impl<const D: usize> Recorder<D> {
         }
         let newton = &step.newton.history;
         let cost = Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };
-        self.write_state(simulation, cost)?;
-        let clock = &simulation.clock;
-        self.progress.show(clock.time(), Shown { step: clock.steps(), newton: cost.newton, krylov: cost.krylov });
+        let energies = self.write_state(simulation, cost)?;
+        let (time, number) = (simulation.clock.time(), simulation.clock.steps());
+        let newton_limit = simulation.settings.newton.max_iterations;
+        let seen = Watched { time, step: number, energies, cost, failed: step.failed.len(), newton_limit };
+        self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
+        let Cost { newton, krylov, .. } = cost;
+        self.progress.show(time, Shown { step: number, newton, krylov, balance: energies.balance });
         Ok(())
     }
 
@@ -233,7 +242,7 @@ impl<const D: usize> Recorder<D> {
         let (counts, time, seconds) = (self.counts, simulation.clock.time(), self.seconds_so_far());
         self.progress.finish();
         let energies = Energies::of(simulation, &self.reference);
-        let report = Report { asked, outcome, time, energies, counts, seconds };
+        let report = Report { asked, outcome, time, energies, counts, seconds, warnings: self.watch.warnings() };
         report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         let particles = &simulation.particles;
         Ok(Summary {
@@ -250,15 +259,15 @@ impl<const D: usize> Recorder<D> {
         &mut self,
         simulation: &Simulation<D, L, A>,
         cost: Cost,
-    ) -> Result<(), OutputError> {
-        self.history.write(simulation, &self.reference, cost)?;
+    ) -> Result<Energies, OutputError> {
+        let energies = self.history.write(simulation, &self.reference, cost)?;
         if let Some(probes) = &mut self.probes {
             probes.write(simulation, &self.reference)?;
         }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write_if_due(simulation, &self.reference)?;
         }
-        Ok(())
+        Ok(energies)
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {

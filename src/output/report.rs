@@ -3,6 +3,7 @@
 use super::OutputError;
 use super::files::{Stream, write_atomically};
 use super::history::Energies;
+use super::warnings::Warning;
 use crate::causes;
 use crate::phases::Phase;
 use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
@@ -117,7 +118,7 @@ impl Seconds {
 
 /// A float in JSON, which has no NaN and no infinity: those become the strings "NaN", "inf" and "-inf" instead of null.
 #[derive(Clone, Copy, Debug)]
-struct Number(f64);
+pub(crate) struct Number(pub f64);
 
 impl Serialize for Number {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -231,6 +232,8 @@ pub(crate) struct Report<'a> {
     pub counts: Counts,
     /// How long it took.
     pub seconds: Seconds,
+    /// What was warned of.
+    pub warnings: &'a [Warning],
 }
 
 impl Report<'_> {
@@ -278,6 +281,7 @@ impl Report<'_> {
         head.insert("energies".to_owned(), energies.into());
         head.insert("counts".to_owned(), serde_json::to_value(self.counts).map_err(json(path))?);
         head.insert("seconds".to_owned(), seconds.into());
+        head.insert("warnings".to_owned(), serde_json::to_value(self.warnings).map_err(json(path))?);
         Ok(head)
     }
 }
@@ -298,6 +302,7 @@ mod tests {
             energies,
             counts: Counts::default(),
             seconds: Seconds::default(),
+            warnings: &[],
         };
         for lines in [&[][..], &["[1.0,1e-9]"], &["[1.0,1e-9]", "[]", "[2.5]"]] {
             let mut log = NewtonLog::open(directory.path().join("newton.jsonl"), None)?;

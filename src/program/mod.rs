@@ -1,9 +1,11 @@
 //! What the commands share: how they end, and where they write.
 
+mod new;
 mod probes;
 mod run;
 mod scene_arguments;
 
+pub use new::New;
 pub use run::Run;
 pub use scene_arguments::SceneArguments;
 

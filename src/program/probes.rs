@@ -26,7 +26,7 @@ impl<const D: usize> Bound<D> {
                 Place::Nearest { .. } => "values are NaN while none is within one grid spacing",
             };
             format!(
-                "warning: probe {:?}: the nearest particle, {}, is {:.3e} away, more than the particle spacing {:.3e}; {consequence}",
+                "probe {:?}: the nearest particle, {}, is {:.3e} away, more than the particle spacing {:.3e}; {consequence}",
                 self.probe.name, self.particle, self.distance, self.spacing
             )
         })

@@ -4,11 +4,11 @@ use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, steps_until};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
-use bfree::output::{Outcome, OutputSettings, Recorder, Reference};
+use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
 use bfree::simulation::Simulation;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
@@ -39,9 +39,12 @@ pub struct Run {
     /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
     #[arg(long)]
     restart: bool,
-    /// Show no progress and no summary.
+    /// Show no progress and no summary. Warnings are written all the same.
     #[arg(long)]
     quiet: bool,
+    /// How progress is written to standard error: a bar or lines to read, or one JSON object a line for a program that watches.
+    #[arg(long, value_enum, default_value_t, conflicts_with = "quiet")]
+    progress: Form,
 }
 
 /// A whole number of an option, in a range.
@@ -55,6 +58,14 @@ fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
 /// A number of an option.
 fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "must be a number".to_owned())
+}
+
+/// The form of progress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Form {
+    #[default]
+    Text,
+    Json,
 }
 
 impl Run {
@@ -85,7 +96,7 @@ impl Run {
             Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))
         });
         let probes = bound_probes(scene, &simulation);
-        probes.iter().filter_map(Bound::warning).for_each(tell);
+        probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let identity = Identity::new(settings.clone(), &simulation.particles);
         let mut asked = Map::new();
@@ -99,7 +110,7 @@ impl Run {
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
             end_time: last as f64 * simulation.clock.nominal(),
-            quiet: self.quiet,
+            audience: self.audience(),
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
         let reference = Reference::of(&simulation);
@@ -180,15 +191,33 @@ impl Run {
         simulation: &mut Simulation<D>,
     ) -> Result<Restored, Failure> {
         let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
-        restored.unusable.iter().for_each(|one| tell(format_args!("warning: a checkpoint cannot be used: {one}")));
+        let unusable = restored.unusable.iter();
+        unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
         if let Some(program) = &restored.other_program {
-            tell(format_args!("warning: the checkpoint was written by {program}: the bits may differ from then on"));
+            self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
         }
         if !self.quiet {
             let (time, path) = (simulation.clock.time(), restored.path.display());
-            tell(format_args!("continues at t = {time}, step {}, from {path}", simulation.clock.steps()));
+            self.say("restart", &format!("continues at t = {time}, step {}, from {path}", simulation.clock.steps()));
         }
         Ok(restored)
+    }
+
+    fn audience(&self) -> Audience {
+        match self.progress {
+            _ if self.quiet => Audience::Nobody,
+            Form::Text => Audience::Person,
+            Form::Json => Audience::Program,
+        }
+    }
+
+    /// Tells something beside the progress, in its form.
+    fn say(&self, event: &str, message: &str) {
+        match self.progress {
+            Form::Json => tell(json!({"event": event, "message": message})),
+            Form::Text if event == "warning" => tell(format_args!("warning: {message}")),
+            Form::Text => tell(message),
+        }
     }
 
     /// The command line, for the report.

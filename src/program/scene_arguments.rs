@@ -69,7 +69,7 @@ impl SceneArguments {
         let _ = write!(text, "{}", Plan::of(&simulation).map_err(|error| self.unusable(error))?);
         for bound in bound_probes(scene, &simulation) {
             let _ = write!(text, "\nprobe         {bound}");
-            bound.warning().into_iter().for_each(tell);
+            bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));
         }
         print(text)
     }

@@ -1,6 +1,6 @@
 //! A run that was killed continues with the same bits, and what is wrong with a checkpoint is said.
 
-use crate::support::Failure;
+use crate::support::{Failure, Random};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -107,16 +107,6 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
         assert!(k < 2 || steps.contains("failed_attempts"), "the third scene is meant to halve steps");
     }
     Ok(())
-}
-
-/// Numbers without pattern from a fixed seed (Knuth's MMIX).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit.max(1)
-    }
 }
 
 /// Killed at any moment, also while it restarts. `BFREE_KILLS=50` kills more often.
