@@ -8,6 +8,7 @@ mod output;
 mod points;
 mod program;
 mod rebound;
+mod restart;
 mod runs;
 mod scenes;
 mod smoothing;
