@@ -45,7 +45,7 @@ pub(super) fn measure(outcome: &mut Outcome) -> Result<(), StudyError> {
             let (peak, copy) = (peak(), copy_bandwidth());
             let mut machine = Table::new("the machine, one core", ["GFLOP/s of multiply-adds", "GB/s copied (read and written)"]);
             machine.push([format!("{:.1}", peak / 1e9), format!("{:.1}", copy / 1e9)]);
-            Ok(vec![machine, products(peak, copy, &two)?, matrices(copy)?, steps()?, rebound()?])
+            Ok(vec![machine, products(peak, copy, &two)?, matrices(copy)?, steps()?, rebound()?, growth()?])
         };
         all().map_err(|error| error.to_string())
     })?;
@@ -217,6 +217,42 @@ fn step<const D: usize>(
         format!("{:.2}", seconds / (units as f64 * product)),
     ]);
     Ok(())
+}
+
+/// Cells along an edge of the block, for 10⁵, 10⁶ and 10⁷ particles in 3D.
+const GROWING: [u32; 3] = [23, 50, 108];
+
+/// How the time of a step grows with the number of particles, at a fixed Courant number.
+fn growth() -> Result<Table, StudyError> {
+    let mut table = Table::new(
+        "the second step of a block in 3D, Newton to 1e-8, Courant 1: time ~ N^p",
+        ["shape", "particles", "s / step", "us / particle", "p from the row before", "Krylov iterations", "Newton", "GiB (planned)"],
+    );
+    for (name, shape) in shapes() {
+        let mut before: Option<(f64, f64)> = None;
+        for cells in GROWING {
+            let mut simulation = block::<3>(shape.clone(), None, cells, 0.1, 1.0)?;
+            let particles = simulation.particles.len() as f64;
+            let planned = Plan::of(&simulation)?.bytes() as f64;
+            simulation.advance()?;
+            let start = Instant::now();
+            let newton = simulation.advance()?.newton.history;
+            let seconds = start.elapsed().as_secs_f64();
+            let power = before.map(|(n, s)| (seconds / s).ln() / (particles / n).ln());
+            before = Some((particles, seconds));
+            table.push([
+                name.into(),
+                format!("{particles}"),
+                format!("{seconds:.2}"),
+                format!("{:.2}", seconds / particles * 1e6),
+                power.map_or_else(|| "-".into(), |p| format!("{p:.3}")),
+                newton.counts.krylov_iterations.to_string(),
+                newton.iterations.len().to_string(),
+                format!("{:.2}", planned / 1024.0_f64.powi(3)),
+            ]);
+        }
+    }
+    Ok(table)
 }
 
 /// The whole rebound, without output.
