@@ -13,3 +13,4 @@ mod scenes;
 mod smoothing;
 mod support;
 mod sweep;
+mod transfer;
