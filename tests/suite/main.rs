@@ -14,3 +14,4 @@ mod scenes;
 mod smoothing;
 mod support;
 mod sweep;
+mod transfer;
