@@ -7,6 +7,7 @@ use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::nodes::Nodes;
 use bfree::particles::Body;
+use bfree::solver::Precision;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
@@ -269,24 +270,28 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let (grid, positions) = regular([3; D], 2);
     let shape = Approximation::from(Linear);
     let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0 }];
-    let (tiled, nodes) = Supports::new(&shape, &grid, &positions)?;
+    let (tiled, nodes) = Supports::with_precision(&shape, &grid, &positions, Precision::Mixed)?;
     let field = vec![Vector::zeros(); nodes.len()];
     for lumping in [1.0, 0.5] {
         let both = matches!(law, Material::StVenantKirchhoff(_));
         let weight = |_: usize| 1.0;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = if lumping < 1.0 { Some(&weight) } else { None };
-        let frozen = tiled.closed_tangents(&field, both, inertia, |_, g| {
+        let closed = |_: usize, g| {
             admissible(g)
                 .map_err(|error| error.to_string())
                 .and_then(|at| law.freeze(&identity(), &at, 1.0).closed().ok_or_else(|| "no closed form".to_string()))
-        });
-        let frozen = frozen.ok_or("no vector lanes")??;
-        assert!(frozen.bytes() > 0);
-        assert_eq!(frozen_bytes(&bodies, &tiled, lumping), frozen.bytes(), "{D}D {law:?}, ε = {lumping}");
+        };
+        let frozen = tiled.closed_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
+        let single = tiled.single_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
+        assert!(frozen.bytes() > 0 && single.bytes() > 0);
+        for (precision, bytes) in [(Precision::Double, frozen.bytes()), (Precision::Mixed, single.bytes())] {
+            let counted = frozen_bytes(&bodies, &tiled, lumping, precision);
+            assert_eq!(counted, bytes, "{D}D {law:?}, ε = {lumping}, {precision:?}");
+        }
         let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
         let each = size_of::<<Material as Law>::Frozen<f64, D>>();
-        assert_eq!(frozen_bytes(&bodies, &plain, lumping), positions.len() * each);
-        assert!(plain.closed_bytes(both, lumping < 1.0).is_none());
+        assert_eq!(frozen_bytes(&bodies, &plain, lumping, Precision::Double), positions.len() * each);
+        assert!(plain.closed_bytes(both, lumping < 1.0, Precision::Double).is_none());
     }
     Ok(())
 }

@@ -111,6 +111,20 @@ fn symmetric<S: Lanes<L>, const D: usize, const L: usize>(s: S, rows: &[[S::X; L
     b
 }
 
+impl<const D: usize> ClosedTangents<D> {
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.0.numbers.as_slice())
+    }
+}
+
+impl<const D: usize> SingleTangents<D> {
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.0.numbers.as_slice())
+    }
+}
+
 /// The weight of a particle's consistent inertia.
 type Inertia<'a> = Option<&'a (dyn Fn(usize) -> f64 + Sync)>;
 
