@@ -13,6 +13,7 @@ use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
+use bfree::solver::NonlinearProblem;
 use bfree::tensor::{Deformation, Tensor, Vector, scaled};
 
 /// What is wrong with a law.
@@ -211,11 +212,17 @@ fn norm<const D: usize>(field: &[Vector<f64, D>]) -> f64 {
     field.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
 }
 
-/// The magnitude over the norm of the residual.
+fn flat<const D: usize>(field: &[Vector<f64, D>]) -> Vec<f64> {
+    field.iter().flat_map(|x| x.iter().copied().collect::<Vec<_>>()).collect()
+}
+
+/// The magnitude over the norm of the residual; Newton's method is told the same one.
 fn share<const D: usize>(equilibrium: &Equilibrium<'_, D, Faulty>, dphi: &[Vector<f64, D>]) -> Result<f64, Failure> {
     let mut residual = equilibrium.residual::<f64>(dphi, Carry::ALL)?;
     equilibrium.clear_prescribed(&mut residual);
-    Ok(equilibrium.magnitude(dphi)? / norm(&residual))
+    let magnitude = equilibrium.magnitude(dphi)?;
+    assert_eq!(NonlinearProblem::magnitude(equilibrium, &flat(dphi))?, magnitude);
+    Ok(magnitude / norm(&residual))
 }
 
 fn magnitudes<const D: usize>() -> Result<(), Failure> {
@@ -274,6 +281,8 @@ fn the_potential_without_loads_is_a_sum_of_nothing_negative() -> Result<(), Fail
         equilibrium.dead_load.copy_from_slice(&direction(cloud.nodes(), 9));
         let works: Vec<f64> = equilibrium.dead_load.iter().zip(&dphi).map(|(f, u)| f.dot(u)).collect();
         let (loaded, larger) = of(&equilibrium)??;
+        let merit = NonlinearProblem::potential(&equilibrium, &flat(&dphi)).ok_or("no merit")??;
+        assert_eq!(merit, (loaded, larger), "what the line search sees");
         let (work, size): (f64, f64) = (works.iter().sum(), works.iter().map(|w| w.abs()).sum());
         assert!((loaded - (potential - work)).abs() < 1e-13 * potential, "{loaded}");
         assert!((larger - (magnitude + size)).abs() < 1e-13 * magnitude, "{larger}");
