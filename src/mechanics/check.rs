@@ -81,16 +81,30 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// The first mismatch, by particle for the geometric and the material term, by node for inertia and pressure.
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
         self.check_particles(dphi, u)?;
+        let pressure = self.pressure_magnitude(u);
         for term in [Term::Inertia, Term::Pressure] {
             let (analytic, dual) = (self.product(term, dphi, u)?, self.dual_product(term, dphi, u)?);
             for (node, (a, d)) in analytic.iter().zip(&dual).enumerate() {
                 let (a, d) = (Tensor::<f64, D>::from_fn(|i, k| if k == 0 { a[i] } else { 0.0 }), {
                     Tensor::<f64, D>::from_fn(|i, k| if k == 0 { d[i] } else { 0.0 })
                 });
-                compare(Compared::Term(term), Site::Node(node), &a, &d, 1e-10, d.norm())?;
+                let scale = d.norm() + if term == Term::Pressure { pressure[node] } else { 0.0 };
+                compare(Compared::Term(term), Site::Node(node), &a, &d, 1e-10, scale)?;
             }
         }
         Ok(())
+    }
+
+    /// Σ p A ‖L‖ N_I: the size of the two parts of the pressure's tangent, which cancel in 1D, where cof F = 1.
+    fn pressure_magnitude(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
+        let mut magnitude = vec![0.0; u.len()];
+        for point in &self.pressures {
+            let l = self.supports.gradient_at(point.particle, u);
+            for (node, n, _) in self.supports.of(point.particle) {
+                magnitude[node] += point.force.norm() * l.norm() * n.abs();
+            }
+        }
+        magnitude
     }
 
     fn check_particles(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {

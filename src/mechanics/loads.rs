@@ -352,4 +352,31 @@ mod tests {
         assert_eq!((step.velocity_start, step.velocity_end), (3.0, 3.0));
         Ok(())
     }
+
+    #[test]
+    fn a_curve_is_constant_before_and_after_and_linear_between() -> Result<(), CurveError> {
+        let curve = Curve::new(vec![[2.0, 5.0], [6.0, 3.0], [6.5, -1.0]])?;
+        let values = [-1.0, 2.0, 3.0, 5.0, 6.0, 6.125, 6.5, 9.0].map(|t| curve.value(t));
+        assert_eq!(values, [5.0, 5.0, 4.5, 3.5, 3.0, 2.0, -1.0, -1.0]);
+        let slopes = [1.0, 2.0, 5.0, 6.0, 6.25, 6.5, 7.0].map(|t| curve.slope(t));
+        assert_eq!(slopes, [0.0, -0.5, -0.5, -8.0, -8.0, 0.0, 0.0]);
+        // 5·2 before the first point, trapezia between, −1·½ after the last.
+        assert_eq!(curve.integral(0.0, 7.0), 10.0 + 16.0 + 0.5 - 0.5);
+        assert_eq!(curve.integral(0.0, 7.0), curve.integral(0.0, 6.25) + curve.integral(6.25, 7.0));
+        Ok(())
+    }
+
+    #[test]
+    fn a_kink_at_the_start_of_a_step_belongs_to_the_step_after_it() -> Result<(), CurveError> {
+        let stop = Motion::Displacement(Curve::new(vec![[0.0, 0.0], [1.0, 3.0], [2.0, 3.0]])?);
+        // However short the step, what is a thousand steps away is not looked at.
+        for dt in [0.1, 1e-7] {
+            let (before, after) = (stop.over(1.0 - dt, dt), stop.over(1.0, dt));
+            assert_eq!((before.velocity_start, before.velocity_end), (3.0, 3.0));
+            assert_eq!((after.velocity_start, after.velocity_end), (0.0, 0.0));
+            let far = stop.over(1.0 - 1000.0 * dt, dt);
+            assert_eq!(far.velocity_start, if dt < 0.01 { 3.0 } else { 0.0 });
+        }
+        Ok(())
+    }
 }

@@ -382,3 +382,37 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Ok(single.map(|single| Box::new(single) as Box<dyn SingleTangent>))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_is_inverted_at_any_size_of_its_rows() {
+        // A stiff node beside a nearly empty one: as they stand, the determinant underflows.
+        for (large, small) in [(1.0, 1.0), (1e12, 1e-9), (1e-150, 1e-200)] {
+            let block = Tensor::<f64, 3>::new(
+                4.0 * large,
+                large,
+                0.0,
+                small,
+                3.0 * small,
+                -small,
+                0.0,
+                0.5 * large,
+                2.0 * large,
+            );
+            let unit = invert_block(&block) * block;
+            assert!((unit - Tensor::identity()).norm() < 1e-14, "{unit}");
+        }
+    }
+
+    #[test]
+    fn a_singular_block_gives_the_inverse_of_its_diagonal() {
+        let singular = Tensor::<f64, 2>::new(4.0, 8.0, 1.0, 2.0);
+        assert_eq!(invert_block(&singular), Tensor::<f64, 2>::new(0.25, 0.0, 0.0, 0.5));
+        // What nothing reaches stays as it is.
+        let nothing = Tensor::<f64, 2>::new(0.0, 0.0, 0.0, 8.0);
+        assert_eq!(invert_block(&nothing), Tensor::<f64, 2>::new(1.0, 0.0, 0.0, 0.125));
+    }
+}

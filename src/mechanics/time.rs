@@ -47,3 +47,29 @@ impl Newmark {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uniformly_accelerated_motion_is_exact_for_every_beta_and_gamma() {
+        let (v, a) = (1.7, -3.0);
+        for (beta, gamma) in [(0.25, 0.5), (0.3025, 0.6), (0.5, 0.9), (1.0, 1.5)] {
+            for dt in [1e-3, 0.5, 40.0] {
+                let alphas = Newmark { beta, gamma }.alphas(dt);
+                let dphi = v * dt + 0.5 * a * dt * dt;
+                let acceleration = alphas.a1 * dphi - alphas.a2 * v - alphas.a3 * a;
+                let velocity = alphas.a4 * dphi + alphas.a5 * v + alphas.a6 * a;
+                assert!(
+                    (acceleration - a).abs() < 1e-15 * alphas.a2 * 64.0 * (1.0 + dt),
+                    "β = {beta}: a = {acceleration}"
+                );
+                assert!(
+                    (velocity - (v + a * dt)).abs() < 1e-13 * (1.0 + dt),
+                    "β = {beta}, γ = {gamma}: v = {velocity}"
+                );
+            }
+        }
+    }
+}

@@ -3,6 +3,7 @@
 mod approximation;
 mod compaction;
 mod dynamics;
+mod equilibrium;
 mod loads;
 mod output;
 mod points;
