@@ -3,6 +3,8 @@
 mod approximation;
 mod compaction;
 mod dynamics;
+mod examples;
+mod hostile;
 mod loads;
 mod output;
 mod points;
