@@ -4,7 +4,7 @@
 //! The energy is the one function below; stress and tangent come from dual numbers, so Newton stays quadratic. For small strains it
 //! is a linear elastic solid of shear modulus 2 (c₁ + c₂), which is how this example checks itself.
 //!
-//! `cargo run --release --example law_from_energy`
+//! `cargo run --release --features examples --example law_from_energy`
 
 use bfree::material::{Energy, FromEnergy};
 use bfree::scalar::Real;
@@ -32,7 +32,8 @@ impl Energy for Mooney {
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// Flies, hits the wall, and checks itself.
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let scene = scene::read_file(&folder.join("rebound.json"), &[])?;
     let mut simulation =

@@ -98,6 +98,17 @@ impl Clock {
     }
 
     /// Halves the step; `false` if the limit is reached.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// let mut clock = Clock::new(0.1, 2);
+    /// assert!(clock.halve());
+    /// clock.advance();
+    /// assert_eq!((clock.time(), clock.step()), (0.05, 0.05));
+    /// clock.advance();
+    /// assert_eq!((clock.time(), clock.step()), (0.1, 0.1)); // back on whole steps
+    /// ```
     pub fn halve(&mut self) -> bool {
         let possible = self.level < self.max_halvings;
         if possible {

@@ -103,6 +103,13 @@ impl Field {
 
     /// The columns of a table in `dimension` dimensions that hold the field under the name `name`: `name` itself for a scalar,
     /// `name_x`, … for as many components of a vector as there are dimensions, `name_xx`, … for all components of a tensor.
+    ///
+    /// ```
+    /// use bfree::field::Field;
+    ///
+    /// assert_eq!(Field::Velocity.columns("tip", 2), ["tip_x", "tip_y"]);
+    /// assert_eq!(Field::Jacobian.columns("tip", 2), ["tip"]);
+    /// ```
     pub fn columns(self, name: &str, dimension: usize) -> Vec<String> {
         let kind = self.kind();
         let count = if kind == Kind::Vector { dimension } else { usize::MAX };

@@ -127,6 +127,7 @@
 //! | continue a run that was killed | [`checkpoint::Checkpoints`], [`checkpoint::restore`], [`output::Recorder::resume`] |
 //! | write a law | [`material::Law`], or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
 //! | write a shape function | [`approximation::ShapeFunction`], or [`approximation::Separable`] for a product |
+//! | see whole programs | the module `examples` |
 //! | follow the loop over particles | [`mechanics::sweep`] |
 //! | use the solver for something else | [`solver::NonlinearProblem`], [`solver::LinearOperator`] |
 
@@ -134,6 +135,8 @@ pub mod approximation;
 pub mod causes;
 pub mod checkpoint;
 pub mod clock;
+#[cfg(doc)]
+pub mod examples;
 pub mod field;
 pub mod grid;
 pub mod material;

@@ -54,6 +54,16 @@ impl<const D: usize> Shape<D> {
     }
 
     /// The signed distance d of `x` from the surface, negative inside; +∞ for an empty union, −∞ for an empty intersection.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let disc = Shape::Ball { center: Vector::from([0.0, 0.0]), radius: 5.0 };
+    /// assert_eq!(disc.signed_distance(&Vector::from([3.0, 4.0])), 0.0);
+    /// assert_eq!(disc.signed_distance(&Vector::from([6.0, 8.0])), 5.0);
+    /// assert_eq!(disc.normal(&Vector::from([6.0, 8.0])), Vector::from([0.6, 0.8]));
+    /// ```
     pub fn signed_distance(&self, x: &Vector<f64, D>) -> f64 {
         self.distance_and_normal(x).0
     }
@@ -243,6 +253,18 @@ pub enum FillError {
 ///
 /// Shapes are clipped to the grid. Only cells that overlap the shape's bounding box are visited; cell by cell and within a
 /// cell, the first axis runs fastest. Every particle stands for the volume (h / `per_axis`)^D.
+///
+/// ```
+/// use bfree::grid::Grid;
+/// use bfree::shape::{Fill, Shape, fill};
+/// use bfree::tensor::Vector;
+///
+/// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [4, 4] };
+/// let square = Shape::Box { min: Vector::from([0.5, 0.5]), max: Vector::from([1.5, 1.5]) };
+/// let particles = fill(&grid, &square, 2, Fill::Particles)?;
+/// assert_eq!((particles.len(), particles[0]), (16, Vector::from([0.625, 0.625])));
+/// # Ok::<(), bfree::shape::FillError>(())
+/// ```
 ///
 /// # Errors
 /// More than [`MAX_CANDIDATES`] positions to look at (found before anything is allocated), or no particle.

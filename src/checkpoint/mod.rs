@@ -1,9 +1,9 @@
 //! Checkpoints: from which a run that was killed continues with the same bits.
 //!
 //! Two files in the directory of the results take turns, so that the one before is there while a new one is written; each is
-//! written under a temporary name, synced and renamed. A checkpoint holds what a step inherits ([`state`]), the scene, and where
+//! written under a temporary name, synced and renamed. A checkpoint holds what a step inherits (`state.rs`), the scene, and where
 //! the files of the results ended ([`Mark`]): [`restore`] puts the simulation back, [`Recorder::resume`] cuts the files off there.
-//! A new array has its place in [`state`].
+//! A new array has its place in `state.rs`.
 
 mod container;
 mod difference;

@@ -46,6 +46,15 @@ impl Lame {
     ///
     /// # Errors
     /// E ≤ 0, or ν outside (−1, ½).
+    ///
+    /// ```
+    /// use bfree::material::Lame;
+    ///
+    /// let lame = Lame::from_young_poisson(2.5, 0.25)?;
+    /// assert_eq!((lame.lambda, lame.shear, lame.p_wave_modulus()), (1.0, 1.0, 3.0));
+    /// assert!(Lame::from_young_poisson(2.5, 0.5).is_err());
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     pub fn from_young_poisson(young: f64, poisson: f64) -> Result<Self, LameError> {
         if !(young > 0.0 && young.is_finite()) {
             return Err(LameError::Young(young));

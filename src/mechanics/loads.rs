@@ -68,6 +68,17 @@ impl Curve {
     }
 
     /// The value at time `t`.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::Curve;
+    ///
+    /// let ramp = Curve::new(vec![[0.0, 0.0], [2.0, 1.0]])?;
+    /// assert_eq!((ramp.value(-1.0), ramp.value(1.0), ramp.value(9.0)), (0.0, 0.5, 1.0));
+    /// assert_eq!((ramp.slope(1.0), ramp.slope(9.0)), (0.5, 0.0));
+    /// assert_eq!(ramp.integral(0.0, 3.0), 2.0);
+    /// assert!(Curve::new(vec![[1.0, 0.0], [1.0, 1.0]]).is_err());
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
     pub fn value(&self, t: f64) -> f64 {
         match self.piece(t) {
             Some((a, b)) => a[1] + (b[1] - a[1]) * ((t - a[0]) / (b[0] - a[0])),

@@ -4,6 +4,7 @@ use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, steps_until};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
+use bfree::output::plot::plot_run;
 use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
@@ -39,6 +40,9 @@ pub struct Run {
     /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
     #[arg(long)]
     restart: bool,
+    /// Draw the results at the end, as `bfree plot` does.
+    #[arg(long)]
+    plot: bool,
     /// Show no progress and no summary. Warnings are written all the same.
     #[arg(long)]
     quiet: bool,
@@ -168,6 +172,12 @@ impl Run {
         let summary = recorder.finish(&simulation, &asked, outcome).map_err(Failure::run)?;
         if !self.quiet {
             print(format_args!("{summary}\nresults   {}", directory.display()))?;
+        }
+        if self.plot {
+            let drawn = plot_run(&directory).map_err(Failure::run)?;
+            if let (false, Some(page)) = (self.quiet, drawn.last()) {
+                print(format_args!("pictures  {}", page.display()))?;
+            }
         }
         let (time, place) = (simulation.clock.time(), directory.display());
         match failure {

@@ -25,6 +25,13 @@ pub struct Key {
 }
 
 /// The keys written in a scene, each once, with their documentation.
+///
+/// ```
+/// let keys = bfree::scene::keys::documented(&serde_json::json!({"time": {"step": 0.1}, "approximation": "linear"}));
+/// let paths: Vec<_> = keys.iter().map(|key| key.path.as_str()).collect();
+/// assert_eq!(paths, ["approximation", "approximation = \"linear\"", "time", "time.step"]);
+/// assert_eq!(keys[3].about, "The time step Δt (time), > 0.");
+/// ```
 pub fn documented(scene: &Value) -> Vec<Key> {
     let mut keys = Vec::new();
     describe(&SCHEMA, scene, "", &mut keys);

@@ -36,8 +36,13 @@ pub enum SceneError {
     )]
     TooLong(Option<u64>),
     /// The text is not UTF-8.
-    #[error("the scene is not UTF-8 text: byte {0} cannot be read")]
-    NotText(usize),
+    #[error("the scene is not UTF-8 text: byte {byte}, in line {line}, cannot be read")]
+    NotText {
+        /// Bytes before it.
+        byte: usize,
+        /// Its line, from 1.
+        line: usize,
+    },
     /// The text is not JSON, or a key or type is not that of a scene.
     #[error(transparent)]
     Malformed(#[from] Malformed),
@@ -91,7 +96,11 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
     if bytes.len() as u64 > MAX_BYTES {
         return Err(SceneError::TooLong(None));
     }
-    let text = std::str::from_utf8(&bytes).map_err(|wrong| SceneError::NotText(wrong.valid_up_to()))?;
+    let text = std::str::from_utf8(&bytes).map_err(|wrong| {
+        let byte = wrong.valid_up_to();
+        let line = 1 + bytes.iter().take(byte).filter(|&&byte| byte == b'\n').count();
+        SceneError::NotText { byte, line }
+    })?;
     read(text, overrides)
 }
 
@@ -99,6 +108,18 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 ///
 /// The text becomes JSON, in which a key given twice is an error; the overrides replace values; JSON becomes a [`Scene`], where
 /// unknown keys and wrong types are errors; then all values are checked.
+///
+/// ```
+/// let text = r#"{"grid": {"size": [1, 1], "spacing": 0.25}, "time": {"step": 0.1, "end": 1},
+///     "bodies": [{"name": "block", "shape": {"box": {"min": [0, 0], "max": [1, 0.5]}}, "density": 1,
+///                 "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}]}"#;
+/// let scene = bfree::scene::read(text, &["time.step=0.05".parse()?])?;
+/// assert_eq!((scene.dimension(), scene.time.step), (2, 0.05));
+///
+/// let error = bfree::scene::read(&text.replace("density", "densty"), &[]).unwrap_err().to_string();
+/// assert!(error.starts_with("bodies[0].densty: unknown field") && error.contains("did you mean `density`?"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// What is wrong, at which key, and where that stands in the text (or in which override).

@@ -4,6 +4,8 @@ mod approximation;
 mod compaction;
 mod dynamics;
 mod equilibrium;
+mod examples;
+mod hostile;
 mod loads;
 mod output;
 mod points;

@@ -29,6 +29,8 @@ pub(super) struct Line {
 pub(super) struct Panel {
     /// Label of the level axis.
     pub x: &'static str,
+    /// Numbers at it, at most.
+    pub x_labels: usize,
     /// Label of the upright axis.
     pub y: &'static str,
     /// The lines.
@@ -77,16 +79,22 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .axis_desc_style(LABEL)
         .x_label_formatter(&|at| tick(*at, x))
         .y_label_formatter(&|at| tick(*at, y))
+        .x_labels(panel.x_labels)
         .y_labels(6)
         .draw()?;
+    // One line that is called what its axis is needs no legend.
+    let named = panel.lines.len() > 1 || panel.lines.iter().any(|line| line.label != panel.y);
     for line in &panel.lines {
         let color = line.color;
         let width = if line.label.is_empty() { 1 } else { 2 };
         let drawn = chart.draw_series(LineSeries::new(thinned(&line.points), color.stroke_width(width)))?;
-        if line.label.is_empty() {
+        if line.label.is_empty() || !named {
             continue;
         }
         drawn.label(&line.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2)));
+    }
+    if !named {
+        return Ok(());
     }
     chart
         .configure_series_labels()

@@ -1,6 +1,6 @@
 //! How the residual falls in Newton's method: a sample of all steps, and the step with the most iterations.
 
-use super::chart::{Line, Panel};
+use super::chart::{Line, Panel, rounded};
 use super::{PlotError, palette};
 use serde::Deserialize;
 use serde_json::Value;
@@ -31,16 +31,19 @@ pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<P
         Some(steps) => steps.iter().filter_map(|step| Step::deserialize(step).ok()).collect(),
         None => logged(directory)?,
     };
-    let Some(worst) = steps.iter().max_by_key(|step| step.newton_residuals.len()) else { return Ok(None) };
+    // Of several the first.
+    let Some(worst) = steps.iter().rev().max_by_key(|step| step.newton_residuals.len()) else { return Ok(None) };
     let stride = steps.len().div_ceil(SAMPLE).max(1);
     let thin = |points| Line { label: String::new(), color: palette::SKY, points };
     let mut lines: Vec<Line> = steps.iter().step_by(stride).map(|step| thin(fall(step))).collect();
     if let Some(first) = lines.first_mut() {
-        first.label = if stride > 1 { format!("every {stride}th step") } else { "all steps".to_owned() };
+        first.label = if stride > 1 { format!("one step in {stride}") } else { "all steps".to_owned() };
     }
-    let label = format!("t = {:.6}: the most iterations", worst.time);
+    let label = format!("t = {}: the most iterations", rounded(worst.time));
     lines.push(Line { label, color: palette::VERMILLION, points: fall(worst) });
-    Ok(Some(Panel { x: "Newton iteration", y: "log10 of |R| / |R_0|", lines, share: 1 }))
+    // Whole iterations only.
+    let x_labels = worst.newton_residuals.len().clamp(2, 12);
+    Ok(Some(Panel { x: "Newton iteration", x_labels, y: "log10 of |R| / |R_0|", lines, share: 1 }))
 }
 
 /// The steps of a run that goes on or was killed; its last line may break off.

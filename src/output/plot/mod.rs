@@ -86,7 +86,7 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let line = |column: &'static str, label: &str, color| -> Result<Line, PlotError> {
         Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
     };
-    let panel = |y, lines, share| Panel { x: "time", y, lines, share };
+    let panel = |y, lines, share| Panel { x: "time", x_labels: 10, y, lines, share };
     let energies = vec![
         line("total", "total", palette::BLACK)?,
         line("kinetic", "kinetic", palette::BLUE)?,
@@ -102,8 +102,10 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let axes = axes.into_iter().filter(|(column, ..)| history.has(column));
     let momentum: Vec<Line> =
         axes.map(|(column, label, color)| line(column, label, color)).collect::<Result<_, _>>()?;
-    let newton = vec![line("newton", "Newton", palette::BLUE)?];
-    let krylov = vec![line("krylov", "Krylov", palette::VERMILLION)?];
+    // The first row is the state before the first step.
+    let of_steps = |line: Line| Line { points: line.points.into_iter().skip(1).collect(), ..line };
+    let newton = vec![of_steps(line("newton", "Newton", palette::BLUE)?)];
+    let krylov = vec![of_steps(line("krylov", "Krylov", palette::VERMILLION)?)];
 
     let mut pictures = vec![
         ("energies", chart::draw("energies", "Energy", &[panel("energy", energies, 3), panel("balance", balance, 2)])?),

@@ -1,0 +1,32 @@
+//! The programs of `examples/`, as modules: what is generic in them is compiled with the rest of the tests.
+
+use crate::support::Failure;
+
+#[path = "../../examples/law_from_energy.rs"]
+mod law_from_energy;
+#[path = "../../examples/observer.rs"]
+mod observer;
+#[path = "../../examples/own_shape_function.rs"]
+mod own_shape_function;
+#[path = "../../examples/scene_in_code.rs"]
+mod scene_in_code;
+
+#[test]
+fn a_law_from_its_energy() -> Result<(), Failure> {
+    law_from_energy::main()
+}
+
+#[test]
+fn an_observer() -> Result<(), Failure> {
+    observer::main()
+}
+
+#[test]
+fn an_own_shape_function() -> Result<(), Failure> {
+    own_shape_function::main()
+}
+
+#[test]
+fn a_scene_in_code() -> Result<(), Failure> {
+    scene_in_code::main()
+}

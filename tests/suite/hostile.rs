@@ -1,0 +1,367 @@
+//! What nobody should give to the program, and somebody will.
+
+use crate::support::{Failure, Random};
+use bfree::checkpoint::{self, Identity};
+use bfree::scene::{self, Scene, SceneError, particle_file};
+use bfree::simulation::Simulation;
+use serde_json::{Value, json};
+use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+fn shipped() -> Result<Vec<String>, Failure> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut paths =
+        std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>, Failure>>()?;
+    paths.sort();
+    paths.iter().map(|path| Ok(std::fs::read_to_string(path)?)).collect()
+}
+
+/// What takes the place of a value. None of it makes a sound scene much larger.
+fn junk(random: &mut Random) -> Value {
+    let list = [
+        Value::Null,
+        json!(true),
+        json!(0),
+        json!(-1),
+        json!(-0.0),
+        json!(2),
+        json!(3.5),
+        json!(1e9),
+        json!(1e308),
+        json!(-1e308),
+        json!(1e-308),
+        json!(5e-324),
+        json!(u64::MAX),
+        json!(i64::MIN),
+        json!("NaN"),
+        json!("inf"),
+        json!(""),
+        json!("linear"),
+        json!("sliding"),
+        json!("\u{0}\u{202e}\n"),
+        json!([]),
+        json!({}),
+        json!([[]]),
+        json!([0, 0]),
+        json!([1e308, -1e308, 1e308]),
+        json!([[0, 0], [0, 0]]),
+        json!([[0, [0, 0]]]),
+        json!({"lme": {}}),
+        json!({"union": []}),
+        json!({"box": {"min": [0, 0], "max": [1, 1]}}),
+        json!({"ball": {"center": [1, 1], "radius": 1e300}}),
+        json!({"half_space": {"point": [1, 1], "normal": [0, 1e-200]}}),
+        json!({"young": 1e308, "poisson": 0.49999999999999994}),
+        json!({"__proto__": {"grid": 1}}),
+        json!("x".repeat(10_000)),
+    ];
+    random.of(&list).clone()
+}
+
+/// The number of values in a value, itself included.
+fn count(value: &Value) -> u64 {
+    1 + match value {
+        Value::Object(object) => object.values().map(count).sum(),
+        Value::Array(list) => list.iter().map(count).sum(),
+        _ => 0,
+    }
+}
+
+/// Changes value number `pick` of `value`; counts down on the way.
+fn change(value: &mut Value, pick: &mut u64, random: &mut Random) -> bool {
+    if *pick > 0 {
+        *pick -= 1;
+        return match value {
+            Value::Object(object) => object.values_mut().any(|inner| change(inner, pick, random)),
+            Value::Array(list) => list.iter_mut().any(|inner| change(inner, pick, random)),
+            _ => false,
+        };
+    }
+    let what = random.below(6);
+    match value {
+        Value::Object(object) if what < 4 && !object.is_empty() => {
+            let keys: Vec<String> = object.keys().cloned().collect();
+            let key = random.of(&keys).clone();
+            let inner = object.remove(&key);
+            match what {
+                // without it, misspelt, with another's name, with an unknown one beside it
+                0 => {}
+                1 => drop(object.insert(key.chars().rev().collect(), inner.unwrap_or_default())),
+                2 => drop(object.insert(random.of(&keys).clone(), inner.unwrap_or_default())),
+                _ => {
+                    object.insert(key, inner.unwrap_or_default());
+                    object.insert("extra".to_owned(), junk(random));
+                }
+            }
+        }
+        Value::Array(list) if what < 3 && !list.is_empty() => {
+            let at = random.below(list.len() as u64) as usize;
+            match what {
+                0 => drop(list.remove(at)),
+                1 => list.push(list[at].clone()),
+                _ => list.push(junk(random)),
+            }
+        }
+        value => *value = junk(random),
+    }
+    true
+}
+
+/// A shipped scene with one to three values changed.
+fn changed(scenes: &[Value], random: &mut Random) -> Value {
+    let mut scene = random.of(scenes).clone();
+    for _ in 0..=random.below(3) {
+        let mut pick = random.below(count(&scene));
+        change(&mut scene, &mut pick, random);
+    }
+    scene
+}
+
+/// Text with bytes changed, repeated, nested, or cut off.
+fn broken(text: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = text.to_vec();
+    for _ in 0..=random.below(3) {
+        let at = random.below(bytes.len() as u64) as usize;
+        match random.below(6) {
+            0 => bytes[at..].iter_mut().take(1).for_each(|byte| *byte = random.below(256) as u8),
+            1 => bytes.truncate(at),
+            2 => {
+                let piece = bytes[at..(at + random.below(40) as usize).min(bytes.len())].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            3 => drop(bytes.splice(
+                at..at,
+                random.of(&[&b"NaN"[..], b"1e999", b"//", b"\"", b"{", b"]", b"\xff", b"-", b","]).iter().copied(),
+            )),
+            4 => drop(bytes.splice(at..at, b"[".repeat(random.below(300) as usize))),
+            _ => drop(bytes.splice(at..(at + 5).min(bytes.len()), [])),
+        }
+        if bytes.is_empty() {
+            break;
+        }
+    }
+    bytes
+}
+
+/// Runs `bfree check` with at most a second of processor time and 4 GB of memory.
+#[cfg(unix)]
+fn check(scene: &Path) -> Result<Output, Failure> {
+    let script = "ulimit -t 1; ulimit -v 4000000; exec \"$0\" check \"$1\"";
+    Ok(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_bfree")]).arg(scene).output()?)
+}
+
+/// 0, or 2 with a message that names the file, and the key or the line.
+#[cfg(unix)]
+fn judged(path: &Path, text: &str) -> Result<bool, Failure> {
+    let output = check(path)?;
+    let message = String::from_utf8(output.stderr)?;
+    let keys = [
+        "grid",
+        "time",
+        "bodies",
+        "boundary",
+        "approximation",
+        "transfer",
+        "gravity",
+        "tractions",
+        "output",
+        "initial_velocity",
+        "title",
+        "extra",
+        "solver",
+        "prescribed",
+        "pressures",
+        "a scene is an object",
+        " line ",
+    ];
+    match output.status.code() {
+        Some(0) => Ok(false),
+        Some(2) => {
+            assert!(message.contains(&path.display().to_string()), "{message}\n{text}");
+            assert!(keys.iter().any(|key| message.contains(key)), "no key: {message}\n{text}");
+            assert!(message.len() < 100_000, "{text}");
+            Ok(true)
+        }
+        code => Err(format!("{code:?} {}: {message}\n{text}", output.status).into()),
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn two_hundred_mutated_scenes_are_judged_within_a_second() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("mutated.json");
+    let texts = shipped()?;
+    let scenes: Vec<Value> = texts.iter().map(|text| serde_json::from_str(text)).collect::<Result<_, _>>()?;
+    let mut random = Random(2026);
+    let mut refused = 0;
+    for k in 0..200 {
+        let bytes = match k % 4 {
+            3 => broken(random.of(&texts).clone().as_bytes(), &mut random),
+            _ => changed(&scenes, &mut random).to_string().into_bytes(),
+        };
+        std::fs::write(&path, &bytes)?;
+        refused += usize::from(judged(&path, &String::from_utf8_lossy(&bytes))?);
+    }
+    assert!((120..200).contains(&refused), "{refused} refused: the mutations should do harm, but not only");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_gigabyte_is_refused_before_it_is_read() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("large.json");
+    // Sparse: it takes no room on the disk, but reading it would take a while.
+    std::fs::File::create(&path)?.set_len(1 << 30)?;
+    let start = Instant::now();
+    let error = scene::read_file(&path, &[]).expect_err("a gigabyte");
+    assert!(matches!(error, SceneError::TooLong(Some(length)) if length == 1 << 30), "{error}");
+    assert!(start.elapsed() < Duration::from_secs(1));
+    let output = check(&path)?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("large.json") && message.contains("1073741824 bytes"), "{message}");
+    // One line of a gigabyte in a particle file is left after four kilobytes.
+    let text = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a",
+        "particles": {"file": "large.json"}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}]}"#;
+    let scene = folder.path().join("scene.json");
+    std::fs::write(&scene, text)?;
+    assert!(judged(&scene, text)?);
+    // A device without an end.
+    let output = check(Path::new("/dev/zero"))?;
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8(output.stderr)?);
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn mutated_particle_files_are_refused_by_line() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let mut random = Random(7);
+    let mut good = b"x,y,volume,vx,vy\n".to_vec();
+    for k in 0..30 {
+        writeln!(good, "{},{},0.25,{},0", 0.5 + 0.1 * f64::from(k), 1.5, 0.1 * f64::from(k))?;
+    }
+    let mut refused = 0;
+    for _ in 0..2000 {
+        let text = broken(&good, &mut random);
+        if let Err(error) = particle_file::read::<2>(&text[..]) {
+            let message = error.to_string();
+            assert!(message.contains("line ") || message.contains("no particles"), "{message}");
+            assert!(message.len() < 1000, "{message}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 1000, "{refused}");
+    let scene = folder.path().join("scene.json");
+    std::fs::write(folder.path().join("p.csv"), b"x,y,volume\n1,1,0.25\n2,NaN,0.25\n")?;
+    let text = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a",
+        "particles": {"file": "p.csv"}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}]}"#;
+    std::fs::write(&scene, text)?;
+    let message = String::from_utf8(check(&scene)?.stderr)?;
+    assert!(
+        message.contains("bodies[0].particles.file") && message.contains("line 3, column 2 (y): \"NaN\""),
+        "{message}"
+    );
+    Ok(())
+}
+
+/// Whether the particles of a scene are so few that building it is a matter of milliseconds.
+fn small(scene: &Scene) -> bool {
+    let cells: f64 = scene.grid.cells().into_iter().flatten().map(f64::from).product();
+    let dimension = scene.dimension() as i32;
+    scene.bodies.iter().map(|body| cells * f64::from(body.particles_per_cell).powi(dimension)).sum::<f64>() < 20_000.0
+}
+
+fn build(scene: &Scene) {
+    let nowhere = Path::new("/nowhere");
+    match scene.dimension() {
+        1 => drop(scene.build::<1>(nowhere)),
+        2 => drop(scene.build::<2>(nowhere)),
+        _ => drop(scene.build::<3>(nowhere)),
+    }
+}
+
+/// A small run with a checkpoint: its directory, identity, simulation at the start, and the checkpoint's bytes.
+fn checkpointed(folder: &Path) -> Result<(Identity, Simulation<2>, Vec<u8>), Failure> {
+    let path = folder.join("scene.json");
+    let text = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a",
+        "shape": {"box": {"min": [1, 1], "max": [2, 2]}}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}],
+        "output": {"checkpoint": 0.1}}"#;
+    std::fs::write(&path, text)?;
+    let status = Command::new(env!("CARGO_BIN_EXE_bfree"))
+        .arg("run")
+        .arg(&path)
+        .arg("--out")
+        .arg(folder)
+        .arg("--quiet")
+        .status()?;
+    assert!(status.success());
+    let scene = scene::read_file(&path, &[])?;
+    let simulation = scene.build::<2>(folder)?;
+    let identity = Identity::new(serde_json::to_value(&scene)?, &simulation.particles);
+    std::fs::remove_file(folder.join("checkpoint_0.bfree"))?;
+    let bytes = std::fs::read(folder.join("checkpoint_1.bfree"))?;
+    Ok((identity, simulation, bytes))
+}
+
+/// `BFREE_FUZZ=1000000 cargo test --release --test suite -- hostile::fuzz --ignored --nocapture`
+#[test]
+#[ignore = "takes minutes; CONTRIBUTING.md has the last result"]
+fn fuzz() -> Result<(), Failure> {
+    let inputs = std::env::var("BFREE_FUZZ").map_or(Ok(10_000), |inputs| inputs.parse::<u64>())?;
+    let folder = tempfile::tempdir()?;
+    let texts = shipped()?;
+    let scenes: Vec<Value> = texts.iter().map(|text| serde_json::from_str(text)).collect::<Result<_, _>>()?;
+    let (identity, fresh, good) = checkpointed(folder.path())?;
+    let table = b"x,y,volume,vx,vy\n1,1,0.25,0,0\n1.5,1,0.25,1e-3,-2\n2,1,0.25,0,0\n";
+    let mut random = Random(1);
+    let (mut refused, mut built, mut slowest) = (0_u64, 0_u64, (Duration::ZERO, String::new()));
+    for k in 0..inputs {
+        let input = match k % 10 {
+            0..6 => changed(&scenes, &mut random).to_string().into_bytes(),
+            6 | 7 => broken(random.of(&texts).clone().as_bytes(), &mut random),
+            8 => broken(table, &mut random),
+            _ => broken(&good, &mut random),
+        };
+        if k % 10 == 9 {
+            std::fs::write(folder.path().join("checkpoint_1.bfree"), &input)?;
+        }
+        let mut simulation = fresh.clone();
+        let start = Instant::now();
+        let judged = catch_unwind(AssertUnwindSafe(|| match k % 10 {
+            0..8 => match scene::read(&String::from_utf8_lossy(&input), &[]) {
+                Ok(scene) if small(&scene) => {
+                    build(&scene);
+                    (false, true)
+                }
+                Ok(_) => (false, false),
+                Err(error) => {
+                    assert!((1..100_000).contains(&error.to_string().len()));
+                    (true, false)
+                }
+            },
+            8 => (particle_file::read::<2>(&input[..]).is_err(), false),
+            _ => {
+                let result = checkpoint::restore(folder.path(), &identity, &mut simulation);
+                assert!(result.is_err() || input == good, "a damaged checkpoint is taken for a good one");
+                (result.is_err(), false)
+            }
+        }));
+        let elapsed = start.elapsed();
+        let text = || String::from_utf8_lossy(&input).into_owned();
+        let Ok(judged) = judged else { return Err(format!("input {k} brings it down:\n{}", text()).into()) };
+        refused += u64::from(judged.0);
+        built += u64::from(judged.1);
+        if elapsed > slowest.0 {
+            slowest = (elapsed, text());
+        }
+    }
+    println!("{inputs} inputs: {refused} refused, {built} built, the slowest {:.3} s", slowest.0.as_secs_f64());
+    assert!(slowest.0 < Duration::from_secs(1), "{}", slowest.1);
+    Ok(())
+}
