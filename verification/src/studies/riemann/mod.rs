@@ -222,7 +222,7 @@ fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
             push("plateau error / jump", found.plateau, Bound::AtMost(0.01));
             let undissipated = runs.particles(Method::UNDISSIPATED, jump, h, COURANT)?;
             push("width / undissipated", found.width / undissipated.width, Bound::AtMost(1.5));
-            if courant < COURANT && courant >= LEAST_COMPARED {
+            if (LEAST_COMPARED..COURANT).contains(&courant) {
                 let undissipated = runs.particles(Method::UNDISSIPATED, jump, h, courant)?;
                 push("width / undissipated, same time step", found.width / undissipated.width, Bound::Reported);
             }
