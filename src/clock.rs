@@ -1,10 +1,28 @@
 //! Time as a count of nominal steps and binary fractions of them: no drift, and halved steps land where whole ones do.
 
+use serde::{Deserialize, Serialize};
+
 /// The most a step can be halved.
 pub const MAX_HALVINGS: u32 = 20;
 
 /// Ticks per nominal step.
 const TICKS: u64 = 1 << MAX_HALVINGS;
+
+/// What a clock inherits from step to step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reached {
+    ticks: u64,
+    level: u32,
+    steps: u64,
+}
+
+impl Reached {
+    /// Steps taken.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+}
 
 /// Where a run is in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +41,20 @@ impl Clock {
     /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most [`MAX_HALVINGS`]).
     pub fn new(dt: f64, max_halvings: u32) -> Self {
         Self { nominal: dt, max_halvings: max_halvings.min(MAX_HALVINGS), ticks: 0, level: 0, steps: 0 }
+    }
+
+    /// How far it has come.
+    pub fn reached(&self) -> Reached {
+        let Self { nominal: _, max_halvings: _, ticks, level, steps } = *self;
+        Reached { ticks, level, steps }
+    }
+
+    /// The same clock where another of the same steps has come to; `None` if this one could not come there.
+    pub fn at(self, reached: Reached) -> Option<Self> {
+        let Reached { ticks, level, steps } = reached;
+        // Far below an overflow of the ticks, far above any number of steps.
+        let possible = level <= self.max_halvings && ticks < 1 << 62 && ticks.is_multiple_of(TICKS >> level);
+        possible.then_some(Self { ticks, level, steps, ..self })
     }
 
     /// t_n
@@ -92,6 +124,25 @@ mod tests {
         // ¼ ¼ then ½: the step grows when it fits, and the time is that of two whole steps
         assert_eq!(lengths, [0.025, 0.025, 0.05]);
         assert_eq!((clock.time(), clock.step(), clock.steps()), (0.2, 0.1, 4));
+    }
+
+    #[test]
+    fn a_clock_continues_where_another_has_come_to() {
+        let mut clock = Clock::new(0.1, 3);
+        clock.advance();
+        clock.halve();
+        clock.halve();
+        clock.advance();
+        let mut again = Clock::new(0.1, 3).at(clock.reached());
+        for _ in 0..5 {
+            assert_eq!(again, Some(clock));
+            clock.advance();
+            again.iter_mut().for_each(Clock::advance);
+        }
+        // halved more often than allowed, and in the middle of a step
+        let (level, steps) = (2, 2);
+        assert_eq!(Clock::new(0.1, 1).at(Reached { ticks: 5 * (TICKS >> 2), level, steps }), None);
+        assert_eq!(Clock::new(0.1, 3).at(Reached { ticks: TICKS >> 3, level, steps }), None);
     }
 
     #[test]

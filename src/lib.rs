@@ -124,6 +124,7 @@
 //! | to | read |
 //! |---|---|
 //! | run a scene from JSON | [`scene::read_file`], [`scene::Scene::build`], [`simulation::Simulation::advance`], [`output::Recorder`] |
+//! | continue a run that was killed | [`checkpoint::Checkpoints`], [`checkpoint::restore`], [`output::Recorder::resume`] |
 //! | write a law | [`material::Law`], or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
 //! | write a shape function | [`approximation::ShapeFunction`], or [`approximation::Separable`] for a product |
 //! | follow the loop over particles | [`mechanics::sweep`] |
@@ -131,6 +132,7 @@
 
 pub mod approximation;
 pub mod causes;
+pub mod checkpoint;
 pub mod clock;
 pub mod field;
 pub mod grid;

@@ -4,10 +4,10 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::tangent::frozen_bytes;
+use crate::mechanics::tangent::{frozen_bytes, has_closed_form};
 use crate::mechanics::time::Newmark;
 use crate::simulation::Simulation;
-use crate::solver::Krylov;
+use crate::solver::{Krylov, Precision};
 use crate::tensor::{Tensor, Vector};
 use serde::Serialize;
 use std::collections::HashSet;
@@ -123,8 +123,9 @@ impl Plan {
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
     ) -> Result<Self, SupportError> {
+        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
         let (supports, nodes) =
-            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+            Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
         let prescribed = simulation.prescribed(&nodes);
         Ok(Self {
             dimension: D,
@@ -132,7 +133,7 @@ impl Plan {
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
             unknowns: D * nodes.len() - prescribed.len(),
-            terms: terms(simulation),
+            terms: terms(simulation, &supports),
             arrays: arrays(simulation, &supports, nodes.len()),
             surfaces: SurfaceUse::of(simulation),
         })
@@ -147,7 +148,7 @@ impl Plan {
     }
 }
 
-fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> Vec<TermUse> {
+fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
     let term = |name, used, why: &str| TermUse { name, used, why: why.into() };
     let (loads, lumping) = (&simulation.loads, simulation.settings.lumping);
     let Newmark { beta, gamma } = simulation.settings.newmark;
@@ -170,7 +171,25 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> Vec<Ter
         ),
         term("prescribed nodes", !loads.prescribed.is_empty(), &format!("{} conditions", loads.prescribed.len())),
         term("work of moving walls", moving, "only where a prescribed motion does not rest"),
+        term(
+            "single precision",
+            precision_used(simulation, supports) == Precision::Mixed,
+            match simulation.settings.newton.precision {
+                Precision::Double => "only with solver.krylov.precision = \"mixed\"",
+                Precision::Mixed => {
+                    "of the linear systems; for shape functions that are products and laws with a closed tangent"
+                }
+            },
+        ),
     ]
+}
+
+/// What the linear systems are solved in.
+fn precision_used<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Precision {
+    match supports.unit() {
+        Some(_) if has_closed_form::<D, L>(&simulation.bodies) => Precision::Mixed,
+        _ => Precision::Double,
+    }
 }
 
 fn arrays<const D: usize, L: Law, A>(
@@ -185,9 +204,11 @@ fn arrays<const D: usize, L: Law, A>(
         Krylov::ConjugateGradient => 4,
     };
     let array = |name, lifetime, bytes: usize| ArrayUse { name, lifetime, bytes: bytes as u64 };
-    let frozen = frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping);
-    // The update interpolates x and H block by block, and then puts them into the order of the particles.
-    let updated = 2 * (vector + tensor + size_of::<usize>());
+    let precision = precision_used(simulation, supports);
+    let frozen = frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping, precision);
+    let share = if precision == Precision::Mixed { 2 } else { 1 };
+    // Δx and H, and the increments of v and a.
+    let updated = 3 * vector + tensor;
     vec![
         array(
             "particles: x, v, a, H, volume, mass, body",
@@ -197,8 +218,8 @@ fn arrays<const D: usize, L: Law, A>(
         array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes()),
         array("nodal fields: v, a, loads, residuals, Δφ", Lifetime::Step, nodes * (12 * vector + 8)),
         array("frozen tangent", Lifetime::Solve, frozen),
-        array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor),
-        array("Krylov vectors", Lifetime::Solve, nodes * vector * krylov_vectors),
+        array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor / share),
+        array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors),
         array("particles: state after the step", Lifetime::Update, particles * updated),
     ]
 }

@@ -182,7 +182,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let alphas = self.settings.newmark.alphas(dt);
         let mut watch = Stopwatch::start();
 
-        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
+        let precision = self.settings.newton.precision;
+        let positions = &self.particles.position;
+        let (supports, nodes) = Supports::with_precision(&self.approximation, &self.grid, positions, precision)?;
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions);
 

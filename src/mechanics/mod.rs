@@ -3,6 +3,7 @@
 pub mod check;
 pub mod loads;
 pub mod residual;
+pub mod single;
 pub mod smoothing;
 pub mod sweep;
 pub mod tangent;

@@ -8,6 +8,7 @@ use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+use std::sync::OnceLock;
 
 /// A particle whose deformation is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -43,6 +44,10 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub prescribed: &'a [PrescribedDof],
     /// Σ_J N_J (α₂ v_n + α₃ a_n)_J at the particles; empty when ε = 1.
     history: Vec<Vector<f64, D>>,
+    /// The preconditioner of the step's linear systems: inverse diagonal blocks of the first tangent that is frozen.
+    pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
+    /// The same for systems in single precision.
+    pub(super) single_inverse_blocks: OnceLock<Vec<Tensor<f32, D>>>,
 }
 
 /// Which occurrences of Δφ carry derivatives. In the code that computes `F S`, letting only the left F carry the dual part gives the
@@ -100,7 +105,20 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         } else {
             Vec::new()
         };
-        Self { particles, bodies, supports, alphas, lumping, nodal, dead_load, pressures, prescribed, history }
+        Self {
+            particles,
+            bodies,
+            supports,
+            alphas,
+            lumping,
+            nodal,
+            dead_load,
+            pressures,
+            prescribed,
+            history,
+            inverse_blocks: OnceLock::new(),
+            single_inverse_blocks: OnceLock::new(),
+        }
     }
 
     /// The law of particle `p`.

@@ -4,7 +4,8 @@ use crate::material::{FrozenTangent, Law, admissible};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
 use crate::mechanics::sweep::{ClosedTangents, Supports};
 use crate::particles::Body;
-use crate::solver::{LinearOperator, NonlinearProblem, Preconditioner};
+use crate::scalar::Real;
+use crate::solver::{LinearOperator, NonlinearProblem, Precision, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
 use num_dual::Dual64;
 
@@ -63,7 +64,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             }
             Term::Pressure => {
                 for point in self.frozen_pressures(dphi) {
-                    point.add_product(self, u, &mut out);
+                    point.add_product(self.supports, u, &mut out, 1.0);
                 }
             }
         }
@@ -129,7 +130,19 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         }
     }
 
-    fn frozen_pressures(&self, dphi: &[Vector<f64, D>]) -> Vec<FrozenPressure<D>> {
+    /// The identity's row and column at prescribed degrees of freedom.
+    pub(super) fn prescribe_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
+        for dof in self.prescribed {
+            let (block, i) = (&mut blocks[dof.node], dof.component);
+            for k in 0..D {
+                block[(i, k)] = 0.0;
+                block[(k, i)] = 0.0;
+            }
+            block[(i, i)] = 1.0;
+        }
+    }
+
+    pub(super) fn frozen_pressures(&self, dphi: &[Vector<f64, D>]) -> Vec<FrozenPressure<D>> {
         self.pressures
             .iter()
             .map(|point| {
@@ -153,30 +166,22 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D, L>, Inadmissible> {
-        let mut tangent = Tangent {
-            equilibrium: self,
-            frozen: self.freeze(dphi)?,
-            pressures: self.frozen_pressures(dphi),
-            inverse_blocks: Vec::new(),
-        };
-        tangent.inverse_blocks = tangent.diagonal_blocks();
-        for block in &mut tangent.inverse_blocks {
-            *block = invert_block(block);
-        }
-        Ok(tangent)
+        Ok(Tangent { equilibrium: self, frozen: self.freeze(dphi)?, pressures: self.frozen_pressures(dphi) })
+    }
+
+    /// The law of particle `p` frozen at ∇u_p = `g`.
+    pub(super) fn freeze_at(&self, p: usize, g: &Tensor<f64, D>) -> Result<L::Frozen<f64, D>, Inadmissible> {
+        let at = admissible(compose(g, &self.particles.displacement_gradient[p]))
+            .map_err(|source| Inadmissible { particle: p, source })?;
+        Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
     }
 
     fn freeze(&self, dphi: &[Vector<f64, D>]) -> Result<Frozen<D, L>, Inadmissible> {
-        let freeze = |p: usize, g: &Tensor<f64, D>| {
-            let at = admissible(compose(g, &self.particles.displacement_gradient[p]))
-                .map_err(|source| Inadmissible { particle: p, source })?;
-            Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
-        };
         if let Some(both) = closed_form::<D, L>(self.bodies) {
             let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
             let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
             let closed = self.supports.closed_tangents(dphi, both, inertia, |p, g| {
-                let closed = freeze(p, &g).map_err(Some)?.closed();
+                let closed = self.freeze_at(p, &g).map_err(Some)?.closed();
                 closed.filter(|form| both || form.both.is_none()).ok_or(None)
             });
             match closed {
@@ -186,7 +191,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
                 Some(Err(None)) | None => {}
             }
         }
-        Ok(Frozen::Each(self.supports.interpolate(dphi, |p, _, g| freeze(p, &g))?))
+        Ok(Frozen::Each(self.supports.interpolate(dphi, |p, _, g| self.freeze_at(p, &g))?))
     }
 }
 
@@ -199,53 +204,70 @@ enum Frozen<const D: usize, L: Law> {
 }
 
 /// Whether all laws have a closed form, and if so, whether one of them has the term b L c. It does not depend on the state.
-fn closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> Option<bool> {
+pub(super) fn closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> Option<bool> {
     let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
     let forms = bodies.iter().map(|body| body.law.freeze(&identity(), &at_rest, 1.0).closed());
     let forms: Option<Vec<_>> = forms.collect();
     forms.map(|forms| forms.iter().any(|form| form.both.is_some()))
 }
 
+/// Whether all laws have a closed form, which products in single precision need.
+pub fn has_closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> bool {
+    closed_form::<D, L>(bodies).is_some()
+}
+
 /// Bytes of the frozen tangent of all particles.
-pub fn frozen_bytes<const D: usize, L: Law>(bodies: &[Body<L>], supports: &Supports<D>, lumping: f64) -> usize {
+pub fn frozen_bytes<const D: usize, L: Law>(
+    bodies: &[Body<L>],
+    supports: &Supports<D>,
+    lumping: f64,
+    precision: Precision,
+) -> usize {
     closed_form::<D, L>(bodies)
-        .and_then(|both| supports.closed_bytes(both, lumping < 1.0))
+        .and_then(|both| supports.closed_bytes(both, lumping < 1.0, precision))
         .unwrap_or(supports.particles() * size_of::<L::Frozen<f64, D>>())
 }
 
 /// Follower pressure frozen at one state: δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
 #[derive(Clone, Copy, Debug)]
-struct FrozenPressure<const D: usize> {
+pub(super) struct FrozenPressure<const D: usize> {
     particle: usize,
     df_inv_t: Tensor<f64, D>,
     force: Vector<f64, D>,
 }
 
 impl<const D: usize> FrozenPressure<D> {
-    fn add_product<L: Law>(&self, eq: &Equilibrium<'_, D, L>, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    /// Adds the product over `scale`; at the particle itself it is formed in double precision.
+    pub(super) fn add_product<T: Real>(
+        &self,
+        supports: &Supports<D>,
+        u: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+        scale: f64,
+    ) {
         let (a, w) = (&self.df_inv_t, &self.force);
-        let l = eq.supports.gradient_at(self.particle, u);
-        let delta = w * contract(a, &l) - a * (l.transpose() * w);
-        for (node, n, _) in eq.supports.of(self.particle) {
-            out[node] += delta * n;
+        let l = supports.gradient_at(self.particle, u).map(T::value);
+        let delta = (w * contract(a, &l) - a * (l.transpose() * w)) / scale;
+        for (node, n, _) in supports.of(self.particle) {
+            out[node] += (delta * n).map(T::lit);
         }
     }
 
     /// The diagonal block N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
-    fn add_blocks<L: Law>(&self, eq: &Equilibrium<'_, D, L>, blocks: &mut [Tensor<f64, D>]) {
-        for (node, n, grad_n) in eq.supports.of(self.particle) {
+    pub(super) fn add_blocks(&self, supports: &Supports<D>, blocks: &mut [Tensor<f64, D>]) {
+        for (node, n, grad_n) in supports.of(self.particle) {
             let g = self.df_inv_t * grad_n;
             blocks[node] += scaled(&(outer(&self.force, &g) - outer(&g, &self.force)), n);
         }
     }
 }
 
-/// K(Δφ), frozen: an operator, with its d×d diagonal blocks as preconditioner.
+/// K(Δφ), frozen: an operator, with d×d diagonal blocks as preconditioner, those of the first tangent frozen in the step: making
+/// them costs as much as a few products, and a step changes them little.
 pub struct Tangent<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
     frozen: Frozen<D, L>,
     pressures: Vec<FrozenPressure<D>>,
-    inverse_blocks: Vec<Tensor<f64, D>>,
 }
 
 impl<const D: usize, L: Law> Tangent<'_, D, L> {
@@ -268,7 +290,7 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
             }
         }
         for point in &self.pressures {
-            point.add_product(eq, u, out);
+            point.add_product(eq.supports, u, out, 1.0);
         }
         eq.clear_prescribed(out);
     }
@@ -287,23 +309,16 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
             ),
         }
         for point in &self.pressures {
-            point.add_blocks(eq, &mut blocks);
+            point.add_blocks(eq.supports, &mut blocks);
         }
-        for dof in eq.prescribed {
-            let (block, i) = (&mut blocks[dof.node], dof.component);
-            for k in 0..D {
-                block[(i, k)] = 0.0;
-                block[(k, i)] = 0.0;
-            }
-            block[(i, i)] = 1.0;
-        }
+        eq.prescribe_blocks(&mut blocks);
         blocks
     }
 }
 
 /// The inverse of a diagonal block. A block that is singular to round-off (a node no stiffness and no mass reaches)
 /// is replaced by the inverse of its diagonal, or by the identity where that is zero too.
-fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
+pub(super) fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
     // Scale rows to the diagonal first: entries range over many orders of magnitude, and det may underflow.
     let diagonal = Vector::<f64, D>::from_fn(|i, _| {
         let d = block[(i, i)].abs();
@@ -328,7 +343,9 @@ impl<const D: usize, L: Law> LinearOperator for Tangent<'_, D, L> {
 impl<const D: usize, L: Law> Preconditioner for Tangent<'_, D, L> {
     fn precondition(&self, r: &[f64], z: &mut [f64]) {
         let (r, z): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverse_blocks) {
+        let invert = || self.diagonal_blocks().iter().map(invert_block).collect();
+        let inverse_blocks: &Vec<_> = self.equilibrium.inverse_blocks.get_or_init(invert);
+        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
             *z = inverse * r;
         }
     }
@@ -358,5 +375,10 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
 
     fn linearize(&self, x: &[f64]) -> Result<Tangent<'_, D, L>, Inadmissible> {
         self.tangent(bytemuck::cast_slice(x))
+    }
+
+    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn SingleTangent + '_>>, Inadmissible> {
+        let single = self.single_tangent(bytemuck::cast_slice(x))?;
+        Ok(single.map(|single| Box::new(single) as Box<dyn SingleTangent>))
     }
 }

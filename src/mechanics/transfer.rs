@@ -205,14 +205,13 @@ impl<const D: usize> Moved<D> {
             };
             impulses.push(nodal.mass[node] * (delta_v[node][i] - by_forces));
         }
-        let moved = supports.interpolate(dphi, |p, delta_x, g| {
-            let h = compose(&g, &particles.displacement_gradient[p]);
-            Ok::<_, std::convert::Infallible>((particles.position[p] + delta_x, h))
+        let mut position = particles.position.clone();
+        let mut displacement_gradient = particles.displacement_gradient.clone();
+        let moved = |p: usize, delta_x, g| (delta_x, compose(&g, &particles.displacement_gradient[p]));
+        supports.each_particle(dphi, moved, |p, (delta_x, h)| {
+            position[p] += delta_x;
+            displacement_gradient[p] = h;
         });
-        let (position, displacement_gradient) = match moved {
-            Ok(moved) => moved.into_iter().unzip(),
-            Err(never) => match never {},
-        };
         Self {
             position,
             delta_velocity: supports.values(&delta_v),

@@ -4,26 +4,33 @@ use super::OutputError;
 use super::files::Stream;
 use std::collections::HashSet;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 
 /// A table on disk.
 #[derive(Debug)]
 pub(crate) struct Table(Stream);
 
 impl Table {
-    /// Creates the file and writes the header.
+    /// Creates the file and writes the header; or continues one whose first `kept` bytes are good.
     ///
     /// # Errors
-    /// The system refuses, or two columns have the same name.
-    pub(crate) fn create(path: PathBuf, columns: &[String]) -> Result<Self, OutputError> {
+    /// The system refuses, two columns have the same name, or the file to be continued has others.
+    pub(crate) fn open(path: PathBuf, columns: &[String], kept: Option<u64>) -> Result<Self, OutputError> {
         let mut seen = HashSet::new();
         if let Some(column) = columns.iter().find(|&column| !seen.insert(column)) {
             return Err(OutputError::DuplicateColumn { path, column: column.clone() });
         }
-        let header: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
-        let mut stream = Stream::create(path)?;
-        stream.line(&header.join(","))?;
-        stream.flush()?;
+        let header = columns.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(",");
+        if kept.is_some() && first_line(&path).map_err(OutputError::io("continue", &path))? != header {
+            return Err(OutputError::OtherColumns { path });
+        }
+        let mut stream = Stream::open(path, kept)?;
+        if kept.is_none() {
+            stream.line(&header)?;
+            stream.flush()?;
+        }
         Ok(Self(stream))
     }
 
@@ -36,6 +43,17 @@ impl Table {
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.0.flush()
     }
+
+    /// Puts all rows on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.0.mark()
+    }
+}
+
+fn first_line(path: &Path) -> std::io::Result<String> {
+    let mut line = String::new();
+    BufReader::new(File::open(path)?).read_line(&mut line)?;
+    Ok(line.trim_end().to_owned())
 }
 
 /// A name as a cell: in quotes if it holds what would break the row (RFC 4180).
@@ -83,10 +101,10 @@ mod tests {
     fn names_cannot_break_a_table() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
         let path = directory.path().join("t.csv");
-        let mut table = Table::create(path.clone(), &["left, \"low\"_x".to_owned(), "time".to_owned()])?;
+        let mut table = Table::open(path.clone(), &["left, \"low\"_x".to_owned(), "time".to_owned()], None)?;
         table.flush()?;
         assert_eq!(std::fs::read_to_string(&path)?, "\"left, \"\"low\"\"_x\",time\n");
-        let twice = Table::create(path, &["a".to_owned(), "a".to_owned()]);
+        let twice = Table::open(path, &["a".to_owned(), "a".to_owned()], None);
         assert!(matches!(twice, Err(OutputError::DuplicateColumn { column, .. }) if column == "a"));
         Ok(())
     }

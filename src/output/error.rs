@@ -63,6 +63,18 @@ pub enum OutputError {
         /// The name.
         column: String,
     },
+    /// A table that was to be continued is another one.
+    #[error("{} has other columns than this run, so it cannot be continued", path.display())]
+    OtherColumns {
+        /// The table.
+        path: PathBuf,
+    },
+    /// A file that was to be continued has lost something since.
+    #[error("{} ends before the place where it was to be continued", path.display())]
+    Shorter {
+        /// The file.
+        path: PathBuf,
+    },
     /// The reference belongs to another set of particles.
     #[error("the reference state has {reference} particles, the simulation {particles}")]
     Reference {

@@ -1,11 +1,14 @@
 //! Two ways to put a file on disk: all at once or not at all, and line by line as it grows.
 
 use super::OutputError;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
+
+/// How the names of files that are being written begin; a killed run leaves them behind.
+pub(crate) const TEMPORARY: &str = ".bfree-";
 
 /// What a dying process may lose of a growing file.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
@@ -20,6 +23,7 @@ pub(crate) fn write_atomically(
 ) -> Result<(), OutputError> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY);
     // Readable by others as far as the umask allows, like any other file; the library's default is the owner only.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -39,14 +43,24 @@ pub(crate) fn write_atomically(
 pub(crate) struct Stream {
     path: PathBuf,
     writer: BufWriter<File>,
+    /// Bytes so far.
+    length: u64,
     flushed: Instant,
 }
 
 impl Stream {
-    /// Creates or empties the file.
-    pub(crate) fn create(path: PathBuf) -> Result<Self, OutputError> {
-        let file = File::create(&path).map_err(OutputError::io("create", &path))?;
-        Ok(Self { path, writer: BufWriter::new(file), flushed: Instant::now() })
+    /// Creates or empties the file; or, to continue it, keeps its first `kept` bytes, which must be there.
+    pub(crate) fn open(path: PathBuf, kept: Option<u64>) -> Result<Self, OutputError> {
+        let length = kept.unwrap_or(0);
+        let open = || -> std::io::Result<File> {
+            let mut file = OpenOptions::new().write(true).create(kept.is_none()).truncate(false).open(&path)?;
+            file.set_len(length)?;
+            file.seek(SeekFrom::Start(length))?;
+            Ok(file)
+        };
+        let action = if kept.is_some() { "continue" } else { "create" };
+        let file = open().map_err(OutputError::io(action, &path))?;
+        Ok(Self { path, writer: BufWriter::new(file), length, flushed: Instant::now() })
     }
 
     /// Where it is.
@@ -57,6 +71,7 @@ impl Stream {
     /// Appends a line.
     pub(crate) fn line(&mut self, line: &str) -> Result<(), OutputError> {
         writeln!(self.writer, "{line}").map_err(OutputError::io("write", &self.path))?;
+        self.length += line.len() as u64 + 1;
         if self.flushed.elapsed() >= FLUSH_INTERVAL { self.flush() } else { Ok(()) }
     }
 
@@ -64,6 +79,14 @@ impl Stream {
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.flushed = Instant::now();
         self.writer.flush().map_err(OutputError::io("write", &self.path))
+    }
+
+    /// Puts everything on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.flush()?;
+        self.writer.get_ref().sync_data().map_err(OutputError::io("write", &self.path))?;
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok((name, self.length))
     }
 }
 
@@ -91,7 +114,7 @@ mod tests {
     #[test]
     fn lines_are_on_disk_soon_although_nobody_flushes() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
-        let mut stream = Stream::create(directory.path().join("a.csv"))?;
+        let mut stream = Stream::open(directory.path().join("a.csv"), None)?;
         stream.line("1")?;
         std::thread::sleep(FLUSH_INTERVAL);
         stream.line("2")?;

@@ -53,16 +53,16 @@ pub struct Cost {
 pub struct History(Table);
 
 impl History {
-    /// Creates the file, with the header for `dimension` components of momentum.
+    /// Creates the file, with the header for `dimension` components of momentum; or continues one whose first `kept` bytes are good.
     ///
     /// # Errors
-    /// The system refuses.
-    pub fn create(path: PathBuf, dimension: usize) -> Result<Self, OutputError> {
+    /// The system refuses, or the file to be continued has other columns.
+    pub fn open(path: PathBuf, dimension: usize, kept: Option<u64>) -> Result<Self, OutputError> {
         let fixed = ["step", "time", "dt", "kinetic", "strain", "external", "total", "balance"];
         let mut columns: Vec<String> = fixed.map(str::to_owned).into();
         columns.extend(AXES.iter().take(dimension).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
-        Ok(Self(Table::create(path, &columns)?))
+        Ok(Self(Table::open(path, &columns, kept)?))
     }
 
     /// Appends the present state; returns its energies.
@@ -93,5 +93,10 @@ impl History {
     /// The system refuses.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.0.flush()
+    }
+
+    /// Puts all rows on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.0.mark()
     }
 }

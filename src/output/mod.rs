@@ -8,15 +8,15 @@
 //! | `reactions.csv` | force of every prescribed condition on the bodies, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
-//! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end |
-//! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step |
+//! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end, and stays beside it only where there are checkpoints |
+//! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, what was warned of |
 //!
 //! [`plot::plot_run`] draws pictures of a directory. Floats in text files have as many digits as it takes to read the same bits back.
 
 mod csv;
 mod error;
 mod fields;
-mod files;
+pub(crate) mod files;
 pub mod history;
 pub mod plot;
 pub mod probes;
@@ -26,13 +26,15 @@ mod reactions;
 mod recorder;
 mod reference;
 pub mod report;
-mod snapshots;
+pub(crate) mod snapshots;
 mod summary;
 pub mod vtu;
+pub mod warnings;
 
 pub use error::OutputError;
 pub use probes::{Place, Probe, nearest};
-pub use recorder::{OutputSettings, Recorder};
+pub use progress::Audience;
+pub use recorder::{Mark, OutputSettings, Recorder};
 pub use reference::Reference;
 pub use report::Outcome;
 pub use summary::Summary;

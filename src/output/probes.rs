@@ -76,13 +76,13 @@ pub(crate) struct Probes<const D: usize> {
 }
 
 impl<const D: usize> Probes<D> {
-    /// Creates the file with its header.
-    pub(crate) fn create(path: PathBuf, probes: Vec<Probe<D>>) -> Result<Self, OutputError> {
+    /// Creates the file with its header; or continues one whose first `kept` bytes are good.
+    pub(crate) fn open(path: PathBuf, probes: Vec<Probe<D>>, kept: Option<u64>) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for probe in &probes {
             columns.extend(probe.field.columns(&probe.name, D));
         }
-        Ok(Self { probes, table: Table::create(path, &columns)? })
+        Ok(Self { probes, table: Table::open(path, &columns, kept)? })
     }
 
     /// Appends the present values.
@@ -110,5 +110,10 @@ impl<const D: usize> Probes<D> {
     /// Hands everything to the system.
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.table.flush()
+    }
+
+    /// Puts all rows on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.table.mark()
     }
 }

@@ -1,6 +1,10 @@
-//! How far a run is, for the one who waits: a bar on a terminal, a line now and then elsewhere, both on standard error.
+//! How far a run is, for the one who waits: a bar on a terminal, a line now and then elsewhere; or lines of JSON for a program
+//! that watches. All of it on standard error.
 
+use super::report::Number;
+use super::warnings::Warning;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
 use std::collections::VecDeque;
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -10,6 +14,9 @@ const WINDOW: f64 = 30.0;
 
 /// Between two lines where there is no terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Between two lines of JSON.
+const JSON_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Resolution of the bar.
 const BAR_LENGTH: f64 = 1000.0;
@@ -41,7 +48,7 @@ impl Pace {
 }
 
 /// What is shown besides the time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shown {
     /// Steps taken.
     pub step: u64,
@@ -49,13 +56,34 @@ pub struct Shown {
     pub newton: usize,
     /// Krylov iterations of the last step.
     pub krylov: usize,
+    /// The balance of energy: what was gained (> 0) or lost so far.
+    pub balance: f64,
+}
+
+/// For whom progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Audience {
+    /// Nobody; warnings are written all the same.
+    Nobody,
+    /// Somebody at a terminal, or who reads a log.
+    #[default]
+    Person,
+    /// A program: one JSON object a line, with the key `event`: `step` (at most ten a second, and the last), `warning`.
+    Program,
 }
 
 /// The way it is shown.
 #[derive(Debug)]
 enum Display {
     Bar(ProgressBar),
-    Lines { last: Instant },
+    Lines {
+        last: Instant,
+    },
+    Json {
+        last: Option<Instant>,
+        /// What was not shown because it came too soon.
+        held: Option<String>,
+    },
     Silent,
 }
 
@@ -69,21 +97,27 @@ pub struct Progress {
     end: f64,
 }
 
+/// Nobody may be listening; the run goes on.
+fn line(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 impl Progress {
-    /// Starts now, at simulated time `start`, towards `end`; `quiet` shows nothing.
-    pub fn new(start: f64, end: f64, quiet: bool) -> Self {
+    /// Starts now, at simulated time `start`, towards `end`.
+    pub fn new(start: f64, end: f64, audience: Audience) -> Self {
         let now = Instant::now();
-        let display = if quiet {
-            Display::Silent
-        } else if std::io::stderr().is_terminal() {
-            let bar = ProgressBar::new(BAR_LENGTH as u64);
-            // The template is a constant; should it be refused, indicatif's own is shown.
-            if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
-                bar.set_style(style);
+        let display = match audience {
+            Audience::Nobody => Display::Silent,
+            Audience::Program => Display::Json { last: None, held: None },
+            Audience::Person if std::io::stderr().is_terminal() => {
+                let bar = ProgressBar::new(BAR_LENGTH as u64);
+                // The template is a constant; should it be refused, indicatif's own is shown.
+                if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
+                    bar.set_style(style);
+                }
+                Display::Bar(bar)
             }
-            Display::Bar(bar)
-        } else {
-            Display::Lines { last: now }
+            Audience::Person => Display::Lines { last: now },
         };
         let mut pace = Pace::default();
         pace.mark(0.0, start);
@@ -95,30 +129,65 @@ impl Progress {
         if matches!(self.display, Display::Silent) {
             return;
         }
-        self.pace.mark(self.since.elapsed().as_secs_f64(), time);
-        let left = self.pace.left(self.end).map_or_else(|| "unknown".to_owned(), readable);
-        let text = format!(
-            "t = {time:.6} of {:.6}, step {}, Newton {}, Krylov {}, {left} left",
-            self.end, shown.step, shown.newton, shown.krylov
-        );
+        let Shown { step, newton, krylov, balance } = shown;
+        let elapsed = self.since.elapsed().as_secs_f64();
+        self.pace.mark(elapsed, time);
+        let (left, end) = (self.pace.left(self.end), self.end);
+        let text = || {
+            let left = left.map_or_else(|| "unknown".to_owned(), readable);
+            format!(
+                "t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, balance {balance:+.1e}, {left} left"
+            )
+        };
         match &mut self.display {
             Display::Bar(bar) => {
                 bar.set_position((BAR_LENGTH * (time - self.start) / (self.end - self.start)) as u64);
-                bar.set_message(text);
+                bar.set_message(text());
             }
             Display::Lines { last } if last.elapsed() >= LINE_INTERVAL => {
-                // Nobody may be listening; the run goes on.
-                let _ = writeln!(std::io::stderr(), "{text}");
+                line(&text());
                 *last = Instant::now();
+            }
+            Display::Json { last, held } => {
+                let text = json!({
+                    "event": "step", "step": step, "time": Number(time), "end": Number(end), "newton": newton, "krylov": krylov,
+                    "balance": Number(balance), "seconds": elapsed, "seconds_left": left,
+                })
+                .to_string();
+                if last.is_none_or(|last| last.elapsed() >= JSON_INTERVAL) {
+                    line(&text);
+                    (*last, *held) = (Some(Instant::now()), None);
+                } else {
+                    *held = Some(text);
+                }
             }
             Display::Lines { .. } | Display::Silent => {}
         }
     }
 
-    /// Takes the bar away.
+    /// Writes a warning, whoever watches.
+    pub fn warn(&self, warning: &Warning) {
+        let Warning { kind, time, step, message } = warning;
+        let text = format!("warning: t = {time}, step {step}: {message}");
+        match &self.display {
+            Display::Bar(bar) => bar.suspend(|| line(&text)),
+            Display::Json { .. } => {
+                let (kind, time) = (json!(kind), Number(*time));
+                line(
+                    &json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message})
+                        .to_string(),
+                );
+            }
+            Display::Lines { .. } | Display::Silent => line(&text),
+        }
+    }
+
+    /// Takes the bar away, and shows what was held back.
     pub fn finish(self) {
-        if let Display::Bar(bar) = self.display {
-            bar.finish_and_clear();
+        match self.display {
+            Display::Bar(bar) => bar.finish_and_clear(),
+            Display::Json { held: Some(text), .. } => line(&text),
+            _ => {}
         }
     }
 }

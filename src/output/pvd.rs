@@ -4,7 +4,11 @@ use super::OutputError;
 use super::files::write_atomically;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// What stands before and behind the entries.
+const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
+const TAIL: &str = "</Collection>\n</VTKFile>\n";
 
 /// A growing series; the file is whole after every snapshot, so that a killed run still opens.
 #[derive(Clone, Debug)]
@@ -19,6 +23,16 @@ impl Series {
         Self { path, entries: String::new() }
     }
 
+    /// Continues the series at `path` after its first `count` entries; later ones are forgotten.
+    ///
+    /// # Errors
+    /// It has not as many, or the system refuses.
+    pub fn resume(path: PathBuf, count: usize) -> Result<Self, OutputError> {
+        let series = Self { entries: first_entries(&path, count)?, path };
+        series.write()?;
+        Ok(series)
+    }
+
     /// Adds `file`, given relative to the directory of the series, and rewrites the list, all or nothing.
     ///
     /// # Errors
@@ -26,10 +40,20 @@ impl Series {
     pub fn push(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
         // Writing to a string cannot fail.
         let _ = writeln!(self.entries, r#"<DataSet timestep="{time:?}" part="0" file="{file}"/>"#);
-        let head = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
-        let tail = "</Collection>\n</VTKFile>\n";
-        write_atomically(&self.path, |file| write!(file, "{head}{}{tail}", self.entries))
+        self.write()
     }
+
+    fn write(&self) -> Result<(), OutputError> {
+        write_atomically(&self.path, |file| write!(file, "{HEAD}{}{TAIL}", self.entries))
+    }
+}
+
+/// The first `count` entries of the series at `path`, one a line.
+pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputError> {
+    let text = std::fs::read_to_string(path).map_err(OutputError::io("continue", path))?;
+    let entries = text.strip_prefix(HEAD).and_then(|rest| rest.strip_suffix(TAIL)).unwrap_or_default();
+    let kept: Vec<&str> = entries.split_inclusive('\n').take(count).collect();
+    if kept.len() == count { Ok(kept.concat()) } else { Err(OutputError::Shorter { path: path.to_owned() }) }
 }
 
 #[cfg(test)]
@@ -54,6 +78,12 @@ mod tests {
             assert_eq!(read, times[..=k]);
         }
         assert_eq!(std::fs::read_dir(directory.path())?.count(), 1, "no temporary file stays");
+        let whole = std::fs::read_to_string(&path)?;
+        let mut shorter = Series::resume(path.clone(), 2)?;
+        assert_eq!(std::fs::read_to_string(&path)?.matches("<DataSet").count(), 2);
+        shorter.push(times[2], "particles_2.vtu")?;
+        assert_eq!(std::fs::read_to_string(&path)?, whole);
+        assert!(matches!(Series::resume(path, 4), Err(OutputError::Shorter { .. })));
         Ok(())
     }
 }

@@ -12,13 +12,18 @@ use std::path::PathBuf;
 pub(crate) struct Reactions(Table);
 
 impl Reactions {
-    /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition.
-    pub(crate) fn create<const D: usize>(path: PathBuf, loads: &Loads<D>) -> Result<Self, OutputError> {
+    /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition; or continues one whose first `kept`
+    /// bytes are good.
+    pub(crate) fn open<const D: usize>(
+        path: PathBuf,
+        loads: &Loads<D>,
+        kept: Option<u64>,
+    ) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for condition in &loads.prescribed {
             columns.extend(AXES.iter().take(D).map(|axis| format!("{}_{axis}", condition.name)));
         }
-        Ok(Self(Table::create(path, &columns)?))
+        Ok(Self(Table::open(path, &columns, kept)?))
     }
 
     /// Appends the forces at `time`.
@@ -32,5 +37,10 @@ impl Reactions {
     /// Hands everything to the system.
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.0.flush()
+    }
+
+    /// Puts all rows on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.0.mark()
     }
 }

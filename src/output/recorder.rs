@@ -1,17 +1,21 @@
 //! Everything that is written about a run, in one place.
 
+use super::files::TEMPORARY;
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
-use super::progress::{Progress, Shown};
+use super::progress::{Audience, Progress, Shown};
 use super::reactions::Reactions;
 use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
-use super::snapshots::{SERIES, Snapshots};
+use super::snapshots::{SERIES, SnapshotMark, Snapshots};
+use super::warnings::{Watch, Watched};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
 use crate::simulation::{Simulation, StepReport};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -29,8 +33,8 @@ pub struct OutputSettings<const D: usize> {
     pub probes: Vec<Probe<D>>,
     /// Time at which the run will end, for the progress bar.
     pub end_time: f64,
-    /// Show no progress.
-    pub quiet: bool,
+    /// For whom progress is shown.
+    pub audience: Audience,
 }
 
 /// Writes a run: [`Recorder::start`], then [`Recorder::record`] after every step, then [`Recorder::finish`], also after a failure.
@@ -58,9 +62,42 @@ pub struct Recorder<const D: usize> {
     snapshots: Option<Snapshots>,
     newton: NewtonLog,
     progress: Progress,
+    watch: Watch,
     counts: Counts,
+    /// Of all steps; the total is that of what was done before `since`.
     seconds: Seconds,
     since: Instant,
+    /// Whether somebody may come back to a mark.
+    marked: bool,
+}
+
+/// Where the files of a run end at one moment, and what was counted until then: all that it takes to continue them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mark {
+    /// Bytes of each file that grows.
+    lengths: BTreeMap<String, u64>,
+    snapshots: Option<SnapshotMark>,
+    watch: Watch,
+    counts: Counts,
+    seconds: Seconds,
+}
+
+impl Mark {
+    /// Whether the files in `directory` still hold what they held then.
+    ///
+    /// # Errors
+    /// One of them is gone, or shorter.
+    pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
+        for (name, &length) in &self.lengths {
+            let path = directory.join(name);
+            let found = std::fs::metadata(&path).map_err(OutputError::io("continue", &path))?.len();
+            if found < length {
+                return Err(OutputError::Shorter { path });
+            }
+        }
+        self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
+    }
 }
 
 impl<const D: usize> Recorder<D> {
@@ -73,37 +110,88 @@ impl<const D: usize> Recorder<D> {
         simulation: &Simulation<D, L, A>,
         reference: Reference<D>,
     ) -> Result<Self, OutputError> {
-        reference.check(simulation)?;
-        let OutputSettings { directory, fields, snapshot_every, probes, end_time, quiet } = settings;
-        std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
-        remove_earlier_run(&directory)?;
-        let at = |name: &str| directory.join(name);
-        let loads = &simulation.loads;
-        let mut recorder = Self {
-            history: History::create(at("history.csv"), D)?,
-            reactions: match loads.prescribed.is_empty() {
-                true => None,
-                false => Some(Reactions::create(at("reactions.csv"), loads)?),
-            },
-            probes: match probes.is_empty() {
-                true => None,
-                false => Some(Probes::create(at("probes.csv"), probes)?),
-            },
-            snapshots: match snapshot_every {
-                None => None,
-                Some(every) => Some(Snapshots::new(directory.clone(), &fields, every)?),
-            },
-            newton: NewtonLog::create(at("newton.jsonl"))?,
-            progress: Progress::new(simulation.clock.time(), end_time, quiet),
-            counts: Counts { particles: simulation.particles.len(), ..Counts::default() },
-            seconds: Seconds::default(),
-            since: Instant::now(),
-            reference,
-            directory,
-        };
+        let mut recorder = Self::open(settings, simulation, reference, None)?;
         recorder.write_state(simulation, Cost::default())?;
         recorder.flush()?;
         Ok(recorder)
+    }
+
+    /// Continues the files of a run from `mark`, with the simulation as it was then and the reference of the start; what was
+    /// written later is cut off.
+    ///
+    /// # Errors
+    /// As [`Self::start`], and [`Mark::check`].
+    pub fn resume<L: Law, A: ShapeFunction>(
+        settings: OutputSettings<D>,
+        simulation: &Simulation<D, L, A>,
+        reference: Reference<D>,
+        mark: &Mark,
+    ) -> Result<Self, OutputError> {
+        mark.check(&settings.directory)?;
+        Self::open(settings, simulation, reference, Some(mark))
+    }
+
+    fn open<L: Law, A: ShapeFunction>(
+        settings: OutputSettings<D>,
+        simulation: &Simulation<D, L, A>,
+        reference: Reference<D>,
+        mark: Option<&Mark>,
+    ) -> Result<Self, OutputError> {
+        reference.check(simulation)?;
+        let OutputSettings { directory, fields, snapshot_every, probes, end_time, audience } = settings;
+        std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
+        remove_later_files(&directory, mark)?;
+        let at = |name: &str| directory.join(name);
+        // A file that the mark does not know begins anew.
+        let kept = |name: &str| mark.and_then(|mark| mark.lengths.get(name).copied());
+        let loads = &simulation.loads;
+        let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
+        Ok(Self {
+            history: History::open(at("history.csv"), D, kept("history.csv"))?,
+            reactions: match loads.prescribed.is_empty() {
+                true => None,
+                false => Some(Reactions::open(at("reactions.csv"), loads, kept("reactions.csv"))?),
+            },
+            probes: match probes.is_empty() {
+                true => None,
+                false => Some(Probes::open(at("probes.csv"), probes, kept("probes.csv"))?),
+            },
+            snapshots: match snapshot_every {
+                None => None,
+                Some(every) => {
+                    let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
+                    Some(Snapshots::new(directory.clone(), &fields, every, snapshots)?)
+                }
+            },
+            newton: NewtonLog::open(at("newton.jsonl"), kept("newton.jsonl"))?,
+            progress: Progress::new(simulation.clock.time(), end_time, audience),
+            watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),
+            counts: mark.map_or(begun, |mark| mark.counts),
+            seconds: mark.map_or_else(Seconds::default, |mark| mark.seconds),
+            since: Instant::now(),
+            marked: mark.is_some(),
+            reference,
+            directory,
+        })
+    }
+
+    /// Puts everything on the disk and says where the files end, so that [`Self::resume`] can continue them from here.
+    /// `newton.jsonl` then stays when the run has ended.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub fn mark(&mut self) -> Result<Mark, OutputError> {
+        self.marked = true;
+        let mut lengths = BTreeMap::from([self.history.mark()?, self.newton.mark()?]);
+        lengths.extend(self.reactions.as_mut().map(Reactions::mark).transpose()?);
+        lengths.extend(self.probes.as_mut().map(Probes::mark).transpose()?);
+        let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
+        let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
+        Ok(Mark { lengths, snapshots, watch, counts, seconds })
+    }
+
+    fn seconds_so_far(&self) -> Seconds {
+        Seconds { total: self.seconds.total + self.since.elapsed().as_secs_f64(), ..self.seconds }
     }
 
     /// Writes a step that has succeeded.
@@ -123,9 +211,13 @@ impl<const D: usize> Recorder<D> {
         }
         let newton = &step.newton.history;
         let cost = Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };
-        self.write_state(simulation, cost)?;
-        let clock = &simulation.clock;
-        self.progress.show(clock.time(), Shown { step: clock.steps(), newton: cost.newton, krylov: cost.krylov });
+        let energies = self.write_state(simulation, cost)?;
+        let (time, number) = (simulation.clock.time(), simulation.clock.steps());
+        let newton_limit = simulation.settings.newton.max_iterations;
+        let seen = Watched { time, step: number, energies, cost, failed: step.failed.len(), newton_limit };
+        self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
+        let Cost { newton, krylov, .. } = cost;
+        self.progress.show(time, Shown { step: number, newton, krylov, balance: energies.balance });
         Ok(())
     }
 
@@ -147,12 +239,11 @@ impl<const D: usize> Recorder<D> {
             snapshots.write(simulation, &self.reference)?;
         }
         self.flush()?;
+        let (counts, time, seconds) = (self.counts, simulation.clock.time(), self.seconds_so_far());
         self.progress.finish();
-        let (counts, time) = (self.counts, simulation.clock.time());
-        let seconds = Seconds { total: self.since.elapsed().as_secs_f64(), ..self.seconds };
         let energies = Energies::of(simulation, &self.reference);
-        let report = Report { asked, outcome, time, energies, counts, seconds };
-        report.write(&self.directory.join("report.json"), self.newton)?;
+        let report = Report { asked, outcome, time, energies, counts, seconds, warnings: self.watch.warnings() };
+        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         let particles = &simulation.particles;
         Ok(Summary {
             time,
@@ -168,15 +259,15 @@ impl<const D: usize> Recorder<D> {
         &mut self,
         simulation: &Simulation<D, L, A>,
         cost: Cost,
-    ) -> Result<(), OutputError> {
-        self.history.write(simulation, &self.reference, cost)?;
+    ) -> Result<Energies, OutputError> {
+        let energies = self.history.write(simulation, &self.reference, cost)?;
         if let Some(probes) = &mut self.probes {
             probes.write(simulation, &self.reference)?;
         }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write_if_due(simulation, &self.reference)?;
         }
-        Ok(())
+        Ok(energies)
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {
@@ -187,16 +278,22 @@ impl<const D: usize> Recorder<D> {
     }
 }
 
-/// Removes what an earlier run left under the names this one may use, so that no file of it is taken for a new one.
-fn remove_earlier_run(directory: &Path) -> Result<(), OutputError> {
+/// Removes what an earlier run left under the names this one may use and will not continue from `mark`, so that no file of it is
+/// taken for a new one.
+fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
+    let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
+    let continued = |name: &str| match name {
+        SERIES => mark.is_some(),
+        _ => mark.is_some_and(|mark| mark.lengths.contains_key(name)),
+    };
+    let own = ["reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
     let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
     for entry in entries {
         let entry = entry.map_err(OutputError::io("read", directory))?;
         let name = entry.file_name();
         let Some(name) = name.to_str() else { continue };
-        let numbered = name.strip_prefix("particles_").and_then(|rest| rest.strip_suffix(".vtu"));
-        let snapshot = numbered.is_some_and(|number| number.len() >= 6 && number.bytes().all(|b| b.is_ascii_digit()));
-        if snapshot || ["reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES].contains(&name) {
+        let file = own.contains(&name) && !continued(name);
+        if file || snapshots.precedes(name) || name.starts_with(TEMPORARY) {
             std::fs::remove_file(entry.path()).map_err(OutputError::io("remove", &entry.path()))?;
         }
     }

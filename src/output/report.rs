@@ -3,11 +3,12 @@
 use super::OutputError;
 use super::files::{Stream, write_atomically};
 use super::history::Energies;
+use super::warnings::Warning;
 use crate::causes;
 use crate::phases::Phase;
 use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
 use crate::solver::NewtonHistory;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -39,7 +40,8 @@ impl Outcome<'_> {
 }
 
 /// What was done, summed over all steps. Iterations, residuals and products of failed attempts at a step are counted too.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Counts {
     /// Particles.
     pub particles: usize,
@@ -90,7 +92,8 @@ impl Counts {
 }
 
 /// Seconds, summed over all steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Seconds {
     /// Of each of [`Phase::ALL`].
     pub phases: [f64; Phase::ALL.len()],
@@ -115,7 +118,7 @@ impl Seconds {
 
 /// A float in JSON, which has no NaN and no infinity: those become the strings "NaN", "inf" and "-inf" instead of null.
 #[derive(Clone, Copy, Debug)]
-struct Number(f64);
+pub(crate) struct Number(pub f64);
 
 impl Serialize for Number {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -183,9 +186,9 @@ struct StepLine<'a> {
 pub(crate) struct NewtonLog(Stream);
 
 impl NewtonLog {
-    /// Creates the file.
-    pub(crate) fn create(path: PathBuf) -> Result<Self, OutputError> {
-        Stream::create(path).map(Self)
+    /// Creates the file, or continues one whose first `kept` bytes are good.
+    pub(crate) fn open(path: PathBuf, kept: Option<u64>) -> Result<Self, OutputError> {
+        Stream::open(path, kept).map(Self)
     }
 
     /// Appends a step that ended at `time`.
@@ -202,6 +205,11 @@ impl NewtonLog {
     /// Hands everything to the system.
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.0.flush()
+    }
+
+    /// Puts everything on the disk; the name of the file, and its bytes.
+    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+        self.0.mark()
     }
 }
 
@@ -224,11 +232,13 @@ pub(crate) struct Report<'a> {
     pub counts: Counts,
     /// How long it took.
     pub seconds: Seconds,
+    /// What was warned of.
+    pub warnings: &'a [Warning],
 }
 
 impl Report<'_> {
-    /// Writes the report, all or nothing; the steps move from `log` into it line by line, then `log` is removed.
-    pub(crate) fn write(&self, path: &Path, mut log: NewtonLog) -> Result<(), OutputError> {
+    /// Writes the report, all or nothing; the steps go from `log` into it line by line, then `log` is removed unless it is `kept`.
+    pub(crate) fn write(&self, path: &Path, mut log: NewtonLog, kept: bool) -> Result<(), OutputError> {
         log.flush()?;
         let log = log.0.path();
         let head = serde_json::to_string_pretty(&self.head(path)?).map_err(json(path))?;
@@ -241,7 +251,7 @@ impl Report<'_> {
             }
             file.write_all(b"\n  ]\n}\n")
         })?;
-        std::fs::remove_file(log).map_err(OutputError::io("remove", log))
+        if kept { Ok(()) } else { std::fs::remove_file(log).map_err(OutputError::io("remove", log)) }
     }
 
     fn head(&self, path: &Path) -> Result<Map<String, Value>, OutputError> {
@@ -271,6 +281,7 @@ impl Report<'_> {
         head.insert("energies".to_owned(), energies.into());
         head.insert("counts".to_owned(), serde_json::to_value(self.counts).map_err(json(path))?);
         head.insert("seconds".to_owned(), seconds.into());
+        head.insert("warnings".to_owned(), serde_json::to_value(self.warnings).map_err(json(path))?);
         Ok(head)
     }
 }
@@ -291,12 +302,13 @@ mod tests {
             energies,
             counts: Counts::default(),
             seconds: Seconds::default(),
+            warnings: &[],
         };
         for lines in [&[][..], &["[1.0,1e-9]"], &["[1.0,1e-9]", "[]", "[2.5]"]] {
-            let mut log = NewtonLog::create(directory.path().join("newton.jsonl"))?;
+            let mut log = NewtonLog::open(directory.path().join("newton.jsonl"), None)?;
             lines.iter().try_for_each(|line| log.0.line(line))?;
             let path = directory.path().join("report.json");
-            report.write(&path, log)?;
+            report.write(&path, log, false)?;
             let read: Value = serde_json::from_slice(&std::fs::read(&path)?)?;
             let residuals: Vec<Value> =
                 lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<_, _>>()?;

@@ -1,13 +1,15 @@
 //! Snapshots of the particles: `particles_*.vtu`, and the series `particles.pvd`.
 
 use super::fields::padded;
-use super::pvd::Series;
+use super::pvd::{Series, first_entries};
 use super::vtu::{Array, Background, Snapshot, Values};
 use super::{OutputError, Reference};
+use crate::clock::Clock;
 use crate::field::{Field, Kind};
 use crate::material::Law;
 use crate::simulation::Simulation;
-use std::path::PathBuf;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
 
 /// The file of the series, in the directory of the run.
 pub(crate) const SERIES: &str = "particles.pvd";
@@ -20,16 +22,44 @@ pub(crate) struct Snapshots {
     series: Series,
     /// Time between snapshots.
     every: f64,
+    mark: SnapshotMark,
+}
+
+/// How far the snapshots of a run have come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SnapshotMark {
     written: usize,
     /// Steps taken when the last one was written.
     last: Option<u64>,
-    /// How many multiples of `every` the time had passed then.
-    passed: f64,
+    /// How many multiples of the time between snapshots had passed when the last one was due.
+    passed: Option<f64>,
+}
+
+impl SnapshotMark {
+    /// Whether the series in `directory` still holds all of them.
+    pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
+        // Nothing is written before the first snapshot.
+        if self.written > 0 { first_entries(&directory.join(SERIES), self.written).map(|_| ()) } else { Ok(()) }
+    }
+
+    /// Whether a file of this name is a snapshot, and one written later.
+    pub(crate) fn precedes(&self, name: &str) -> bool {
+        let number = name.strip_prefix("particles_").and_then(|rest| rest.strip_suffix(".vtu"));
+        let digits = number.filter(|number| number.len() >= 6 && number.bytes().all(|b| b.is_ascii_digit()));
+        digits.is_some_and(|digits| digits.parse().map_or(true, |number: usize| number >= self.written))
+    }
 }
 
 impl Snapshots {
     /// Of `fields` (each once, whatever the list says), into `directory`, whenever the time passes a multiple of `every`.
-    pub(crate) fn new(directory: PathBuf, fields: &[Field], every: f64) -> Result<Self, OutputError> {
+    /// What was written up to `mark` is continued.
+    pub(crate) fn new(
+        directory: PathBuf,
+        fields: &[Field],
+        every: f64,
+        mark: SnapshotMark,
+    ) -> Result<Self, OutputError> {
         if !(every > 0.0 && every.is_finite()) {
             return Err(OutputError::SnapshotEvery(every));
         }
@@ -39,8 +69,14 @@ impl Snapshots {
                 unique.push(field);
             }
         }
-        let series = Series::new(directory.join(SERIES));
-        Ok(Self { directory, fields: unique, series, every, written: 0, last: None, passed: f64::NEG_INFINITY })
+        let path = directory.join(SERIES);
+        let series = if mark.written > 0 { Series::resume(path, mark.written)? } else { Series::new(path) };
+        Ok(Self { directory, fields: unique, series, every, mark })
+    }
+
+    /// How far they have come.
+    pub(crate) fn mark(&self) -> SnapshotMark {
+        self.mark
     }
 
     /// Writes the present state if the time has reached a multiple of `every` since the last snapshot, or if there is none yet.
@@ -49,11 +85,10 @@ impl Snapshots {
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
     ) -> Result<(), OutputError> {
-        // Round-off must not put a step that ends on a multiple before it.
         let clock = &simulation.clock;
-        let passed = ((clock.time() + 1e-6 * clock.nominal()) / self.every).floor();
-        if passed > self.passed {
-            self.passed = passed;
+        let passed = multiples(clock, self.every);
+        if self.mark.passed.is_none_or(|before| passed > before) {
+            self.mark.passed = Some(passed);
             self.write(simulation, reference)?;
         }
         Ok(())
@@ -66,16 +101,22 @@ impl Snapshots {
         reference: &Reference<D>,
     ) -> Result<(), OutputError> {
         let step = simulation.clock.steps();
-        if self.last == Some(step) {
+        if self.mark.last == Some(step) {
             return Ok(());
         }
-        let file = format!("particles_{:06}.vtu", self.written);
+        let file = format!("particles_{:06}.vtu", self.mark.written);
         snapshot(simulation, reference, &self.fields)?.write(&self.directory.join(&file))?;
         self.series.push(simulation.clock.time(), &file)?;
-        self.written += 1;
-        self.last = Some(step);
+        self.mark.written += 1;
+        self.mark.last = Some(step);
         Ok(())
     }
+}
+
+/// How many multiples of `every` the time has reached.
+pub(crate) fn multiples(clock: &Clock, every: f64) -> f64 {
+    // Round-off must not put a step that ends on a multiple before it.
+    ((clock.time() + 1e-6 * clock.nominal()) / every).floor()
 }
 
 /// The particles with the fields asked for; no others are computed.

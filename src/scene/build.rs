@@ -211,6 +211,7 @@ impl Scene {
                     Method::Gmres(gmres) => solver::Krylov::Gmres { restart: gmres.restart as usize },
                     Method::ConjugateGradient => solver::Krylov::ConjugateGradient,
                 },
+                precision: krylov.precision,
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },

@@ -4,7 +4,7 @@ use super::place::Place;
 use std::fmt::{self, Display};
 
 /// Problems kept; a table of a million wrong rows needs no million messages.
-const KEPT: usize = 50;
+pub(super) const KEPT: usize = 50;
 
 /// Bodies, loads, parts of a shape or probes, at most.
 pub(super) const MOST: usize = 1000;

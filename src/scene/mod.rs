@@ -9,6 +9,7 @@ pub mod body;
 pub mod boundary;
 pub mod check;
 pub mod grid;
+pub mod keys;
 pub mod load;
 pub mod output;
 pub mod particle_file;
@@ -37,6 +38,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
+    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. Of no other effect.
+    #[serde(rename = "$schema")]
+    pub schema: Option<String>,
     /// One line about the scene.
     pub title: Option<String>,
     /// The box and its background grid.

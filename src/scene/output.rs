@@ -16,6 +16,10 @@ pub struct Output {
     /// The time between two snapshots of all particles, > 0. Default: no snapshots.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
+    /// The time between two checkpoints, > 0, from which `bfree run SCENE --restart` continues a run that was killed, with the same
+    /// bits. One more is written at the start, at the end and on Ctrl-C; the last two are kept. Default: no checkpoints.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub checkpoint: Option<f64>,
     /// The fields of a snapshot, each at most once. Default: displacement, velocity, stress, jacobian.
     #[serde(default = "Output::default_fields")]
     pub fields: Vec<Field>,
@@ -26,7 +30,7 @@ pub struct Output {
 
 impl Default for Output {
     fn default() -> Self {
-        Self { every: None, fields: Self::default_fields(), probes: Vec::new() }
+        Self { every: None, checkpoint: None, fields: Self::default_fields(), probes: Vec::new() }
     }
 }
 
@@ -64,6 +68,9 @@ impl Output {
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
         if let Some(every) = self.every {
             problems.positive("output.every", every);
+        }
+        if let Some(checkpoint) = self.checkpoint {
+            problems.positive("output.checkpoint", checkpoint);
         }
         for (i, field) in problems.few("output.fields", &self.fields).iter().enumerate() {
             let again = self.fields.iter().take(i).any(|earlier| earlier == field);

@@ -1,9 +1,9 @@
 //! From text to a checked scene.
 
-use super::check::Problems;
+use super::check::{KEPT, Problems};
 use super::overrides::{Override, OverrideError};
 use super::place::{Place, Step, locate, path, steps};
-use super::{Scene, suggest};
+use super::{Scene, keys, suggest};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use serde_path_to_error::Segment;
@@ -30,8 +30,11 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// The text is too long.
-    #[error("the scene is longer than {MAX_BYTES} bytes, the most that is read; give many particles in a CSV file")]
-    TooLong,
+    #[error(
+        "the scene{} is longer than {MAX_BYTES} bytes, the most that is read; give many particles in a CSV file",
+        .0.map_or(String::new(), |found| format!(", of {found} bytes,"))
+    )]
+    TooLong(Option<u64>),
     /// The text is not UTF-8.
     #[error("the scene is not UTF-8 text: byte {0} cannot be read")]
     NotText(usize),
@@ -55,6 +58,8 @@ pub struct Malformed {
     pub message: String,
     /// Where.
     pub place: Option<Place>,
+    /// What else is wrong of the same kind.
+    pub others: Vec<Malformed>,
 }
 
 impl Display for Malformed {
@@ -64,7 +69,8 @@ impl Display for Malformed {
         let path: String = self.path.chars().take(PATH).collect();
         let more = if path.len() < self.path.len() { "…" } else { "" };
         write!(f, "{path}{more}{separator}{}", self.message)?;
-        self.place.iter().try_for_each(|place| write!(f, "\n{place}"))
+        self.place.iter().try_for_each(|place| write!(f, "\n{place}"))?;
+        self.others.iter().try_for_each(|other| write!(f, "\n{other}"))
     }
 }
 
@@ -76,9 +82,14 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
     let failed = |source| SceneError::File { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
+    // A pipe or a device does not say how long it is; of a file that does, nothing needs to be read.
+    let length = file.metadata().map_err(failed)?.len();
+    if length > MAX_BYTES {
+        return Err(SceneError::TooLong(Some(length)));
+    }
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong);
+        return Err(SceneError::TooLong(None));
     }
     let text = std::str::from_utf8(&bytes).map_err(|wrong| SceneError::NotText(wrong.valid_up_to()))?;
     read(text, overrides)
@@ -93,30 +104,47 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 /// What is wrong, at which key, and where that stands in the text (or in which override).
 pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     if text.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong);
+        return Err(SceneError::TooLong(None));
     }
     let text = text.trim_start_matches('\u{feff}');
     if text.trim().is_empty() {
         let message = format!("the text is empty; {SHAPE}");
-        return Err(Malformed { path: String::new(), message, place: None }.into());
+        return Err(Malformed { path: String::new(), message, place: None, others: Vec::new() }.into());
     }
     let mut json = parse(text)?;
     for replaced in overrides {
         replaced.apply(&mut json)?;
     }
     if !json.is_object() {
-        return Err(
-            Malformed { path: String::new(), message: SHAPE.to_owned(), place: Some(Place::at(text, 0)) }.into()
-        );
+        let place = Some(Place::at(text, 0));
+        return Err(Malformed { path: String::new(), message: SHAPE.to_owned(), place, others: Vec::new() }.into());
     }
 
     let place = |steps: &[Step]| find(steps, text, overrides);
     let scene: Scene = serde_path_to_error::deserialize(&json).map_err(|error| {
-        let steps = segments(error.path());
-        Malformed { path: path(&steps), message: explain(&error.inner().to_string()), place: place(&steps) }
+        let malformed = |steps: &[Step], message: &str| Malformed {
+            path: path(steps),
+            message: explain(message),
+            place: place(steps),
+            others: Vec::new(),
+        };
+        let (first, said) = (segments(error.path()), error.inner().to_string());
+        // Of one key serde's word is enough; of an object, several keys may be missing.
+        let another = |(steps, message): &(Vec<Step>, String)| {
+            *steps != first || (message.starts_with("missing field") && *message != said)
+        };
+        let others = keys::wrong(&json).into_iter().filter(another).take(KEPT - 1);
+        let others = others.map(|(steps, message)| malformed(&steps, &message)).collect();
+        Malformed { others, ..malformed(&first, &said) }
     })?;
     if let Some((steps, message)) = serde_json::to_value(&scene).ok().and_then(|read| misshapen(&json, &read)) {
-        return Err(Malformed { path: path(&steps), message: message.to_owned(), place: place(&steps) }.into());
+        return Err(Malformed {
+            path: path(&steps),
+            message: message.to_owned(),
+            place: place(&steps),
+            others: Vec::new(),
+        }
+        .into());
     }
     let mut problems = scene.check();
     for problem in &mut problems.list {
@@ -160,7 +188,7 @@ pub(super) fn parse(text: &str) -> Result<Value, Malformed> {
             Place::Text { excerpt, indent, .. } => hint(&excerpt.chars().skip(*indent).collect::<String>()),
             Place::Override(_) => "",
         };
-        Malformed { path, message: format!("{bare}{hint}"), place: Some(place) }
+        Malformed { path, message: format!("{bare}{hint}"), place: Some(place), others: Vec::new() }
     };
     let value: Unique = serde_path_to_error::deserialize(&mut json)
         .map_err(|error| located(path(&segments(error.path())), error.inner()))?;

@@ -1,6 +1,7 @@
 //! Settings of Newton's method and of the linear solver.
 
 use super::check::Problems;
+use crate::solver::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,9 @@ pub struct Krylov {
     /// How far each linear problem is solved.
     #[serde(default)]
     pub forcing: Forcing,
+    /// The numbers of Krylov vectors, tangent products and preconditioner. Default "double".
+    #[serde(default)]
+    pub precision: Precision,
     /// Iterations of one linear solve, at most, 1 to 1000000. Default 2000.
     #[serde(default = "Krylov::default_max_iterations")]
     #[schemars(range(min = 1, max = 1_000_000))]
@@ -72,7 +76,8 @@ impl Krylov {
 impl Default for Krylov {
     fn default() -> Self {
         let max_iterations = Self::default_max_iterations();
-        Self { method: Method::default(), forcing: Forcing::default(), max_iterations }
+        let (method, forcing, precision) = Default::default();
+        Self { method, forcing, precision, max_iterations }
     }
 }
 

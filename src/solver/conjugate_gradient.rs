@@ -1,13 +1,13 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
-use super::vector::{axpy, dot, norm, xpby};
+use super::vector::{Entry, axpy, dot, norm, xpby};
 use super::{
     InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
     true_residual,
 };
 
-/// A curvature below this part of the largest one seen is round-off: neither its size nor its sign means anything.
-const UNRESOLVED: f64 = 16.0 * f64::EPSILON;
+/// A curvature below this part of the largest one seen, in units of round-off: neither its size nor its sign means anything.
+const UNRESOLVED: f64 = 16.0;
 
 /// Iterations beyond n without a better residual after which nothing more is expected: exact arithmetic ends at n.
 const PATIENCE: usize = 50;
@@ -43,16 +43,16 @@ impl Default for ConjugateGradientSettings {
 ///
 /// # Errors
 /// A setting out of range, lengths that differ, NaN or infinity.
-pub fn conjugate_gradient<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+pub fn conjugate_gradient<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
     operator: &A,
     preconditioner: &M,
-    rhs: &[f64],
-    solution: &mut [f64],
+    rhs: &[S],
+    solution: &mut [S],
     settings: &ConjugateGradientSettings,
 ) -> Result<LinearReport, LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
     let b_norm = checked_norm(rhs, solution)?;
-    solution.fill(0.0);
+    solution.fill(S::zero());
     let mut report =
         LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 };
     if b_norm == 0.0 {
@@ -94,18 +94,18 @@ struct Run {
 }
 
 /// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`.
-fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+fn descend<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
     operator: &A,
     preconditioner: &M,
-    r: &mut [f64],
+    r: &mut [S],
     r_norm: f64,
     target: f64,
-    solution: &mut [f64],
+    solution: &mut [S],
     allowed: usize,
 ) -> Result<Run, LinearError> {
     let n = r.len();
     let mut x = solution.to_vec();
-    let (mut z, mut q) = (vec![0.0; n], vec![0.0; n]);
+    let (mut z, mut q) = (vec![S::zero(); n], vec![S::zero(); n]);
     preconditioner.precondition(r, &mut z);
     let mut p = z.clone();
     let mut rz = dot(r, &z);
@@ -131,8 +131,9 @@ fn descend<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
         let curvature = p_a_p / p_m_p;
         largest = largest.max(curvature);
-        if curvature <= UNRESOLVED * largest {
-            let negative = curvature < -UNRESOLVED * largest;
+        let unresolved = UNRESOLVED * S::EPSILON * largest;
+        if curvature <= unresolved {
+            let negative = curvature < -unresolved;
             return stop(if negative { LinearOutcome::NegativeCurvature } else { LinearOutcome::Stagnated }, run);
         }
         // α = r·z / p·Ap

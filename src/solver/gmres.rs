@@ -1,6 +1,6 @@
 //! Restarted GMRES, preconditioned from the right (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.5).
 
-use super::vector::{axpy, dot, norm, scaled};
+use super::vector::{Entry, axpy, dot, norm, scaled};
 use super::{
     InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
     true_residual,
@@ -10,8 +10,8 @@ use super::{
 /// Kaufman, Stewart 1976).
 const REORTHOGONALISE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A new direction below this part of the vector it was made from is round-off: the Krylov space is exhausted.
-const EXHAUSTED: f64 = 8.0 * f64::EPSILON;
+/// A new direction below this part of the vector it was made from, in units of round-off: the Krylov space is exhausted.
+const EXHAUSTED: f64 = 8.0;
 
 /// A whole cycle that leaves more than this part of the residual is stagnation: a thousand such cycles gain a factor e.
 const STAGNATION: f64 = 0.999;
@@ -53,17 +53,17 @@ impl Default for GmresSettings {
 ///
 /// # Errors
 /// A setting out of range, lengths that differ, NaN or infinity.
-pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
     operator: &A,
     preconditioner: &M,
-    rhs: &[f64],
-    solution: &mut [f64],
+    rhs: &[S],
+    solution: &mut [S],
     settings: &GmresSettings,
 ) -> Result<LinearReport, LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
     InvalidSetting::check_restart(settings.restart)?;
     let b_norm = checked_norm(rhs, solution)?;
-    solution.fill(0.0);
+    solution.fill(S::zero());
     let mut report =
         LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 };
     if b_norm == 0.0 {
@@ -74,8 +74,8 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
     let mut restart = settings.restart.min(rhs.len());
     let mut r = rhs.to_vec();
     let mut r_norm = b_norm;
-    let mut trial = vec![0.0; rhs.len()];
-    let mut correction = vec![0.0; rhs.len()];
+    let mut trial = vec![S::zero(); rhs.len()];
+    let mut correction = vec![S::zero(); rhs.len()];
     loop {
         report.relative_residual = r_norm / b_norm;
         if report.iterations >= settings.max_iterations {
@@ -113,37 +113,44 @@ pub fn gmres<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the
 /// correction of x and returns the iterations taken and the norm the residual should have then.
-fn cycle<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
+fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
     operator: &A,
     preconditioner: &M,
-    r: &[f64],
+    r: &[S],
     r_norm: f64,
     target: f64,
     length: usize,
-    correction: &mut [f64],
+    correction: &mut [S],
 ) -> Result<(usize, f64), LinearError> {
-    let mut v = vec![0.0; r.len()];
+    let mut v = vec![S::zero(); r.len()];
     scaled(1.0 / r_norm, r, &mut v);
     // Grows by one vector an iteration: what is not needed is not allocated.
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let mut triangle = Triangle { columns: Vec::new(), rotations: Vec::new(), g: Vec::new(), last: r_norm };
+    let mut basis: Vec<Vec<S>> = Vec::new();
+    let exhausted_below = EXHAUSTED * S::EPSILON;
+    let mut triangle = Triangle {
+        columns: Vec::new(),
+        rotations: Vec::new(),
+        g: Vec::new(),
+        last: r_norm,
+        negligible: exhausted_below,
+    };
     for iteration in 0..length {
-        let mut w = vec![0.0; r.len()];
+        let mut w = vec![S::zero(); r.len()];
         // `correction` holds M⁻¹ v meanwhile.
         preconditioner.precondition(&v, correction);
         operator.apply(correction, &mut w);
         basis.push(v);
         let w_norm = finite(norm(&w), "the norm of a Krylov vector", iteration)?;
         let (column, left) = orthogonalise(&mut w, w_norm, &basis);
-        let exhausted = left <= EXHAUSTED * w_norm;
+        let exhausted = left <= exhausted_below * w_norm;
         triangle.push(column, if exhausted { 0.0 } else { left });
         if exhausted || triangle.residual() <= target {
             break;
         }
-        v = vec![0.0; r.len()];
+        v = vec![S::zero(); r.len()];
         scaled(1.0 / left, &w, &mut v);
     }
-    let mut sum = vec![0.0; r.len()];
+    let mut sum = vec![S::zero(); r.len()];
     for (y, v) in triangle.solve().iter().zip(&basis) {
         axpy(*y, v, &mut sum);
     }
@@ -152,7 +159,7 @@ fn cycle<A: LinearOperator + ?Sized, M: Preconditioner + ?Sized>(
 }
 
 /// Takes out of `w` its parts along the orthonormal `basis`. Returns these parts and the norm of what is left.
-fn orthogonalise(w: &mut [f64], w_norm: f64, basis: &[Vec<f64>]) -> (Vec<f64>, f64) {
+fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Vec<S>]) -> (Vec<f64>, f64) {
     let mut column = vec![0.0; basis.len()];
     let mut before = w_norm;
     for _ in 0..2 {
@@ -181,6 +188,8 @@ struct Triangle {
     g: Vec<f64>,
     /// Its entry below the triangle, the residual up to sign.
     last: f64,
+    /// A pivot below this part of the largest one is round-off.
+    negligible: f64,
 }
 
 impl Triangle {
@@ -215,7 +224,7 @@ impl Triangle {
         let largest = (0..self.columns.len()).map(diagonal).fold(0.0, f64::max);
         // Only an exhausted space of a singular operator ends in a zero pivot.
         let mut n = self.columns.len();
-        while n > 0 && diagonal(n - 1) <= EXHAUSTED * largest {
+        while n > 0 && diagonal(n - 1) <= self.negligible * largest {
             n -= 1;
         }
         let mut y = self.g[..n].to_vec();

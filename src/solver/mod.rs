@@ -14,27 +14,35 @@ pub use forcing::Forcing;
 pub use gmres::{GmresSettings, gmres};
 pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
-    NewtonIteration, NewtonReport, NewtonSettings, newton,
+    NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
 
-/// A square matrix known by its product.
-pub trait LinearOperator {
+use vector::Entry;
+
+/// A square matrix known by its product, in double or single precision.
+pub trait LinearOperator<S = f64> {
     /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
-    fn apply(&self, x: &[f64], y: &mut [f64]);
+    fn apply(&self, x: &[S], y: &mut [S]);
 }
 
 /// An approximate inverse M⁻¹, the same linear map at every call.
-pub trait Preconditioner {
+pub trait Preconditioner<S = f64> {
     /// `z = M⁻¹ r`; `r` and `z` have the order of the operator, and `z` is overwritten.
-    fn precondition(&self, r: &[f64], z: &mut [f64]);
+    fn precondition(&self, r: &[S], z: &mut [S]);
+}
+
+/// A tangent in single precision, divided by a power of two that keeps its entries near 1, whatever the units.
+pub trait SingleTangent: LinearOperator<f32> + Preconditioner<f32> {
+    /// That power of two.
+    fn scale(&self) -> f64;
 }
 
 /// No preconditioning: M = I.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity;
 
-impl Preconditioner for Identity {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+impl<S: Copy> Preconditioner<S> for Identity {
+    fn precondition(&self, r: &[S], z: &mut [S]) {
         z.copy_from_slice(r);
     }
 }
@@ -70,6 +78,14 @@ pub trait NonlinearProblem {
     /// # Errors
     /// x is not admissible.
     fn linearize(&self, x: &[f64]) -> Result<Self::Tangent<'_>, Self::Inadmissible>;
+
+    /// The tangent at x in single precision; `None` if there is none.
+    ///
+    /// # Errors
+    /// x is not admissible.
+    fn linearize_single(&self, _x: &[f64]) -> Result<Option<Box<dyn SingleTangent + '_>>, Self::Inadmissible> {
+        Ok(None)
+    }
 }
 
 /// What a Krylov method did.
@@ -166,7 +182,7 @@ impl InvalidSetting {
 }
 
 /// Common start of the Krylov methods: agreeing lengths and a finite ‖b‖, which is returned.
-fn checked_norm(rhs: &[f64], solution: &[f64]) -> Result<f64, LinearError> {
+fn checked_norm<S: Entry>(rhs: &[S], solution: &[S]) -> Result<f64, LinearError> {
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
     }
@@ -179,7 +195,7 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
 }
 
 /// `r = b − A x`, and its norm.
-fn true_residual<A: LinearOperator + ?Sized>(operator: &A, rhs: &[f64], x: &[f64], r: &mut [f64]) -> f64 {
+fn true_residual<S: Entry, A: LinearOperator<S> + ?Sized>(operator: &A, rhs: &[S], x: &[S], r: &mut [S]) -> f64 {
     operator.apply(x, r);
     vector::xpby(rhs, -1.0, r);
     vector::norm(r)

@@ -4,7 +4,22 @@
 //! them. Every function takes vectors of one length (the shorter one counts if they differ). Products are formed as they
 //! are: in [`dot`], entries should lie between 1e-150 and 1e150 in magnitude, or be zero; [`norm`] takes any.
 
+use crate::scalar::Real;
 use rayon::prelude::*;
+
+/// What vectors are made of: `f64` or `f32`. Reductions are added up in double precision in both.
+pub trait Entry: Real + Send + Sync {
+    /// The unit of round-off.
+    const EPSILON: f64;
+}
+
+impl Entry for f64 {
+    const EPSILON: f64 = Self::EPSILON;
+}
+
+impl Entry for f32 {
+    const EPSILON: f64 = Self::EPSILON as f64;
+}
 
 /// Entries per partial sum.
 const CHUNK: usize = 4096;
@@ -16,7 +31,7 @@ const PARALLEL: usize = 8 * CHUNK;
 const LANES: usize = 8;
 
 /// `Σ xᵢ yᵢ`
-pub fn dot(x: &[f64], y: &[f64]) -> f64 {
+pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
@@ -25,11 +40,11 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     }
 }
 
-fn dot_chunk(x: &[f64], y: &[f64]) -> f64 {
+fn dot_chunk<S: Entry>(x: &[S], y: &[S]) -> f64 {
     let mut lanes = [0.0; LANES];
     for (x, y) in x.chunks(LANES).zip(y.chunks(LANES)) {
         for ((sum, x), y) in lanes.iter_mut().zip(x).zip(y) {
-            *sum += x * y;
+            *sum += x.value() * y.value();
         }
     }
     lanes.iter().sum()
@@ -39,40 +54,43 @@ fn dot_chunk(x: &[f64], y: &[f64]) -> f64 {
 const SAFE_SQUARE: f64 = 1e-280;
 
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
-pub fn norm(x: &[f64]) -> f64 {
+pub fn norm<S: Entry>(x: &[S]) -> f64 {
     let square = dot(x, x);
     if (SAFE_SQUARE..=f64::MAX).contains(&square) {
         return square.sqrt();
     }
     // Squares under- or overflow, all entries are zero, or one is not finite.
-    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.value().abs()));
     if largest == 0.0 || !largest.is_finite() || square.is_nan() {
         return square.sqrt();
     }
     // ‖x‖ = 2ᵏ ‖x/2ᵏ‖ with 2ᵏ near the largest entry: exact. 2ᵏ in two factors, neither of which over- or underflows.
     let k = largest.log2() as i32;
     let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
-    let scaled: Vec<f64> = x.iter().map(|x| x * half * rest).collect();
+    let scaled: Vec<f64> = x.iter().map(|x| x.value() * half * rest).collect();
     dot(&scaled, &scaled).sqrt() / half / rest
 }
 
 /// `y ← a x + y`
-pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+pub fn axpy<S: Entry>(a: f64, x: &[S], y: &mut [S]) {
+    let a = S::lit(a);
     update(x, y, |x, y| a * x + y);
 }
 
 /// `y ← x + b y`
-pub fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
+pub fn xpby<S: Entry>(x: &[S], b: f64, y: &mut [S]) {
+    let b = S::lit(b);
     update(x, y, |x, y| x + b * y);
 }
 
 /// `y ← a x`
-pub fn scaled(a: f64, x: &[f64], y: &mut [f64]) {
+pub fn scaled<S: Entry>(a: f64, x: &[S], y: &mut [S]) {
+    let a = S::lit(a);
     update(x, y, |x, _| a * x);
 }
 
-fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
-    let chunk = |(x, y): (&[f64], &mut [f64])| {
+fn update<S: Entry>(x: &[S], y: &mut [S], f: impl Fn(S, S) -> S + Sync) {
+    let chunk = |(x, y): (&[S], &mut [S])| {
         for (x, y) in x.iter().zip(y) {
             *y = f(*x, *y);
         }

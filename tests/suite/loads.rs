@@ -1,6 +1,9 @@
 //! Moving walls, follower pressure, tractions: facts about loads on whole runs.
 
-use bfree::mechanics::loads::Pressing;
+use bfree::approximation::{Approximation, Linear};
+use bfree::grid::Grid;
+use bfree::mechanics::loads::{Curve, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
+use bfree::mechanics::sweep::Supports;
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -108,9 +111,14 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
                     "material": {"neo_hookean": {"lambda": 10, "shear": 10}}}],
         "boundary": {"left": moving, "right": moving, "bottom": moving, "top": moving}
     }))?;
+    let start = simulation.particles.position.clone();
     for _ in 0..10 {
         simulation.advance()?;
         let t = simulation.clock.time();
+        // The walls have moved by the integral of their velocity, whatever the step.
+        for (x, x0) in simulation.particles.position.iter().zip(&start) {
+            assert!((x - x0 - Vector::from([1.5, 0.5]) * t * t).amax() < 1e-13, "x = {x} at t = {t}");
+        }
         for (v, a) in simulation.particles.velocity.iter().zip(&simulation.particles.acceleration) {
             assert!((v - Vector::from([3.0, 1.0]) * t).amax() < 1e-13, "v = {v} at t = {t}");
             assert!((a - Vector::from([3.0, 1.0])).amax() < 1e-12, "a = {a} at t = {t}");
@@ -232,6 +240,31 @@ fn a_traction_pulls_a_bar_to_its_static_stretch() -> Result<(), Failure> {
         if (0.3..1.8).contains(&x[0]) {
             assert!((1.0 + h[(0, 0)] - stretch).abs() < 0.02 * stretch, "F = {} at {}", 1.0 + h[(0, 0)], x[0]);
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn every_load_follows_its_curve() -> Result<(), Failure> {
+    let ramp = Curve::new(vec![[0.0, 0.0], [4.0, 2.0]])?;
+    let point = SurfacePoint { particle: 0, normal: Vector::from([0.6, 0.8]), area: 0.25, offset: 0.0 };
+    let surface = |pressing| SurfaceLoad { pressing, curve: ramp.clone(), points: vec![point] };
+    let loads = Loads::<2> {
+        gravity: Some(Gravity { acceleration: Vector::from([0.0, -8.0]), curve: ramp.clone() }),
+        surface: vec![surface(Pressing::Traction(Vector::from([16.0, 0.0]))), surface(Pressing::Pressure(40.0))],
+        prescribed: Vec::new(),
+    };
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [1, 1] };
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &[Vector::from([0.5, 0.5])])?;
+    for (t, factor) in [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (9.0, 2.0)] {
+        // A particle of mass 3 in the middle of four nodes: a quarter of m b, and of T A, to each.
+        for force in loads.dead(t, &[0.75; 4], &supports) {
+            assert_eq!(force, Vector::from([0.25 * 16.0 * 0.25, 0.75 * -8.0]) * factor, "t = {t}");
+        }
+        let pressures = loads.pressures(t);
+        assert_eq!((pressures.len(), pressures[0].particle), (1, 0));
+        // p A N
+        assert!((pressures[0].force - Vector::from([6.0, 8.0]) * factor).norm() < 1e-14, "t = {t}");
     }
     Ok(())
 }

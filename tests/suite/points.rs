@@ -2,8 +2,10 @@
 
 use bfree::approximation::{Approximation, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction, Support};
 use bfree::grid::Grid;
-use bfree::material::{FrozenTangent, Lame, Law, Material, NeoHookean, StVenantKirchhoff, admissible, first_piola};
-use bfree::tensor::{Tensor, Vector, identity};
+use bfree::material::{
+    FrozenTangent, Lame, LameError, Law, Material, NeoHookean, StVenantKirchhoff, admissible, first_piola,
+};
+use bfree::tensor::{Deformation, Tensor, Vector, identity};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -136,4 +138,60 @@ fn laws_are_those_of_the_reference() {
         // The reference gives the block for gradients in the reference configuration.
         check("K", law.freeze(&identity(), &at, 1.0).block(&v, &b), point.K_vb_per_unit_volume);
     }
+}
+
+#[test]
+fn three_pairs_of_constants_are_one_solid() -> Result<(), LameError> {
+    for (lambda, shear) in [(300.0, 200.0), (-20.0, 50.0), (7e9, 3.0)] {
+        let solid = Lame::new(lambda, shear)?;
+        let (young, poisson) =
+            (shear * (3.0 * lambda + 2.0 * shear) / (lambda + shear), 0.5 * lambda / (lambda + shear));
+        for same in [Lame::from_young_poisson(young, poisson)?, Lame::from_bulk_shear(lambda + shear / 1.5, shear)?] {
+            // 1 − 2ν loses as many digits as Λ is larger than G.
+            let digits = 16.0 * f64::EPSILON * (1.0 + (lambda / shear).abs());
+            assert!(
+                (same.shear / shear - 1.0).abs() < 1e-15 && (same.lambda / lambda - 1.0).abs() < digits,
+                "{same:?}"
+            );
+        }
+        // The stiffness of a bar that cannot contract.
+        let laws: [Material; 3] = [
+            NeoHookean::ciarlet(solid).into(),
+            NeoHookean::logarithmic(solid).into(),
+            StVenantKirchhoff { lame: solid }.into(),
+        ];
+        for law in laws {
+            let stiffness = law.elasticity(&Deformation::new(Tensor::<f64, 1>::zeros()), &identity())[0];
+            assert!((stiffness / solid.p_wave_modulus() - 1.0).abs() < 1e-15, "{law:?}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn constants_at_the_limits_of_stability_are_refused() {
+    let inf = f64::INFINITY;
+    for shear in [0.0, -1.0, inf, f64::NAN] {
+        assert!(matches!(Lame::new(1.0, shear), Err(LameError::Shear(_))), "G = {shear}");
+        assert!(matches!(Lame::from_bulk_shear(1.0, shear), Err(LameError::Shear(_))), "G = {shear}");
+    }
+    assert!(matches!(Lame::new(-2.0, 3.0), Err(LameError::Bulk(_))));
+    for bulk in [0.0, -1.0, inf, f64::NAN] {
+        assert_eq!(Lame::from_bulk_shear(bulk, 1.0).map_err(|error| error.to_string().contains("bulk")), Err(true));
+    }
+    for young in [0.0, -1.0, inf, f64::NAN] {
+        assert!(matches!(Lame::from_young_poisson(young, 0.3), Err(LameError::Young(_))), "E = {young}");
+    }
+    for poisson in [-1.0, 0.5, -1.5, 0.6, f64::NAN] {
+        assert!(matches!(Lame::from_young_poisson(1.0, poisson), Err(LameError::Poisson(_))), "ν = {poisson}");
+    }
+}
+
+#[test]
+fn a_body_without_volume_or_of_infinite_volume_is_inadmissible() {
+    for stretch in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+        let h = Tensor::<f64, 2>::new(stretch - 1.0, 0.0, 0.0, 0.0);
+        assert!(admissible(h).is_err(), "F = diag({stretch}, 1)");
+    }
+    assert!(admissible(Tensor::<f64, 2>::new(f64::EPSILON - 1.0, 0.0, 0.0, 0.0)).is_ok());
 }

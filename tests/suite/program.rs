@@ -221,6 +221,91 @@ fn every_refusal_names_the_file() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_new_scene_is_checked_runs_and_is_never_overwritten() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let new = |arguments: &[&str]| -> Result<(Option<i32>, String), Failure> {
+        let output = program().arg("new").args(arguments).current_dir(&folder).output()?;
+        Ok((output.status.code(), String::from_utf8(output.stdout)? + &String::from_utf8(output.stderr)?))
+    };
+    let (code, list) = new(&[])?;
+    assert_eq!(code, Some(0));
+    let problems: Vec<&str> = list.lines().skip(2).filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(problems.len() >= 6 && list.contains("Rebound of an elastic cylinder"), "{list}");
+    for problem in problems {
+        let (code, text) = new(&[problem])?;
+        assert_eq!(code, Some(0), "{text}");
+        assert!(text.contains("bodies[].density") && text.contains("Mass per reference volume, > 0."), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 110), "{text}");
+        let file = folder.path().join(format!("{problem}.json"));
+        let scene = std::fs::read_to_string(&file)?;
+        let schema = folder.path().join("scene.schema.json");
+        assert_eq!(serde_json::from_str::<Value>(&scene)?["$schema"], "scene.schema.json");
+        assert!(serde_json::from_slice::<Value>(&std::fs::read(&schema)?)?["$defs"].is_object());
+        let output = program().arg("check").arg(&file).output()?;
+        assert!(output.status.success(), "{}", String::from_utf8(output.stderr)?);
+        let out = folder.path().join("out");
+        let output = program().arg("run").arg(&file).args(["--steps", "3", "--quiet", "--out"]).arg(&out).output()?;
+        assert_eq!((output.status.code(), String::from_utf8(output.stderr)?.as_str()), (Some(0), ""));
+        assert_eq!(report(&out)?["counts"]["steps"], 3);
+        let (code, text) = new(&[problem])?;
+        assert!(
+            code == Some(2) && text.contains(&format!("cannot write {problem}.json")) && text.contains("exists"),
+            "{text}"
+        );
+        assert_eq!(std::fs::read_to_string(&file)?, scene);
+    }
+    let (code, text) = new(&["rebund"])?;
+    assert!(code == Some(2) && text.contains("'rebound'"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_program_that_watches_reads_json() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}}]"#;
+    let arguments = ["--progress", "json", "--until", "24", "--set", "time.lumping=0.05", "--set", far];
+    let output = rebound(directory.path(), &arguments)?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{text}");
+    let lines: Vec<Value> = text.lines().map(serde_json::from_str).collect::<Result<_, _>>()?;
+    assert_eq!(lines[0]["event"], "warning");
+    assert!(lines[0]["message"].as_str().is_some_and(|words| words.starts_with("probe \"far\"")), "{text}");
+    let steps: Vec<&Value> = lines.iter().filter(|line| line["event"] == "step").collect();
+    let last = steps.last().ok_or("no step")?;
+    assert_eq!((&last["step"], &last["time"], &last["end"]), (&480.into(), &24.0.into(), &24.0.into()));
+    let history = std::fs::read_to_string(directory.path().join("history.csv"))?;
+    let row: Vec<&str> = history.lines().last().ok_or("no rows")?.split(',').collect();
+    assert_eq!((last["balance"].as_f64(), last["krylov"].to_string()), (row[7].parse().ok(), row[11].to_owned()));
+    assert!(last["seconds_left"].as_f64() == Some(0.0) && last["seconds"].as_f64() > Some(0.0), "{last}");
+    assert!(steps.is_sorted_by_key(|step| step["step"].as_u64()));
+    // what was warned of is in the report too
+    let warned = lines.iter().filter(|line| line["event"] == "warning" && line["kind"].is_string()).count();
+    assert_eq!(report(directory.path())?["warnings"].as_array().map(Vec::len), Some(warned));
+    let both = rebound(directory.path(), &["--progress", "json", "--quiet"])?;
+    assert_eq!(both.status.code(), Some(2));
+    Ok(())
+}
+
+#[test]
+fn a_run_warns_once_of_halved_steps_and_many_iterations() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let scene = scene("rebound_fast.json");
+    let arguments = ["--set", "time.step=0.2", "--set", "solver.newton.max_iterations=3", "--until", "6", "--quiet"];
+    let output = program().arg("run").arg(scene).arg("--out").arg(directory.path()).args(arguments).output()?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{text}");
+    assert_eq!(text.matches("the step had to be halved").count(), 1, "{text}");
+    assert!(text.contains("of 3 allowed iterations"), "{text}");
+    let warnings = report(directory.path())?["warnings"].clone();
+    for warning in warnings.as_array().ok_or("no warnings")? {
+        let (time, step) = (warning["time"].as_f64().ok_or("no time")?, &warning["step"]);
+        let line = format!("warning: t = {time}, step {step}: {}", warning["message"].as_str().unwrap_or_default());
+        assert_eq!(text.matches(&line).count(), 1, "{line} in {text}");
+    }
+    Ok(())
+}
+
+#[test]
 fn a_cause_is_told_once() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     let file = directory.path().join("file");

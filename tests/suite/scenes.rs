@@ -26,7 +26,7 @@ const GOOD: &str = r#"{
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
-  "output": { "every": 0.1, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
+  "output": { "every": 0.1, "checkpoint": 0.2, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
 }"#;
 
 /// The same with velocities given to nodes, which then no body may have.
@@ -60,7 +60,17 @@ fn shipped_scenes_are_sound() {
     names.sort();
     assert_eq!(
         names,
-        ["ball_drop", "compaction", "compaction_confined", "rebound", "rebound_fast", "riemann", "riemann_jump"]
+        [
+            "ball_drop",
+            "cantilever",
+            "collision",
+            "compaction",
+            "compaction_confined",
+            "rebound",
+            "rebound_fast",
+            "riemann",
+            "riemann_jump"
+        ]
     );
 }
 
@@ -264,6 +274,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#"{ "gmres": { "restart": 50 } }"#, r#""conjugate_gradient""#, "solver.krylov.method", &["pressures", "gmres"]),
     (r#""fixed": 1e-7"#, r#""fixed": 1"#, "solver.krylov.forcing.fixed", &["1 is not", "0.9"]),
     (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
+    (r#""checkpoint": 0.2"#, r#""checkpoint": 0"#, "output.checkpoint", &["0 is not", "> 0"]),
     (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
     // tip is a stress: its columns are tip_xx, tip_yy, …
@@ -499,6 +510,59 @@ fn all_wrong_values_are_told_at_once() {
 }
 
 #[test]
+fn all_wrong_keys_and_types_are_told_at_once() {
+    let text = GOOD
+        .replace(r#""density": 2"#, r#""densty": 2"#)
+        .replace(r#""left": "sliding""#, r#""left": "slding", "uper": 1"#)
+        .replace(r#""step": 0.01, "#, "")
+        .replace(r#""max_halvings": 3"#, r#""max_halvings": -3"#)
+        .replace(r#""ball": { "center": [0.5"#, r#""bal": { "center": [0.5"#)
+        .replace(r#""particles_per_cell": 3, "fill""#, r#""particles_per_cell": "three", "fill""#)
+        .replace(r#""acceleration": [0, -9.81]"#, r#""acceleration": {"y": -9.81}"#);
+    let message = refusal(&text);
+    for words in [
+        "bodies[0].densty: unknown field `densty`",
+        "did you mean `density`?",
+        "bodies[0]: missing field `density`",
+        "boundary.left: unknown variant `slding`",
+        "did you mean `sliding`?",
+        "boundary.uper: unknown field `uper`",
+        "time: missing field `step`",
+        "time.max_halvings: invalid",
+        "bodies[0].shape.difference.minus: unknown variant `bal`",
+        "did you mean `ball`?",
+        "bodies[0].particles_per_cell: invalid type: string \"three\", expected a whole number",
+        "gravity.acceleration: invalid type: an object, expected a list",
+    ] {
+        assert_eq!(message.matches(words).count(), 1, "{words}\n{message}");
+    }
+    // each with its place, and nothing else
+    assert_eq!(message.matches("--> line").count(), 9, "{message}");
+    let SceneError::Malformed(first) = scene::read(&text, &[]).expect_err("wrong") else { panic!("{message}") };
+    assert_eq!(first.others.len(), 8, "{message}");
+}
+
+#[test]
+fn every_key_of_the_good_scene_is_documented_once() {
+    let keys = scene::keys::documented(&serde_json::from_str(GOOD).unwrap());
+    let paths: Vec<&str> = keys.iter().map(|key| key.path.as_str()).collect();
+    for path in [
+        "bodies[].density",
+        "bodies[].shape.difference.of.box",
+        "bodies[].fill = \"cells\"",
+        "boundary.left = \"sliding\"",
+        "boundary.right.velocity",
+        "time.lumping",
+        "solver.krylov.forcing.fixed",
+        "gravity.curve",
+        "output.probes[].at.particle",
+    ] {
+        assert_eq!(paths.iter().filter(|one| **one == path).count(), 1, "{path} in {paths:?}");
+    }
+    assert!(keys.iter().all(|key| !key.about.is_empty()));
+}
+
+#[test]
 fn overrides_replace_add_and_are_named() {
     let scene =
         overridden(&["time.step=0.02", "bodies.0.density=3", "bodies[1].density=4", "approximation=linear"]).unwrap();
@@ -534,7 +598,7 @@ fn overrides_replace_add_and_are_named() {
 
 #[test]
 fn text_that_is_too_long_too_deep_or_no_object_is_refused() {
-    assert!(matches!(scene::read(&" ".repeat(scene::MAX_BYTES as usize + 1), &[]), Err(SceneError::TooLong)));
+    assert!(matches!(scene::read(&" ".repeat(scene::MAX_BYTES as usize + 1), &[]), Err(SceneError::TooLong(None))));
     assert!(refusal(&"[".repeat(100_000)).contains("recursion limit"));
     let nested = format!("{}{}{}", r#"{"union": ["#.repeat(1000), "1", "]}".repeat(1000));
     assert!(

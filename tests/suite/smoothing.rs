@@ -247,3 +247,18 @@ fn a_bar_keeps_its_momentum_and_loses_as_much_energy_in_two_half_steps_as_in_one
     assert!(by_long > 1e-4 * total && (by_short / by_long - 1.0).abs() < 0.1, "{by_long} {by_short} of {total}");
     Ok(())
 }
+
+#[test]
+fn a_node_without_mass_does_not_disturb_its_particle() -> Result<(), Failure> {
+    // On a face between two cells the far node has N = 0 and ∇N ≠ 0: it is active, and weighs nothing.
+    let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [3] };
+    let mut particles = Particles::default();
+    particles.push(Vector::from([1.0]), Vector::from([4.0]), 1.0, 1.0, 0);
+    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    assert!(nodal.mass.contains(&0.0) && nodal.velocity.iter().all(|v| v[0] == 0.0 || v[0] == 4.0));
+    let smoothing = Smoothing { order: 3, rate: f64::INFINITY };
+    let change = smoothing.change(&particles, &supports, &nodal.mass, &particles.velocity, 0.1);
+    assert_eq!(change, [Vector::from([0.0])]);
+    Ok(())
+}

@@ -17,3 +17,19 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
 pub fn rows(text: &str) -> impl Iterator<Item = Vec<f64>> + '_ {
     text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
 }
+
+/// Numbers without pattern from a fixed seed (Knuth's MMIX).
+pub struct Random(pub u64);
+
+impl Random {
+    /// A number below `limit`, and 0 for 0.
+    pub fn below(&mut self, limit: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % limit.max(1)
+    }
+
+    /// An entry of a list that is not empty.
+    pub fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
+        &list[self.below(list.len() as u64) as usize]
+    }
+}

@@ -2,11 +2,17 @@
 
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
 use bfree::grid::Grid;
+use bfree::material::{FrozenTangent, Lame, Law, Material, NeoHookean, StVenantKirchhoff, admissible};
 use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::tangent::frozen_bytes;
 use bfree::nodes::Nodes;
-use bfree::tensor::{Tensor, Vector};
+use bfree::particles::Body;
+use bfree::solver::Precision;
+use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
+
+type Failure = Box<dyn std::error::Error>;
 
 /// Numbers without pattern in (−1, 1): the golden-ratio sequence.
 struct Irregular(u32);
@@ -196,4 +202,111 @@ fn the_first_particle_that_fails_is_named() {
         assert_eq!((fast.particle, fast.source), (plain.particle, plain.source));
         assert_eq!(plain.particle, 200);
     }
+}
+
+/// Cells of edge 1, `per_axis` particles along each axis of the cells `cells`, counted from the corner.
+fn regular<const D: usize>(cells: [u32; D], per_axis: u32) -> (Grid<D>, Vec<Vector<f64, D>>) {
+    let side = cells.map(|n| n * per_axis);
+    let place = |p: u32, k: usize| p / side[..k].iter().product::<u32>() % side[k];
+    let at = |p: u32| Vector::from_fn(|k, _| (f64::from(place(p, k)) + 0.5) / f64::from(per_axis));
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [64; D] };
+    (grid, (0..side.iter().product()).map(at).collect())
+}
+
+/// How often each window (nodes along each axis, particles) is there.
+fn windows<const D: usize>(cells: [u32; D], per_axis: u32) -> Vec<([usize; 3], usize, usize)> {
+    let (grid, positions) = regular(cells, per_axis);
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &positions).unwrap();
+    let mut all = supports.windows();
+    all.sort_unstable();
+    all.chunk_by(|a, b| a == b).map(|same| (same[0].0, same[0].1, same.len())).collect()
+}
+
+#[test]
+fn a_regular_layout_fills_the_vector_lanes() {
+    // Eight particles a cell, 2×2×2 nodes; four a cell, two cells side by side; two a cell, four side by side.
+    assert_eq!(windows([6, 5, 4], 2), [([2, 2, 2], 8, 120)]);
+    assert_eq!(windows([32, 20], 2), [([3, 2, 1], 8, 320)]);
+    assert_eq!(windows([64], 2), [([5, 1, 1], 8, 16)]);
+    // One a cell: no more cells side by side than six nodes hold, and none from another block (32 cells in 1D, 16 in 2D,
+    // 4 in 3D) or another row.
+    assert_eq!(windows([64], 1), [([3, 1, 1], 2, 2), ([6, 1, 1], 5, 12)]);
+    assert_eq!(windows([32, 3], 1), [([2, 2, 1], 1, 6), ([6, 2, 1], 5, 18)]);
+    assert_eq!(windows([8, 2, 2], 1), [([5, 2, 2], 4, 8)]);
+    // Nine or more in a cell: eight, and the rest.
+    assert_eq!(windows([3, 1], 3), [([2, 2, 1], 1, 3), ([2, 2, 1], 8, 3)]);
+    assert_eq!(windows([2], 9), [([2, 1, 1], 1, 2), ([2, 1, 1], 8, 2)]);
+    // Cells apart do not share a window.
+    let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [64] };
+    let apart = [0.5, 2.5, 3.5].map(|x| Vector::from([x]));
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &apart).unwrap();
+    assert_eq!(supports.windows(), [([2, 1, 1], 1), ([3, 1, 1], 2)]);
+    let (plain, _) = Supports::plain(&Approximation::from(Linear), &grid, &apart).unwrap();
+    assert!(plain.windows().is_empty());
+}
+
+fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
+    let (grid, positions) = regular([3; D], 2);
+    let bytes = |positions: &[Vector<f64, D>]| {
+        Supports::plain(&Approximation::from(Linear), &grid, positions).map(|(plain, _)| plain.bytes())
+    };
+    let (plain, nodes) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
+    let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
+    assert!(positions.len() <= 256, "one block");
+    // An entry is a place in the list of nodes, N and ∇N; particles say where their entries begin.
+    assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + positions.len() + 1));
+    let many: Vec<_> = positions.iter().cycle().take(600).copied().collect();
+    assert_eq!(bytes(&many)?, bytes(&many[..256])? + bytes(&many[256..512])? + bytes(&many[512..])?);
+    // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes twice.
+    let (tiled, nodes) = Supports::new(&Approximation::from(Linear), &grid, &positions)?;
+    let windows = tiled.windows();
+    let weights: usize = windows.iter().map(|(width, _)| 2 * 64 * width[..D].iter().sum::<usize>()).sum();
+    let least = weights + windows.len() * (8 * 4 + 12) + 4 * positions.len() + 8 * nodes.len();
+    assert!((least..least + 512).contains(&tiled.bytes()), "{} for at least {least}", tiled.bytes());
+    Ok(())
+}
+
+fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Result<(), Failure> {
+    let (grid, positions) = regular([3; D], 2);
+    let shape = Approximation::from(Linear);
+    let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0 }];
+    let (tiled, nodes) = Supports::with_precision(&shape, &grid, &positions, Precision::Mixed)?;
+    let field = vec![Vector::zeros(); nodes.len()];
+    for lumping in [1.0, 0.5] {
+        let both = matches!(law, Material::StVenantKirchhoff(_));
+        let weight = |_: usize| 1.0;
+        let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = if lumping < 1.0 { Some(&weight) } else { None };
+        let closed = |_: usize, g| {
+            admissible(g)
+                .map_err(|error| error.to_string())
+                .and_then(|at| law.freeze(&identity(), &at, 1.0).closed().ok_or_else(|| "no closed form".to_string()))
+        };
+        let frozen = tiled.closed_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
+        let single = tiled.single_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
+        assert!(frozen.bytes() > 0 && single.bytes() > 0);
+        for (precision, bytes) in [(Precision::Double, frozen.bytes()), (Precision::Mixed, single.bytes())] {
+            let counted = frozen_bytes(&bodies, &tiled, lumping, precision);
+            assert_eq!(counted, bytes, "{D}D {law:?}, ε = {lumping}, {precision:?}");
+        }
+        let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
+        let each = size_of::<<Material as Law>::Frozen<f64, D>>();
+        assert_eq!(frozen_bytes(&bodies, &plain, lumping, Precision::Double), positions.len() * each);
+        assert!(plain.closed_bytes(both, lumping < 1.0, Precision::Double).is_none());
+    }
+    Ok(())
+}
+
+#[test]
+fn bytes_are_counted_as_they_are_stored() -> Result<(), Failure> {
+    bytes_are_those_of_the_arrays::<1>()?;
+    bytes_are_those_of_the_arrays::<2>()?;
+    bytes_are_those_of_the_arrays::<3>()?;
+    let lame = Lame::new(1.0, 1.0)?;
+    let laws: [Material; 2] = [NeoHookean::ciarlet(lame).into(), StVenantKirchhoff { lame }.into()];
+    for law in &laws {
+        frozen_bytes_are_those_of_the_tangent::<1>(law)?;
+        frozen_bytes_are_those_of_the_tangent::<2>(law)?;
+        frozen_bytes_are_those_of_the_tangent::<3>(law)?;
+    }
+    Ok(())
 }

@@ -35,8 +35,9 @@ impl<const D: usize> Prepared<D> {
     /// A particle without shape functions, or a projection that overflows.
     pub fn new<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Result<Self, StepError> {
         let (t, dt) = (simulation.clock.time(), simulation.clock.step());
+        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
         let (supports, nodes) =
-            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+            Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
         let prescribed = simulation.prescribed(&nodes);
         let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), simulation.settings.lumping)?
             .with_prescribed(&prescribed);

@@ -19,7 +19,7 @@ use argmin::solver::neldermead::NelderMead;
 /// A particle on a wall, where λ is infinite, is moved inside by [`LmeCircle::INSET`] h: an error of that size in the
 /// position, and none in Σ ∇N = 0 and Σ x ⊗ ∇N = I. For large γ̂ the circle holds too few nodes; see
 /// [`LmeCircle::largest_gamma`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LmeCircle {
     gamma: f64,
     tolerance: f64,

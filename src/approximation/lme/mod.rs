@@ -4,6 +4,7 @@
 
 mod circle;
 mod separable;
+mod starts;
 
 pub use circle::LmeCircle;
 pub use separable::Lme;

@@ -1,9 +1,11 @@
 //! LME on a box of nodes: a product of one-dimensional LME functions, each one scalar root away.
 
+use super::starts::Starts;
 use super::{radius, validate};
 use crate::approximation::product::Place;
 use crate::approximation::{ApproximationError, AxisWeights, Separable, Validate};
 use crate::grid::Axis;
+use std::sync::Arc;
 
 /// LME on the nodes of the box |D_k| < R_a, R_a = h sqrt(−ln TOL₀ / γ̂).
 ///
@@ -26,9 +28,11 @@ use crate::grid::Axis;
 /// ```
 ///
 /// f increases with a slope of at least 1, so that |μ* − μ| ≤ |f(μ)|: one evaluation gives a bracket, and Newton kept in
-/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: one to three evaluations of f inside a body of
-/// nodes, at most five near a wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: at most five evaluations of f.
+///
+/// Away from walls μ is a function of a alone. There q is tabulated, and one step of Newton's method from the table, written
+/// in q, needs no exponential and no logarithm.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Lme {
     gamma: f64,
     tolerance: f64,
@@ -36,10 +40,12 @@ pub struct Lme {
     radius: f64,
     /// exp(−2γ̂) = gⱼ gⱼ₋₂ / gⱼ₋₁²
     decay: f64,
+    /// q away from walls.
+    starts: Option<Arc<Starts>>,
 }
 
 /// Nodes further away than those of the cell: how many of them on the lower and on the upper side.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reach {
     pub lower: u32,
     pub upper: u32,
@@ -49,11 +55,21 @@ pub(super) struct Reach {
 const ITERATIONS: usize = 200;
 /// A Newton step below this leaves an error of its square.
 const LAST_STEP: f64 = 1e-9;
+/// Below this step e^s − 1 = s + s²/2 and artanh t = t + t³/3 leave an error that the next step corrects.
+const SMALL_STEP: f64 = 1e-3;
 
 impl Lme {
     /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
-        Self { gamma, tolerance, radius: radius(gamma, tolerance), decay: (-2.0 * gamma).exp() }
+        let radius = radius(gamma, tolerance);
+        let mut lme = Self { gamma, tolerance, radius, decay: (-2.0 * gamma).exp(), starts: None };
+        lme.starts = Starts::new(&lme).map(Arc::new);
+        lme
+    }
+
+    /// R_a/h
+    pub(super) fn radius(&self) -> f64 {
+        self.radius
     }
 
     /// γ̂
@@ -69,9 +85,16 @@ impl Lme {
     /// The nodes with |D| < R_a beyond those of the cell, as far as the axis goes.
     #[inline]
     pub(super) fn reach(&self, axis: &Axis, place: &Place) -> Reach {
+        let Reach { lower, upper } = self.free_reach(place);
+        Reach { lower: lower.min(place.cell), upper: upper.min(axis.cells - 1 - place.cell) }
+    }
+
+    /// The same away from walls.
+    #[inline]
+    fn free_reach(&self, place: &Place) -> Reach {
         // j < R − d; a cast saturates, and takes NaN to 0.
         let count = |distance: f64| ((self.radius - distance).ceil() - 1.0).max(0.0) as u32;
-        Reach { lower: count(place.below).min(place.cell), upper: count(place.above).min(axis.cells - 1 - place.cell) }
+        Reach { lower: count(place.below), upper: count(place.above) }
     }
 
     /// Σⱼ (d + j) gⱼ qʲ and Σⱼ j (d + j) gⱼ qʲ for j = 0 … `reach`.
@@ -151,6 +174,51 @@ impl Lme {
         mu
     }
 
+    /// q and dq/da away from walls: f depends on a directly and through μ, so dμ/da = −(∂f/∂a)/(∂f/∂μ).
+    pub(super) fn start(&self, place: &Place) -> [f64; 2] {
+        let reach = self.free_reach(place);
+        let mu = self.solve(place, reach);
+        let q = mu.exp();
+        let total = |reach: u32, q: f64| {
+            let mut sum = 1.0;
+            self.weights(reach, q, |_, weight| sum += weight);
+            sum
+        };
+        let (lower, lower_slope) = self.moments(place.below, reach.lower, q);
+        let (upper, upper_slope) = self.moments(place.above, reach.upper, q.recip());
+        let direct = total(reach.lower, q) / lower + total(reach.upper, q.recip()) / upper;
+        [q, -q * direct / (1.0 + lower_slope / lower + upper_slope / upper)]
+    }
+
+    /// q and 1/q at the root, from the table; `None` near walls, and where the table is too coarse.
+    ///
+    /// Newton's step in μ is −f/f' with f = −ln(U/(qL)) = −2 artanh t, t = (U − qL)/(U + qL), and multiplies q by its
+    /// exponential. As soon as a step is small both are polynomials to the last digit.
+    #[inline]
+    fn tabulated(&self, place: &Place, reach: Reach) -> Option<(f64, f64)> {
+        let starts = self.starts.as_ref()?;
+        if reach != self.free_reach(place) {
+            return None;
+        }
+        let mut q = starts.at(place);
+        for _ in 0..3 {
+            let p = q.recip();
+            let (lower, lower_slope) = self.moments(place.below, reach.lower, q);
+            let (upper, upper_slope) = self.moments(place.above, reach.upper, p);
+            let t = (upper - q * lower) / (upper + q * lower);
+            let step = 2.0 * t * (1.0 + t * t / 3.0) / (1.0 + lower_slope / lower + upper_slope / upper);
+            if step.is_nan() || step.abs() >= SMALL_STEP {
+                return None;
+            }
+            let growth = step * (1.0 + 0.5 * step);
+            q += q * growth;
+            if step.abs() <= LAST_STEP {
+                return Some((q, p - p * growth));
+            }
+        }
+        None
+    }
+
     /// λ in units of 1/h; infinite on a wall.
     pub(super) fn multiplier(&self, place: &Place, reach: Reach) -> f64 {
         self.solve(place, reach) + self.gamma * (place.below - place.above)
@@ -179,10 +247,12 @@ impl Separable for Lme {
             return Ok(());
         }
 
-        let mu = self.solve(&place, reach);
-        let (q, p) = (mu.exp(), (-mu).exp());
+        let (q, p) = self.tabulated(&place, reach).unwrap_or_else(|| {
+            let mu = self.solve(&place, reach);
+            (mu.exp(), (-mu).exp())
+        });
         // The common factor that keeps the larger of the two weights in the cell at 1.
-        let (lower, upper) = if mu >= 0.0 { (1.0, p) } else { (q, 1.0) };
+        let (lower, upper) = if q >= 1.0 { (1.0, p) } else { (q, 1.0) };
         out.start(place.cell - reach.lower);
         self.weights(reach.lower, q, |j, weight| out.push(lower * weight, place.below + j));
         out.values.reverse();
@@ -213,5 +283,35 @@ impl Separable for Lme {
     fn width(&self) -> usize {
         // |D| < R holds for ceil(2R) nodes at most, and the two of the cell are always there.
         ((2.0 * self.radius).ceil() as usize).max(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_leads_to_the_root_that_is_found_without_it() {
+        let axis = Axis { origin: 0.0, spacing: 1.0, cells: 40 };
+        for (gamma, tolerance) in [(0.3, 1e-6), (0.8, 1e-6), (1.8, 1e-10), (3.0, 1e-6), (4.0, 1e-2), (9.9, 1e-16)] {
+            let with = Lme::new(gamma, tolerance);
+            assert!(with.starts.is_some());
+            let without = Lme { starts: None, ..with.clone() };
+            let (mut fast, mut plain) = (AxisWeights::default(), AxisWeights::default());
+            let mut from_table = 0;
+            for i in 0..=1000 {
+                let x = 20.0 + f64::from(i) / 1000.0;
+                let place = Place::new(&axis, x).expect("inside");
+                from_table += usize::from(with.tabulated(&place, with.reach(&axis, &place)).is_some());
+                with.axis(&axis, x, &mut fast).expect("inside");
+                without.axis(&axis, x, &mut plain).expect("inside");
+                assert_eq!((fast.first, fast.values.len()), (plain.first, plain.values.len()));
+                let both = [(&fast.values, &plain.values), (&fast.derivatives, &plain.derivatives)];
+                for (a, b) in both.into_iter().flat_map(|(a, b)| a.iter().zip(b)) {
+                    assert!((a - b).abs() < 4e-15, "gamma {gamma}, x {x}: {a} {b}");
+                }
+            }
+            assert!(from_table > 950, "gamma {gamma}, TOL {tolerance}: {from_table} of 1001");
+        }
     }
 }

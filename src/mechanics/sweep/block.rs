@@ -1,22 +1,17 @@
 //! A block of cells: its groups of particles, their weights, and its box of nodes.
 
 use super::kernel::Window;
-use super::lanes::LANES;
+use super::lanes::{LANES, SINGLE_LANES};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 
 /// A cube of cells: its groups, its box of nodes, and which of them are active.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// 1, 2 or 3.
-    pub(super) dimension: usize,
-    /// Number of the first group, over all blocks.
-    pub(super) first_group: usize,
-    pub(super) groups: Vec<Group>,
-    /// Weights of the groups, one after the other, as in [`Window`].
-    pub(super) weights: Vec<[f64; LANES]>,
-    /// Particles of each group; the lanes behind them hold zeros.
-    pub(super) particles: Vec<[u32; LANES]>,
+    /// The particles.
+    pub(super) groups: Groups<f64, LANES>,
+    /// The same particles in the same order, for products in single precision.
+    pub(super) single: Option<Groups<f32, SINGLE_LANES>>,
     /// Index of the first node of the box along each axis.
     pub(super) origin: [u32; 3],
     /// Nodes of the box along each axis; 1 along axes that do not exist.
@@ -27,7 +22,23 @@ pub(super) struct Block {
     pub(super) places: Vec<u32>,
 }
 
-/// Up to eight particles and their common window.
+/// Groups of up to `L` particles of a block, with a common window each.
+#[derive(Clone, Debug)]
+pub(super) struct Groups<X, const L: usize> {
+    /// 1, 2 or 3.
+    pub(super) dimension: usize,
+    /// Nodes of the box from one row to the next, and from one plane to the next.
+    pub(super) stride: [usize; 2],
+    /// Number of the first group, over all blocks.
+    pub(super) first: usize,
+    pub(super) windows: Vec<Group>,
+    /// Weights of the groups, one after the other, as in [`Window`]; in single precision dN/dx is in units of 1/h.
+    pub(super) weights: Vec<[X; L]>,
+    /// Particles of each group; the lanes behind them hold zeros.
+    pub(super) particles: Vec<[u32; L]>,
+}
+
+/// Particles and their common window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Group {
     /// Where its weights begin.
@@ -40,26 +51,27 @@ pub(super) struct Group {
     pub(super) lanes: u8,
 }
 
-impl Block {
-    pub(super) fn groups(&self) -> usize {
-        self.groups.len()
+impl<X, const L: usize> Groups<X, L> {
+    pub(super) fn new(dimension: usize, size: [usize; 3]) -> Self {
+        let stride = [size[0], size[0] * size[1]];
+        Self { dimension, stride, first: 0, windows: Vec::new(), weights: Vec::new(), particles: Vec::new() }
     }
 
-    /// Nodes of the box.
-    pub(super) fn box_nodes(&self) -> usize {
-        self.size.iter().product()
+    /// Number of groups.
+    pub(super) fn len(&self) -> usize {
+        self.windows.len()
     }
 
     /// The particles of a group.
     #[inline(always)]
     pub(super) fn particles(&self, group: usize) -> &[u32] {
-        &self.particles[group][..usize::from(self.groups[group].lanes)]
+        &self.particles[group][..usize::from(self.windows[group].lanes)]
     }
 
     /// Window and weights of a group.
     #[inline(always)]
-    pub(super) fn window(&self, group: usize) -> Window<'_> {
-        let Group { weights, first, width, lanes } = self.groups[group];
+    pub(super) fn window(&self, group: usize) -> Window<'_, X, L> {
+        let Group { weights, first, width, lanes } = self.windows[group];
         let width = width.map(usize::from);
         let rows = 2 * width[..self.dimension].iter().sum::<usize>();
         Window {
@@ -67,28 +79,70 @@ impl Block {
             weights: &self.weights[weights as usize..weights as usize + rows],
             lanes: usize::from(lanes),
             first: first as usize,
-            stride: [self.size[0], self.size[0] * self.size[1]],
+            stride: self.stride,
         }
     }
 
+    /// Calls `visit(group, lane, particle)`.
+    pub(super) fn each(&self, mut visit: impl FnMut(usize, usize, usize)) {
+        for group in 0..self.len() {
+            for (lane, &p) in self.particles(group).iter().enumerate() {
+                visit(group, lane, p as usize);
+            }
+        }
+    }
+
+    /// Group and lane of every particle, in their order.
+    pub(super) fn slots(&self) -> impl Iterator<Item = (usize, usize)> {
+        let lanes = self.windows.iter().map(|window| usize::from(window.lanes));
+        lanes.enumerate().flat_map(|(group, lanes)| (0..lanes).map(move |lane| (group, lane)))
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.windows.as_slice())
+            + size_of_val(self.weights.as_slice())
+            + size_of_val(self.particles.as_slice())
+    }
+
+    pub(super) fn shrink_to_fit(&mut self) {
+        self.windows.shrink_to_fit();
+        self.weights.shrink_to_fit();
+        self.particles.shrink_to_fit();
+    }
+}
+
+impl Block {
+    /// Nodes of the box.
+    pub(super) fn box_nodes(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self)
+            + self.groups.bytes()
+            + self.single.as_ref().map_or(0, Groups::bytes)
+            + size_of_val(self.nodes.as_slice())
+            + size_of_val(self.places.as_slice())
+    }
+
     /// Fills the box from a field on the active nodes; zero at the others.
-    pub(super) fn fill<T: Real, const D: usize>(&self, field: &[Vector<T, D>], nodal: &mut [f64]) {
-        nodal.fill(0.0);
+    pub(super) fn fill<X: Real, T: Real, const D: usize>(&self, field: &[Vector<T, D>], nodal: &mut [X]) {
+        nodal.fill(X::zero());
         for (&node, &place) in self.nodes.iter().zip(&self.places) {
             for c in 0..D {
-                nodal[place as usize * D + c] = field[node as usize][c].value();
+                nodal[place as usize * D + c] = X::lit(field[node as usize][c].value());
             }
         }
     }
 
     /// Adds the part of the box, `numbers` numbers a node, that lies on the active nodes `first ..` of which `out` holds the sums.
-    pub(super) fn add<O>(
+    pub(super) fn add<X, O>(
         &self,
-        buffer: &[f64],
+        buffer: &[X],
         numbers: usize,
         first: usize,
         out: &mut [O],
-        add: impl Fn(&mut O, &[f64]),
+        add: impl Fn(&mut O, &[X]),
     ) {
         let start = self.nodes.partition_point(|&node| (node as usize) < first);
         let end = self.nodes.partition_point(|&node| (node as usize) < first + out.len());
@@ -106,15 +160,6 @@ impl Block {
         nodal
     }
 
-    /// Calls `visit(group, lane, particle)`.
-    pub(super) fn each(&self, mut visit: impl FnMut(usize, usize, usize)) {
-        for group in 0..self.groups.len() {
-            for (lane, &p) in self.particles(group).iter().enumerate() {
-                visit(group, lane, p as usize);
-            }
-        }
-    }
-
     /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
     #[inline(always)]
     pub(super) fn entries<const D: usize>(
@@ -123,7 +168,7 @@ impl Block {
         lane: usize,
         mut visit: impl FnMut(usize, f64, Vector<f64, D>),
     ) {
-        let window = self.window(group);
+        let window = self.groups.window(group);
         let weights = |k: usize, at: usize| {
             let (n, dn) = window.axis(k);
             [n[at][lane], dn[at][lane]]

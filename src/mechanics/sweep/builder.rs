@@ -1,12 +1,12 @@
 //! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
 
-use super::block::{Block, Group};
-use super::kernel::TILE;
-use super::lanes::LANES;
+use super::block::{Block, Group, Groups};
+use super::kernel::widest_window;
 use super::order::{Key, follows};
 use crate::approximation::{ApproximationError, AxisWeights, Separable};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
+use crate::scalar::Real;
 use crate::tensor::Vector;
 
 /// The weights of one particle along one axis: its nodes, and where N and dN/dx of each are.
@@ -24,7 +24,7 @@ impl Along {
 }
 
 /// The block of the particles `keys`, without its number of groups before it and its node numbers; and which nodes of its
-/// box are active.
+/// box are active. With `single` it has groups for single precision too.
 ///
 /// # Errors
 /// The smallest particle whose functions do not exist.
@@ -33,6 +33,7 @@ pub(super) fn block<const D: usize>(
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
     keys: &[Key],
+    single: bool,
 ) -> Result<(Block, Vec<bool>), (usize, ApproximationError)> {
     let mut scratch = AxisWeights::default();
     let mut weights: Vec<[f64; 2]> = Vec::new();
@@ -67,42 +68,50 @@ pub(super) fn block<const D: usize>(
         size[k] = (high[k] - low[k]) as usize;
         origin[k] = low[k];
     }
-    let mut built = Block {
-        dimension: D,
-        first_group: 0,
-        groups: Vec::new(),
-        weights: Vec::new(),
-        particles: Vec::new(),
+    let block = Block {
+        groups: groups(keys, &along, &weights, origin, size, 1.0),
+        single: single.then(|| groups(keys, &along, &weights, origin, size, grid.spacing)),
         origin,
         size,
         nodes: Vec::new(),
         places: Vec::new(),
     };
-    let mut active = vec![false; size.iter().product()];
-    let mut start = 0;
-    while start < keys.len() {
-        let end = group_end(keys, &along, start);
-        push(&mut built, &keys[start..end], &along[start..end], &weights, &mut active);
-        start = end;
-    }
-    built.groups.shrink_to_fit();
-    built.weights.shrink_to_fit();
-    built.particles.shrink_to_fit();
-    Ok((built, active))
+    let active = active(&block, &along, &weights);
+    Ok((block, active))
 }
 
-/// Where the group that begins at `start` ends: eight particles of a cell, or whole neighbouring cells along x while all
-/// fit into the lanes and their window along x into a tile.
-fn group_end<const D: usize>(keys: &[Key], along: &[[Along; D]], start: usize) -> usize {
+/// The particles by groups, dN/dx times `unit`.
+fn groups<X: Real, const L: usize, const D: usize>(
+    keys: &[Key],
+    along: &[[Along; D]],
+    weights: &[[f64; 2]],
+    origin: [u32; 3],
+    size: [usize; 3],
+    unit: f64,
+) -> Groups<X, L> {
+    let mut built = Groups::new(D, size);
+    let mut start = 0;
+    while start < keys.len() {
+        let end = group_end::<L, D>(keys, along, start);
+        push(&mut built, &keys[start..end], &along[start..end], weights, origin, size, unit);
+        start = end;
+    }
+    built.shrink_to_fit();
+    built
+}
+
+/// Where the group that begins at `start` ends: as many particles of a cell as there are lanes, or whole neighbouring cells
+/// along x while all fit into the lanes and their window is not too wide.
+fn group_end<const L: usize, const D: usize>(keys: &[Key], along: &[[Along; D]], start: usize) -> usize {
     let cell_end = |from: usize| from + keys[from..].partition_point(|key| key.0 == keys[from].0);
     let mut end = cell_end(start);
-    if end - start > LANES {
-        return start + LANES;
+    if end - start > L {
+        return start + L;
     }
     while end < keys.len() && follows::<D>(&keys[end - 1], &keys[end]) {
         let next = cell_end(end);
         let [low, high] = window(&along[start..next], 0);
-        if next - start > LANES || (high - low) as usize > TILE {
+        if next - start > L || (high - low) as usize > widest_window(L) {
             break;
         }
         end = next;
@@ -115,52 +124,59 @@ fn window<const D: usize>(along: &[[Along; D]], k: usize) -> [u32; 2] {
     along.iter().fold([u32::MAX, 0], |[low, high], axes| [low.min(axes[k].first), high.max(axes[k].end())])
 }
 
-/// Appends a group and marks the nodes it sees.
-fn push<const D: usize>(
-    block: &mut Block,
+/// Appends a group.
+fn push<X: Real, const L: usize, const D: usize>(
+    groups: &mut Groups<X, L>,
     keys: &[Key],
     along: &[[Along; D]],
     weights: &[[f64; 2]],
-    active: &mut [bool],
+    origin: [u32; 3],
+    size: [usize; 3],
+    unit: f64,
 ) {
     let windows: [[u32; 2]; D] = std::array::from_fn(|k| window(along, k));
     let mut width = [1; 3];
     let mut first = 0;
     for k in (0..D).rev() {
         width[k] = (windows[k][1] - windows[k][0]) as u8;
-        first = first * block.size[k] + (windows[k][0] - block.origin[k]) as usize;
+        first = first * size[k] + (windows[k][0] - origin[k]) as usize;
     }
-    let group = Group { weights: block.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
+    let group = Group { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
     for k in 0..D {
-        let start = block.weights.len();
+        let start = groups.weights.len();
         let nodes = usize::from(width[k]);
-        block.weights.resize(start + 2 * nodes, [0.0; LANES]);
+        groups.weights.resize(start + 2 * nodes, [X::zero(); L]);
         for (lane, axes) in along.iter().enumerate() {
             let at = start + (axes[k].first - windows[k][0]) as usize;
             for (i, [n, dn]) in weights[axes[k].start..axes[k].start + axes[k].width as usize].iter().enumerate() {
-                block.weights[at + i][lane] = *n;
-                block.weights[at + nodes + i][lane] = *dn;
+                groups.weights[at + i][lane] = X::lit(*n);
+                groups.weights[at + nodes + i][lane] = X::lit(dn * unit);
             }
         }
     }
-    block.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
-    block.groups.push(group);
-    mark(block, along, weights, active);
+    groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
+    groups.windows.push(group);
 }
 
-/// Marks the nodes with N ≠ 0 or ∇N ≠ 0 for some particle of the last group.
-fn mark<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]], active: &mut [bool]) {
-    for (lane, axes) in along.iter().enumerate() {
+/// Which nodes of the box have N ≠ 0 or ∇N ≠ 0 for some particle.
+fn active<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]]) -> Vec<bool> {
+    let mut active = vec![false; block.box_nodes()];
+    let mut last = None;
+    for ((group, lane), axes) in block.groups.slots().zip(along) {
         let list = |k: usize| &weights[axes[k].start..axes[k].start + axes[k].width as usize];
         let smallest: f64 = (0..D).map(|k| list(k).iter().fold(f64::INFINITY, |low, w| low.min(w[0].abs()))).product();
         if smallest > 0.0 {
-            // No N vanishes, nor underflows: the whole of the particle's window.
+            // No N vanishes, nor underflows: the whole of the particle's window, often that of the particle before it.
             let mut begin = [0; 3];
             let mut width = [1; 3];
             for k in 0..D {
                 begin[k] = (axes[k].first - block.origin[k]) as usize;
                 width[k] = axes[k].width as usize;
             }
+            if last == Some((begin, width)) {
+                continue;
+            }
+            last = Some((begin, width));
             for z in begin[2]..begin[2] + width[2] {
                 for y in begin[1]..begin[1] + width[1] {
                     let row = (z * block.size[1] + y) * block.size[0] + begin[0];
@@ -168,9 +184,10 @@ fn mark<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]
                 }
             }
         } else {
-            block.entries::<D>(block.groups.len() - 1, lane, |place, _, _| active[place] = true);
+            block.entries::<D>(group, lane, |place, _, _| active[place] = true);
         }
     }
+    active
 }
 
 /// Numbers the active nodes in the order of the grid, and gives each block those of its box. `active` marks them in the

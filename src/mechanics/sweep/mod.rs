@@ -16,13 +16,14 @@ mod plain;
 mod tiled;
 mod waves;
 
-pub use closed::ClosedTangents;
+pub use closed::{ClosedTangents, SingleTangents};
 
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
 use crate::material::ClosedTangent;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
+use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use plain::Plain;
@@ -93,9 +94,23 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
+        Self::with_precision(approximation, grid, positions, Precision::Double)
+    }
+
+    /// As [`Self::new`], prepared for products in single precision if they are asked for and shape functions are products.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_precision<A: ShapeFunction>(
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+        precision: Precision,
+    ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions)?;
+                let single = precision == Precision::Mixed;
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, single)?;
                 Ok((Self(Way::Tiled(tiled)), nodes))
             }
             _ => Self::plain(approximation, grid, positions),
@@ -154,7 +169,25 @@ impl<const D: usize> Supports<D> {
 
     /// Σ u_I N_I at every particle.
     pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        infallible(self.interpolate(field, |_, value, _| Ok(value)))
+        let mut values = vec![Vector::zeros(); self.particles()];
+        self.each_particle(field, |_, value, _| value, |p, value| values[p] = value);
+        values
+    }
+
+    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
+    pub fn each_particle<R: Send>(
+        &self,
+        field: &[Vector<f64, D>],
+        point: impl Fn(usize, Vector<f64, D>, Tensor<f64, D>) -> R + Sync,
+        mut take: impl FnMut(usize, R),
+    ) {
+        match &self.0 {
+            Way::Plain(plain) => {
+                let results = infallible(plain.interpolate(field, |p, value, gradient| Ok(point(p, value, gradient))));
+                results.into_iter().enumerate().for_each(|(p, result)| take(p, result));
+            }
+            Way::Tiled(tiled) => waves::each_particle(tiled, field, point, take),
+        }
     }
 
     /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
@@ -248,11 +281,51 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// Bytes of [`Self::closed_tangents`]; `None` where the sweep has no vector lanes.
-    pub fn closed_bytes(&self, both: bool, inertia: bool) -> Option<usize> {
+    /// The spacing h, if the supports are prepared for products in single precision.
+    pub fn unit(&self) -> Option<f64> {
         match &self.0 {
             Way::Plain(_) => None,
-            Way::Tiled(tiled) => Some(tiled.closed_bytes(both, inertia)),
+            Way::Tiled(tiled) => tiled.unit,
+        }
+    }
+
+    /// As [`Self::closed_tangents`], in single precision: for gradients in units of 1/h; `None` also where the supports are not
+    /// prepared for it.
+    ///
+    /// # Errors
+    /// As [`Self::closed_tangents`].
+    pub fn single_tangents<E: Send>(
+        &self,
+        field: &[Vector<f64, D>],
+        both: bool,
+        inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
+        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
+    ) -> Option<Result<SingleTangents<D>, E>> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => tiled.closed_single(field, both, inertia, point),
+        }
+    }
+
+    /// [`Self::product`] in single precision, gradients in units of 1/h.
+    pub fn single_product(&self, tangents: &SingleTangents<D>, field: &[Vector<f32, D>], out: &mut [Vector<f32, D>]) {
+        if let Way::Tiled(tiled) = &self.0 {
+            tiled.product_single(tangents, field, out);
+        }
+    }
+
+    /// [`Self::add_blocks`] in single precision, gradients in units of 1/h.
+    pub fn add_single_blocks(&self, tangents: &SingleTangents<D>, out: &mut [Tensor<f32, D>]) {
+        if let Way::Tiled(tiled) = &self.0 {
+            tiled.add_blocks_single(tangents, out);
+        }
+    }
+
+    /// Bytes of [`Self::closed_tangents`], or of [`Self::single_tangents`]; `None` where the sweep has no vector lanes.
+    pub fn closed_bytes(&self, both: bool, inertia: bool, precision: Precision) -> Option<usize> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => Some(tiled.closed_bytes(both, inertia, precision == Precision::Mixed)),
         }
     }
 

@@ -1,81 +1,97 @@
 //! The kernels over one block of cells.
 //!
-//! These functions are not generic, so that the kernels are compiled once, here, for every dimension and instruction set, and
-//! not again for every point function: what a particle does comes in by reference.
+//! These functions are generic over the number at most, so that the kernels are compiled once, here, for every dimension and
+//! instruction set, and not again for every point function: what a particle does comes in by reference.
 
-use super::block::Block;
+use super::block::Groups;
 use super::closed::{Form, Numbers};
 use super::kernel::{Quadratic, Rows, Signed, Terms, gather, load, pair, scatter, scatter_blocks, store};
-use super::lanes::{LANES, Lanes, WithLanes, widest};
+use super::lanes::{LANES, Lanes, Number, WithLanes};
 use crate::material::ClosedTangent;
+use crate::scalar::Real;
+
+/// The groups of a block in double precision.
+type Double = Groups<f64, LANES>;
 
 /// What is done at the particles of a group: puts q in the place of u and σ in that of L.
 pub(super) type Point<'a> = dyn Fn(&[u32], &mut Rows) + Sync + 'a;
 
 /// Calls a function of the dimension.
 macro_rules! by_dimension {
-    ($block:expr, $work:ident { $($field:ident),* }) => {
-        match $block.dimension {
-            1 => widest($work::<1> { $($field),* }),
-            2 => widest($work::<2> { $($field),* }),
-            _ => widest($work::<3> { $($field),* }),
+    ($number:ty, $groups:expr, $work:ident { $($field:ident),* }) => {
+        match $groups.dimension {
+            1 => <$number>::widest($work::<1> { $($field),* }),
+            2 => <$number>::widest($work::<2> { $($field),* }),
+            _ => <$number>::widest($work::<3> { $($field),* }),
+        }
+    };
+    ($number:ty, $lanes:ident, $groups:expr, $work:ident { $($field:ident),* }) => {
+        match $groups.dimension {
+            1 => <$number>::widest($work::<1, $number, $lanes> { $($field),* }),
+            2 => <$number>::widest($work::<2, $number, $lanes> { $($field),* }),
+            _ => <$number>::widest($work::<3, $number, $lanes> { $($field),* }),
         }
     };
 }
 
 /// u and L of every group.
-pub(super) fn gather_all(block: &Block, nodal: &[f64], rows: &mut [Rows]) {
-    by_dimension!(block, GatherAll { block, nodal, rows });
+pub(super) fn gather_all(groups: &Double, nodal: &[f64], rows: &mut [Rows]) {
+    by_dimension!(f64, groups, GatherAll { groups, nodal, rows });
 }
 
 /// Gathers, asks `point`, and scatters.
-pub(super) fn each(block: &Block, nodal: &[f64], buffer: &mut [f64], point: &Point<'_>) {
-    by_dimension!(block, Each { block, nodal, buffer, point });
+pub(super) fn each(groups: &Double, nodal: &[f64], buffer: &mut [f64], point: &Point<'_>) {
+    by_dimension!(f64, groups, Each { groups, nodal, buffer, point });
 }
 
 /// As [`each`], with |N| and |∇N| in the scatter.
-pub(super) fn magnitudes(block: &Block, nodal: &[f64], buffer: &mut [f64], point: &Point<'_>) {
-    by_dimension!(block, Magnitudes { block, nodal, buffer, point });
+pub(super) fn magnitudes(groups: &Double, nodal: &[f64], buffer: &mut [f64], point: &Point<'_>) {
+    by_dimension!(f64, groups, Magnitudes { groups, nodal, buffer, point });
 }
 
 /// Scatters q alone; nothing is gathered.
-pub(super) fn spread(block: &Block, buffer: &mut [f64], point: &Point<'_>) {
-    by_dimension!(block, Spread { block, buffer, point });
+pub(super) fn spread(groups: &Double, buffer: &mut [f64], point: &Point<'_>) {
+    by_dimension!(f64, groups, Spread { groups, buffer, point });
 }
 
 /// The product with tangents in closed form.
-pub(super) fn product(block: &Block, nodal: &[f64], buffer: &mut [f64], frozen: &Numbers) {
+pub(super) fn product<X: Number<L>, const L: usize>(
+    groups: &Groups<X, L>,
+    nodal: &[X],
+    buffer: &mut [X],
+    frozen: &Numbers<X, L>,
+) {
     match (frozen.form.both, frozen.form.inertia) {
-        (false, false) => by_dimension!(block, Product { block, nodal, buffer, frozen }),
-        (false, true) => by_dimension!(block, ProductInertia { block, nodal, buffer, frozen }),
-        (true, false) => by_dimension!(block, ProductBoth { block, nodal, buffer, frozen }),
-        (true, true) => by_dimension!(block, ProductBothInertia { block, nodal, buffer, frozen }),
+        (false, false) => by_dimension!(X, L, groups, Product { groups, nodal, buffer, frozen }),
+        (false, true) => by_dimension!(X, L, groups, ProductInertia { groups, nodal, buffer, frozen }),
+        (true, false) => by_dimension!(X, L, groups, ProductBoth { groups, nodal, buffer, frozen }),
+        (true, true) => by_dimension!(X, L, groups, ProductBothInertia { groups, nodal, buffer, frozen }),
     }
 }
 
 /// The diagonal blocks of tangents in closed form.
-pub(super) fn diagonal(block: &Block, buffer: &mut [f64], frozen: &Numbers) {
-    by_dimension!(block, Diagonal { block, buffer, frozen });
+pub(super) fn diagonal<X: Number<L>, const L: usize>(groups: &Groups<X, L>, buffer: &mut [X], frozen: &Numbers<X, L>) {
+    by_dimension!(X, L, groups, Diagonal { groups, buffer, frozen });
 }
 
 /// The diagonal blocks of tangents that `quadratic` knows, group by group.
-pub(super) fn quadratics(block: &Block, buffer: &mut [f64], quadratic: &(dyn Fn(&[u32]) -> Quadratic + Sync)) {
-    by_dimension!(block, Quadratics { block, buffer, quadratic });
+pub(super) fn quadratics(groups: &Double, buffer: &mut [f64], quadratic: &(dyn Fn(&[u32]) -> Quadratic + Sync)) {
+    by_dimension!(f64, groups, Quadratics { groups, buffer, quadratic });
 }
 
 struct GatherAll<'a, const D: usize> {
-    block: &'a Block,
+    groups: &'a Double,
     nodal: &'a [f64],
     rows: &'a mut [Rows],
 }
 
-impl<const D: usize> WithLanes for GatherAll<'_, D> {
+impl<const D: usize> WithLanes<f64, LANES> for GatherAll<'_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
+    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
         for (group, rows) in self.rows.iter_mut().enumerate() {
-            store(s, &gather::<S, D, true>(s, &self.block.window(group), self.nodal), rows);
+            store(s, &gather::<S, D, LANES, true>(s, &self.groups.window(group), self.nodal), rows);
         }
     }
 }
@@ -110,23 +126,23 @@ impl Terms for OnlyGradient {
 macro_rules! each_particle {
     ($name:ident, $terms:ident) => {
         struct $name<'a, const D: usize> {
-            block: &'a Block,
+            groups: &'a Double,
             nodal: &'a [f64],
             buffer: &'a mut [f64],
             point: &'a Point<'a>,
         }
 
-        impl<const D: usize> WithLanes for $name<'_, D> {
+        impl<const D: usize> WithLanes<f64, LANES> for $name<'_, D> {
             type Output = ();
 
             #[inline(always)]
-            fn run<S: Lanes>(self, s: S) {
+            fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
                 let mut rows = [[0.0; LANES]; 12];
-                for group in 0..self.block.groups() {
-                    let window = self.block.window(group);
-                    store(s, &gather::<S, D, true>(s, &window, self.nodal), &mut rows);
-                    (self.point)(self.block.particles(group), &mut rows);
-                    scatter::<S, $terms, D>(s, &window, &load(s, &rows), self.buffer);
+                for group in 0..self.groups.len() {
+                    let window = self.groups.window(group);
+                    store(s, &gather::<S, D, LANES, true>(s, &window, self.nodal), &mut rows);
+                    (self.point)(self.groups.particles(group), &mut rows);
+                    scatter::<S, $terms, D, LANES>(s, &window, &load(s, &rows), self.buffer);
                 }
             }
         }
@@ -137,44 +153,44 @@ each_particle!(Each, Signed);
 each_particle!(Magnitudes, Absolute);
 
 struct Spread<'a, const D: usize> {
-    block: &'a Block,
+    groups: &'a Double,
     buffer: &'a mut [f64],
     point: &'a Point<'a>,
 }
 
-impl<const D: usize> WithLanes for Spread<'_, D> {
+impl<const D: usize> WithLanes<f64, LANES> for Spread<'_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
+    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
         let mut rows = [[0.0; LANES]; 12];
-        for group in 0..self.block.groups() {
-            (self.point)(self.block.particles(group), &mut rows);
-            scatter::<S, OnlyValue, D>(s, &self.block.window(group), &load(s, &rows), self.buffer);
+        for group in 0..self.groups.len() {
+            (self.point)(self.groups.particles(group), &mut rows);
+            scatter::<S, OnlyValue, D, LANES>(s, &self.groups.window(group), &load(s, &rows), self.buffer);
         }
     }
 }
 
 macro_rules! closed_product {
     ($name:ident, $terms:ident, $both:expr, $inertia:expr) => {
-        struct $name<'a, const D: usize> {
-            block: &'a Block,
-            nodal: &'a [f64],
-            buffer: &'a mut [f64],
-            frozen: &'a Numbers,
+        struct $name<'a, const D: usize, X, const L: usize> {
+            groups: &'a Groups<X, L>,
+            nodal: &'a [X],
+            buffer: &'a mut [X],
+            frozen: &'a Numbers<X, L>,
         }
 
-        impl<const D: usize> WithLanes for $name<'_, D> {
+        impl<const D: usize, X: Real, const L: usize> WithLanes<X, L> for $name<'_, D, X, L> {
             type Output = ();
 
             #[inline(always)]
-            fn run<S: Lanes>(self, s: S) {
+            fn run<S: Lanes<L, X = X>>(self, s: S) {
                 const FORM: Form = Form { both: $both, inertia: $inertia };
                 let count = FORM.rows(D);
-                for group in 0..self.block.groups() {
-                    let window = self.block.window(group);
-                    let mut at = gather::<S, D, { $inertia }>(s, &window, self.nodal);
-                    let numbers = self.frozen.of_group(self.block.first_group + group, count);
+                for group in 0..self.groups.len() {
+                    let window = self.groups.window(group);
+                    let mut at = gather::<S, D, L, { $inertia }>(s, &window, self.nodal);
+                    let numbers = self.frozen.of_group(self.groups.first + group, count);
                     let tangent: ClosedTangent<S::N, D> = FORM.read(s, numbers);
                     at.gradient = tangent.product(s, &at.gradient);
                     if $inertia {
@@ -183,7 +199,7 @@ macro_rules! closed_product {
                             *value = s.mul(weight, *value);
                         }
                     }
-                    scatter::<S, $terms, D>(s, &window, &at, self.buffer);
+                    scatter::<S, $terms, D, L>(s, &window, &at, self.buffer);
                 }
             }
         }
@@ -195,22 +211,22 @@ closed_product!(ProductInertia, Signed, false, true);
 closed_product!(ProductBoth, OnlyGradient, true, false);
 closed_product!(ProductBothInertia, Signed, true, true);
 
-struct Diagonal<'a, const D: usize> {
-    block: &'a Block,
-    buffer: &'a mut [f64],
-    frozen: &'a Numbers,
+struct Diagonal<'a, const D: usize, X, const L: usize> {
+    groups: &'a Groups<X, L>,
+    buffer: &'a mut [X],
+    frozen: &'a Numbers<X, L>,
 }
 
-impl<const D: usize> WithLanes for Diagonal<'_, D> {
+impl<const D: usize, X: Real, const L: usize> WithLanes<X, L> for Diagonal<'_, D, X, L> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
+    fn run<S: Lanes<L, X = X>>(self, s: S) {
         let form = self.frozen.form;
         let count = form.rows(D);
-        let mut quadratic = Quadratic::zero();
-        for group in 0..self.block.groups() {
-            let numbers = self.frozen.of_group(self.block.first_group + group, count);
+        let mut quadratic = Quadratic::<X, L>::zero();
+        for group in 0..self.groups.len() {
+            let numbers = self.frozen.of_group(self.groups.first + group, count);
             let tangent: ClosedTangent<S::N, D> = form.read(s, numbers);
             for l in 0..D {
                 for k in 0..=l {
@@ -226,25 +242,25 @@ impl<const D: usize> WithLanes for Diagonal<'_, D> {
             if form.inertia {
                 quadratic.mass = numbers[count - 1];
             }
-            scatter_blocks::<S, D>(s, &self.block.window(group), &quadratic, self.buffer);
+            scatter_blocks::<S, D, L>(s, &self.groups.window(group), &quadratic, self.buffer);
         }
     }
 }
 
 struct Quadratics<'a, const D: usize> {
-    block: &'a Block,
+    groups: &'a Double,
     buffer: &'a mut [f64],
     quadratic: &'a (dyn Fn(&[u32]) -> Quadratic + Sync),
 }
 
-impl<const D: usize> WithLanes for Quadratics<'_, D> {
+impl<const D: usize> WithLanes<f64, LANES> for Quadratics<'_, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        for group in 0..self.block.groups() {
-            let quadratic = (self.quadratic)(self.block.particles(group));
-            scatter_blocks::<S, D>(s, &self.block.window(group), &quadratic, self.buffer);
+    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
+        for group in 0..self.groups.len() {
+            let quadratic = (self.quadratic)(self.groups.particles(group));
+            scatter_blocks::<S, D, LANES>(s, &self.groups.window(group), &quadratic, self.buffer);
         }
     }
 }

@@ -27,6 +27,8 @@ pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
     /// Slot of each particle, eight for each group: group · 8 + lane.
     slots: Vec<u32>,
+    /// h, if the blocks are prepared for single precision.
+    pub(super) unit: Option<f64>,
 }
 
 impl<const D: usize> Tiled<D> {
@@ -36,6 +38,7 @@ impl<const D: usize> Tiled<D> {
         product: &dyn Separable,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
+        single: bool,
     ) -> Result<(Self, Nodes), SupportError> {
         // The product names the axis that fails; the shape function names the whole position.
         let failure = |particle: usize, source: Option<ApproximationError>| {
@@ -49,15 +52,19 @@ impl<const D: usize> Tiled<D> {
         for run in keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)) {
             runs.push(run);
         }
-        let built = infallible(ordered(runs.len(), |b| Ok(block(product, grid, positions, runs[b]))));
+        let built = infallible(ordered(runs.len(), |b| Ok(block(product, grid, positions, runs[b], single))));
         let mut first_failure: Option<(usize, ApproximationError)> = None;
         let (mut blocks, mut active) = (Vec::with_capacity(built.len()), Vec::with_capacity(built.len()));
-        let mut first_group = 0;
+        let (mut first, mut first_single) = (0, 0);
         for result in built {
             match result {
                 Ok((mut block, mask)) => {
-                    block.first_group = first_group;
-                    first_group += block.groups.len();
+                    block.groups.first = first;
+                    first += block.groups.len();
+                    if let Some(groups) = &mut block.single {
+                        groups.first = first_single;
+                        first_single += groups.len();
+                    }
                     blocks.push(block);
                     active.push(mask);
                 }
@@ -74,13 +81,9 @@ impl<const D: usize> Tiled<D> {
         let nodes = number(grid, &mut blocks, &active);
         let mut slots = vec![0; positions.len()];
         for block in &blocks {
-            for (g, (group, particles)) in block.groups.iter().zip(&block.particles).enumerate() {
-                for (lane, &p) in particles[..usize::from(group.lanes)].iter().enumerate() {
-                    slots[p as usize] = ((block.first_group + g) * LANES + lane) as u32;
-                }
-            }
+            block.groups.each(|group, lane, p| slots[p] = ((block.groups.first + group) * LANES + lane) as u32);
         }
-        Ok((Self { blocks, slots }, nodes))
+        Ok((Self { blocks, slots, unit: single.then_some(grid.spacing) }, nodes))
     }
 
     pub(super) fn particles(&self) -> usize {
@@ -89,32 +92,24 @@ impl<const D: usize> Tiled<D> {
 
     /// Number of groups.
     pub(super) fn groups(&self) -> usize {
-        self.blocks.last().map_or(0, |last| last.first_group + last.groups.len())
+        self.blocks.last().map_or(0, |last| last.groups.first + last.groups.len())
     }
 
     pub(super) fn windows(&self) -> Vec<([usize; 3], usize)> {
-        let groups = self.blocks.iter().flat_map(|block| &block.groups);
+        let groups = self.blocks.iter().flat_map(|block| &block.groups.windows);
         groups.map(|group| (group.width.map(usize::from), usize::from(group.lanes))).collect()
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let of_block = |block: &Block| {
-            size_of_val(block)
-                + size_of_val(block.groups.as_slice())
-                + size_of_val(block.weights.as_slice())
-                + size_of_val(block.particles.as_slice())
-                + size_of_val(block.nodes.as_slice())
-                + size_of_val(block.places.as_slice())
-        };
-        size_of_val(self.slots.as_slice()) + self.blocks.iter().map(of_block).sum::<usize>()
+        size_of_val(self.slots.as_slice()) + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
 
     /// The group and the lane of a particle: (block, group in the block, lane).
     fn place(&self, particle: usize) -> (&Block, usize, usize) {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);
-        let block = &self.blocks[self.blocks.partition_point(|block| block.first_group <= group) - 1];
-        (block, group - block.first_group, lane)
+        let block = &self.blocks[self.blocks.partition_point(|block| block.groups.first <= group) - 1];
+        (block, group - block.groups.first, lane)
     }
 
     pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
@@ -142,7 +137,7 @@ impl<const D: usize> Tiled<D> {
             let nodal = block.boxed(field);
             let mut buffer = vec![Vector::zeros(); block.box_nodes()];
             let mut failure = None;
-            block.each(|group, lane, p| {
+            block.groups.each(|group, lane, p| {
                 let (value, gradient) = block.gather(group, lane, &nodal);
                 match point(p, value, gradient) {
                     Ok((force, stress)) => block.entries::<D>(group, lane, |place, n, grad_n| {
@@ -179,8 +174,8 @@ impl<const D: usize> Tiled<D> {
             }
         };
         waves::run(self, Some(field), out, &|block, nodal, buffer| match magnitude {
-            Magnitude::No => of_block::each(block, nodal, buffer, &one_by_one),
-            Magnitude::Yes => of_block::magnitudes(block, nodal, buffer, &one_by_one),
+            Magnitude::No => of_block::each(&block.groups, nodal, buffer, &one_by_one),
+            Magnitude::Yes => of_block::magnitudes(&block.groups, nodal, buffer, &one_by_one),
         });
         let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
         failure.map_or(Ok(()), |(_, error)| Err(error))
@@ -192,7 +187,7 @@ impl<const D: usize> Tiled<D> {
     {
         let buffers = infallible(self.in_order(|block| {
             let mut buffer = vec![O::zero(); block.box_nodes()];
-            block.each(|group, lane, p| {
+            block.groups.each(|group, lane, p| {
                 block.entries::<D>(group, lane, |place, n, grad_n| buffer[place] += scatter(p, n, &grad_n));
             });
             Ok(buffer)
@@ -212,7 +207,7 @@ impl<const D: usize> Tiled<D> {
             let nodal = block.boxed(field);
             let mut part = Vec::with_capacity(block.groups.len() * LANES);
             let mut failure = None;
-            block.each(|group, lane, p| {
+            block.groups.each(|group, lane, p| {
                 let (value, gradient) = block.gather(group, lane, &nodal);
                 match point(p, value, gradient) {
                     Ok(result) => part.push((p, result)),
@@ -232,7 +227,7 @@ impl<const D: usize> Tiled<D> {
         let results = waves::gathered(self, field, vec![(); self.blocks.len()], |block, (), gathered| {
             let mut part = Vec::with_capacity(block.groups.len() * LANES);
             let mut failure = None;
-            block.each(|group, lane, p| {
+            block.groups.each(|group, lane, p| {
                 let (value, gradient) = of_lane(&gathered[group], lane);
                 match point(p, value, gradient) {
                     Ok(result) => part.push((p, result)),
@@ -264,7 +259,7 @@ impl<const D: usize> Tiled<D> {
                 }
             }
         };
-        waves::run(self, None, out, &|block, _, buffer| of_block::spread(block, buffer, &point));
+        waves::run(self, None, out, &|block, _, buffer| of_block::spread(&block.groups, buffer, &point));
     }
 
     /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I` with B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
@@ -296,7 +291,7 @@ impl<const D: usize> Tiled<D> {
             }
             quadratic
         };
-        self.blocks_by(out, &|block, buffer| of_block::quadratics(block, buffer, &quadratic));
+        self.blocks_by(out, &|block, buffer| of_block::quadratics(&block.groups, buffer, &quadratic));
     }
 
     /// `f` of every block, in their order; the error is that of the particle with the smallest number.

@@ -5,12 +5,12 @@
 //! depend on the number of threads.
 
 use super::block::Block;
-use super::kernel::Rows;
-use super::lanes::LANES;
+use super::kernel::{Rows, of_lane};
+use super::lanes::{LANES, SINGLE_LANES};
 use super::of_block;
 use super::tiled::Tiled;
 use crate::scalar::Real;
-use crate::tensor::Vector;
+use crate::tensor::{Tensor, Vector};
 use rayon::prelude::*;
 
 /// Blocks of a wave: their buffers stay in the second-level caches.
@@ -23,32 +23,32 @@ const SLAB: usize = 1024;
 const PARALLEL: usize = 256;
 
 /// `(block, nodal, buffer)`: adds the sums of a block to its buffer, from the field in its box.
-type Sums<'a> = dyn Fn(&Block, &[f64], &mut [f64]) + Sync + 'a;
+type Sums<'a, X> = dyn Fn(&Block, &[X], &mut [X]) + Sync + 'a;
 
 /// `(block, scratch, buffer)`: fills the buffer of a block.
-type Work<'a> = dyn Fn(&Block, &mut Vec<f64>, &mut [f64]) + Sync + 'a;
+type Work<'a, X> = dyn Fn(&Block, &mut Vec<X>, &mut [X]) + Sync + 'a;
 
 /// `(block, buffer, first, slab)`: adds what lies on the active nodes `first ..` of the slab.
-type Add<'a, O> = dyn Fn(&Block, &[f64], usize, &mut [O]) + Sync + 'a;
+type Add<'a, X, O> = dyn Fn(&Block, &[X], usize, &mut [O]) + Sync + 'a;
 
-/// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I`, `T` being `f64`; without a field the box is empty.
-pub(super) fn run<T: Real, const D: usize>(
+/// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with boxes of the number `X`, which is `T`; without a field the box is empty.
+pub(super) fn run<X: Real + Send + Sync, T: Real, const D: usize>(
     tiled: &Tiled<D>,
     field: Option<&[Vector<T, D>]>,
     out: &mut [Vector<T, D>],
-    sums: &Sums<'_>,
+    sums: &Sums<'_, X>,
 ) {
-    let work = |block: &Block, nodal: &mut Vec<f64>, buffer: &mut [f64]| {
+    let work = |block: &Block, nodal: &mut Vec<X>, buffer: &mut [X]| {
         if let Some(field) = field {
-            nodal.resize(block.box_nodes() * D, 0.0);
+            nodal.resize(block.box_nodes() * D, X::zero());
             block.fill(field, nodal);
         }
         sums(block, nodal, buffer);
     };
-    let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [Vector<T, D>]| {
+    let add = |block: &Block, buffer: &[X], first: usize, out: &mut [Vector<T, D>]| {
         block.add(buffer, D, first, out, |sum, numbers| {
             for (sum, &x) in sum.iter_mut().zip(numbers) {
-                *sum += T::lit(x);
+                *sum += T::lit(x.value());
             }
         });
     };
@@ -56,28 +56,28 @@ pub(super) fn run<T: Real, const D: usize>(
 }
 
 /// The waves, with `numbers` numbers a node in the buffers.
-pub(super) fn each_block<O: Send, const D: usize>(
+pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
     tiled: &Tiled<D>,
     numbers: usize,
     out: &mut [O],
-    work: &Work<'_>,
-    add: &Add<'_, O>,
+    work: &Work<'_, X>,
+    add: &Add<'_, X, O>,
 ) {
-    let length = tiled.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + LANES;
+    let length = tiled.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + SINGLE_LANES;
     let parallel = rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL;
-    let one = |scratch: &mut Vec<f64>, buffer: &mut [f64], block: &Block| {
-        buffer[..block.box_nodes() * numbers + LANES].fill(0.0);
+    let one = |scratch: &mut Vec<X>, buffer: &mut [X], block: &Block| {
+        buffer[..block.box_nodes() * numbers + SINGLE_LANES].fill(X::zero());
         work(block, scratch, buffer);
     };
     if !parallel {
-        let (mut scratch, mut buffer) = (Vec::new(), vec![0.0; length]);
+        let (mut scratch, mut buffer) = (Vec::new(), vec![X::zero(); length]);
         for block in &tiled.blocks {
             one(&mut scratch, &mut buffer, block);
             add(block, &buffer, 0, out);
         }
         return;
     }
-    let mut buffers = vec![0.0; WAVE.min(tiled.blocks.len()) * length];
+    let mut buffers = vec![X::zero(); WAVE.min(tiled.blocks.len()) * length];
     for blocks in tiled.blocks.chunks(WAVE) {
         buffers
             .par_chunks_mut(length)
@@ -93,6 +93,56 @@ pub(super) fn each_block<O: Send, const D: usize>(
     }
 }
 
+/// `take(p, point(p, u_p, ∇u_p))` of every particle, in the order of the blocks; no more results wait to be taken than those of a
+/// wave.
+pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
+    tiled: &Tiled<D>,
+    field: &[Vector<T, D>],
+    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
+    mut take: impl FnMut(usize, R),
+) {
+    let gather = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block, take: &mut dyn FnMut(usize, R)| {
+        let (nodal, rows) = scratch;
+        gather_block(block, field, nodal, rows);
+        block.groups.each(|group, lane, p| {
+            let (value, gradient) = of_lane(&rows[group], lane);
+            take(p, point(p, value, gradient));
+        });
+    };
+    if rayon::current_num_threads() == 1 || tiled.groups() < PARALLEL {
+        let mut scratch = Default::default();
+        for block in &tiled.blocks {
+            gather(&mut scratch, block, &mut take);
+        }
+        return;
+    }
+    for blocks in tiled.blocks.chunks(WAVE) {
+        let part = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block| {
+            let mut part = Vec::with_capacity(block.groups.len() * LANES);
+            gather(scratch, block, &mut |p, result| part.push((p, result)));
+            part
+        };
+        let parts: Vec<Vec<(usize, R)>> = blocks.par_iter().map_init(Default::default, part).collect();
+        for (p, result) in parts.into_iter().flatten() {
+            take(p, result);
+        }
+    }
+}
+
+/// u and L of each group of a block.
+fn gather_block<T: Real, const D: usize>(
+    block: &Block,
+    field: &[Vector<T, D>],
+    nodal: &mut Vec<f64>,
+    rows: &mut Vec<Rows>,
+) {
+    nodal.resize(block.box_nodes() * D, 0.0);
+    block.fill(field, nodal);
+    rows.clear();
+    rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
+    of_block::gather_all(&block.groups, nodal, rows);
+}
+
 /// `visit(block, chunk, u and L of each group)` of every block; `chunks` hands out a part of the result to each.
 pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
     tiled: &Tiled<D>,
@@ -102,11 +152,7 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
 ) -> Vec<R> {
     let one = |scratch: &mut (Vec<f64>, Vec<Rows>), (block, chunk): (&Block, C)| {
         let (nodal, rows) = scratch;
-        nodal.resize(block.box_nodes() * D, 0.0);
-        block.fill(field, nodal);
-        rows.clear();
-        rows.resize(block.groups(), [[0.0; LANES]; 12]);
-        of_block::gather_all(block, nodal, rows);
+        gather_block(block, field, nodal, rows);
         visit(block, chunk, rows)
     };
     if rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL {

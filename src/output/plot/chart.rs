@@ -17,8 +17,8 @@ pub(super) const LABEL: (&str, u32) = ("sans-serif", 14);
 
 /// A line with its place in the legend.
 pub(super) struct Line {
-    /// Name.
-    pub label: &'static str,
+    /// Name; lines without one are not in the legend.
+    pub label: String,
     /// Colour.
     pub color: RGBColor,
     /// Points.
@@ -27,6 +27,8 @@ pub(super) struct Line {
 
 /// One pair of axes.
 pub(super) struct Panel {
+    /// Label of the level axis.
+    pub x: &'static str,
     /// Label of the upright axis.
     pub y: &'static str,
     /// The lines.
@@ -69,7 +71,7 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
-        .x_desc("time")
+        .x_desc(panel.x)
         .y_desc(panel.y)
         .label_style(LABEL)
         .axis_desc_style(LABEL)
@@ -79,10 +81,12 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .draw()?;
     for line in &panel.lines {
         let color = line.color;
-        chart
-            .draw_series(LineSeries::new(thinned(&line.points), color.stroke_width(2)))?
-            .label(line.label)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2)));
+        let width = if line.label.is_empty() { 1 } else { 2 };
+        let drawn = chart.draw_series(LineSeries::new(thinned(&line.points), color.stroke_width(width)))?;
+        if line.label.is_empty() {
+            continue;
+        }
+        drawn.label(&line.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2)));
     }
     chart
         .configure_series_labels()

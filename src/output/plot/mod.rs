@@ -1,8 +1,11 @@
-//! Pictures of a finished (or killed) run: energies, iterations, and the particles of the last snapshot.
+//! Pictures of a finished (or killed) run: energies, momentum, iterations, Newton's convergence, the particles of the last snapshot;
+//! and all of them with the numbers of the run on one page, `report.html`, that opens anywhere.
 //!
 //! Everything is drawn as SVG; the PNG beside it is made from the SVG with an embedded DejaVu Sans, so that no fonts need to be installed.
 
 mod chart;
+mod convergence;
+mod html;
 mod palette;
 mod particles;
 pub mod png;
@@ -13,6 +16,7 @@ use super::snapshots::SERIES;
 use super::vtu::{ReadError, Snapshot};
 use super::{OutputError, vtu};
 use chart::{Line, Panel};
+use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use table::Columns;
@@ -46,6 +50,14 @@ pub enum PlotError {
         /// What is there.
         cell: String,
     },
+    /// The report is none.
+    #[error("{} is no report written by bfree: {source}", path.display())]
+    Report {
+        /// The file.
+        path: PathBuf,
+        /// What JSON says.
+        source: serde_json::Error,
+    },
     /// A snapshot cannot be read.
     #[error(transparent)]
     Snapshot(#[from] vtu::ReadError),
@@ -62,16 +74,19 @@ pub enum PlotError {
     Write(#[from] OutputError),
 }
 
-/// Draws what is in the directory of a run, as `.svg` and `.png`, into the same directory: `energies`, `iterations`, and
-/// `particles` if there are snapshots. Returns the files written.
+/// Draws what is in the directory of a run, as `.svg` and `.png`, into the same directory: `energies`, `momentum`, `iterations`,
+/// `convergence` once there are steps, and `particles` if there are snapshots; and writes `report.html`, with all of them in it.
+/// Returns the files written.
 ///
 /// # Errors
-/// `history.csv` is missing or damaged, or the last snapshot is; the system refuses.
+/// `history.csv` is missing or damaged, or the report or the last snapshot is damaged; the system refuses.
 pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let history = Columns::read(directory.join("history.csv"))?;
-    let line = |column: &'static str, label: &'static str, color| -> Result<Line, PlotError> {
-        Ok(Line { label, color, points: history.pairs("time", column)? })
+    let report = report(directory)?;
+    let line = |column: &'static str, label: &str, color| -> Result<Line, PlotError> {
+        Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
     };
+    let panel = |y, lines, share| Panel { x: "time", y, lines, share };
     let energies = vec![
         line("total", "total", palette::BLACK)?,
         line("kinetic", "kinetic", palette::BLUE)?,
@@ -79,27 +94,61 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
         line("external", "external work", palette::GREEN)?,
     ];
     let balance = vec![line("balance", "total - initial - external work", palette::PURPLE)?];
+    let axes = [
+        ("momentum_x", "x", palette::BLUE),
+        ("momentum_y", "y", palette::VERMILLION),
+        ("momentum_z", "z", palette::GREEN),
+    ];
+    let axes = axes.into_iter().filter(|(column, ..)| history.has(column));
+    let momentum: Vec<Line> =
+        axes.map(|(column, label, color)| line(column, label, color)).collect::<Result<_, _>>()?;
     let newton = vec![line("newton", "Newton", palette::BLUE)?];
     let krylov = vec![line("krylov", "Krylov", palette::VERMILLION)?];
 
+    let mut pictures = vec![
+        ("energies", chart::draw("energies", "Energy", &[panel("energy", energies, 3), panel("balance", balance, 2)])?),
+        ("momentum", chart::draw("momentum", "Momentum", &[panel("momentum", momentum, 1)])?),
+        (
+            "iterations",
+            chart::draw(
+                "iterations",
+                "Iterations per step",
+                &[panel("Newton", newton, 1), panel("Krylov", krylov, 1)],
+            )?,
+        ),
+    ];
+    if let Some(panel) = convergence::panel(report.as_ref(), directory)? {
+        pictures.push(("convergence", chart::draw("convergence", "Convergence of Newton's method", &[panel])?));
+    }
+    if let Some(path) = last_snapshot(directory)? {
+        pictures.push(("particles", particles::draw("particles", &Snapshot::read(&path)?)?));
+    }
     let mut written = Vec::new();
-    let mut keep = |name: &'static str, svg: String| -> Result<(), PlotError> {
-        let png = png::from_svg(name, &svg)?;
-        for (extension, content) in [("svg", svg.as_bytes()), ("png", &png)] {
-            let path = directory.join(name).with_extension(extension);
-            write_atomically(&path, |file| file.write_all(content))?;
-            written.push(path);
-        }
+    let mut keep = |file: &str, content: &[u8]| -> Result<(), PlotError> {
+        let path = directory.join(file);
+        write_atomically(&path, |file| file.write_all(content))?;
+        written.push(path);
         Ok(())
     };
-    let panels = [Panel { y: "energy", lines: energies, share: 3 }, Panel { y: "balance", lines: balance, share: 2 }];
-    keep("energies", chart::draw("energies", "Energy", &panels)?)?;
-    let panels = [Panel { y: "Newton", lines: newton, share: 1 }, Panel { y: "Krylov", lines: krylov, share: 1 }];
-    keep("iterations", chart::draw("iterations", "Iterations per step", &panels)?)?;
-    if let Some(path) = last_snapshot(directory)? {
-        keep("particles", particles::draw("particles", &Snapshot::read(&path)?)?)?;
+    for (name, svg) in &pictures {
+        keep(&format!("{name}.svg"), svg.as_bytes())?;
+        keep(&format!("{name}.png"), &png::from_svg(name, svg)?)?;
     }
+    // What one looks at first stands first.
+    let shift = usize::from(pictures.last().is_some_and(|(name, _)| *name == "particles"));
+    pictures.rotate_right(shift);
+    keep("report.html", html::page(report.as_ref(), &pictures).as_bytes())?;
     Ok(written)
+}
+
+/// The report of a run that has ended.
+fn report(directory: &Path) -> Result<Option<Value>, PlotError> {
+    let path = directory.join("report.json");
+    match std::fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| PlotError::Report { path, source }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(PlotError::Read { path, source }),
+    }
 }
 
 /// The file of the last snapshot in the series, if there is a series.

@@ -10,7 +10,7 @@ use plotters::prelude::*;
 const SIDE: (f64, f64) = (760.0, 160.0);
 
 /// Width of the labels at the left, height of those below and of the title, width of the colour bar.
-const MARGINS: (u32, u32, u32, u32) = (76, 52, 40, 120);
+const MARGINS: (u32, u32, u32, u32) = (76, 52, 40, 150);
 
 /// Grid lines beyond so many along an axis would be a grey area.
 const MAX_LINES: u32 = 200;
@@ -138,7 +138,8 @@ fn draw_on(svg: &mut String, snapshot: &Snapshot) -> Result<(), Box<dyn std::err
         let mut chart = ChartBuilder::on(&side)
             .margin_top(10)
             .margin_bottom(below)
-            .right_y_label_area_size(92)
+            .margin_right(24)
+            .right_y_label_area_size(98)
             .build_cartesian_2d(0.0..1.0, low..high)?;
         let steps = 128;
         let at = |k: i32| low + (high - low) * f64::from(k) / f64::from(steps);

@@ -35,6 +35,11 @@ impl Columns {
         Ok(Self { path, names, cells })
     }
 
+    /// Whether there is a column of this name.
+    pub(super) fn has(&self, column: &str) -> bool {
+        self.names.iter().any(|name| name == column)
+    }
+
     /// The pairs (x, y) of two columns.
     pub(super) fn pairs(&self, x: &'static str, y: &'static str) -> Result<Vec<(f64, f64)>, PlotError> {
         let find = |column: &'static str| {

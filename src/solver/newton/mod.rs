@@ -10,12 +10,12 @@ mod tests;
 
 pub use failure::{LinearSolverFailure, NewtonError, NewtonFailure};
 pub use report::{Convergence, Merit, NewtonCounts, NewtonHistory, NewtonIteration, NewtonReport};
-pub use settings::{Krylov, NewtonSettings};
+pub use settings::{Krylov, NewtonSettings, Precision};
 
 use super::NonlinearProblem;
 use super::forcing::Progress;
 use super::vector::{dot, norm};
-use linear::solve;
+use linear::{SINGLE_TOLERANCE, solve, solve_single};
 use search::{Search, Step, search};
 
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
@@ -34,7 +34,8 @@ const DIVERGED: f64 = 1e8;
 ///
 /// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude), the magnitude being that of the initial guess.
 /// 2. K = linearize(x).
-/// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`](super::Forcing). A solve that ends early is still used if it is below 0.9.
+/// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`](super::Forcing), at least 1e-5 in single precision. A
+///    solve that ends early is still used if it is below 0.9.
 /// 4. s = 1.
 /// 5. Accept x + s d if ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
@@ -94,14 +95,26 @@ fn iterate<P: NonlinearProblem>(
         if iteration > settings.max_iterations {
             return Err(NewtonFailure::MaxIterations { allowed: settings.max_iterations, residual, target });
         }
-        let forcing = settings.forcing.next(progress, target / residual);
-        let (krylov, negative_curvature) = {
+        let mut forcing = settings.forcing.next(progress, target / residual);
+        let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
+        let mut solved = None;
+        if settings.precision == Precision::Mixed
+            && let Some(tangent) = problem.linearize_single(x).map_err(inadmissible)?
+        {
             history.counts.linearizations += 1;
-            let tangent = problem
-                .linearize(x)
-                .map_err(|source| NewtonFailure::Inadmissible { iteration: iteration - 1, source })?;
-            solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts)
-                .map_err(|source| NewtonFailure::LinearSolverFailed { iteration, residual, source })?
+            let reachable = forcing.max(SINGLE_TOLERANCE);
+            // What single precision cannot solve, double precision may.
+            solved = solve_single(tangent.as_ref(), &r, &mut d, reachable, settings, &mut history.counts).ok();
+            forcing = if solved.is_some() { reachable } else { forcing };
+        }
+        let (krylov, negative_curvature) = match solved {
+            Some(solved) => solved,
+            None => {
+                history.counts.linearizations += 1;
+                let tangent = problem.linearize(x).map_err(inadmissible)?;
+                solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts)
+                    .map_err(|source| NewtonFailure::LinearSolverFailed { iteration, residual, source })?
+            }
         };
         let at = Step { x, d: &d, residual, slope: dot(&r, &d), linear: krylov.relative_residual };
         let round_off = ROUND_OFF_MULTIPLE * floor * first_magnitude;

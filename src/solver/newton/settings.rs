@@ -21,6 +21,19 @@ pub enum Krylov {
     ConjugateGradient,
 }
 
+/// The numbers of Krylov vectors, tangent products and preconditioner. Everything else is always in double precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// Double precision.
+    #[default]
+    Double,
+    /// Single precision, for half the memory and more speed. Each linear system is then solved to 1e-5 at best, so that Newton's
+    /// method takes an iteration more, to the same residual. Where the shape functions are no products, or a law has no closed
+    /// tangent, double precision all the same.
+    Mixed,
+}
+
 /// Settings of [`newton()`](crate::solver::newton()).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -36,6 +49,8 @@ pub struct NewtonSettings {
     pub forcing: Forcing,
     /// How each linear system is solved.
     pub krylov: Krylov,
+    /// In which precision.
+    pub precision: Precision,
     /// Krylov iterations allowed for each linear system, at least 1.
     pub max_krylov_iterations: usize,
     /// How often the line search may halve the step, at most 60.
@@ -50,6 +65,7 @@ impl Default for NewtonSettings {
             max_iterations: 50,
             forcing: Forcing::Fixed(1e-8),
             krylov: Krylov::Gmres { restart: FALLBACK_RESTART },
+            precision: Precision::Double,
             max_krylov_iterations: 1000,
             max_halvings: 25,
         }

@@ -13,6 +13,7 @@ use bfree::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
 use bfree::mechanics::residual::{Carry, Equilibrium};
 use bfree::mechanics::tangent::frozen_bytes;
+use bfree::solver::Precision;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{GmresSettings, NonlinearProblem, gmres};
@@ -124,7 +125,7 @@ impl Study {
 
         let particles = simulation.particles.len();
         let lumping = simulation.settings.lumping;
-        let free_bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, lumping);
+        let free_bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, lumping, Precision::Double);
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");
         let (spent, saved) = (pattern_seconds + b_free_seconds - freeze_seconds, free_seconds - matrix_seconds);

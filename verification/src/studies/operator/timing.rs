@@ -13,6 +13,7 @@ use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
+use bfree::solver::Precision;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -44,7 +45,7 @@ pub(super) fn measure(outcome: &mut Outcome) -> Result<(), StudyError> {
             let (peak, copy) = (peak(), copy_bandwidth());
             let mut machine = Table::new("the machine, one core", ["GFLOP/s of multiply-adds", "GB/s copied (read and written)"]);
             machine.push([format!("{:.1}", peak / 1e9), format!("{:.1}", copy / 1e9)]);
-            Ok(vec![machine, products(peak, copy, &two)?, matrices(copy)?, steps()?, rebound()?])
+            Ok(vec![machine, products(peak, copy, &two)?, matrices(copy)?, steps()?, rebound()?, growth()?])
         };
         all().map_err(|error| error.to_string())
     })?;
@@ -57,7 +58,7 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
     let mut table = Table::new(
         "one tangent product, and the other parts of a step in units of it",
         [
-            "case", "particles", "M particles/s", "ns", "floor ns", "useful share of peak", "with padding", "2 threads", "residual",
+            "case", "particles", "M particles/s", "ns", "floor ns", "useful share of peak", "with padding", "2 threads", "in single", "residual",
             "tangent frozen", "shape functions",
         ],
     );
@@ -79,9 +80,10 @@ fn product<const D: usize>(
     [peak, copy]: [f64; 2],
     two: &rayon::ThreadPool,
 ) -> Result<(), StudyError> {
-    let simulation = block::<D>(shape.clone(), None, cells, jitter, 1.0)?;
+    let mut simulation = block::<D>(shape.clone(), None, cells, jitter, 1.0)?;
+    let work = Work::of(&simulation, &Prepared::new(&simulation)?)?;
+    simulation.settings.newton.precision = Precision::Mixed;
     let prepared = Prepared::new(&simulation)?;
-    let work = Work::of(&simulation, &prepared)?;
     let equilibrium = prepared.equilibrium(&simulation);
     let mut random = Random::new(11);
     let u: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x: &Vector<f64, D>| x * 0.01).collect();
@@ -89,6 +91,14 @@ fn product<const D: usize>(
     let mut out = vec![Vector::zeros(); u.len()];
     let seconds = best(15, || tangent.product(&u, &mut out));
     let on_two = two.install(|| best(15, || tangent.product(&u, &mut out)));
+    let in_single = match equilibrium.single_tangent(&u)? {
+        Some(single) => {
+            let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
+            let mut out = vec![Vector::zeros(); u.len()];
+            best(15, || single.product(&u, &mut out))
+        }
+        None => f64::NAN,
+    };
     let particles = simulation.particles.len() as f64;
     let times = |s: f64| format!("{:.1}", s / seconds);
     let floor = (work.useful / peak).max(work.bytes / copy);
@@ -101,6 +111,7 @@ fn product<const D: usize>(
         format!("{:.0} %", 100.0 * work.useful / seconds / peak),
         format!("{:.0} %", 100.0 * work.padded / seconds / peak),
         format!("{:.2} x", seconds / on_two),
+        format!("{:.2} x", seconds / in_single),
         times(best(5, || equilibrium.residual::<f64>(&u, Carry::ALL))),
         times(best(5, || equilibrium.tangent(&u).map(|_| ()))),
         times(best(5, || Supports::new(shape, &simulation.grid, &simulation.particles.position).map(|_| ()))),
@@ -128,7 +139,7 @@ fn matrices(copy: f64) -> Result<Table, StudyError> {
         let mut out = vec![Vector::zeros(); count];
         let by_matrix = best(9, || matrix.product(&u, &mut out));
         let free = best(9, || tangent.product(&u, &mut out));
-        let bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, 1.0);
+        let bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, 1.0, Precision::Double);
         table.push([
             name.into(),
             simulation.particles.len().to_string(),
@@ -151,18 +162,27 @@ fn steps() -> Result<Table, StudyError> {
         ],
     );
     for (name, shape) in shapes() {
-        for cells in [80, 160] {
-            step::<2>(&mut table, name, &shape, cells)?;
-        }
-        for cells in [20, 40] {
-            step::<3>(&mut table, name, &shape, cells)?;
+        for precision in [Precision::Double, Precision::Mixed] {
+            for cells in [80, 160] {
+                step::<2>(&mut table, name, &shape, cells, precision)?;
+            }
+            for cells in [20, 40] {
+                step::<3>(&mut table, name, &shape, cells, precision)?;
+            }
         }
     }
     Ok(table)
 }
 
-fn step<const D: usize>(table: &mut Table, name: &str, shape: &Approximation, cells: u32) -> Result<(), StudyError> {
+fn step<const D: usize>(
+    table: &mut Table,
+    name: &str,
+    shape: &Approximation,
+    cells: u32,
+    precision: Precision,
+) -> Result<(), StudyError> {
     let mut simulation = block::<D>(shape.clone(), None, cells, 0.1, 1.0)?;
+    simulation.settings.newton.precision = precision;
     let particles = simulation.particles.len();
     let planned = Plan::of(&simulation)?.bytes();
     let product = {
@@ -186,7 +206,7 @@ fn step<const D: usize>(table: &mut Table, name: &str, shape: &Approximation, ce
     let counts = newton.history.counts;
     let units = counts.tangent_products + counts.residuals + counts.linearizations + 1;
     table.push([
-        format!("{D}D {name}"),
+        format!("{D}D {name}{}", if precision == Precision::Mixed { ", mixed" } else { "" }),
         particles.to_string(),
         format!("{:.2}", seconds / particles as f64 * 1e6),
         counts.tangent_products.to_string(),
@@ -197,6 +217,42 @@ fn step<const D: usize>(table: &mut Table, name: &str, shape: &Approximation, ce
         format!("{:.2}", seconds / (units as f64 * product)),
     ]);
     Ok(())
+}
+
+/// Cells along an edge of the block, for 10⁵, 10⁶ and 10⁷ particles in 3D.
+const GROWING: [u32; 3] = [23, 50, 108];
+
+/// How the time of a step grows with the number of particles, at a fixed Courant number.
+fn growth() -> Result<Table, StudyError> {
+    let mut table = Table::new(
+        "the second step of a block in 3D, Newton to 1e-8, Courant 1: time ~ N^p",
+        ["shape", "particles", "s / step", "us / particle", "p from the row before", "Krylov iterations", "Newton", "GiB (planned)"],
+    );
+    for (name, shape) in shapes() {
+        let mut before: Option<(f64, f64)> = None;
+        for cells in GROWING {
+            let mut simulation = block::<3>(shape.clone(), None, cells, 0.1, 1.0)?;
+            let particles = simulation.particles.len() as f64;
+            let planned = Plan::of(&simulation)?.bytes() as f64;
+            simulation.advance()?;
+            let start = Instant::now();
+            let newton = simulation.advance()?.newton.history;
+            let seconds = start.elapsed().as_secs_f64();
+            let power = before.map(|(n, s)| (seconds / s).ln() / (particles / n).ln());
+            before = Some((particles, seconds));
+            table.push([
+                name.into(),
+                format!("{particles}"),
+                format!("{seconds:.2}"),
+                format!("{:.2}", seconds / particles * 1e6),
+                power.map_or_else(|| "-".into(), |p| format!("{p:.3}")),
+                newton.counts.krylov_iterations.to_string(),
+                newton.iterations.len().to_string(),
+                format!("{:.2}", planned / 1024.0_f64.powi(3)),
+            ]);
+        }
+    }
+    Ok(table)
 }
 
 /// The whole rebound, without output.

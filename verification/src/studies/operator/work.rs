@@ -6,6 +6,7 @@ use crate::studies::StudyError;
 use crate::table::Table;
 use bfree::approximation::{Approximation, AxisWeights, Linear, Lme, ShapeFunction};
 use bfree::mechanics::tangent::frozen_bytes;
+use bfree::solver::Precision;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 
@@ -62,7 +63,7 @@ impl Work {
             work.padded += 2.0 * (LANES * (gather(width, D) + point(D)) + lanes * scatter(rows, width[0], D)) as f64;
         }
         let field = prepared.nodes.len() * size_of::<Vector<f64, D>>();
-        let frozen = frozen_bytes(&simulation.bodies, &prepared.supports, simulation.settings.lumping);
+        let frozen = frozen_bytes(&simulation.bodies, &prepared.supports, simulation.settings.lumping, Precision::Double);
         work.bytes = (prepared.supports.bytes() + frozen + 2 * field) as f64;
         Ok(work)
     }

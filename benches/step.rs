@@ -1,0 +1,148 @@
+//! What a step is made of, in particles a second: `cargo bench --bench step`, with `-- product` behind it for one part.
+//!
+//! One thread; a jittered, strained block with 2^D particles a cell. The study `operator` of the verification compares the same
+//! parts with the limits of the machine.
+
+use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::simulation::Simulation;
+use bfree::solver::Precision;
+use bfree::tensor::Vector;
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use serde_json::json;
+use std::hint::black_box;
+use std::path::Path;
+
+const SHAPES: [&str; 4] = ["linear", "gimp", "cubic", "lme"];
+
+fn main() {
+    if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(1).build_global() {
+        eprintln!("{error}");
+    }
+    divan::main();
+}
+
+/// A block of `cells`ᴰ cells, its particles moved by up to 0.1 h.
+fn block<const D: usize>(shape: &str, cells: u32) -> Simulation<D> {
+    let approximation = match shape {
+        "linear" => json!("linear"),
+        "gimp" => json!({"gimp": {}}),
+        "cubic" => json!({"bspline": "cubic"}),
+        _ => json!({"lme": {"gamma": 3}}),
+    };
+    let scene = json!({
+        "grid": {"size": vec![cells + 8; D], "spacing": 1}, "time": {"step": 0.01, "end": 1}, "approximation": approximation,
+        "bodies": [{"name": "block", "shape": {"box": {"min": vec![4; D], "max": vec![cells + 4; D]}}, "density": 1,
+                    "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}}]
+    });
+    let scene = bfree::scene::read(&scene.to_string(), &[]).expect("a valid scene");
+    let mut simulation: Simulation<D> = scene.build(Path::new(".")).expect("a valid scene");
+    let mut at = 0.0;
+    for x in &mut simulation.particles.position {
+        *x = x.map(|x| {
+            at += 0.618_033_988_749_894_9_f64;
+            x + 0.2 * (at.fract() - 0.5)
+        });
+    }
+    simulation
+}
+
+/// Calls `work` with the equilibrium of the coming step and a small displacement.
+fn at_a_step<const D: usize>(
+    bencher: Bencher<'_, '_>,
+    shape: &str,
+    cells: u32,
+    work: impl FnOnce(Bencher<'_, '_>, &Equilibrium<'_, D, bfree::material::Material>, &[Vector<f64, D>]),
+) {
+    let simulation = block::<D>(shape, cells);
+    let (positions, dt) = (&simulation.particles.position, simulation.clock.step());
+    let (supports, nodes) =
+        Supports::with_precision(&simulation.approximation, &simulation.grid, positions, Precision::Mixed)
+            .expect("inside the grid");
+    let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), 1.0).expect("finite velocities");
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    let u: Vec<Vector<f64, D>> =
+        nodes.positions(&simulation.grid).map(|(_, x)| x.map(|x| 0.01 * (0.7 * x).sin())).collect();
+    work(bencher, &equilibrium, &u);
+}
+
+macro_rules! in_dimension {
+    ($name:ident, $dimension:literal, $cells:literal) => {
+        mod $name {
+            use super::*;
+
+            const PARTICLES: usize = (2 * $cells as usize).pow($dimension);
+
+            #[divan::bench(args = SHAPES)]
+            fn product(bencher: Bencher<'_, '_>, shape: &str) {
+                at_a_step::<$dimension>(
+                    bencher.counter(ItemsCount::new(PARTICLES)),
+                    shape,
+                    $cells,
+                    |bencher, at, u| {
+                        let tangent = at.tangent(u).expect("admissible");
+                        let mut out = vec![Vector::zeros(); u.len()];
+                        bencher.bench_local(|| tangent.product(black_box(u), &mut out));
+                    },
+                );
+            }
+
+            #[divan::bench(args = SHAPES)]
+            fn product_in_single_precision(bencher: Bencher<'_, '_>, shape: &str) {
+                at_a_step::<$dimension>(
+                    bencher.counter(ItemsCount::new(PARTICLES)),
+                    shape,
+                    $cells,
+                    |bencher, at, u| {
+                        let tangent = at.single_tangent(u).expect("admissible").expect("prepared");
+                        let u: Vec<Vector<f32, $dimension>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
+                        let mut out = vec![Vector::zeros(); u.len()];
+                        bencher.bench_local(|| tangent.product(black_box(&u), &mut out));
+                    },
+                );
+            }
+
+            #[divan::bench(args = SHAPES)]
+            fn residual(bencher: Bencher<'_, '_>, shape: &str) {
+                at_a_step::<$dimension>(
+                    bencher.counter(ItemsCount::new(PARTICLES)),
+                    shape,
+                    $cells,
+                    |bencher, at, u| {
+                        bencher.bench_local(|| at.residual::<f64>(black_box(u), Carry::ALL));
+                    },
+                );
+            }
+
+            #[divan::bench(args = SHAPES)]
+            fn freezing_the_tangent(bencher: Bencher<'_, '_>, shape: &str) {
+                at_a_step::<$dimension>(
+                    bencher.counter(ItemsCount::new(PARTICLES)),
+                    shape,
+                    $cells,
+                    |bencher, at, u| {
+                        bencher.bench_local(|| at.tangent(black_box(u)).is_ok());
+                    },
+                );
+            }
+
+            #[divan::bench(args = SHAPES)]
+            fn shape_functions(bencher: Bencher<'_, '_>, shape: &str) {
+                let simulation = block::<$dimension>(shape, $cells);
+                bencher.counter(ItemsCount::new(PARTICLES)).bench_local(|| {
+                    Supports::new(
+                        &simulation.approximation,
+                        &simulation.grid,
+                        black_box(&simulation.particles.position),
+                    )
+                    .is_ok()
+                });
+            }
+        }
+    };
+}
+
+in_dimension!(plane, 2, 64);
+in_dimension!(space, 3, 16);

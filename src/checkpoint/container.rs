@@ -1,0 +1,270 @@
+//! The file format: a header in JSON and arrays of floats, each with a checksum.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 8 | `bfree\r\n` and 0x1A: whoever sends it as text breaks it visibly |
+//! | 4 | version of the format |
+//! | 4 | length of the header |
+//! | … | the header, JSON: names, types and lengths of the arrays, and whatever the writer adds |
+//! | 4 | CRC-32 of version, length and header |
+//! | … | for every array its numbers, then their CRC-32 |
+//!
+//! All numbers are little endian. The file ends with the last checksum: one that is cut off, or longer, is refused.
+
+use crc32fast::Hasher;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::io::{self, Read, Write};
+
+const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
+
+/// Version of the format.
+const VERSION: u32 = 1;
+
+/// Bytes of a header, at most: a scene has at most a quarter of that.
+const MAX_HEADER: u32 = 64 << 20;
+
+/// Numbers converted at a time.
+const CHUNK: usize = 8192;
+
+/// Why a file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum Damage {
+    /// It cannot be read.
+    #[error("it cannot be read: {0}")]
+    Io(#[from] io::Error),
+    /// It is something else.
+    #[error("it is no checkpoint of bfree")]
+    Foreign,
+    /// Written by another version.
+    #[error("its format is version {0}, this program reads version {VERSION}")]
+    Version(u32),
+    /// Cut off, or something was appended.
+    #[error("it has {found} bytes and should have {expected}")]
+    Length {
+        /// Bytes it has.
+        found: u64,
+        /// Bytes it should have.
+        expected: u64,
+    },
+    /// A checksum is wrong.
+    #[error("its {0} is damaged: the checksum is wrong")]
+    Checksum(String),
+    /// All checksums are right, but the content is not that of a checkpoint.
+    #[error("its content is not understood: {0}")]
+    Content(String),
+}
+
+/// The type of an array's numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Type {
+    F64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Shape {
+    name: String,
+    r#type: Type,
+    length: u64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header<H> {
+    arrays: Vec<Shape>,
+    content: H,
+}
+
+/// An array with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Array {
+    pub name: String,
+    pub values: Vec<f64>,
+}
+
+/// Writes a file.
+pub(super) fn write(out: &mut impl Write, content: &impl Serialize, arrays: &[(&str, &[f64])]) -> io::Result<()> {
+    let shape = |&(name, values): &(&str, &[f64])| Shape {
+        name: name.to_owned(),
+        r#type: Type::F64,
+        length: values.len() as u64,
+    };
+    let header = serde_json::to_vec(&Header { arrays: arrays.iter().map(shape).collect(), content })?;
+    let too_long = || io::Error::other("its header would be too long");
+    let length = u32::try_from(header.len()).ok().filter(|&length| length <= MAX_HEADER).ok_or_else(too_long)?;
+    let mut head = [VERSION.to_le_bytes(), length.to_le_bytes()].concat();
+    head.extend(header);
+    out.write_all(MAGIC)?;
+    out.write_all(&head)?;
+    out.write_all(&crc32fast::hash(&head).to_le_bytes())?;
+    for (_, values) in arrays {
+        let mut sum = Hasher::new();
+        for chunk in values.chunks(CHUNK) {
+            let bytes: Vec<u8> = chunk.iter().flat_map(|x| x.to_le_bytes()).collect();
+            sum.update(&bytes);
+            out.write_all(&bytes)?;
+        }
+        out.write_all(&sum.finalize().to_le_bytes())?;
+    }
+    Ok(())
+}
+
+/// Reads a file of `found` bytes. Nothing is allocated that the file is too short to fill.
+pub(super) fn read<H: DeserializeOwned>(mut input: impl Read, found: u64) -> Result<(H, Vec<Array>), Damage> {
+    let long_enough = |expected: u64| if found >= expected { Ok(()) } else { Err(Damage::Length { found, expected }) };
+    let prefix = (MAGIC.len() + 8) as u64;
+    let mut magic = [0; MAGIC.len()];
+    if found < magic.len() as u64 {
+        return Err(Damage::Foreign);
+    }
+    input.read_exact(&mut magic)?;
+    if &magic != MAGIC {
+        return Err(Damage::Foreign);
+    }
+    long_enough(prefix)?;
+    let (version, length) = (word(&mut input)?, word(&mut input)?);
+    if version != VERSION {
+        return Err(Damage::Version(version));
+    }
+    if length > MAX_HEADER {
+        return Err(Damage::Checksum("header".to_owned()));
+    }
+    let mut expected = prefix + u64::from(length) + 4;
+    long_enough(expected)?;
+    let mut header = vec![0; length as usize];
+    input.read_exact(&mut header)?;
+    let mut sum = Hasher::new();
+    [&version.to_le_bytes()[..], &length.to_le_bytes(), &header].iter().for_each(|bytes| sum.update(bytes));
+    if word(&mut input)? != sum.finalize() {
+        return Err(Damage::Checksum("header".to_owned()));
+    }
+    let Header { arrays: shapes, content } =
+        serde_json::from_slice::<Header<H>>(&header).map_err(|error| Damage::Content(error.to_string()))?;
+    for shape in &shapes {
+        let bytes = shape.length.checked_mul(8).and_then(|bytes| bytes.checked_add(4));
+        let sum = bytes.and_then(|bytes| expected.checked_add(bytes));
+        expected = sum.ok_or_else(|| Damage::Content(format!("{} numbers of {}", shape.length, shape.name)))?;
+    }
+    if found != expected {
+        return Err(Damage::Length { found, expected });
+    }
+    let arrays = shapes.into_iter().map(|shape| array(&mut input, shape)).collect::<Result<_, _>>()?;
+    Ok((content, arrays))
+}
+
+fn word(input: &mut impl Read) -> io::Result<u32> {
+    let mut bytes = [0; 4];
+    input.read_exact(&mut bytes)?;
+    Ok(u32::from_le_bytes(bytes))
+}
+
+fn array(input: &mut impl Read, Shape { name, r#type: Type::F64, length }: Shape) -> Result<Array, Damage> {
+    let mut values = Vec::new();
+    let mut sum = Hasher::new();
+    let mut bytes = [0; 8 * CHUNK];
+    while (values.len() as u64) < length {
+        let count = (length - values.len() as u64).min(CHUNK as u64) as usize;
+        let chunk = &mut bytes[..8 * count];
+        input.read_exact(chunk)?;
+        sum.update(chunk);
+        values.extend(chunk.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)));
+    }
+    if word(input)? == sum.finalize() {
+        Ok(Array { name, values })
+    } else {
+        Err(Damage::Checksum(format!("array {name}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+
+    const WILD: [f64; 6] = [0.1, -0.0, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE / 8.0, 1.0 / 3.0];
+
+    fn written(lengths: &[usize]) -> Vec<u8> {
+        let values: Vec<Vec<f64>> =
+            lengths.iter().map(|&n| (0..n).map(|k| WILD[k % 6] * (1 + k / 6) as f64).collect()).collect();
+        let names = ["position", "velocity", "λ"];
+        let arrays: Vec<(&str, &[f64])> = names.iter().copied().zip(values.iter().map(Vec::as_slice)).collect();
+        let mut bytes = Vec::new();
+        write(&mut bytes, &json!({"title": "two blocks"}), &arrays).unwrap();
+        bytes
+    }
+
+    fn parsed(bytes: &[u8]) -> Result<(Value, Vec<Array>), Damage> {
+        read(bytes, bytes.len() as u64)
+    }
+
+    #[test]
+    fn what_is_written_is_read_bit_for_bit() {
+        for lengths in [&[][..], &[0], &[1, 0, 5], &[CHUNK], &[CHUNK + 1, 3 * CHUNK]] {
+            let bytes = written(lengths);
+            let (content, arrays) = parsed(&bytes).unwrap();
+            assert_eq!(content["title"], "two blocks");
+            assert_eq!(arrays.iter().map(|array| array.values.len()).collect::<Vec<_>>(), lengths);
+            for array in &arrays {
+                let wild = (0..array.values.len()).map(|k| (WILD[k % 6] * (1 + k / 6) as f64).to_bits());
+                assert!(array.values.iter().map(|x| x.to_bits()).eq(wild), "{}", array.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_of_any_other_length_is_refused() {
+        let whole = written(&[7, 0, 40]);
+        for length in 0..whole.len() {
+            assert!(parsed(&whole[..length]).is_err(), "{length}");
+        }
+        let longer = [&whole[..], b"\0"].concat();
+        assert!(matches!(parsed(&longer), Err(Damage::Length { .. })));
+        // the file may also be shorter than the system said
+        assert!(matches!(read::<Value>(&whole[..50], whole.len() as u64), Err(Damage::Io(_))));
+    }
+
+    #[test]
+    fn another_version_is_named() {
+        let mut bytes = written(&[3]);
+        bytes[8] = 7;
+        assert!(parsed(&bytes).unwrap_err().to_string().contains("version 7, this program reads version 1"));
+        assert!(matches!(parsed(b"{\"grid\": {}}, and so on"), Err(Damage::Foreign)));
+    }
+
+    #[test]
+    fn a_header_that_asks_for_too_much_is_refused_before_anything_is_allocated() {
+        for length in [u64::MAX, u64::MAX / 8, 1 << 50] {
+            let header =
+                json!({"arrays": [{"name": "x", "type": "f64", "length": length}], "content": null}).to_string();
+            let mut head = [VERSION.to_le_bytes(), (header.len() as u32).to_le_bytes()].concat();
+            head.extend(header.bytes());
+            let bytes = [&MAGIC[..], &head, &crc32fast::hash(&head).to_le_bytes()].concat();
+            assert!(matches!(parsed(&bytes), Err(Damage::Content(_) | Damage::Length { .. })), "{length}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_flipped_bit_is_seen_wherever_it_is(place in any::<prop::sample::Index>(), bit in 0..8) {
+            let mut bytes = written(&[5, 0, 300]);
+            let at = place.index(bytes.len());
+            bytes[at] ^= 1_u8 << bit;
+            prop_assert!(parsed(&bytes).is_err(), "byte {at}");
+        }
+
+        #[test]
+        fn no_bytes_bring_the_reader_down(
+            rubbish in prop::collection::vec(any::<u8>(), 0..200), from in 0..400_usize, headed in any::<bool>(),
+        ) {
+            let mut bytes = written(&[5, 20]);
+            let from = if headed { from.min(bytes.len()) } else { 0 };
+            bytes.truncate(from);
+            bytes.extend(rubbish);
+            let whole = written(&[5, 20]);
+            prop_assert!(parsed(&bytes).is_err() || bytes == whole);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The consistent tangent in single precision, for Krylov methods inside a Newton method in double precision.
+//!
+//! It has no units: gradients are taken in units of 1/h, and all is divided by a power of two near its largest entries, so that
+//! single precision neither over- nor underflows in any set of units.
+
+use crate::material::{ClosedTangent, FrozenTangent, Law};
+use crate::mechanics::residual::{Equilibrium, Inadmissible};
+use crate::mechanics::sweep::SingleTangents;
+use crate::mechanics::tangent::{FrozenPressure, closed_form, invert_block};
+use crate::solver::{LinearOperator, Preconditioner, SingleTangent};
+use crate::tensor::{Deformation, Tensor, Vector, identity, scaled};
+
+/// K(Δφ)/s in single precision, frozen.
+pub struct Single<'a, const D: usize, L: Law> {
+    equilibrium: &'a Equilibrium<'a, D, L>,
+    /// s, a power of two.
+    scale: f64,
+    frozen: SingleTangents<D>,
+    pressures: Vec<FrozenPressure<D>>,
+    /// α₁ ε m_I / s
+    lumped: Vec<f32>,
+}
+
+impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
+    /// Freezes the tangent at Δφ in single precision; `None` if the supports are not prepared for it, or a law has no closed tangent.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn single_tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Option<Single<'_, D, L>>, Inadmissible> {
+        let Some(both) = closed_form::<D, L>(self.bodies) else { return Ok(None) };
+        let Some(h) = self.supports.unit() else { return Ok(None) };
+        let scale = self.size(h);
+        let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0) / scale;
+        let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
+        let frozen = self.supports.single_tangents(dphi, both, inertia, |p, g| {
+            let closed = self.freeze_at(p, &g).map_err(Some)?.closed();
+            let closed = closed.filter(|form| both || form.both.is_none()).ok_or(None)?;
+            Ok(closed.times(1.0 / (scale * h * h)))
+        });
+        let frozen = match frozen {
+            Some(Ok(frozen)) => frozen,
+            Some(Err(Some(inadmissible))) => return Err(inadmissible),
+            Some(Err(None)) | None => return Ok(None),
+        };
+        let lumped: Vec<f32> =
+            self.nodal.mass.iter().map(|m| (self.alphas.a1 * self.lumping * m / scale) as f32).collect();
+        Ok(Some(Single { equilibrium: self, scale, frozen, pressures: self.frozen_pressures(dphi), lumped }))
+    }
+
+    /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.
+    fn size(&self, h: f64) -> f64 {
+        let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
+        let volume = self.particles.volume.iter().fold(0.0, |largest: f64, v| largest.max(*v));
+        let stiffness = self.bodies.iter().filter_map(|body| body.law.freeze(&identity(), &at_rest, volume).closed());
+        let stiffness = stiffness.map(|form: ClosedTangent<f64, D>| form.bulk.abs() + form.right[0][0].abs());
+        let mass = self.nodal.mass.iter().fold(0.0, |largest: f64, m| largest.max(*m));
+        let largest = stiffness.fold(0.0, f64::max) / (h * h) + self.alphas.a1 * mass;
+        if largest > 0.0 && largest.is_finite() { largest.log2().round().exp2() } else { 1.0 }
+    }
+}
+
+impl<const D: usize, L: Law> Single<'_, D, L> {
+    /// K_II/s of every active node; a prescribed degree of freedom has the identity's row and column.
+    fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
+        let eq = self.equilibrium;
+        let mut single: Vec<Tensor<f32, D>> = self.lumped.iter().map(|&m| scaled(&identity(), m)).collect();
+        eq.supports.add_single_blocks(&self.frozen, &mut single);
+        let mut blocks: Vec<Tensor<f64, D>> = single.iter().map(|block| block.map(f64::from)).collect();
+        let mut pressure = vec![Tensor::zeros(); if self.pressures.is_empty() { 0 } else { blocks.len() }];
+        for point in &self.pressures {
+            point.add_blocks(eq.supports, &mut pressure);
+        }
+        for (block, pressure) in blocks.iter_mut().zip(&pressure) {
+            *block += pressure / self.scale;
+        }
+        eq.prescribe_blocks(&mut blocks);
+        blocks
+    }
+
+    /// K u/s on the free degrees of freedom (u is taken as zero on the prescribed ones).
+    pub fn product(&self, u: &[Vector<f32, D>], out: &mut [Vector<f32, D>]) {
+        let eq = self.equilibrium;
+        for ((out, u), &m) in out.iter_mut().zip(u).zip(&self.lumped) {
+            *out = u * m;
+        }
+        eq.supports.single_product(&self.frozen, u, out);
+        for point in &self.pressures {
+            point.add_product(eq.supports, u, out, self.scale);
+        }
+        eq.clear_prescribed(out);
+    }
+}
+
+impl<const D: usize, L: Law> LinearOperator<f32> for Single<'_, D, L> {
+    fn apply(&self, x: &[f32], y: &mut [f32]) {
+        self.product(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+    }
+}
+
+impl<const D: usize, L: Law> Preconditioner<f32> for Single<'_, D, L> {
+    fn precondition(&self, r: &[f32], z: &mut [f32]) {
+        let (r, z): (&[Vector<f32, D>], &mut [Vector<f32, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
+        let invert = || self.diagonal_blocks().iter().map(|block| invert_block(block).map(|x| x as f32)).collect();
+        let inverse_blocks: &Vec<_> = self.equilibrium.single_inverse_blocks.get_or_init(invert);
+        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
+            *z = inverse * r;
+        }
+    }
+}
+
+impl<const D: usize, L: Law> SingleTangent for Single<'_, D, L> {
+    fn scale(&self) -> f64 {
+        self.scale
+    }
+}

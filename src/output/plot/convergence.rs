@@ -1,0 +1,57 @@
+//! How the residual falls in Newton's method: a sample of all steps, and the step with the most iterations.
+
+use super::chart::{Line, Panel};
+use super::{PlotError, palette};
+use serde::Deserialize;
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Steps drawn besides the one with the most iterations.
+const SAMPLE: usize = 60;
+
+/// What of a step's line is drawn; residuals that are no numbers are strings.
+#[derive(Deserialize)]
+struct Step {
+    time: f64,
+    newton_residuals: Vec<Value>,
+}
+
+/// log₁₀ of the residuals over the first one, by iteration.
+fn fall(step: &Step) -> Vec<(f64, f64)> {
+    let residuals: Vec<f64> = step.newton_residuals.iter().filter_map(Value::as_f64).collect();
+    let first = residuals.first().copied().unwrap_or(1.0);
+    let ratio = residuals.iter().enumerate().map(|(k, r)| (k as f64, (r / first).log10()));
+    ratio.filter(|point| point.1.is_finite()).collect()
+}
+
+/// The panel; `None` where no step was taken.
+pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<Panel>, PlotError> {
+    let steps = match report.map(|report| &report["steps"]).and_then(Value::as_array) {
+        Some(steps) => steps.iter().filter_map(|step| Step::deserialize(step).ok()).collect(),
+        None => logged(directory)?,
+    };
+    let Some(worst) = steps.iter().max_by_key(|step| step.newton_residuals.len()) else { return Ok(None) };
+    let stride = steps.len().div_ceil(SAMPLE).max(1);
+    let thin = |points| Line { label: String::new(), color: palette::SKY, points };
+    let mut lines: Vec<Line> = steps.iter().step_by(stride).map(|step| thin(fall(step))).collect();
+    if let Some(first) = lines.first_mut() {
+        first.label = if stride > 1 { format!("every {stride}th step") } else { "all steps".to_owned() };
+    }
+    let label = format!("t = {:.6}: the most iterations", worst.time);
+    lines.push(Line { label, color: palette::VERMILLION, points: fall(worst) });
+    Ok(Some(Panel { x: "Newton iteration", y: "log10 of |R| / |R_0|", lines, share: 1 }))
+}
+
+/// The steps of a run that goes on or was killed; its last line may break off.
+fn logged(directory: &Path) -> Result<Vec<Step>, PlotError> {
+    let path = directory.join("newton.jsonl");
+    match std::fs::File::open(&path) {
+        Ok(file) => {
+            let lines = BufReader::new(file).lines().map_while(Result::ok);
+            Ok(lines.filter_map(|line| serde_json::from_str(&line).ok()).collect())
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(source) => Err(PlotError::Read { path, source }),
+    }
+}

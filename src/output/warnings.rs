@@ -1,0 +1,167 @@
+//! What the one who waits should know before the end: each kind once, with time and value.
+
+use super::history::{Cost, Energies};
+use serde::{Deserialize, Serialize};
+
+/// Energy created, as a part of the largest energy so far, above which there is a warning.
+const CREATED: f64 = 0.01;
+
+/// Steps whose mean is what iterations usually are.
+const MEMORY: u64 = 50;
+
+/// Steps before iterations are compared with their mean.
+const USUAL_AFTER: u64 = 10;
+
+/// Krylov iterations of a step climb when they are so many times the usual ones, and more than so many.
+const CLIMB: (f64, f64) = (5.0, 100.0);
+
+/// What a warning is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The balance of energy is positive.
+    EnergyCreated,
+    /// A step was taken with less than its nominal length.
+    StepHalved,
+    /// Newton's method takes more than half of the iterations it may.
+    NewtonClimbs,
+    /// The linear solver takes many more iterations than it used to.
+    KrylovClimbs,
+}
+
+/// A warning.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Warning {
+    /// What it is about.
+    pub kind: Kind,
+    /// t_{n+1} of the step.
+    pub time: f64,
+    /// Its number.
+    pub step: u64,
+    /// What happened, with its value.
+    pub message: String,
+}
+
+/// Watches a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Watch {
+    /// The most energy so far, counted without sign.
+    most_energy: f64,
+    /// The usual number of Krylov iterations.
+    usual_krylov: f64,
+    /// Steps seen.
+    seen: u64,
+    warnings: Vec<Warning>,
+}
+
+/// A step, as far as it is watched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Watched {
+    pub time: f64,
+    pub step: u64,
+    pub energies: Energies,
+    pub cost: Cost,
+    /// Attempts that failed before it.
+    pub failed: usize,
+    /// Newton iterations allowed.
+    pub newton_limit: usize,
+}
+
+impl Watch {
+    /// All warnings so far.
+    pub(crate) fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Looks at a step; what is new.
+    pub(crate) fn see(&mut self, step: &Watched) -> &[Warning] {
+        let known = self.warnings.len();
+        let Watched { energies, cost, failed, newton_limit, .. } = *step;
+        let Energies { kinetic, strain, external, balance, .. } = energies;
+        let energy = kinetic.abs() + strain.abs() + external.abs();
+        if energy.is_finite() {
+            self.most_energy = self.most_energy.max(energy);
+        }
+        if balance > CREATED * self.most_energy {
+            let part = 100.0 * balance / self.most_energy;
+            self.warn(step, Kind::EnergyCreated, || {
+                format!("energy was created: the balance is {balance:+.3e}, {part:.1} % of the most energy so far")
+            });
+        }
+        if failed > 0 {
+            let dt = cost.dt;
+            self.warn(step, Kind::StepHalved, || {
+                format!("the step had to be halved {failed} times, to dt = {dt:.3e}; report.json says why")
+            });
+        }
+        if 2 * cost.newton > newton_limit && newton_limit > 1 {
+            self.warn(step, Kind::NewtonClimbs, || {
+                format!("Newton's method took {} of {newton_limit} allowed iterations", cost.newton)
+            });
+        }
+        let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
+        if self.seen >= USUAL_AFTER && krylov > CLIMB.0 * usual && krylov > CLIMB.1 {
+            self.warn(step, Kind::KrylovClimbs, || {
+                format!("the linear solver took {krylov} iterations in a step; {usual:.0} had been usual")
+            });
+        }
+        self.seen += 1;
+        self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
+        &self.warnings[known..]
+    }
+
+    fn warn(&mut self, step: &Watched, kind: Kind, message: impl FnOnce() -> String) {
+        if self.warnings.iter().all(|warning| warning.kind != kind) {
+            let Watched { time, step, .. } = *step;
+            self.warnings.push(Warning { kind, time, step, message: message() });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(number: u64) -> Watched {
+        let energies = Energies { kinetic: 2.0, strain: 1.0, external: -1.0, total: 3.0, balance: -0.5 };
+        let cost = Cost { dt: 0.1, newton: 3, krylov: 30 };
+        Watched { time: 0.1 * number as f64, step: number, energies, cost, failed: 0, newton_limit: 30 }
+    }
+
+    #[test]
+    fn each_kind_is_told_once_with_time_and_value() {
+        let mut watch = Watch::default();
+        for number in 1..=20 {
+            assert!(watch.see(&step(number)).is_empty(), "{number}");
+        }
+        let balance = |x: f64| Watched { energies: Energies { balance: x, ..step(0).energies }, ..step(21) };
+        assert!(watch.see(&balance(0.039)).is_empty(), "1 % of 4 is not reached");
+        let [warning] = watch.see(&balance(0.08)) else { panic!("one") };
+        assert_eq!((warning.kind, warning.step, warning.time), (Kind::EnergyCreated, 21, 2.1));
+        assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
+        assert!(watch.see(&balance(3.0)).is_empty(), "once");
+        let halved = Watched { failed: 2, ..step(22) };
+        assert!(watch.see(&halved).iter().any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1")));
+        let newton = Watched { cost: Cost { newton: 16, ..step(0).cost }, ..step(23) };
+        assert!(watch.see(&newton).iter().any(|warning| warning.message.contains("16 of 30")));
+        let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
+        assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
+        assert!(watch.see(&krylov(170)).iter().any(|warning| warning.message.contains("170 iterations in a step; 3")));
+        assert_eq!(watch.warnings().len(), 4);
+        // what it knows survives a checkpoint
+        let text = serde_json::to_string(&watch).unwrap();
+        assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
+    }
+
+    #[test]
+    fn numbers_that_are_none_leave_it_able_to_be_saved() {
+        let mut watch = Watch::default();
+        let nan =
+            Energies { kinetic: f64::NAN, strain: f64::INFINITY, external: 0.0, total: f64::NAN, balance: f64::NAN };
+        watch.see(&Watched { energies: nan, ..step(1) });
+        let text = serde_json::to_string(&watch).unwrap();
+        assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
+    }
+}

@@ -1,0 +1,53 @@
+//! What the commands share: how they end, and where they write.
+
+mod new;
+mod probes;
+mod run;
+mod scene_arguments;
+
+pub use new::New;
+pub use run::Run;
+pub use scene_arguments::SceneArguments;
+
+use std::error::Error;
+use std::fmt::Display;
+use std::io::{ErrorKind, Write as _};
+
+/// How the program ends: 2 for a scene or an option that cannot be used, 1 for a run that failed, 130 for one stopped by Ctrl-C.
+pub enum Failure {
+    Scene(Box<dyn Error>),
+    Run(Box<dyn Error>),
+    Interrupted,
+}
+
+/// The exit code of a program that Ctrl-C has ended: 128 and the number of the signal.
+pub const INTERRUPTED: u8 = 130;
+
+impl Failure {
+    pub fn scene(error: impl Error + 'static) -> Self {
+        Self::Scene(Box::new(error))
+    }
+
+    pub fn run(error: impl Error + 'static) -> Self {
+        Self::Run(Box::new(error))
+    }
+}
+
+/// Writes to standard output. A reader that has seen enough and closed the pipe, like `head`, is no failure.
+pub fn print(text: impl Display) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::run(Unwritable(error))),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a line to standard error; where that is impossible, there is nobody to tell.
+pub fn tell(text: impl Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Standard output cannot be written to.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write to standard output")]
+struct Unwritable(#[source] std::io::Error);

@@ -1,0 +1,112 @@
+//! `bfree new`: a scene to start from.
+//!
+//! JSON has no comments. The scene names its schema instead, which is written beside it and lets editors explain every key
+//! where it stands; and the same sentences are printed.
+
+use super::{Failure, print};
+use bfree::scene::{self, keys};
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use std::fmt::Write as _;
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+/// The problems, and the scene of each.
+const PROBLEMS: [(&str, &str); 6] = [
+    ("rebound", include_str!("../../scenes/rebound.json")),
+    ("collision", include_str!("../../scenes/collision.json")),
+    ("cantilever", include_str!("../../scenes/cantilever.json")),
+    ("compaction", include_str!("../../scenes/compaction.json")),
+    ("riemann_jump", include_str!("../../scenes/riemann_jump.json")),
+    ("ball_drop", include_str!("../../scenes/ball_drop.json")),
+];
+
+/// The schema's file beside the scene.
+const SCHEMA: &str = "scene.schema.json";
+
+/// Columns of a terminal, and those of a long key.
+const WIDTH: (usize, usize) = (110, 34);
+
+/// `bfree new`.
+#[derive(Args)]
+pub struct New {
+    /// The problem.
+    #[arg(value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
+    problem: Option<String>,
+    /// The file to write [default: the problem's name and .json]. A file that is there stays as it is.
+    file: Option<PathBuf>,
+}
+
+/// A file that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}", path.display())]
+struct Refused {
+    path: PathBuf,
+    source: std::io::Error,
+}
+
+impl New {
+    /// Writes the scene, or prints the list.
+    pub fn execute(&self) -> Result<(), Failure> {
+        let Some((name, text)) = PROBLEMS.iter().find(|(name, _)| Some(*name) == self.problem.as_deref()) else {
+            return print(list());
+        };
+        let path = self.file.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.json")));
+        let schema = path.parent().unwrap_or(Path::new("")).join(SCHEMA);
+        create(&path, &text.replacen('{', &format!("{{\n  \"$schema\": \"{SCHEMA}\","), 1))?;
+        match create(&schema, &serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run)?) {
+            // That of an earlier scene.
+            Err(Failure::Scene(_)) => {}
+            result => result?,
+        }
+        let shown = path.display();
+        let mut out = format!("wrote {shown}, and {} for completion in editors\n", schema.display());
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "\n{}", explained(text)?);
+        let _ = write!(out, "bfree check {shown}\nbfree run {shown}");
+        print(out)
+    }
+}
+
+fn list() -> String {
+    let mut out = "bfree new PROBLEM [FILE] writes the scene of one of these:\n".to_owned();
+    for (name, text) in PROBLEMS {
+        let title = scene::read(text, &[]).ok().and_then(|scene| scene.title).unwrap_or_default();
+        let _ = write!(out, "\n  {name:<14} {title}");
+    }
+    out
+}
+
+/// Every key of the scene with its sentence, in columns.
+fn explained(text: &str) -> Result<String, Failure> {
+    let scene = serde_json::from_str(text).map_err(Failure::run)?;
+    let (width, column) = WIDTH;
+    let mut out = String::new();
+    for key in keys::documented(&scene) {
+        let mut line = format!("{:<column$}", key.path);
+        let mut room = width.saturating_sub(line.chars().count().max(column));
+        for word in key.about.split(' ') {
+            let length = word.chars().count() + 1;
+            if length > room {
+                let _ = write!(line, "\n{:column$}", "");
+                room = width - column;
+            }
+            let _ = write!(line, " {word}");
+            room = room.saturating_sub(length);
+        }
+        let _ = writeln!(out, "{line}");
+    }
+    Ok(out)
+}
+
+/// Writes a file that is not there yet.
+fn create(path: &Path, content: &str) -> Result<(), Failure> {
+    let refused = |source: std::io::Error| {
+        let there = source.kind() == ErrorKind::AlreadyExists;
+        let error = Refused { path: path.to_owned(), source };
+        if there { Failure::scene(error) } else { Failure::run(error) }
+    };
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(refused)?;
+    file.write_all(content.as_bytes()).map_err(refused)
+}

@@ -1,0 +1,71 @@
+//! Probes of a scene and the particles they look at.
+
+use bfree::output::{Place, Probe, nearest};
+use bfree::scene::{self, Scene, output::At};
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+use std::fmt::{Display, Formatter};
+
+/// A probe of the scene, and the particle it looks at first.
+pub struct Bound<const D: usize> {
+    pub probe: Probe<D>,
+    particle: usize,
+    /// Its distance from the place that was asked for.
+    distance: f64,
+    /// The particle spacing of its body.
+    spacing: f64,
+}
+
+impl<const D: usize> Bound<D> {
+    /// What the user should know of a place far from any particle.
+    pub fn warning(&self) -> Option<String> {
+        (self.distance > self.spacing).then(|| {
+            let consequence = match self.probe.place {
+                Place::Particle(_) => "it is followed all the same",
+                Place::Nearest { .. } => "values are NaN while none is within one grid spacing",
+            };
+            format!(
+                "probe {:?}: the nearest particle, {}, is {:.3e} away, more than the particle spacing {:.3e}; {consequence}",
+                self.probe.name, self.particle, self.distance, self.spacing
+            )
+        })
+    }
+
+    /// For the report.
+    pub fn report(&self) -> Value {
+        json!({"name": self.probe.name, "particle": self.particle, "distance": self.distance, "warning": self.warning()})
+    }
+}
+
+impl<const D: usize> Display for Bound<D> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Self { probe: Probe { name, field, place }, particle, distance, .. } = self;
+        let (field, kept) = match place {
+            Place::Particle(_) => (field.name(), "follows"),
+            Place::Nearest { .. } => (field.name(), "fixed in space, first sees"),
+        };
+        write!(f, "{name}: {field}, {kept} particle {particle}, {distance:.3e} from the place given")
+    }
+}
+
+/// The probes of a scene with the particles nearest to them at the start.
+pub fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Bound<D>> {
+    let particles = &simulation.particles;
+    let bind = |probe: &scene::output::Probe| {
+        let body = |name: &String| simulation.bodies.iter().position(|body| body.name == *name).map(|body| body as u32);
+        let body = probe.body.as_ref().and_then(body);
+        let (At::Particle(x) | At::Point(x)) = &probe.at;
+        let point = Vector::<f64, D>::from_iterator(x.iter().copied());
+        let (particle, distance) = nearest(particles, &point, body)?;
+        let place = match &probe.at {
+            At::Particle(_) => Place::Particle(particle),
+            At::Point(_) => Place::Nearest { point, body, within: simulation.grid.spacing },
+        };
+        let per_cell = scene.bodies.get(particles.body[particle] as usize)?.particles_per_cell;
+        let spacing = simulation.grid.spacing / f64::from(per_cell);
+        let probe = Probe { name: probe.name.clone(), field: probe.field, place };
+        Some(Bound { probe, particle, distance, spacing })
+    };
+    scene.output.probes.iter().filter_map(bind).collect()
+}

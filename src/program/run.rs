@@ -1,0 +1,247 @@
+//! `bfree run`.
+
+use super::probes::{Bound, bound_probes};
+use super::scene_arguments::{SceneArguments, steps_until};
+use super::{Failure, INTERRUPTED, print, tell};
+use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
+use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
+use bfree::plan::SurfaceUse;
+use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
+use bfree::simulation::Simulation;
+use clap::{Args, ValueEnum};
+use serde_json::{Map, Value, json};
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// `bfree run`.
+#[derive(Args)]
+pub struct Run {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Directory of the results [default: out/ and the scene's name].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// End at this time instead of the scene's time.end; the same values are allowed.
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = number)]
+    until: Option<f64>,
+    /// Take at most this many whole time steps; 0 writes the initial state only.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0, MAX_STEPS as u64))]
+    steps: Option<u64>,
+    /// Threads, 1 to 1024 [default: all cores]. The results have the same bits for any number.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, 1024))]
+    threads: Option<u64>,
+    /// Compare the tangent with dual numbers every EVERY steps, and stop where they part.
+    #[arg(long, value_name = "EVERY", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true,
+          value_parser = whole(1, MAX_STEPS as u64))]
+    check_tangent: Option<u64>,
+    /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
+    #[arg(long)]
+    restart: bool,
+    /// Show no progress and no summary. Warnings are written all the same.
+    #[arg(long)]
+    quiet: bool,
+    /// How progress is written to standard error: a bar or lines to read, or one JSON object a line for a program that watches.
+    #[arg(long, value_enum, default_value_t, conflicts_with = "quiet")]
+    progress: Form,
+}
+
+/// A whole number of an option, in a range.
+fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| (min..=max).contains(number));
+        number.ok_or_else(|| format!("must be a whole number from {min} to {max}"))
+    }
+}
+
+/// A number of an option.
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "must be a number".to_owned())
+}
+
+/// The form of progress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Form {
+    #[default]
+    Text,
+    Json,
+}
+
+impl Run {
+    /// Runs the scene.
+    pub fn execute(&self) -> Result<(), Failure> {
+        let mut scene = self.scene.read()?;
+        if let Some(until) = self.until {
+            scene.time =
+                scene.time.until(until, "--until").map_err(|wrong| Failure::scene(SceneError::Values(wrong)))?;
+        }
+        if let Some(threads) = self.threads {
+            let threads = usize::try_from(threads).unwrap_or(usize::MAX);
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::run)?;
+        }
+        match scene.dimension() {
+            1 => self.execute_in::<1>(&scene),
+            2 => self.execute_in::<2>(&scene),
+            _ => self.execute_in::<3>(&scene),
+        }
+    }
+
+    fn execute_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
+        let mut simulation = scene.build::<D>(self.scene.folder()).map_err(|error| self.scene.unusable(error))?;
+        simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
+        let until = steps_until(&simulation, scene.time.end);
+        let last = self.steps.map_or(until, |steps| steps.min(until));
+        let directory = self.out.clone().unwrap_or_else(|| {
+            Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))
+        });
+        let probes = bound_probes(scene, &simulation);
+        probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
+        let settings = serde_json::to_value(scene).map_err(Failure::run)?;
+        let identity = Identity::new(settings.clone(), &simulation.particles);
+        let mut asked = Map::new();
+        asked.insert("command".to_owned(), self.options(&directory));
+        asked.insert("settings".to_owned(), settings);
+        asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
+        asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
+        let output = OutputSettings {
+            directory: directory.clone(),
+            fields: scene.output.fields.clone(),
+            snapshot_every: scene.output.every,
+            probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
+            end_time: last as f64 * simulation.clock.nominal(),
+            audience: self.audience(),
+        };
+        let interrupted = stop_on_interrupt().map_err(Failure::run)?;
+        let reference = Reference::of(&simulation);
+        let restored = match self.restart {
+            true => Some(self.restore(&directory, &identity, &mut simulation)?),
+            false => checkpoint::forget(&directory).map(|()| None).map_err(Failure::run)?,
+        };
+        let mut recorder = match &restored {
+            Some(restored) => Recorder::resume(output, &simulation, reference, &restored.mark),
+            None => Recorder::start(output, &simulation, reference),
+        }
+        .map_err(Failure::run)?;
+        let mut checkpoints = scene.output.checkpoint.map(|every| {
+            Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
+        });
+        let mut failure = None;
+        let unwritten = |simulation: &Simulation<D>| {
+            let (time, place) = (simulation.clock.time(), directory.display());
+            tell(format_args!("stopped at t = {time}; {place} holds what was written until then, and no report"));
+        };
+        loop {
+            if let Some(checkpoints) = &mut checkpoints {
+                checkpoints.write_if_due(&simulation, &mut recorder).map_err(|error| {
+                    unwritten(&simulation);
+                    Failure::run(error)
+                })?;
+            }
+            if simulation.clock.nominal_steps() >= last || interrupted.load(Ordering::Relaxed) {
+                break;
+            }
+            match simulation.advance() {
+                Ok(step) => recorder.record(&simulation, &step).map_err(|error| {
+                    unwritten(&simulation);
+                    Failure::run(error)
+                })?,
+                Err(error) => {
+                    failure = Some(error);
+                    break;
+                }
+            }
+        }
+        if let (Some(checkpoints), None) = (&mut checkpoints, &failure) {
+            // Before the last snapshot, which an undisturbed run would not write here.
+            checkpoints.write(&simulation, &mut recorder).map_err(|error| {
+                unwritten(&simulation);
+                Failure::run(error)
+            })?;
+        }
+        let stopped = simulation.clock.nominal_steps() < last;
+        let outcome = match &failure {
+            Some(error) => Outcome::Failed(error),
+            None if stopped => Outcome::Interrupted,
+            None => Outcome::Finished,
+        };
+        let summary = recorder.finish(&simulation, &asked, outcome).map_err(Failure::run)?;
+        if !self.quiet {
+            print(format_args!("{summary}\nresults   {}", directory.display()))?;
+        }
+        let (time, place) = (simulation.clock.time(), directory.display());
+        match failure {
+            Some(error) => {
+                tell(format_args!("stopped at t = {time} after the last good step; its state is in {place}"));
+                Err(Failure::run(error))
+            }
+            None if stopped => {
+                tell(format_args!("interrupted at t = {time} after a whole step; everything up to it is in {place}"));
+                Err(Failure::Interrupted)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Puts the simulation back to the last good checkpoint, and says which it is.
+    fn restore<const D: usize>(
+        &self,
+        directory: &Path,
+        identity: &Identity,
+        simulation: &mut Simulation<D>,
+    ) -> Result<Restored, Failure> {
+        let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
+        let unusable = restored.unusable.iter();
+        unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
+        if let Some(program) = &restored.other_program {
+            self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
+        }
+        if !self.quiet {
+            let (time, path) = (simulation.clock.time(), restored.path.display());
+            self.say("restart", &format!("continues at t = {time}, step {}, from {path}", simulation.clock.steps()));
+        }
+        Ok(restored)
+    }
+
+    fn audience(&self) -> Audience {
+        match self.progress {
+            _ if self.quiet => Audience::Nobody,
+            Form::Text => Audience::Person,
+            Form::Json => Audience::Program,
+        }
+    }
+
+    /// Tells something beside the progress, in its form.
+    fn say(&self, event: &str, message: &str) {
+        match self.progress {
+            Form::Json => tell(json!({"event": event, "message": message})),
+            Form::Text if event == "warning" => tell(format_args!("warning: {message}")),
+            Form::Text => tell(message),
+        }
+    }
+
+    /// The command line, for the report.
+    fn options(&self, directory: &Path) -> Value {
+        json!({
+            "scene": self.scene.scene.display().to_string(),
+            "set": self.scene.overrides,
+            "out": directory.display().to_string(),
+            "until": self.until,
+            "steps": self.steps,
+            "threads": rayon::current_num_threads(),
+            "check_tangent": self.check_tangent,
+        })
+    }
+}
+
+/// Set by Ctrl-C: the run then ends after the current step. A second Ctrl-C ends it at once.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+    })?;
+    Ok(interrupted)
+}

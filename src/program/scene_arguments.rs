@@ -1,0 +1,81 @@
+//! The scene that a command is about, and its check.
+
+use super::probes::bound_probes;
+use super::{Failure, print, tell};
+use bfree::material::Material;
+use bfree::plan::Plan;
+use bfree::scene::{self, Override, Scene, SceneError};
+use bfree::simulation::Simulation;
+use clap::Args;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// The scene, and what replaces values of it.
+#[derive(Args)]
+pub struct SceneArguments {
+    /// The scene, a JSON file.
+    pub scene: PathBuf,
+    /// Override one key of the scene, for example time.step=0.01 or approximation='"linear"'.
+    #[arg(long = "set", value_name = "KEY.PATH=JSON")]
+    pub overrides: Vec<String>,
+}
+
+/// A scene that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {source}", path.display())]
+struct Unusable {
+    path: PathBuf,
+    source: Box<dyn Error>,
+}
+
+impl SceneArguments {
+    /// The scene, checked.
+    pub fn read(&self) -> Result<Scene, Failure> {
+        let overrides: Result<Vec<Override>, _> = self.overrides.iter().map(|text| text.parse()).collect();
+        scene::read_file(&self.scene, &overrides.map_err(Failure::scene)?).map_err(|error| match error {
+            // The one names the file, the other is about an option.
+            SceneError::File { .. } | SceneError::Override(_) => Failure::scene(error),
+            error => self.unusable(error),
+        })
+    }
+
+    /// Names the scene that an error is about.
+    pub fn unusable(&self, error: impl Error + 'static) -> Failure {
+        Failure::scene(Unusable { path: self.scene.clone(), source: Box::new(error) })
+    }
+
+    /// Where the files it names are looked for.
+    pub fn folder(&self) -> &Path {
+        self.scene.parent().unwrap_or(Path::new("."))
+    }
+
+    /// Prints what the scene requires.
+    pub fn check(&self) -> Result<(), Failure> {
+        let scene = self.read()?;
+        match scene.dimension() {
+            1 => self.check_in::<1>(&scene),
+            2 => self.check_in::<2>(&scene),
+            _ => self.check_in::<3>(&scene),
+        }
+    }
+
+    fn check_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
+        let simulation = scene.build::<D>(self.folder()).map_err(|error| self.unusable(error))?;
+        let mut text = scene.title.as_ref().map_or_else(String::new, |title| format!("{title}\n"));
+        let steps = steps_until(&simulation, scene.time.end);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
+        let _ = write!(text, "{}", Plan::of(&simulation).map_err(|error| self.unusable(error))?);
+        for bound in bound_probes(scene, &simulation) {
+            let _ = write!(text, "\nprobe         {bound}");
+            bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));
+        }
+        print(text)
+    }
+}
+
+/// Whole steps that reach `end`, to within a billionth of a step; a last step may lead beyond it.
+pub fn steps_until<const D: usize>(simulation: &Simulation<D, Material>, end: f64) -> u64 {
+    (end / simulation.clock.nominal() - 1e-9).ceil().max(0.0) as u64
+}

@@ -1,0 +1,204 @@
+//! The keys of a scene, read from its schema: what each of them is, and everything that is wrong with those written.
+//!
+//! serde stops at the first key or type that does not fit. Once it has, the schema tells the others.
+
+use super::place::Step;
+use serde_json::{Map, Value};
+use std::sync::LazyLock;
+
+static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::schema().to_value());
+
+/// What serde would say of each key, in serde's words.
+pub(super) fn wrong(written: &Value) -> Vec<(Vec<Step>, String)> {
+    let mut audit = Audit::default();
+    audit.value(&SCHEMA, written);
+    audit.found
+}
+
+/// A key that is written in a scene, and the sentence that documents it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Such as `bodies[].density`, the same for all entries of a list; or with a chosen word, `boundary.left = "sliding"`.
+    pub path: String,
+    /// What it is.
+    pub about: String,
+}
+
+/// The keys written in a scene, each once, with their documentation.
+pub fn documented(scene: &Value) -> Vec<Key> {
+    let mut keys = Vec::new();
+    describe(&SCHEMA, scene, "", &mut keys);
+    keys
+}
+
+/// Follows references, and of a key that may be null takes what else it may be.
+fn resolved(mut schema: &Value) -> &Value {
+    loop {
+        let of_type = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/"));
+        let present = schema["anyOf"].as_array().and_then(|any| any.iter().find(|one| one["type"] != "null"));
+        schema = match (of_type, present) {
+            (Some(name), _) => &SCHEMA["$defs"][name],
+            (None, Some(present)) => present,
+            (None, None) => return schema,
+        }
+    }
+}
+
+fn may_be_null(schema: &Value) -> bool {
+    let alternatives = schema["anyOf"].as_array().is_some_and(|any| any.iter().any(|one| one["type"] == "null"));
+    alternatives || types(schema).contains(&"null")
+}
+
+/// `"type": "number"` or `"type": ["number", "null"]`.
+fn types(schema: &Value) -> Vec<&str> {
+    match &schema["type"] {
+        Value::String(one) => vec![one],
+        several => several.as_array().into_iter().flatten().filter_map(Value::as_str).collect(),
+    }
+}
+
+/// The alternatives of an enum by name: words, and objects with one key.
+fn variants(schema: &Value) -> Option<Vec<(&str, &Value)>> {
+    let list = schema["oneOf"].as_array()?;
+    Some(list.iter().filter_map(|one| Some((variant_name(one)?, one))).collect())
+}
+
+fn variant_name(one: &Value) -> Option<&str> {
+    let key = one["properties"].as_object().and_then(|keys| keys.keys().next());
+    one["const"].as_str().or(key.map(String::as_str))
+}
+
+fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// A walk through a scene beside its schema.
+#[derive(Default)]
+struct Audit {
+    steps: Vec<Step>,
+    found: Vec<(Vec<Step>, String)>,
+}
+
+impl Audit {
+    fn within(&mut self, step: Step, schema: &Value, value: &Value) {
+        self.steps.push(step);
+        self.value(schema, value);
+        self.steps.pop();
+    }
+
+    fn say(&mut self, message: String) {
+        self.found.push((self.steps.clone(), message));
+    }
+
+    fn value(&mut self, schema: &Value, value: &Value) {
+        if value.is_null() && may_be_null(schema) {
+            return;
+        }
+        let schema = resolved(schema);
+        if let Some(variants) = variants(schema) {
+            return self.variant(&variants, value);
+        }
+        match (types(schema).first().copied(), value) {
+            (Some("object"), Value::Object(object)) => self.object(schema, object),
+            (Some("array"), Value::Array(list)) => {
+                for (i, value) in list.iter().enumerate() {
+                    self.within(Step::Index(i), schema["prefixItems"].get(i).unwrap_or(&schema["items"]), value);
+                }
+            }
+            (Some("object"), _) => self.mismatch("an object", value),
+            (Some("array"), _) => self.mismatch("a sequence", value),
+            (Some("number"), value) if !value.is_number() => self.mismatch("f64", value),
+            (Some("integer"), value) if !value.is_u64() => self.mismatch("u32", value),
+            (Some("string"), value) if !value.is_string() => self.mismatch("a string", value),
+            (Some("boolean"), value) if !value.is_boolean() => self.mismatch("a boolean", value),
+            _ => {}
+        }
+    }
+
+    fn object(&mut self, schema: &Value, object: &Map<String, Value>) {
+        let Some(known) = schema["properties"].as_object() else { return };
+        for (key, value) in object {
+            let step = Step::Key(key.clone());
+            match known.get(key) {
+                Some(schema) => self.within(step, schema, value),
+                None => {
+                    self.steps.push(step);
+                    let allowed = quoted(known.keys().map(String::as_str));
+                    self.say(format!("unknown field `{key}`, expected one of {allowed}"));
+                    self.steps.pop();
+                }
+            }
+        }
+        let required = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        for key in required.filter(|key| !object.contains_key(*key)) {
+            self.say(format!("missing field `{key}`"));
+        }
+    }
+
+    fn variant(&mut self, variants: &[(&str, &Value)], value: &Value) {
+        let (word, inner) = match value {
+            Value::String(word) => (word, None),
+            Value::Object(object) => match (object.iter().next(), object.len()) {
+                (Some((word, inner)), 1) => (word, Some(inner)),
+                _ => return self.mismatch("map with a single key", value),
+            },
+            _ => return self.mismatch("string or map", value),
+        };
+        match (variants.iter().find(|(name, _)| name == word), inner) {
+            (Some((_, variant)), Some(inner)) if variant["properties"].is_object() => {
+                self.within(Step::Key(word.clone()), &variant["properties"][word], inner);
+            }
+            // A word that wants more, or an object where a word is enough: serde's business.
+            (Some(_), _) => {}
+            (None, _) => {
+                let allowed = quoted(variants.iter().map(|(name, _)| *name));
+                self.say(format!("unknown variant `{word}`, expected one of {allowed}"));
+            }
+        }
+    }
+
+    fn mismatch(&mut self, expected: &str, value: &Value) {
+        let is = match value {
+            Value::Null => "null".to_owned(),
+            Value::Bool(x) => format!("boolean `{x}`"),
+            Value::Number(x) => format!("number `{x}`"),
+            Value::String(x) => format!("string {x:?}"),
+            Value::Array(_) => "a list".to_owned(),
+            Value::Object(_) => "an object".to_owned(),
+        };
+        self.say(format!("invalid type: {is}, expected {expected}"));
+    }
+}
+
+fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
+    let schema = resolved(schema);
+    let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
+    let variants = variants(schema).unwrap_or_default();
+    let variant = |word: &str| variants.iter().find(|(name, _)| *name == word).map(|(_, variant)| *variant);
+    match value {
+        Value::String(word) => {
+            variant(word).into_iter().for_each(|one| tell(format!("{at} = {word:?}"), one, keys));
+        }
+        Value::Object(object) => {
+            for (key, value) in object {
+                let one = variant(key);
+                let property = &one.unwrap_or(schema)["properties"][key];
+                tell(below(key), one.unwrap_or(property), keys);
+                describe(property, value, &below(key), keys);
+            }
+        }
+        Value::Array(list) => {
+            list.iter().for_each(|value| describe(&schema["items"], value, &format!("{at}[]"), keys));
+        }
+        _ => {}
+    }
+}
+
+/// Adds a key, unless it has no sentence or is there already.
+fn tell(path: String, schema: &Value, keys: &mut Vec<Key>) {
+    let about = schema["description"].as_str().unwrap_or_default();
+    let key = Key { path, about: about.split_whitespace().collect::<Vec<_>>().join(" ") };
+    if !key.about.is_empty() && !keys.contains(&key) {
+        keys.push(key);
+    }
+}

@@ -1,0 +1,92 @@
+//! Particles to nodes: what the projection solves, and which nodes are too light for it.
+
+use crate::support::Failure;
+use bfree::approximation::{Approximation, Bspline, Linear, Lme};
+use bfree::grid::Grid;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::Particles;
+use bfree::tensor::Vector;
+
+fn cloud(velocity: f64, acceleration: f64) -> Particles<2> {
+    let number = |k: usize| 2.0 * ((k + 1) as f64 * 0.618_033_988_749_894_9).fract() - 1.0;
+    let mut particles = Particles::default();
+    for p in 0..80 {
+        let vector = |from: usize, size: f64| Vector::from_fn(|k, _| size * number(17 * p + from + k));
+        let position = Vector::repeat(2.5) + vector(0, 2.0);
+        particles.push(position, vector(2, velocity), 0.1, 0.2 + 0.1 * number(17 * p + 4), 0);
+        particles.acceleration[p] = vector(5, acceleration);
+    }
+    particles
+}
+
+const GRID: fn() -> Grid<2> = || Grid { origin: Vector::zeros(), spacing: 0.5, cells: [10, 10] };
+
+#[test]
+fn the_projection_solves_its_equation_for_every_lumping() -> Result<(), Failure> {
+    let particles = cloud(1.0, 50.0);
+    let families: [Approximation; 3] = [Linear.into(), Bspline::Quadratic.into(), Lme::new(1.8, 1e-6).into()];
+    for family in families {
+        let (supports, nodes) = Supports::new(&family, &GRID(), &particles.position)?;
+        for lumping in [1.0, 0.7, 0.1] {
+            let nodal = Nodal::project(&particles, &supports, nodes.len(), lumping)?;
+            assert_eq!(nodal.iterations > 0, lumping < 1.0);
+            for (projected, field) in
+                [(&nodal.velocity, &particles.velocity), (&nodal.acceleration, &particles.acceleration)]
+            {
+                // Σ_p m N_I [(1−ε) Σ_J N_J v_J + ε v_I − v_p] = 0, node by node (eq. 42).
+                let (mut defect, mut size) = (vec![Vector::zeros(); nodes.len()], 0.0);
+                for p in 0..particles.len() {
+                    let at_particle: Vector<f64, 2> = supports.of(p).map(|(node, n, _)| projected[node] * n).sum();
+                    for (node, n, _) in supports.of(p) {
+                        let mixed = at_particle * (1.0 - lumping) + projected[node] * lumping;
+                        defect[node] += (mixed - field[p]) * (n * particles.mass[p]);
+                        size += (n * particles.mass[p] * field[p].norm()).powi(2);
+                    }
+                }
+                let defect = defect.iter().map(Vector::norm_squared).sum::<f64>().sqrt() / size.sqrt();
+                assert!(defect < 1e-11, "{family:?}, ε = {lumping}: {defect:e}");
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_iterations_of_both_fields_are_counted() -> Result<(), Failure> {
+    let iterations = |velocity, acceleration| -> Result<usize, Failure> {
+        let particles = cloud(velocity, acceleration);
+        let (supports, nodes) = Supports::new(&Approximation::from(Linear), &GRID(), &particles.position)?;
+        Ok(Nodal::project(&particles, &supports, nodes.len(), 0.2)?.iterations)
+    };
+    let (of_v, of_a) = (iterations(1.0, 0.0)?, iterations(0.0, 1.0)?);
+    assert!(of_v > 1 && of_a > 1);
+    assert_eq!(iterations(1.0, 1.0)?, of_v + of_a);
+    Ok(())
+}
+
+#[test]
+fn only_a_node_of_next_to_no_mass_gets_no_velocity_in_any_unit_of_mass() -> Result<(), Failure> {
+    let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [3] };
+    for mass in [1e-9, 1.0, 1e9] {
+        for (beyond, light) in [(4e-16, true), (1e-12, false)] {
+            let mut particles = Particles::default();
+            particles.push(Vector::from([1.0 + beyond]), Vector::from([4.0]), 1.0, mass, 0);
+            particles.acceleration[0] = Vector::from([-3.0]);
+            let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+            let mut nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+            // Node 2 carries the share `beyond` of the particle, node 1 the rest.
+            let [near, far] = [1, 2].map(|id| nodes.number(id));
+            let (near, far) = (near.ok_or("no node 1")?, far.ok_or("no node 2")?);
+            let of = |field: &[Vector<f64, 1>]| [field[near][0], field[far][0]].map(|x| (x * 1e9).round() / 1e9);
+            let expected = |x: f64| [x, if light { 0.0 } else { x }];
+            assert_eq!(of(&nodal.velocity), expected(4.0), "mass {mass}, {beyond} beyond the node");
+            assert_eq!(of(&nodal.acceleration), expected(-3.0));
+            // a = −R/m, with R = −2 m.
+            let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| Vector::from([-2.0 * m])).collect();
+            nodal.accelerate(&particles, &unbalanced);
+            assert_eq!(of(&nodal.acceleration), expected(2.0));
+        }
+    }
+    Ok(())
+}
