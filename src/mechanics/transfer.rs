@@ -230,10 +230,12 @@ impl<const D: usize> Moved<D> {
         mass: &[f64],
         dt: f64,
     ) {
+        let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
         let fields =
             [(&mut self.delta_velocity, &particles.velocity), (&mut self.delta_acceleration, &particles.acceleration)];
         for (delta, field) in fields {
-            for (delta, change) in delta.iter_mut().zip(smoothing.change(particles, supports, mass, field, dt)) {
+            let changes = smoothing.change(particles, supports, mass, at_kinks.as_deref(), field, dt);
+            for (delta, change) in delta.iter_mut().zip(changes) {
                 *delta += change;
             }
         }

@@ -196,8 +196,9 @@ impl Scene {
             },
             smoothing: match &self.transfer {
                 Transfer::Flip => None,
-                Transfer::Pic(pic) => Some(Smoothing { order: pic.order, rate: f64::INFINITY }),
-                Transfer::Blend(blend) => Some(Smoothing { order: blend.order, rate: blend.rate }),
+                Transfer::Pic(pic) => Some(Smoothing::uniform(pic.order, f64::INFINITY)),
+                Transfer::Blend(blend) => Some(Smoothing::uniform(blend.order, blend.rate)),
+                Transfer::Limited(limited) => Some(Smoothing::limited(limited.rate)),
             },
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,

@@ -171,6 +171,12 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
         "transfer.pic.order",
         &["21", "1 to 20"],
     ),
+    (
+        r#"{ "blend": { "order": 2, "rate": 5 } }"#,
+        r#"{ "limited": { "rate": -1 } }"#,
+        "transfer.limited.rate",
+        &["-1 is not", "> 0"],
+    ),
     (r#""max_halvings": 3"#, r#""max_halvings": 21"#, "time.max_halvings", &["21", "0 to 20"]),
     (r#""name": "stiff""#, r#""name": """#, "bodies[1].name", &["empty"]),
     (r#""name": "stiff""#, r#""name": "soft""#, "bodies[1].name", &["soft", "differ"]),

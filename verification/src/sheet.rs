@@ -216,8 +216,9 @@ impl Panel {
                 let length = 20 * FINE as i32;
                 let (start, width) = if curve.mark == Mark::Dots { (length / 2, 5 * FINE) } else { (0, 2 * FINE) };
                 let end = if curve.mark == Mark::Dots { start + width as i32 } else { length };
+                // The library measures text too short: without the blanks it would leave the box.
                 series
-                    .label(&curve.name)
+                    .label(format!("{}    ", curve.name))
                     .legend(move |(x, y)| PathElement::new([(x + start, y), (x + end, y)], color.stroke_width(width)));
             }
             if curve.mark == Mark::Joined {

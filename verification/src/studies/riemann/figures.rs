@@ -38,7 +38,7 @@ pub(super) fn cases() -> Vec<Case> {
 }
 
 pub(super) fn all(runs: &Runs) -> Result<Vec<Sheet>, StudyError> {
-    Ok(vec![profiles(runs)?, convergence(runs)?, time_steps(runs)?, strong(runs)?])
+    Ok(vec![profiles(runs)?, convergence(runs)?, time_steps(runs)?, strong(runs)?, trade(runs)?])
 }
 
 /// The exact velocity at 3 ms between two places.
@@ -52,10 +52,10 @@ fn exact(jump: Jump, from: f64, to: f64) -> Result<Curve, StudyError> {
 }
 
 fn profiles(runs: &Runs) -> Result<Sheet, StudyError> {
-    let window = [(37.0, 63.0), (-4.0, 14.0)];
+    let window = [(40.7, 59.3), (-2.0, 12.0)];
     let mut panels = Vec::new();
     for (k, (name, case)) in discretisations().into_iter().enumerate() {
-        let mut curves = vec![exact(Jump::PAPER, 37.0, 63.0)?];
+        let mut curves = vec![exact(Jump::PAPER, 40.7, 59.3)?];
         for (color, gamma) in GAMMAS.into_iter().enumerate() {
             let profile = runs.of(case(gamma))?.profile.clone();
             curves.push(Curve::new(format!("γ = {gamma}"), color + 1, Mark::Line, profile));
@@ -159,7 +159,7 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
     for (k, size) in [100.0, 1000.0, -1000.0].into_iter().enumerate() {
         let jump = Jump::of(size);
         let mut curves = vec![exact(jump, 32.0, 68.0)?];
-        for (method, courant, color) in [(LME, 1.0, 1), (SMOOTH, 1.0, 5), (Method::RECOMMENDED, COURANT, 4)] {
+        for (method, courant, color) in [(LME, 1.0, 1), (Method::UNDISSIPATED, COURANT, 5), (Method::RECOMMENDED, COURANT, 4)] {
             if let Ok(found) = runs.particles(method, jump, STRONG_SPACING, courant) {
                 curves.push(Curve::new(method.name, color, Mark::Line, found.profile.clone()));
             }
@@ -174,13 +174,16 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
             legend: (k == 0).then_some(SeriesLabelPosition::UpperRight),
         });
     }
-    for (k, size) in [100.0, 1000.0, -1000.0].into_iter().enumerate() {
+    // Room for the legend below the points.
+    let heights = [(2.0, 200.0), (20.0, 2000.0), (20.0, 2000.0)];
+    for (k, (size, height)) in [100.0, 1000.0, -1000.0].into_iter().zip(heights).enumerate() {
         let jump = Jump::of(size);
         let mut curves = Vec::new();
         for (method, courant, color, spacings) in [
             (LINEAR, 1.0, 2, &[0.1, 0.05, 0.025][..]),
             (LME, 1.0, 1, &[0.1, 0.05, 0.025]),
-            (SMOOTH, 1.0, 5, &SPACINGS),
+            (SMOOTH, 1.0, 3, &SPACINGS),
+            (Method::UNDISSIPATED, COURANT, 5, &SPACINGS),
             (Method::RECOMMENDED, COURANT, 4, &SPACINGS),
         ] {
             let points = spacings.iter().filter_map(|&h| Some((h, runs.particles(method, jump, h, courant).ok()?.particles)));
@@ -190,16 +193,48 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
             title: format!("{} m/s: L2 error at particles", jump.left - jump.right),
             x: Axis::logarithmic("h (m)"),
             y: Axis::logarithmic("|e| (m^1.5/s)"),
-            window: None,
+            window: Some([(0.02, 0.125), height]),
             curves,
             legend: (k == 0).then_some(SeriesLabelPosition::LowerLeft),
         });
     }
     Ok(Sheet {
         name: "riemann_strong",
-        caption: "Strong jumps, E = 5e10 Pa: the paper's scheme (LME 4; LME 1.4), and the recommended setting.".into(),
+        caption: "Strong jumps, E = 5e10 Pa: the paper's scheme (linear, LME 4, LME 1.4), and the recommended setting without and with its smoothing.".into(),
         columns: 3,
         size: (430, 340),
+        panels,
+    })
+}
+
+fn trade(runs: &Runs) -> Result<Sheet, StudyError> {
+    let mut panels = Vec::new();
+    for (k, size) in [100.0, 1000.0].into_iter().enumerate() {
+        let jump = Jump::of(size);
+        let mut curves = vec![
+            Curve::new("asked for", 0, Mark::Dashed, vec![(0.8, 2.0), (1.5, 2.0)]),
+            Curve::new("", 0, Mark::Dashed, vec![(1.5, 2.0), (1.5, 0.0)]),
+        ];
+        for ((name, strengths), color) in tables::TRADE.into_iter().zip([1, 2, 4]) {
+            let points: Result<Vec<_>, StudyError> = (strengths.iter())
+                .map(|&transfer| tables::trade(runs, transfer, jump).map(|(width, overshoot, _)| (width, 100.0 * overshoot)))
+                .collect();
+            curves.push(Curve::new(name, color, Mark::Joined, points?));
+        }
+        panels.push(Panel {
+            title: format!("{size} m/s, h = 0.1 m, Courant 0.5"),
+            x: Axis::linear("width of the front / undissipated"),
+            y: Axis::linear("overshoot (% of the jump)"),
+            window: Some([(0.8, 3.0), (-0.5, 20.0)]),
+            curves,
+            legend: (k == 0).then_some(SeriesLabelPosition::UpperRight),
+        });
+    }
+    Ok(Sheet {
+        name: "riemann_trade",
+        caption: "Overshoot against width as the smoothing grows, in three ways: a blend of order 1, one of order 2, and the limited one.".into(),
+        columns: 2,
+        size: (520, 380),
         panels,
     })
 }

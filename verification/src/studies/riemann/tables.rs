@@ -30,15 +30,17 @@ fn changes() -> Vec<(&'static str, Method, f64)> {
         paper("8 particles a cell", Method { particles_per_cell: 8, ..a }),
         paper("PIC", Method { transfer: Transfer::Pic(1), ..a }),
         paper("FMPM(4)", Method { transfer: Transfer::Pic(4), ..a }),
-        paper("blend at the recommended rate", Method { transfer: Transfer::Blend(1, 1.0), ..a }),
+        paper("monotone blend", Method { transfer: Transfer::MONOTONE, ..a }),
+        paper("limited, 0.8 c/h", Method { transfer: Transfer::Limited(0.8), ..a }),
         paper("gamma 0.6", Method { gamma: 0.6, ..a }),
         paper("eps 0.1", Method { lumping: 0.1, ..a }),
-        best("recommended: LME 1.4, eps 0.02, blend", b),
-        best("FLIP", Method { transfer: Transfer::Flip, ..b }),
-        best("FMPM(2) at 5 times the rate", Method { transfer: Transfer::Blend(2, 5.0), ..b }),
+        best("recommended: LME 1.4, eps 0.02, limited 0.8 c/h", b),
+        best("FLIP", Method::UNDISSIPATED),
         best("FMPM(8) in every step", Method { transfer: Transfer::Pic(8), ..b }),
-        best("half the rate", Method { transfer: Transfer::Blend(1, 0.5), ..b }),
-        best("twice the rate", Method { transfer: Transfer::Blend(1, 2.0), ..b }),
+        best("monotone blend, 1.2 (c/h)(h/L)^(1/4)", Method { transfer: Transfer::MONOTONE, ..b }),
+        best("blend of order 2, 0.8 c/h", Method { transfer: Transfer::Blend(2, 0.8, 0.0), ..b }),
+        best("half the rate", Method { transfer: Transfer::Limited(0.4), ..b }),
+        best("twice the rate", Method { transfer: Transfer::Limited(1.6), ..b }),
         best("eps 0.8", Method { lumping: 0.8, ..b }),
         best("LME 4", Method { shape: LME.shape, ..b }),
         best("LME 1.8", Method { shape: r#"{"lme":{"gamma":1.8}}"#, ..b }),
@@ -50,6 +52,75 @@ fn changes() -> Vec<(&'static str, Method, f64)> {
 }
 
 const CAUSES: [Jump; 2] = [Jump::of(100.0), Jump::of(1000.0)];
+
+/// Smoothing in three ways at several strengths, a of κ = a (c/h) (h/L)^e.
+pub(super) const TRADE: [(&str, &[Transfer]); 3] = [
+    ("order 1, a (c/h) (h/L)^(1/4)", &[
+        Transfer::Blend(1, 0.15, 0.25),
+        Transfer::Blend(1, 0.3, 0.25),
+        Transfer::Blend(1, 0.6, 0.25),
+        Transfer::Blend(1, 0.9, 0.25),
+        Transfer::Blend(1, 1.2, 0.25),
+    ]),
+    ("order 2, a c/h", &[
+        Transfer::Blend(2, 0.1, 0.0),
+        Transfer::Blend(2, 0.2, 0.0),
+        Transfer::Blend(2, 0.4, 0.0),
+        Transfer::Blend(2, 0.8, 0.0),
+        Transfer::Blend(2, 3.2, 0.0),
+        Transfer::Blend(2, 12.8, 0.0),
+    ]),
+    ("limited, a c/h", &[
+        Transfer::Limited(0.1),
+        Transfer::Limited(0.2),
+        Transfer::Limited(0.4),
+        Transfer::Limited(0.6),
+        Transfer::Limited(0.8),
+        Transfer::Limited(1.0),
+        Transfer::Limited(1.6),
+    ]),
+];
+
+/// The spacing of the trade.
+const TRADE_SPACING: f64 = 0.1;
+
+/// The run of one kind and strength of smoothing.
+fn traded(transfer: Transfer, jump: Jump) -> Case {
+    let method = Method { transfer, ..Method::RECOMMENDED };
+    Case::particles(method, jump, TRADE_SPACING, COURANT)
+}
+
+/// Overshoot in parts of the jump and width over that of the undissipated scheme.
+pub(super) fn trade(runs: &Runs, transfer: Transfer, jump: Jump) -> Result<(f64, f64, f64), StudyError> {
+    let undissipated = runs.particles(Method::UNDISSIPATED, jump, TRADE_SPACING, COURANT)?;
+    let found = runs.of(traded(transfer, jump))?;
+    Ok((found.width / undissipated.width, found.overshoot, found.particles))
+}
+
+fn trades(runs: &Runs) -> Result<Table, StudyError> {
+    let mut table = Table::new(
+        format!("the trade: smoothing in three ways, h = {TRADE_SPACING} m, Courant {COURANT}; 100 | 1000 m/s"),
+        ["smoothing", "a", "overshoot (%)", "width / undissipated", "L2 (m^1.5/s)"],
+    );
+    for (kind, strengths) in TRADE {
+        for &transfer in strengths {
+            let [weak, strong] = CAUSES.map(|jump| trade(runs, transfer, jump));
+            let (weak, strong) = (weak?, strong?);
+            let a = match transfer {
+                Transfer::Blend(_, a, _) | Transfer::Limited(a) => a.to_string(),
+                Transfer::Flip | Transfer::Pic(_) => "-".to_owned(),
+            };
+            table.push([
+                kind.to_owned(),
+                a,
+                format!("{:.1} | {:.1}", 100.0 * weak.1, 100.0 * strong.1),
+                format!("{:.2} | {:.2}", weak.0, strong.0),
+                format!("{:.1} | {:.1}", weak.2, strong.2),
+            ]);
+        }
+    }
+    Ok(table)
+}
 
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
@@ -63,6 +134,11 @@ pub(super) fn cases() -> Vec<Case> {
             cases.extend(strong_jumps().map(|jump| Case::particles(method, jump, h, courant)));
         }
     }
+    for (_, strengths) in TRADE {
+        for &transfer in strengths {
+            cases.extend(CAUSES.map(|jump| traded(transfer, jump)));
+        }
+    }
     cases
 }
 
@@ -74,6 +150,7 @@ pub(super) fn all(runs: &Runs, plan: &Plan) -> Result<Vec<Table>, StudyError> {
     let mut tables = vec![by_spacing(runs), by_step(runs), by_gamma(runs)?];
     tables.push(strong(runs));
     tables.extend(CAUSES.map(|jump| causes(runs, jump)));
+    tables.push(trades(runs)?);
     tables.push(judged(runs, plan)?);
     tables.push(cost()?);
     Ok(tables)
@@ -202,7 +279,9 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
             "overshoot (%)",
             "plateau (%)",
             "width (h)",
-            "width of LME 1.4 undissipated (h)",
+            "undissipated, Courant 0.5 (h)",
+            "undissipated, same step (h)",
+            "paper's scheme, LME 1.4 (h)",
             "energy lost (%)",
             "lost in exact shocks (%)",
             "seconds",
@@ -213,7 +292,10 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
         let by_step = plan.courants(jump).iter().skip(1).map(|&courant| (plan.spacings[0], courant));
         for (h, courant) in by_h.chain(by_step) {
             let found = runs.particles(Method::RECOMMENDED, jump, h, courant)?;
-            let undissipated = runs.particles(SMOOTH, jump, h, 1.0)?;
+            let undissipated = runs.particles(Method::UNDISSIPATED, jump, h, COURANT)?;
+            let width = |found: &Measured| format!("{:.1}", found.width / h);
+            let same_step = runs.particles(Method::UNDISSIPATED, jump, h, courant).map_or("-".into(), width);
+            let paper = runs.particles(SMOOTH, jump, h, 1.0)?;
             table.push([
                 jump.name(),
                 h.to_string(),
@@ -222,8 +304,10 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
                 format!("{:.3}", found.nodes),
                 format!("{:.2}", 100.0 * found.overshoot),
                 format!("{:.2}", 100.0 * found.plateau),
-                format!("{:.1}", found.width / h),
-                format!("{:.1}", undissipated.width / h),
+                width(found),
+                width(undissipated),
+                same_step,
+                width(paper),
                 format!("{:.2}", 100.0 * found.lost),
                 format!("{:.2}", 100.0 * found.lost_by_shocks),
                 format!("{:.1}", found.seconds),
@@ -241,9 +325,8 @@ fn cost() -> Result<Table, StudyError> {
         ["scheme", "Courant", "steps", "seconds", "of the first", "energy lost (%)", "L2 (m^1.5/s)"],
     );
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let flip = Method { name: "recommended without blend", transfer: Transfer::Flip, ..Method::RECOMMENDED };
     let mut first = None;
-    for (method, courant) in [(LME, 1.0), (LME, COURANT), (SMOOTH, COURANT), (flip, COURANT), (Method::RECOMMENDED, COURANT)] {
+    for (method, courant) in [(LME, 1.0), (LME, COURANT), (SMOOTH, COURANT), (Method::UNDISSIPATED, COURANT), (Method::RECOMMENDED, COURANT)] {
         let case = Case::particles(method, jump, 0.1, courant);
         let found = pool.install(|| case.run().map_err(|error| error.to_string()))?;
         let unit = *first.get_or_insert(found.seconds);
