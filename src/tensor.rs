@@ -132,12 +132,12 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     /// sum would cancel.
     ///
     /// ```
-    /// use bfree::tensor::{Deformation, Tensor};
+    /// use bfree::tensor::{Deformation, Tensor, Vector};
     ///
     /// // Stretched by 2 along x and by ½ along y: no change of volume, E = diag(3/2, -3/8).
-    /// let at = Deformation::<f64, 2>::new(Tensor::from_diagonal(&[1.0, -0.5].into()));
+    /// let at = Deformation::<f64, 2>::new(Tensor::from_diagonal(&Vector::from([1.0, -0.5])));
     /// assert_eq!(at.jacobian, 1.0);
-    /// assert_eq!(at.green_lagrange().diagonal(), [1.5, -0.375].into());
+    /// assert_eq!(at.green_lagrange().diagonal(), Vector::from([1.5, -0.375]));
     /// // A strain of 1e-12 has all its digits, which F alone would have lost.
     /// let small = Deformation::<f64, 1>::new(Tensor::from_element(1e-12));
     /// assert_eq!(small.j, 1e-12);
