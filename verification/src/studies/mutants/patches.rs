@@ -22,6 +22,7 @@ const TANGENT: Check = Check::Study("tangent");
 const PATCH: Check = Check::Study("patch");
 const BALANCE: Check = Check::Study("balance");
 const DIGITS: Check = Check::Study("digits");
+const OPERATOR: Check = Check::Study("operator");
 const DYNAMICS: Check = Check::Test("dynamics::");
 const POINTS: Check = Check::Test("points::");
 const LOADS: Check = Check::Test("loads::");
@@ -29,7 +30,7 @@ const SHAPES: Check = Check::Test("approximation::");
 const SMOOTH: Check = Check::Test("smoothing::");
 
 /// All checks that a patch can name.
-pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH];
+pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH];
 
 /// What is to become of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +65,7 @@ const RESIDUAL: &str = "src/mechanics/residual.rs";
 const PRODUCT: &str = "src/mechanics/tangent.rs";
 const TRANSFER: &str = "src/mechanics/transfer.rs";
 const SMOOTHING: &str = "src/mechanics/smoothing.rs";
+const SINGLE: &str = "src/mechanics/single.rs";
 const NEWMARK: &str = "src/mechanics/time.rs";
 const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
@@ -203,6 +205,14 @@ pub(super) const PATCHES: &[Patch] = &[
         "-(-self.rate * dt).exp_m1()",
         "(self.rate * dt).min(1.0)",
         Killed(&[SMOOTH], &[DYNAMICS])),
+    patch("kinks are where the velocity is, not its curvature", SMOOTHING,
+        "(v - v_twice).norm_squared()",
+        "v.norm_squared()",
+        Killed(&[SMOOTH], &[DYNAMICS])),
+    patch("single precision forgets the share of lumping", SINGLE,
+        "self.alphas.a1 * self.lumping * m / scale",
+        "self.alphas.a1 * m / scale",
+        Killed(&[OPERATOR], &[TANGENT, DYNAMICS])),
     patch("smoothing towards a sum that is no mean", SMOOTHING,
         "field[p] * particles.mass[p]",
         "field[p]",
@@ -212,8 +222,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "(&mut self.delta_acceleration, &particles.velocity)",
         Killed(&[SMOOTH], &[DYNAMICS])),
     patch("particles move backwards", TRANSFER,
-        "particles.position[p] + delta_x",
-        "particles.position[p] - delta_x",
+        "position[p] += delta_x;",
+        "position[p] -= delta_x;",
         Killed(&[PATCH, DYNAMICS, BALANCE], &[TANGENT])),
     patch("gamma for gamma/2 in a6", NEWMARK,
         "(1.0 - gamma / (2.0 * beta)) * dt",
