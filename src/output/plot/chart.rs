@@ -118,7 +118,8 @@ pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f6
     let least = 1e-6 * low.abs().max(high.abs());
     match high - low {
         span if span < 1e-100 && least < 1e-100 => (low - 1.0, high + 1.0),
-        span if span <= least => (low - least, high + least),
+        // What does not vary is shown as such, not as its round-off.
+        span if span <= least => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
         span => (low - padding * span, high + padding * span),
     }
 }
