@@ -14,7 +14,7 @@ use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
-    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps, kept in
+    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the paper, kept in
     /// verification/FULL.md, `results` the studies of the paper with their tables and pictures, kept in
     /// verification/RESULTS.md and verification/results
     #[arg(value_name = "STUDY", default_value = "all")]
@@ -45,44 +45,43 @@ fn studies_list() -> String {
 }
 
 /// The studies asked for, each once, and how much they do; the word that names none is the error.
-fn selected(arguments: &Arguments) -> Result<(Vec<&'static Study>, Effort), String> {
-    let mut effort = match arguments.effort {
+fn selected(arguments: &Arguments) -> Result<Vec<(&'static Study, Effort)>, String> {
+    let effort = match arguments.effort {
         EffortArgument::Short => Effort::Short,
         EffortArgument::Full => Effort::Full,
     };
-    let mut chosen: Vec<&Study> = Vec::new();
+    let mut chosen: Vec<(&Study, Effort)> = Vec::new();
     for word in &arguments.studies {
-        let named: Vec<&Study> = match word.as_str() {
-            "all" => STUDIES.iter().collect(),
+        let of_the_paper = |study: &&Study| PAPER.contains(&study.name);
+        let named: Vec<(&Study, Effort)> = match word.as_str() {
+            "all" => STUDIES.iter().map(|study| (study, effort)).collect(),
+            // The long sweeps of the paper's studies are `results`.
             "full" => {
-                effort = Effort::Full;
-                STUDIES.iter().collect()
+                let effort_of = |study: &Study| if PAPER.contains(&study.name) { Effort::Short } else { Effort::Full };
+                STUDIES.iter().map(|study| (study, effort_of(study))).collect()
             }
-            "results" => {
-                effort = Effort::Full;
-                STUDIES.iter().filter(|study| PAPER.contains(&study.name)).collect()
-            }
-            name => vec![STUDIES.iter().find(|study| study.name == name).ok_or_else(|| word.clone())?],
+            "results" => STUDIES.iter().filter(of_the_paper).map(|study| (study, Effort::Full)).collect(),
+            name => vec![(STUDIES.iter().find(|study| study.name == name).ok_or_else(|| word.clone())?, effort)],
         };
         for study in named {
-            if !chosen.iter().any(|one| one.name == study.name) {
+            if !chosen.iter().any(|(one, _)| one.name == study.0.name) {
                 chosen.push(study);
             }
         }
     }
-    Ok((chosen, effort))
+    Ok(chosen)
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let (studies, effort) = match selected(&arguments) {
+    let studies = match selected(&arguments) {
         Ok(selected) => selected,
         Err(word) => {
             eprintln!("error: there is no study `{word}`\n\n{}\n\nor `all`, `full` or `results`", studies_list());
             return ExitCode::from(2);
         }
     };
-    match run(&studies, effort, &arguments) {
+    match run(&studies, &arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         // Nobody reads on: `… | head`.
@@ -106,15 +105,15 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
     move |source| Failure { place: place.into(), source }
 }
 
-fn run(studies: &[&Study], effort: Effort, arguments: &Arguments) -> Result<bool, Failure> {
+fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
     let mut results = Vec::new();
     let mut verdicts = Vec::new();
     let mut documents = Vec::new();
     let mut chapters = Vec::new();
-    for study in studies {
+    for (study, effort) in studies {
         let start = Instant::now();
-        let result = (study.run)(&effort);
+        let result = (study.run)(effort);
         let seconds = start.elapsed().as_secs_f64();
         let passed = matches!(&result, Ok(outcome) if outcome.passed());
         let before = results.len();
