@@ -175,7 +175,7 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
         });
     }
     // Room for the legend below the points.
-    let heights = [(2.0, 200.0), (20.0, 2000.0), (20.0, 2000.0)];
+    let heights = [(0.5, 200.0), (20.0, 2000.0), (20.0, 2000.0)];
     for (k, (size, height)) in [100.0, 1000.0, -1000.0].into_iter().zip(heights).enumerate() {
         let jump = Jump::of(size);
         let mut curves = Vec::new();
