@@ -28,17 +28,26 @@ const SIDES: [(&str, &str, &str, Option<f64>); 2] = [
 
 const LME: &str = r#"approximation={"lme":{"gamma":3}}"#;
 
+const SMOOTH_LME: &str = r#"approximation={"lme":{"gamma":1.4}}"#;
+
+/// The smoothing recommended for jumps, at the rate 0.8 c/h with c = √((Λ + 2G)/ρ).
+const LIMITED: &str = r#"transfer={"limited":{"rate":51}}"#;
+
 /// (name, overrides of the scene)
-const METHODS: [(&str, &[&str]); 6] = [
+const METHODS: [(&str, &[&str]); 8] = [
     ("linear", &[r#"approximation="linear""#]),
     ("uGIMP", &[r#"approximation="gimp""#]),
     ("quadratic B-splines", &[r#"approximation={"bspline":{"degree":2}}"#]),
     ("LME 3 (paper)", &[LME]),
     ("LME 3, eps 0.1", &[LME, "time.lumping=0.1"]),
+    ("LME 1.4, eps 0.1", &[SMOOTH_LME, "time.lumping=0.1"]),
+    ("recommended for jumps", &[SMOOTH_LME, "time.lumping=0.02", LIMITED]),
     ("linear, eps 0.1", &[r#"approximation="linear""#, "time.lumping=0.1"]),
 ];
 const PAPER: usize = 3;
-const IMPROVED: usize = 4;
+const IMPROVED: [usize; 3] = [4, 5, 6];
+/// Drawn, and in which colour of the palette.
+const DRAWN: [(usize, usize); 5] = [(0, 2), (1, 3), (2, 4), (PAPER, 1), (5, 5)];
 
 /// u_y at the probe: (t, u) of every step.
 type History = Vec<(f64, f64)>;
@@ -124,8 +133,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     for (scene, sides, reference, bound) in SIDES {
         let chosen: &[usize] = match effort {
             Effort::Short if bound.is_none() => &[],
-            Effort::Short => &[PAPER, IMPROVED],
-            Effort::Full => &[0, 1, 2, 3, 4, 5],
+            Effort::Short => &[PAPER, IMPROVED[0]],
+            Effort::Full => &[0, 1, 2, 3, 4, 5, 6, 7],
         };
         let q8 = elements(scene)?;
         report.push(&["Q8 elements from an independent program's", sides], distance(&q8, &rows(reference)), Bound::AtMost(1e-6));
@@ -149,13 +158,15 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             ]);
             let asked = if *k == PAPER { bound.map_or(Bound::Reported, Bound::AtMost) } else { Bound::Reported };
             report.push(&[name, sides], far, asked);
-            if *k < 5 {
-                curves.push(Curve::new(name, [2, 3, 4, 1, 5][*k], Mark::Line, u.clone()));
+            if let Some((_, colour)) = DRAWN.iter().find(|(drawn, _)| drawn == k) {
+                curves.push(Curve::new(name, *colour, Mark::Line, u.clone()));
             }
         }
         let of = |k: usize| histories.iter().find(|(at, _)| *at == k).map(|(_, u)| distance(u, &q8));
-        if let (Some(paper), Some(improved)) = (of(PAPER), of(IMPROVED)) {
-            report.push(&["eps 0.1 over the paper's eps 1, LME 3", sides], improved / paper, Bound::AtMost(1.0));
+        for k in IMPROVED {
+            if let (Some(paper), Some(improved)) = (of(PAPER), of(k)) {
+                report.push(&[&format!("{} over LME 3 (paper)", METHODS[k].0), sides], improved / paper, Bound::AtMost(1.0));
+            }
         }
         outcome.tables.push(table);
         panels.push(Panel {
@@ -197,5 +208,6 @@ const REMARKS: [&str; 2] = [
      Their history agrees with an independent finite element program to its round-off.",
     "With the paper's lumped mass, what separates LME from the elements is mostly a lag: the projection with a lumped mass smooths the velocity before \
      it moves the particles, which lowers the frequency. With eps = 0.1 most of that is gone, for every shape function; linear functions remain far off, \
-     because particles cross cells.",
+     because particles cross cells. Smoother functions do the rest: LME 1.4 with eps = 0.1 stays within a percent of the elements. The setting \
+     recommended for jumps, with its smoothing, lies closer than the paper's scheme too, though this motion has no jump to smooth.",
 ];
