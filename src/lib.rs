@@ -141,6 +141,7 @@ pub mod field;
 pub mod grid;
 pub mod material;
 pub mod mechanics;
+pub mod memory;
 pub mod nodes;
 pub mod output;
 pub mod particles;

@@ -7,6 +7,7 @@ use bfree::output::plot::plot_run;
 use bfree::scene;
 use clap::{Parser, Subcommand};
 use program::{Failure, INTERRUPTED, New, Run, SceneArguments, print, tell};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -36,7 +37,9 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    let json = matches!(&command, Command::Run(run) if run.tells_json());
+    let result = match command {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
         Command::New(new) => new.execute(),
@@ -49,7 +52,12 @@ fn main() -> ExitCode {
         Err(Failure::Scene(error)) => (error, 2),
         Err(Failure::Run(error)) => (error, 1),
     };
-    tell(format_args!("error: {}", causes::messages(&*error).join("\n  because: ")));
+    let messages = causes::messages(&*error);
+    if json {
+        tell(json!({"event": "error", "code": code, "message": messages.first(), "because": messages.get(1..)}));
+    } else {
+        tell(format_args!("error: {}", messages.join("\n  because: ")));
+    }
     ExitCode::from(code)
 }
 

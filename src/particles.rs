@@ -47,6 +47,10 @@ impl<const D: usize> Default for Particles<D> {
 }
 
 impl<const D: usize> Particles<D> {
+    /// Bytes of one particle in all arrays.
+    pub const BYTES: usize =
+        3 * size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + size_of::<u32>();
+
     /// Number of particles.
     pub fn len(&self) -> usize {
         self.position.len()
@@ -55,6 +59,15 @@ impl<const D: usize> Particles<D> {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
+    }
+
+    /// Makes room for `more` particles, and no more than that: arrays that double would for a moment need three times their size.
+    pub fn reserve(&mut self, more: usize) {
+        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body } = self;
+        [position, velocity, acceleration].into_iter().for_each(|array| array.reserve_exact(more));
+        displacement_gradient.reserve_exact(more);
+        [volume, mass].into_iter().for_each(|array| array.reserve_exact(more));
+        body.reserve_exact(more);
     }
 
     /// Adds an undeformed particle at rest acceleration.

@@ -6,9 +6,11 @@ use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::{frozen_bytes, has_closed_form};
 use crate::mechanics::time::Newmark;
+use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crate::solver::{Krylov, Precision};
 use crate::tensor::{Tensor, Vector};
+use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::collections::HashSet;
 use std::fmt::{Display, Formatter};
@@ -94,6 +96,19 @@ impl Display for SurfaceUse {
     }
 }
 
+/// A run needs more memory than there is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the run needs {} of memory at one time, and {} can be had: use a coarser grid, fewer particles per cell, or fewer Krylov \
+     vectors (solver.krylov.method)", BinaryBytes(*needed), BinaryBytes(*memory)
+)]
+pub struct TooLarge {
+    /// Bytes that the arrays of a step hold at one time.
+    pub needed: u64,
+    /// Bytes that can be had.
+    pub memory: u64,
+}
+
 /// What a run of a simulation requires, at its present state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -145,6 +160,15 @@ impl Plan {
             self.arrays.iter().filter(|array| array.lifetime == lifetime).map(|array| array.bytes).sum()
         };
         of(Lifetime::Step) + of(Lifetime::Solve).max(of(Lifetime::Update))
+    }
+
+    /// Whether the arrays fit into `memory` bytes.
+    ///
+    /// # Errors
+    /// They do not.
+    pub fn check_fits(&self, memory: u64) -> Result<(), TooLarge> {
+        let needed = self.bytes();
+        if needed <= memory { Ok(()) } else { Err(TooLarge { needed, memory }) }
     }
 }
 
@@ -210,11 +234,7 @@ fn arrays<const D: usize, L: Law, A>(
     // Δx and H, and the increments of v and a.
     let updated = 3 * vector + tensor;
     vec![
-        array(
-            "particles: x, v, a, H, volume, mass, body",
-            Lifetime::Step,
-            particles * (3 * vector + tensor + 2 * 8 + 4),
-        ),
+        array("particles: x, v, a, H, volume, mass, body", Lifetime::Step, particles * Particles::<D>::BYTES),
         array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes()),
         array("nodal fields: v, a, loads, residuals, Δφ", Lifetime::Step, nodes * (12 * vector + 8)),
         array("frozen tangent", Lifetime::Solve, frozen),
@@ -222,18 +242,6 @@ fn arrays<const D: usize, L: Law, A>(
         array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors),
         array("particles: state after the step", Lifetime::Update, particles * updated),
     ]
-}
-
-/// Bytes in a unit that suits them.
-fn readable(bytes: u64) -> String {
-    let mut value = bytes as f64;
-    for unit in ["B", "KiB", "MiB"] {
-        if value < 1024.0 {
-            return format!("{value:.1} {unit}");
-        }
-        value /= 1024.0;
-    }
-    format!("{value:.1} GiB")
 }
 
 impl Display for Plan {
@@ -250,14 +258,14 @@ impl Display for Plan {
         for surface in &self.surfaces {
             writeln!(f, "  surface: {surface}")?;
         }
-        write!(f, "memory        {} at most at one time", readable(self.bytes()))?;
+        write!(f, "memory        {} at most at one time", BinaryBytes(self.bytes()))?;
         for array in &self.arrays {
             let when = match array.lifetime {
                 Lifetime::Step => "",
                 Lifetime::Solve => " (while solving)",
                 Lifetime::Update => " (while updating)",
             };
-            write!(f, "\n  {:>10}  {}{when}", readable(array.bytes), array.name)?;
+            write!(f, "\n  {:>10}  {}{when}", BinaryBytes(array.bytes).to_string(), array.name)?;
         }
         Ok(())
     }

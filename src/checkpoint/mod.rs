@@ -296,6 +296,29 @@ fn read(path: &Path) -> Result<(Content, Vec<Array>), Damage> {
     container::read(BufReader::new(file), length)
 }
 
+/// A run that was killed or interrupted, and could be continued.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unfinished {
+    /// Its last checkpoint that can be read.
+    pub path: PathBuf,
+    /// Steps taken then.
+    pub steps: u64,
+}
+
+/// The run in `directory` that was killed or interrupted, if there is one with a checkpoint that can be read.
+pub fn unfinished(directory: &Path) -> Option<Unfinished> {
+    // A run that was killed wrote no report.
+    let ended = std::fs::read(directory.join("report.json")).is_ok_and(|text| {
+        serde_json::from_slice::<Value>(&text).is_ok_and(|report| report["outcome"] != "interrupted")
+    });
+    let readable = NAMES.iter().filter_map(|name| {
+        let path = directory.join(name);
+        let (content, _) = read(&path).ok()?;
+        Some(Unfinished { path, steps: content.clock.steps() })
+    });
+    readable.max_by_key(|one| one.steps).filter(|_| !ended)
+}
+
 /// Removes the checkpoints of an earlier run: a new one in the same directory must not be continued from them.
 ///
 /// # Errors

@@ -25,7 +25,7 @@ const PROBLEMS: [(&str, &str); 6] = [
 /// The schema's file beside the scene.
 const SCHEMA: &str = "scene.schema.json";
 
-/// Columns of a terminal, and those of a long key.
+/// Columns of a terminal, and those of the keys; what a longer key is begins on the next line.
 const WIDTH: (usize, usize) = (110, 34);
 
 /// `bfree new`.
@@ -85,7 +85,10 @@ fn explained(text: &str) -> Result<String, Failure> {
     let mut out = String::new();
     for key in keys::documented(&scene) {
         let mut line = format!("{:<column$}", key.path);
-        let mut room = width.saturating_sub(line.chars().count().max(column));
+        let mut room = width - column;
+        if line.chars().count() > column {
+            let _ = write!(line, "\n{:column$}", "");
+        }
         for word in key.about.split(' ') {
             let length = word.chars().count() + 1;
             if length > room {

@@ -3,7 +3,7 @@
 use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, steps_until};
 use super::{Failure, INTERRUPTED, print, tell};
-use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
+use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
 use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::plan::SurfaceUse;
@@ -40,6 +40,9 @@ pub struct Run {
     /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
     #[arg(long)]
     restart: bool,
+    /// Begin anew in a directory that holds a run which was killed or interrupted, and lose that run.
+    #[arg(long, conflicts_with = "restart")]
+    discard: bool,
     /// Draw the results at the end, as `bfree plot` does.
     #[arg(long)]
     plot: bool,
@@ -72,7 +75,23 @@ enum Form {
     Json,
 }
 
+/// A run that could be continued is in the way.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{} holds a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, \
+     or write elsewhere by --out", directory.display(), found.steps, found.path.display()
+)]
+struct WouldBeLost {
+    directory: PathBuf,
+    found: Unfinished,
+}
+
 impl Run {
+    /// Whether a program reads what is told, as JSON.
+    pub fn tells_json(&self) -> bool {
+        self.progress == Form::Json
+    }
+
     /// Runs the scene.
     pub fn execute(&self) -> Result<(), Failure> {
         let mut scene = self.scene.read()?;
@@ -92,7 +111,8 @@ impl Run {
     }
 
     fn execute_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
-        let mut simulation = scene.build::<D>(self.scene.folder()).map_err(|error| self.scene.unusable(error))?;
+        let mut simulation = self.scene.build::<D>(scene)?;
+        self.scene.plan(&simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let until = steps_until(&simulation, scene.time.end);
         let last = self.steps.map_or(until, |steps| steps.min(until));
@@ -120,7 +140,7 @@ impl Run {
         let reference = Reference::of(&simulation);
         let restored = match self.restart {
             true => Some(self.restore(&directory, &identity, &mut simulation)?),
-            false => checkpoint::forget(&directory).map(|()| None).map_err(Failure::run)?,
+            false => self.begin(&directory).map(|()| None)?,
         };
         let mut recorder = match &restored {
             Some(restored) => Recorder::resume(output, &simulation, reference, &restored.mark),
@@ -133,7 +153,10 @@ impl Run {
         let mut failure = None;
         let unwritten = |simulation: &Simulation<D>| {
             let (time, place) = (simulation.clock.time(), directory.display());
-            tell(format_args!("stopped at t = {time}; {place} holds what was written until then, and no report"));
+            self.say(
+                "stopped",
+                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
+            );
         };
         loop {
             if let Some(checkpoints) = &mut checkpoints {
@@ -182,14 +205,26 @@ impl Run {
         let (time, place) = (simulation.clock.time(), directory.display());
         match failure {
             Some(error) => {
-                tell(format_args!("stopped at t = {time} after the last good step; its state is in {place}"));
+                self.say(
+                    "stopped",
+                    &format!("stopped at t = {time} after the last good step; its state is in {place}"),
+                );
                 Err(Failure::run(error))
             }
             None if stopped => {
-                tell(format_args!("interrupted at t = {time} after a whole step; everything up to it is in {place}"));
+                let text = format!("interrupted at t = {time} after a whole step; everything up to it is in {place}");
+                self.say("stopped", &text);
                 Err(Failure::Interrupted)
             }
             None => Ok(()),
+        }
+    }
+
+    /// Makes room for a new run; one that could be continued is lost only on request.
+    fn begin(&self, directory: &Path) -> Result<(), Failure> {
+        match checkpoint::unfinished(directory) {
+            Some(found) if !self.discard => Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), found })),
+            _ => checkpoint::forget(directory).map_err(Failure::run),
         }
     }
 

@@ -3,6 +3,8 @@
 use super::probes::bound_probes;
 use super::{Failure, print, tell};
 use bfree::material::Material;
+use bfree::memory;
+use bfree::particles::Particles;
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Scene, SceneError};
 use bfree::simulation::Simulation;
@@ -50,6 +52,22 @@ impl SceneArguments {
         self.scene.parent().unwrap_or(Path::new("."))
     }
 
+    /// The simulation at t = 0, if there is memory for its particles.
+    pub fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
+        let memory = memory::available().unwrap_or(u64::MAX);
+        scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
+    }
+
+    /// What a run of the simulation requires, if there is memory for it.
+    pub fn plan<const D: usize>(&self, simulation: &Simulation<D>) -> Result<Plan, Failure> {
+        let plan = Plan::of(simulation).map_err(|error| self.unusable(error))?;
+        // The particles are there already.
+        let particles = (simulation.particles.len() * Particles::<D>::BYTES) as u64;
+        let memory = memory::available().map_or(u64::MAX, |bytes| bytes.saturating_add(particles));
+        plan.check_fits(memory).map_err(|error| self.unusable(error))?;
+        Ok(plan)
+    }
+
     /// Prints what the scene requires.
     pub fn check(&self) -> Result<(), Failure> {
         let scene = self.read()?;
@@ -61,12 +79,12 @@ impl SceneArguments {
     }
 
     fn check_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
-        let simulation = scene.build::<D>(self.folder()).map_err(|error| self.unusable(error))?;
+        let simulation = self.build::<D>(scene)?;
         let mut text = scene.title.as_ref().map_or_else(String::new, |title| format!("{title}\n"));
         let steps = steps_until(&simulation, scene.time.end);
         // Writing to a string cannot fail.
         let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
-        let _ = write!(text, "{}", Plan::of(&simulation).map_err(|error| self.unusable(error))?);
+        let _ = write!(text, "{}", self.plan(&simulation)?);
         for bound in bound_probes(scene, &simulation) {
             let _ = write!(text, "\nprobe         {bound}");
             bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));

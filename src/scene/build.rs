@@ -21,6 +21,7 @@ use crate::shape::{FillError, Shape, fill};
 use crate::simulation::{InitialGuess, Settings, Simulation, StepError};
 use crate::solver::{self, NewtonSettings};
 use crate::tensor::Vector;
+use indicatif::BinaryBytes;
 use std::path::Path;
 
 /// Why a checked scene still gives no simulation.
@@ -57,6 +58,21 @@ pub enum BuildError {
         path: String,
         /// What is wrong.
         source: FillError,
+    },
+    /// More particles than there is memory for.
+    #[error(
+        "{path}: {particles} particles so far need at least {} of memory, and {} can be had: use a coarser grid, fewer particles \
+         per cell or a smaller body", BinaryBytes(*needed), BinaryBytes(*memory)
+    )]
+    Memory {
+        /// The key.
+        path: String,
+        /// Of this body and those before.
+        particles: usize,
+        /// Bytes, at least.
+        needed: u64,
+        /// Bytes that can be had.
+        memory: u64,
     },
     /// A particle file.
     #[error("{path}: {file}: {source}")]
@@ -127,6 +143,33 @@ pub enum BuildError {
     },
 }
 
+/// What bodies are filled from and into.
+struct Means<'a> {
+    /// Where particle files are.
+    folder: &'a Path,
+    /// Bytes that can be had.
+    memory: u64,
+}
+
+impl Means<'_> {
+    /// Room for `more` particles. A step needs the state at its start, as much for that at its end, and shape functions and
+    /// frozen tangents that are larger still: what it needs in all is known once the shape functions are, and less than this never.
+    fn make_room<const D: usize>(
+        &self,
+        path: &str,
+        particles: &mut Particles<D>,
+        more: usize,
+    ) -> Result<(), BuildError> {
+        let count = particles.len() + more;
+        let (needed, memory) = (3 * (count * Particles::<D>::BYTES) as u64, self.memory);
+        if needed > memory {
+            return Err(BuildError::Memory { path: path.to_owned(), particles: count, needed, memory });
+        }
+        particles.reserve(more);
+        Ok(())
+    }
+}
+
 impl Scene {
     /// 1 (uniaxial strain), 2 (plane strain) or 3.
     pub fn dimension(&self) -> usize {
@@ -138,13 +181,22 @@ impl Scene {
     /// # Errors
     /// What only shows once particles are there; and any scene whose dimension is not `D`.
     pub fn build<const D: usize>(&self, folder: &Path) -> Result<Simulation<D>, BuildError> {
+        self.build_within(folder, u64::MAX)
+    }
+
+    /// As [`Self::build`], where no more than so many bytes of memory can be had.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; and particles that surely need more, before room is made for them.
+    pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
+        let means = Means { folder, memory };
         let mut particles = Particles::default();
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
             let path = format!("bodies[{i}]");
-            body.fill(&path, folder, &grid, i as u32, &mut particles, self.initial_velocity.is_some())?;
+            body.fill(&path, &means, &grid, i as u32, &mut particles, self.initial_velocity.is_some())?;
             bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
         }
         let loads = self.loads(&grid, &particles)?;
@@ -373,7 +425,7 @@ impl Body {
     fn fill<const D: usize>(
         &self,
         path: &str,
-        folder: &Path,
+        means: &Means<'_>,
         grid: &Grid<D>,
         number: u32,
         particles: &mut Particles<D>,
@@ -389,13 +441,14 @@ impl Body {
             let volume = (grid.spacing / f64::from(self.particles_per_cell)).powi(D as i32);
             let velocity = common.unwrap_or_else(Vector::zeros);
             let positions = fill(grid, &shape, self.particles_per_cell, self.fill.into())
-                .map_err(|source| BuildError::Fill { path, source })?;
+                .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
+            means.make_room(&path, particles, positions.len())?;
             for x in positions {
                 particles.push(x, velocity, volume, self.density * volume, number);
             }
         } else if let Some(file) = &self.particles {
             let path = format!("{path}.particles.file");
-            let place = folder.join(&file.file);
+            let place = means.folder.join(&file.file);
             let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
                 path: path.clone(),
                 file: place.display().to_string(),
@@ -404,6 +457,7 @@ impl Body {
             if velocity_on_nodes && read.velocities.is_some() {
                 return Err(BuildError::TwoVelocities { path, file: place.display().to_string() });
             }
+            means.make_room(&path, particles, read.positions.len())?;
             for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
                 if !grid.contains(x) {
                     let position = x.iter().copied().collect();

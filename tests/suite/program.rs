@@ -281,6 +281,15 @@ fn a_program_that_watches_reads_json() -> Result<(), Failure> {
     // what was warned of is in the report too
     let warned = lines.iter().filter(|line| line["event"] == "warning" && line["kind"].is_string()).count();
     assert_eq!(report(directory.path())?["warnings"].as_array().map(Vec::len), Some(warned));
+    // and so is an error
+    let wrong = rebound(directory.path(), &["--progress", "json", "--set", "time.step=-1"])?;
+    let error: Value = serde_json::from_slice(&wrong.stderr)?;
+    assert_eq!((&error["event"], &error["code"], wrong.status.code()), (&"error".into(), &2.into(), Some(2)));
+    assert!(error["message"].as_str().is_some_and(|text| text.contains("rebound.json")), "{error}");
+    assert!(
+        error["because"].to_string().contains("time.step") || error["message"].to_string().contains("time.step"),
+        "{error}"
+    );
     let both = rebound(directory.path(), &["--progress", "json", "--quiet"])?;
     assert_eq!(both.status.code(), Some(2));
     Ok(())

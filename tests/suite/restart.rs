@@ -288,3 +288,24 @@ fn a_full_disk_leaves_the_checkpoint_before() -> Result<(), Failure> {
     assert!(output.status.success() && message(&output).contains("step 30, from"), "{}", message(&output));
     assert_same(&whole, &full)
 }
+
+#[test]
+fn a_run_that_could_be_continued_is_lost_on_request_only() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let directory = folder.path().join("killed");
+    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "50"]])?.status.success());
+    // It ended: a new run may take its place. Without the report it is one that was killed.
+    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60"]])?.status.success());
+    std::fs::remove_file(directory.join("report.json"))?;
+    let kept: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;
+    let output = run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10"]])?;
+    let text = message(&output);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("after step 60") && text.contains("--restart") && text.contains("--discard"), "{text}");
+    let now: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;
+    assert!(now == kept && !kept.is_empty(), "nothing was touched");
+    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10", "--discard"]])?.status.success());
+    let steps = std::fs::read_to_string(directory.join("history.csv"))?.lines().count();
+    assert_eq!(steps, 12, "a header, the start and ten steps");
+    Ok(())
+}

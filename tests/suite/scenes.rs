@@ -1,5 +1,7 @@
 //! Scenes: the shipped ones are sound, wrong ones are refused with a message that helps, and no text brings the reader down.
 
+use bfree::particles::Particles;
+use bfree::plan::Plan;
 use bfree::scene::{self, Override, Place, Scene, SceneError};
 use bfree::shape::{Fill, fill};
 use bfree::simulation::Simulation;
@@ -97,6 +99,23 @@ fn shipped_scenes_have_the_published_sizes() {
     let lame = rebound.bodies[0].material.constants().lame().unwrap().unwrap();
     assert_eq!((lame.lambda, lame.shear), (150.0, 30.0));
     assert_eq!((rebound.time.end / rebound.time.step).round(), 1600.0);
+}
+
+#[test]
+fn a_scene_too_large_for_the_memory_is_refused() {
+    let scene = scene::read_file(&folder("scenes").join("compaction.json"), &[]).unwrap();
+    let simulation = scene.build::<2>(&folder("scenes")).unwrap();
+    let plan = Plan::of(&simulation).unwrap();
+    // Before room is made for the particles, and not where the whole plan would fit.
+    let least = 3 * 400 * Particles::<2>::BYTES as u64;
+    assert!(least < plan.bytes());
+    assert!(scene.build_within::<2>(&folder("scenes"), least).is_ok());
+    let refused = scene.build_within::<2>(&folder("scenes"), least - 1).err().map(|error| error.to_string());
+    let refused = refused.unwrap_or_default();
+    assert!(refused.starts_with("bodies[0].shape: 400 particles so far need at least 117.19 KiB"), "{refused}");
+    assert!(plan.check_fits(plan.bytes()).is_ok());
+    let refused = plan.check_fits(plan.bytes() - 1).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(refused.contains("solver.krylov.method"), "{refused}");
 }
 
 #[test]

@@ -1,0 +1,60 @@
+//! How much memory there is to have, so that a scene that is too large is refused instead of ending the program.
+
+use std::fs;
+use std::path::Path;
+
+/// Bytes that can still be had without swapping: what Linux calls available, or what is left of the control group's limit if that
+/// is less. `None` where the system does not say.
+///
+/// ```
+/// assert!(bfree::memory::available().is_none_or(|bytes| bytes > 0));
+/// ```
+pub fn available() -> Option<u64> {
+    let of_machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| meminfo(&text));
+    let of_group = limit_left(Path::new("/sys/fs/cgroup"));
+    [of_machine, of_group].into_iter().flatten().min()
+}
+
+/// `MemAvailable:  123 kB` of /proc/meminfo, in bytes.
+fn meminfo(text: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kilobytes.checked_mul(1024)
+}
+
+/// What is left of the limit of a control group (version 2), caches of files not counted as used.
+fn limit_left(group: &Path) -> Option<u64> {
+    let read = |name: &str| fs::read_to_string(group.join(name)).ok();
+    let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
+    let (limit, used) = (number("memory.max")?, number("memory.current")?);
+    let cached = read("memory.stat")
+        .and_then(|text| text.lines().find_map(|line| line.strip_prefix("inactive_file ")?.parse::<u64>().ok()));
+    Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_linux_says_is_read() {
+        let text = "MemTotal:       24689536 kB\nMemFree:         1000 kB\nMemAvailable:   23489008 kB\n";
+        assert_eq!(meminfo(text), Some(23_489_008 * 1024));
+        assert_eq!(meminfo("MemTotal: 5 kB\n"), None);
+        assert_eq!(meminfo("MemAvailable: many kB\n"), None);
+    }
+
+    #[test]
+    fn a_limit_counts_what_cannot_be_given_back() {
+        let group = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| fs::write(group.path().join(name), text).unwrap();
+        assert_eq!(limit_left(group.path()), None);
+        write("memory.current", "700\n");
+        write("memory.max", "max\n");
+        assert_eq!(limit_left(group.path()), None, "no limit");
+        write("memory.max", "1000\n");
+        assert_eq!(limit_left(group.path()), Some(300));
+        write("memory.stat", "anon 500\ninactive_file 200\n");
+        assert_eq!(limit_left(group.path()), Some(500));
+    }
+}
