@@ -13,7 +13,8 @@ pub struct Body<L> {
     pub density: f64,
 }
 
-/// State of all particles at the last converged step; one entry per particle in each array.
+/// State of all particles at the last converged step; one entry per particle in each array. Without inertia those of velocity and
+/// acceleration are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Particles<const D: usize> {
     /// Position x.
@@ -59,9 +60,14 @@ impl<const D: usize> Particles<D> {
 
     /// Adds an undeformed particle at rest acceleration.
     pub fn push(&mut self, position: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
-        self.position.push(position);
+        self.push_without_inertia(position, volume, mass, body);
         self.velocity.push(velocity);
         self.acceleration.push(Vector::zeros());
+    }
+
+    /// Adds an undeformed particle to those that have no inertia; its mass is what gravity acts on.
+    pub fn push_without_inertia(&mut self, position: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
+        self.position.push(position);
         self.displacement_gradient.push(Tensor::zeros());
         self.volume.push(volume);
         self.mass.push(mass);
@@ -75,6 +81,8 @@ impl<const D: usize> Particles<D> {
 
     /// Σ ½ m v·v
     pub fn kinetic_energy(&self) -> f64 {
-        self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared()).sum()
+        let energies = self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared());
+        // Of no velocities the sum would be −0.
+        energies.fold(0.0, |sum, energy| sum + energy)
     }
 }
