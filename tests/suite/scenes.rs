@@ -64,6 +64,7 @@ fn shipped_scenes_are_sound() {
             "ball_drop",
             "cantilever",
             "collision",
+            "column_static",
             "compaction",
             "compaction_confined",
             "rebound",

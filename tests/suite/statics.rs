@@ -50,12 +50,14 @@ fn a_column_carries_the_weight_above() -> Result<(), Failure> {
         let start = simulation.particles.position.clone();
         run(&mut simulation, 1)?;
         let law = &simulation.bodies[0].law;
+        // Quadratic B-splines err by a part of (h/H)².
+        let bound = (simulation.grid.spacing / height).powi(2);
         let strain = |x: f64| stretch(law, -density * g * (height - x)) - 1.0;
         for (p, x) in start.iter().enumerate() {
             let h = simulation.particles.displacement_gradient[p];
             // Confined: no strain across.
             assert!(h[(0, 0)].abs() < 1e-12 && h[(0, 1)].abs() < 1e-12 && h[(1, 0)].abs() < 1e-12, "{h}");
-            assert!((h[(1, 1)] - strain(x[1])).abs() < 2e-3, "H = {} at {}, {}", h[(1, 1)], x[1], strain(x[1]));
+            assert!((h[(1, 1)] - strain(x[1])).abs() < bound, "H = {} at {}, {}", h[(1, 1)], x[1], strain(x[1]));
         }
         // Simpson's rule up to the top particle.
         let (top, x) = start.iter().enumerate().max_by(|a, b| a.1[1].total_cmp(&b.1[1])).ok_or("no particles")?;
@@ -64,9 +66,10 @@ fn a_column_carries_the_weight_above() -> Result<(), Failure> {
         let sum: f64 = (0..=n).map(|k| weight(k) * strain(x[1] * k as f64 / n as f64)).sum();
         let u = simulation.particles.position[top][1] - x[1];
         let exact = sum * x[1] / (3.0 * n as f64);
-        assert!((u - exact).abs() < 1e-4 * exact.abs(), "{u} instead of {exact}");
-        // The work of gravity that acts at once is twice what an ideal column stores; the rest is what a slow lift would take.
-        assert!(simulation.external_work > simulation.strain_energy());
+        assert!((u - exact).abs() < bound * exact.abs(), "{u} instead of {exact}");
+        // A weight put on at once does about twice the work that is stored: exactly twice for a linear law.
+        let ratio = simulation.external_work / simulation.strain_energy();
+        assert!((1.8..2.2).contains(&ratio), "{ratio}");
     }
     Ok(())
 }
