@@ -90,11 +90,21 @@ impl Clock {
 
     /// Moves to t_{n+1}; a halved step grows back by one level as soon as it fits the grid of longer steps.
     pub fn advance(&mut self) {
+        self.advance_and_grow_if(true);
+    }
+
+    /// As [`Self::advance`], but a halved step grows back only if it `may` do so.
+    pub fn advance_and_grow_if(&mut self, may: bool) {
         self.ticks += TICKS >> self.level;
         self.steps += 1;
-        if self.level > 0 && self.ticks.is_multiple_of(TICKS >> (self.level - 1)) {
+        if may && self.level > 0 && self.ticks.is_multiple_of(TICKS >> (self.level - 1)) {
             self.level -= 1;
         }
+    }
+
+    /// Whether the step can be halved once more.
+    pub fn can_halve(&self) -> bool {
+        self.level < self.max_halvings
     }
 
     /// Halves the step; `false` if the limit is reached.
@@ -110,7 +120,7 @@ impl Clock {
     /// assert_eq!((clock.time(), clock.step()), (0.1, 0.1)); // back on whole steps
     /// ```
     pub fn halve(&mut self) -> bool {
-        let possible = self.level < self.max_halvings;
+        let possible = self.can_halve();
         if possible {
             self.level += 1;
         }
@@ -154,6 +164,22 @@ mod tests {
         let (level, steps) = (2, 2);
         assert_eq!(Clock::new(0.1, 1).at(Reached { ticks: 5 * (TICKS >> 2), level, steps }), None);
         assert_eq!(Clock::new(0.1, 3).at(Reached { ticks: TICKS >> 3, level, steps }), None);
+    }
+
+    #[test]
+    fn a_step_that_may_not_grow_stays_short_and_grows_where_it_fits() {
+        let mut clock = Clock::new(1.0, 3);
+        assert!(clock.halve() && clock.halve());
+        let lengths: Vec<f64> = [false, false, false, true, true, true]
+            .map(|may| {
+                let dt = clock.step();
+                clock.advance_and_grow_if(may);
+                dt
+            })
+            .into();
+        // Four quarters fill a step; from there on it may double, each time once it is allowed to.
+        assert_eq!(lengths, [0.25, 0.25, 0.25, 0.25, 0.5, 0.5]);
+        assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
     }
 
     #[test]

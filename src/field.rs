@@ -88,6 +88,11 @@ impl Field {
         }
     }
 
+    /// Whether particles have it only where bodies have inertia.
+    pub const fn needs_inertia(self) -> bool {
+        matches!(self, Self::Velocity | Self::Acceleration)
+    }
+
     /// What its components are.
     pub const fn kind(self) -> Kind {
         match self {

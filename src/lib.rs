@@ -69,6 +69,8 @@
 //!           − Σ_Γ A T N_I             nominal traction T, or follower pressure T = −p J F⁻ᵀ 𝐍
 //! ```
 //!
+//! Without inertia ([`mechanics::time::Inertia::None`]) there is no M̃, v or a: step 2 falls away, and R is what remains without its first line.
+//!
 //! Where every load has a potential, R is the gradient of
 //!
 //! ```text

@@ -13,7 +13,8 @@ pub struct Body<L> {
     pub density: f64,
 }
 
-/// State of all particles at the last converged step; one entry per particle in each array.
+/// State of all particles at the last converged step; one entry per particle in each array. Without inertia those of velocity and
+/// acceleration are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Particles<const D: usize> {
     /// Position x.
@@ -47,9 +48,9 @@ impl<const D: usize> Default for Particles<D> {
 }
 
 impl<const D: usize> Particles<D> {
-    /// Bytes of one particle in all arrays.
+    /// Bytes of one particle in all arrays but those of velocity and acceleration.
     pub const BYTES: usize =
-        3 * size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + size_of::<u32>();
+        size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + size_of::<u32>();
 
     /// Number of particles.
     pub fn len(&self) -> usize {
@@ -61,10 +62,11 @@ impl<const D: usize> Particles<D> {
         self.position.is_empty()
     }
 
-    /// Makes room for `more` particles, and no more than that: arrays that double would for a moment need three times their size.
+    /// Makes room for `more` particles, and no more than that: arrays that double need for a moment three times their size. Those of
+    /// velocity and acceleration grow when there is one.
     pub fn reserve(&mut self, more: usize) {
-        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body } = self;
-        [position, velocity, acceleration].into_iter().for_each(|array| array.reserve_exact(more));
+        let Self { position, velocity: _, acceleration: _, displacement_gradient, volume, mass, body } = self;
+        position.reserve_exact(more);
         displacement_gradient.reserve_exact(more);
         [volume, mass].into_iter().for_each(|array| array.reserve_exact(more));
         body.reserve_exact(more);
@@ -72,9 +74,14 @@ impl<const D: usize> Particles<D> {
 
     /// Adds an undeformed particle at rest acceleration.
     pub fn push(&mut self, position: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
-        self.position.push(position);
+        self.push_without_inertia(position, volume, mass, body);
         self.velocity.push(velocity);
         self.acceleration.push(Vector::zeros());
+    }
+
+    /// Adds an undeformed particle to those that have no inertia; its mass is what gravity acts on.
+    pub fn push_without_inertia(&mut self, position: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
+        self.position.push(position);
         self.displacement_gradient.push(Tensor::zeros());
         self.volume.push(volume);
         self.mass.push(mass);
@@ -88,6 +95,8 @@ impl<const D: usize> Particles<D> {
 
     /// Σ ½ m v·v
     pub fn kinetic_energy(&self) -> f64 {
-        self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared()).sum()
+        let energies = self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared());
+        // Of no velocities the sum would be −0.
+        energies.fold(0.0, |sum, energy| sum + energy)
     }
 }

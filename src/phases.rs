@@ -1,4 +1,4 @@
-//! Seconds by phase of a step.
+//! Seconds, and passes over the particles, by phase of a step.
 
 use std::time::Instant;
 
@@ -28,25 +28,32 @@ impl Phase {
 /// Measures phases one after the other.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
-    last: Instant,
+    last: (Instant, u64),
     seconds: [f64; Phase::ALL.len()],
+    passes: [u64; Phase::ALL.len()],
 }
 
 impl Stopwatch {
     /// Starts now.
     pub fn start() -> Self {
-        Self { last: Instant::now(), seconds: [0.0; Phase::ALL.len()] }
+        Self { last: (Instant::now(), 0), seconds: [0.0; Phase::ALL.len()], passes: [0; Phase::ALL.len()] }
     }
 
-    /// Books the time since the last lap to `phase`.
-    pub fn lap(&mut self, phase: Phase) {
+    /// Books the time since the last lap to `phase`, and the passes over the particles, of which there were `passes` so far.
+    pub fn lap(&mut self, phase: Phase, passes: u64) {
         let now = Instant::now();
-        self.seconds[phase as usize] += (now - self.last).as_secs_f64();
-        self.last = now;
+        self.seconds[phase as usize] += (now - self.last.0).as_secs_f64();
+        self.passes[phase as usize] += passes - self.last.1;
+        self.last = (now, passes);
     }
 
     /// Seconds booked to each of [`Phase::ALL`].
     pub fn seconds(&self) -> [f64; Phase::ALL.len()] {
         self.seconds
+    }
+
+    /// Passes over the particles booked to each of [`Phase::ALL`].
+    pub fn passes(&self) -> [u64; Phase::ALL.len()] {
+        self.passes
     }
 }

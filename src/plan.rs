@@ -2,12 +2,12 @@
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad};
+use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::{frozen_bytes, has_closed_form};
-use crate::mechanics::time::Newmark;
+use crate::mechanics::time::{Inertia, Newmark};
 use crate::particles::Particles;
-use crate::simulation::Simulation;
+use crate::simulation::{Settings, Simulation};
 use crate::solver::{Krylov, Precision};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
@@ -174,8 +174,11 @@ impl Plan {
 
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
     let term = |name, used, why: &str| TermUse { name, used, why: why.into() };
-    let (loads, lumping) = (&simulation.loads, simulation.settings.lumping);
-    let Newmark { beta, gamma } = simulation.settings.newmark;
+    let (loads, settings) = (&simulation.loads, &simulation.settings);
+    let Settings { lumping, newmark: Newmark { beta, gamma }, .. } = *settings;
+    let moves = settings.inertia == Inertia::Newmark;
+    let still = "time.inertia is \"none\": load steps, each to its equilibrium";
+    let of_motion = |why: String| if moves { why } else { still.into() };
     let surface = |pressure: bool| {
         let of_kind = loads.surface.iter().filter(|load| matches!(load.pressing, Pressing::Pressure(_)) == pressure);
         of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
@@ -183,10 +186,32 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     let (tractions, pressures) = (surface(false), surface(true));
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
     vec![
-        term("inertia, lumped", lumping > 0.0, &format!("time.lumping = {lumping}, Newmark β = {beta}, γ = {gamma}")),
-        term("inertia, consistent", lumping < 1.0, "only for time.lumping < 1; its projection is an iteration"),
-        term("internal force", true, "F S of every particle"),
-        term("gravity", loads.gravity.is_some(), "only with gravity; from the lumped mass, no pass over particles"),
+        term(
+            "inertia, lumped",
+            moves && lumping > 0.0,
+            &of_motion(format!("time.lumping = {lumping}, Newmark β = {beta}, γ = {gamma}")),
+        ),
+        term(
+            "inertia, consistent",
+            moves && lumping < 1.0,
+            &of_motion("only for time.lumping < 1; its projection is an iteration".into()),
+        ),
+        term(
+            "smoothing",
+            moves && settings.smoothing.is_some(),
+            &of_motion("only with a transfer other than flip".into()),
+        ),
+        term("internal force", true, &format!("F S of every particle, {D}×{D}")),
+        term("third axis", D == 3, &format!("grid.size has {D} components: so has every vector")),
+        term(
+            "gravity",
+            loads.gravity.is_some(),
+            match (loads.gravity.is_some(), moves) {
+                (false, _) => "only with gravity",
+                (true, true) => "from the lumped mass: no pass over particles of its own",
+                (true, false) => "one pass over particles a step, for the nodal mass it acts on",
+            },
+        ),
         term("tractions", tractions > 0, &format!("{tractions} loaded particles")),
         term(
             "follower pressure",
@@ -223,25 +248,41 @@ fn arrays<const D: usize, L: Law, A>(
 ) -> Vec<ArrayUse> {
     let (vector, tensor) = (size_of::<Vector<f64, D>>(), size_of::<Tensor<f64, D>>());
     let particles = simulation.particles.len();
+    let moves = simulation.settings.inertia == Inertia::Newmark;
+    let weighs = moves || simulation.loads.gravity.is_some();
+    let lumping = if moves { simulation.settings.lumping } else { 1.0 };
+    let consistent = moves && lumping < 1.0;
     let krylov_vectors = match simulation.settings.newton.krylov {
         Krylov::Gmres { restart } => restart + 1,
         Krylov::ConjugateGradient => 4,
     };
     let array = |name, lifetime, bytes: usize| ArrayUse { name, lifetime, bytes: bytes as u64 };
     let precision = precision_used(simulation, supports);
-    let frozen = frozen_bytes(&simulation.bodies, supports, simulation.settings.lumping, precision);
+    let frozen = frozen_bytes(&simulation.bodies, supports, lumping, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
-    // Δx and H, and the increments of v and a.
-    let updated = 3 * vector + tensor;
-    vec![
-        array("particles: x, v, a, H, volume, mass, body", Lifetime::Step, particles * Particles::<D>::BYTES),
-        array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes()),
-        array("nodal fields: v, a, loads, residuals, Δφ", Lifetime::Step, nodes * (12 * vector + 8)),
-        array("frozen tangent", Lifetime::Solve, frozen),
-        array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor / share),
-        array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors),
-        array("particles: state after the step", Lifetime::Update, particles * updated),
+    let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
+    // What is not there does not appear.
+    let only = |used: bool, array: ArrayUse| used.then_some(array);
+    [
+        only(true, array("particles: x, H, volume, mass, body", Lifetime::Step, particles * Particles::<D>::BYTES)),
+        only(moves, array("particles: v, a", Lifetime::Step, particles * 2 * vector)),
+        only(consistent, array("particles: history of the consistent inertia", Lifetime::Step, particles * vector)),
+        only(true, array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes())),
+        // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
+        only(true, array("nodal fields: loads, Δφ, residuals", Lifetime::Step, nodes * 8 * vector)),
+        only(weighs, array("nodal mass", Lifetime::Step, nodes * 8)),
+        // As projected, and with prescribed values in place.
+        only(moves, array("nodal fields: v, a", Lifetime::Step, nodes * 4 * vector)),
+        only(faces > 0, array("loaded surfaces", Lifetime::Step, faces * size_of::<SurfacePoint<D>>())),
+        only(true, array("frozen tangent", Lifetime::Solve, frozen)),
+        only(true, array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor / share)),
+        only(true, array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors)),
+        only(true, array("particles: x and H after the step", Lifetime::Update, particles * (vector + tensor))),
+        only(moves, array("particles: increments of v and a", Lifetime::Update, particles * 2 * vector)),
     ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 impl Display for Plan {

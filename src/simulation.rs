@@ -8,9 +8,10 @@ use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
+use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::time::{Alphas, Newmark};
+use crate::mechanics::time::{Alphas, Inertia, Newmark};
 use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
 use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
@@ -25,13 +26,19 @@ pub enum InitialGuess {
     /// Δφ = 0, as in the paper's Table 3.
     #[default]
     Zero,
-    /// Δφ = Δt v_n.
+    /// Δφ = Δt v_n; zero without inertia.
     Velocity,
 }
+
+/// A step grows only if its error is at most this part of the tolerance: one of twice the length has eight times the error.
+const ROOM: f64 = 0.1;
 
 /// How a step is taken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
+    /// Whether there is inertia. Without it, neither Newmark's constants nor lumping, walls in the update, smoothing or any velocity
+    /// means anything, and none of them is looked at.
+    pub inertia: Inertia,
     /// β and γ.
     pub newmark: Newmark,
     /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
@@ -44,20 +51,35 @@ pub struct Settings {
     pub smoothing: Option<Smoothing>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
+    /// The most a step may err, see [`Moved::local_error`], in units of the grid spacing: a longer one is taken back and halved, as
+    /// often as the clock allows, and it grows back only when its error is small. `None` for steps as given, and without inertia.
+    pub error_tolerance: Option<f64>,
     /// Compare the tangent with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,
+}
+
+impl Settings {
+    /// The α-parameters of a step of length `dt`.
+    pub fn alphas(&self, dt: f64) -> Alphas {
+        match self.inertia {
+            Inertia::Newmark => self.newmark.alphas(dt),
+            Inertia::None => Alphas::NONE,
+        }
+    }
 }
 
 impl Default for Settings {
     /// The trapezoidal rule with a lumped mass, Newton from Δφ = 0, walls as in the paper.
     fn default() -> Self {
         Self {
+            inertia: Inertia::default(),
             newmark: Newmark::default(),
             lumping: 1.0,
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
             smoothing: None,
             newton: NewtonSettings::default(),
+            error_tolerance: None,
             check_tangent: None,
         }
     }
@@ -100,9 +122,11 @@ pub struct StepReport<const D: usize> {
     /// Force of each of [`Loads::prescribed`] on the bodies: the reaction at t_{n+1}, and spread over the step the impulse
     /// with which a wall takes along nodes that do not move with it yet.
     pub reactions: Vec<Vector<f64, D>>,
-    /// Seconds by phase.
+    /// Its local error in units of the grid spacing, where a tolerance asks for it; above the tolerance only if it could not be halved.
+    pub error: Option<f64>,
+    /// Seconds, and passes over the particles, by phase.
     pub seconds: Stopwatch,
-    /// The attempts before it, each of which failed and was repeated with half of its length.
+    /// The attempts before it, each of which failed or was too long, and was repeated with half of its length.
     pub failed: Vec<FailedAttempt>,
 }
 
@@ -111,6 +135,8 @@ pub struct StepReport<const D: usize> {
 pub struct FailedAttempt {
     /// Its length.
     pub dt: f64,
+    /// Whether all that was wrong is its error.
+    pub inaccurate: bool,
     /// Why it failed, on one line.
     pub why: String,
     /// What Newton's method did; empty if it was not reached.
@@ -120,10 +146,12 @@ pub struct FailedAttempt {
 impl FailedAttempt {
     fn new(dt: f64, error: &StepError) -> Self {
         let newton = match error {
-            StepError::Newton(error) => (*error.history).clone(),
+            StepError::Newton(source) | StepError::Loose { source, .. } => (*source.history).clone(),
+            StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
-        Self { dt, why: causes::on_one_line(error), newton }
+        let inaccurate = matches!(error, StepError::Inaccurate { .. });
+        Self { dt, inaccurate, why: causes::on_one_line(error), newton }
     }
 }
 
@@ -139,6 +167,26 @@ pub enum StepError {
     /// Newton found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
+    /// Without inertia, bodies are pushed where nothing holds them.
+    #[error(
+        "{loose}: without inertia there is no equilibrium; hold them with a boundary condition, or give the scene inertia"
+    )]
+    Loose {
+        /// Which bodies, and where.
+        loose: Loose,
+        /// What Newton's method says.
+        source: NewtonError<Inadmissible>,
+    },
+    /// The step is too long for the tolerance, and can be halved.
+    #[error("the local error is {error:.2e} grid spacings; {tolerance:.2e} are allowed")]
+    Inaccurate {
+        /// The error.
+        error: f64,
+        /// The most allowed.
+        tolerance: f64,
+        /// What Newton's method did.
+        newton: Box<NewtonHistory>,
+    },
     /// The state at the start of the step is impossible.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
@@ -179,26 +227,27 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
-        let alphas = self.settings.newmark.alphas(dt);
+        let alphas = self.settings.alphas(dt);
         let mut watch = Stopwatch::start();
 
         let precision = self.settings.newton.precision;
         let positions = &self.particles.position;
         let (supports, nodes) = Supports::with_precision(&self.approximation, &self.grid, positions, precision)?;
         let prescribed = self.prescribed(&nodes);
-        watch.lap(Phase::ShapeFunctions);
+        watch.lap(Phase::ShapeFunctions, supports.passes());
 
-        let projected = Nodal::project(&self.particles, &supports, nodes.len(), self.settings.lumping)?;
+        let projected = self.project(&supports)?;
         let nodal = projected.with_prescribed(&prescribed);
-        watch.lap(Phase::Projection);
+        watch.lap(Phase::Projection, supports.passes());
 
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
-        let mut dphi = self.initial_guess(&nodal, dt);
+        let mut dphi = self.initial_guess(&nodal, nodes.len(), dt);
         for dof in &prescribed {
             dphi[dof.node][dof.component] = dof.step.increment;
         }
-        let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &self.settings.newton)?;
-        watch.lap(Phase::Newton);
+        let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &self.settings.newton)
+            .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
+        watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &dphi)?;
 
         let mut moved = Moved::new(
@@ -211,17 +260,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.settings.wall_update,
             &dphi,
         );
+        let error = self.local_error(&moved, dt, &newton)?;
         if let Some(smoothing) = &self.settings.smoothing {
             moved.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
         }
         self.check_inside(moved.positions())?;
         let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, moved.impulses())?;
-        watch.lap(Phase::Update);
+        watch.lap(Phase::Update, supports.passes());
 
         let projection_iterations = projected.iterations;
         moved.commit(&mut self.particles);
         self.external_work += work;
-        self.clock.advance();
+        let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
+        self.clock.advance_and_grow_if(error.is_none_or(small));
         let active_nodes = nodes.len();
         Ok(StepReport {
             dt,
@@ -229,12 +280,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             newton,
             projection_iterations,
             reactions,
+            error,
             seconds: watch,
             failed: Vec::new(),
         })
     }
 
-    /// As [`Self::step`], halving Δt while Newton fails, down to the clock's limit; Δt grows back afterwards.
+    /// As [`Self::step`], halving Δt while Newton fails or the error is too large, down to the clock's limit; Δt grows back afterwards.
     ///
     /// # Errors
     /// The last failure, once Δt cannot be halved further, or a failure that a shorter step does not mend.
@@ -247,7 +299,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Err(cause) => cause,
             };
             failed.push(FailedAttempt::new(dt, &cause));
-            if !(matches!(cause, StepError::Newton(_)) && self.clock.halve()) {
+            let mended = match cause {
+                StepError::Newton(_) | StepError::Inaccurate { .. } => true,
+                // A step too long to see a wall.
+                StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
+                _ => false,
+            };
+            if !(mended && self.clock.halve()) {
                 return Err(AdvanceError { time, dt, cause: Box::new(cause), failed });
             }
         }
@@ -273,11 +331,51 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Equilibrium::new(particles, bodies, supports, alphas, lumping, nodal, dead_load, pressures, prescribed)
     }
 
-    fn initial_guess(&self, nodal: &Nodal<D>, dt: f64) -> Vec<Vector<f64, D>> {
-        match self.settings.initial_guess {
-            InitialGuess::Zero => vec![Vector::zeros(); nodal.velocity.len()],
-            InitialGuess::Velocity => nodal.velocity.iter().map(|v| v * dt).collect(),
+    /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.
+    ///
+    /// # Errors
+    /// Particle velocities so large that the projection overflows.
+    pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
+        match self.settings.inertia {
+            Inertia::Newmark => Nodal::project(&self.particles, supports, supports.nodes(), self.settings.lumping),
+            Inertia::None if self.loads.gravity.is_some() => {
+                Ok(Nodal::mass_alone(&self.particles, supports, supports.nodes()))
+            }
+            Inertia::None => Ok(Nodal::default()),
         }
+    }
+
+    fn initial_guess(&self, nodal: &Nodal<D>, count: usize, dt: f64) -> Vec<Vector<f64, D>> {
+        let mut dphi = vec![Vector::zeros(); count];
+        if self.settings.initial_guess == InitialGuess::Velocity {
+            dphi.iter_mut().zip(&nodal.velocity).for_each(|(dphi, v)| *dphi = v * dt);
+        }
+        dphi
+    }
+
+    /// Without inertia, a body that nothing holds has no equilibrium; Newton's method can only say that it found none.
+    fn explained(
+        &self,
+        error: NewtonError<Inadmissible>,
+        equilibrium: &Equilibrium<'_, D, L>,
+        nodes: &Nodes,
+    ) -> StepError {
+        let loose = equilibrium.nodal.is_static().then(|| loose(&self.grid, equilibrium, nodes));
+        match loose.flatten() {
+            Some(loose) => StepError::Loose { loose, source: error },
+            None => StepError::Newton(error),
+        }
+    }
+
+    /// The error of a step that ends in `moved`, where somebody asks for it.
+    fn local_error(&self, moved: &Moved<D>, dt: f64, newton: &NewtonReport) -> Result<Option<f64>, StepError> {
+        let Some(tolerance) = self.settings.error_tolerance else { return Ok(None) };
+        let error = moved.local_error(self.settings.newmark.beta, dt, &self.particles.mass) / self.grid.spacing;
+        // Not a number is no small error.
+        if (error.is_nan() || error > tolerance) && self.clock.can_halve() {
+            return Err(StepError::Inaccurate { error, tolerance, newton: Box::new(newton.history.clone()) });
+        }
+        Ok(Some(error))
     }
 
     /// Reactions at t_{n+1} and impulses J over Δt, summed over each prescribed condition, and the work of the step,
@@ -382,14 +480,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     ///
     /// The lumped mass serves for every ε: it is exact for uniform loads, and of second order in h for others.
     ///
+    /// Without inertia it does nothing.
+    ///
     /// # Errors
     /// A particle without shape functions, or with det F ≤ 0.
     pub fn set_initial_acceleration(&mut self) -> Result<(), StepError> {
+        if self.settings.inertia == Inertia::None {
+            return Ok(());
+        }
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
         let prescribed = self.prescribed(&nodes);
         let mut nodal = Nodal::at_rest(&self.particles, &supports, nodes.len());
         // Δφ, v_n and a_n are zero, and with them the inertia, whatever α is.
-        let alphas = self.settings.newmark.alphas(self.clock.step());
+        let alphas = self.settings.alphas(self.clock.step());
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration, Carry::ALL)?;
         nodal.accelerate(&self.particles, &unbalanced);

@@ -253,11 +253,15 @@ pub struct PressurePoint<const D: usize> {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Nodal dead loads at time `t`: Σ_p m b N_I + Σ_Γ T N_I A, one vector per active node; `mass` is the lumped nodal mass.
+    /// Nodal dead loads at time `t`: Σ_p m b N_I + Σ_Γ T N_I A, one vector per active node; `mass` is the lumped nodal mass, not
+    /// looked at without gravity.
     pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Vec<Vector<f64, D>> {
-        let body = self.gravity.as_ref().map_or_else(Vector::zeros, |g| g.acceleration * g.curve.value(t));
-        // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
-        let mut force: Vec<_> = mass.iter().map(|&m| body * m).collect();
+        let mut force = vec![Vector::zeros(); supports.nodes()];
+        if let Some(gravity) = &self.gravity {
+            // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
+            let b = gravity.acceleration * gravity.curve.value(t);
+            force.iter_mut().zip(mass).for_each(|(force, &m)| *force = b * m);
+        }
         for load in &self.surface {
             if let Pressing::Traction(traction) = load.pressing {
                 let traction = traction * load.curve.value(t);

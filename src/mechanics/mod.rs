@@ -3,6 +3,7 @@
 pub mod check;
 pub mod loads;
 pub mod residual;
+pub mod rigid;
 pub mod single;
 pub mod smoothing;
 pub mod sweep;

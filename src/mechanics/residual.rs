@@ -34,7 +34,7 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub alphas: Alphas,
     /// ε of M̃ = (1−ε) M + ε lumped(M).
     pub lumping: f64,
-    /// Lumped mass, v_n and a_n at the nodes, prescribed values in place.
+    /// Lumped mass, v_n and a_n at the nodes, prescribed values in place; without v_n and a_n there is no inertia.
     pub nodal: &'a Nodal<D>,
     /// Nodal dead loads at t_{n+1}.
     pub dead_load: Vec<Vector<f64, D>>,
@@ -98,6 +98,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         pressures: Vec<PressurePoint<D>>,
         prescribed: &'a [PrescribedDof],
     ) -> Self {
+        // Without inertia nothing is weighed, and nothing is consistent.
+        let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, lumping) };
         let history = if lumping < 1.0 {
             let nodal_history: Vec<_> =
                 (nodal.velocity.iter().zip(&nodal.acceleration)).map(|(v, a)| v * alphas.a2 + a * alphas.a3).collect();
@@ -133,11 +135,20 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
     }
 
-    /// a_I = α₁ Δφ − α₂ v_n − α₃ a_n
+    /// ε m_I and a_I = α₁ Δφ − α₂ v_n − α₃ a_n; `None` without inertia.
     #[inline(always)]
-    fn acceleration<T: Real>(&self, node: usize, dphi: &Vector<T, D>) -> Vector<T, D> {
-        let (v, a) = (&self.nodal.velocity[node], &self.nodal.acceleration[node]);
-        Vector::from_fn(|i, _| T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i]))
+    fn motion<T: Real>(&self, node: usize, dphi: &Vector<T, D>) -> Option<(T, Vector<T, D>)> {
+        let (v, a) = (self.nodal.velocity.get(node)?, self.nodal.acceleration.get(node)?);
+        let a = Vector::from_fn(|i, _| {
+            T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i])
+        });
+        Some((T::lit(self.lumping * self.nodal.mass[node]), a))
+    }
+
+    /// α₁ ε m_I of every node; none without inertia.
+    pub(super) fn lumped_weights(&self) -> impl Iterator<Item = f64> {
+        let weight = |m| self.alphas.a1 * self.lumping * m;
+        self.nodal.mass.iter().take(self.nodal.velocity.len()).map(weight)
     }
 
     /// (1−ε) m a at particle `p`, from Δφ there.
@@ -189,8 +200,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             .iter()
             .enumerate()
             .map(|(node, dphi)| {
-                let a = self.acceleration(node, &dphi.map(|x| carried(x, carry.inertia)));
-                a * T::lit(self.lumping * self.nodal.mass[node]) - self.dead_load[node].map(T::lit)
+                let motion = self.motion(node, &dphi.map(|x| carried(x, carry.inertia)));
+                motion.map_or_else(Vector::zeros, |(m, a)| a * m) - self.dead_load[node].map(T::lit)
             })
             .collect();
         self.supports.assemble(dphi, &mut out, |p, u, g| {
@@ -218,9 +229,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             .iter()
             .enumerate()
             .map(|(node, dphi)| {
-                let (v, a) = (self.nodal.velocity[node].abs(), self.nodal.acceleration[node].abs());
+                let motion = self.nodal.velocity.get(node).zip(self.nodal.acceleration.get(node));
                 // The whole mass, also for ε < 1: the consistent part is of the same size.
-                (dphi.abs() * a1 + v * a2 + a * a3.abs()) * self.nodal.mass[node] + self.dead_load[node].abs()
+                let inertia = motion.map_or_else(Vector::zeros, |(v, a)| {
+                    (dphi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * self.nodal.mass[node]
+                });
+                inertia + self.dead_load[node].abs()
             })
             .collect();
         self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
@@ -259,8 +273,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 magnitude += contribution.value().abs();
             }
             for (node, dphi) in dphi.iter().enumerate() {
-                let a = self.acceleration(node, dphi);
-                let inertia = half_over_a1 * T::lit(self.lumping * self.nodal.mass[node]) * a.dot(&a);
+                let inertia = self.motion(node, dphi).map_or_else(T::zero, |(m, a)| half_over_a1 * m * a.dot(&a));
                 let work = self.dead_load[node].map(T::lit).dot(dphi);
                 sum += inertia - work;
                 magnitude += inertia.value().abs() + work.value().abs();

@@ -17,7 +17,7 @@ pub struct Single<'a, const D: usize, L: Law> {
     scale: f64,
     frozen: SingleTangents<D>,
     pressures: Vec<FrozenPressure<D>>,
-    /// α₁ ε m_I / s
+    /// α₁ ε m_I / s; empty without inertia.
     lumped: Vec<f32>,
 }
 
@@ -42,8 +42,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             Some(Err(Some(inadmissible))) => return Err(inadmissible),
             Some(Err(None)) | None => return Ok(None),
         };
-        let lumped: Vec<f32> =
-            self.nodal.mass.iter().map(|m| (self.alphas.a1 * self.lumping * m / scale) as f32).collect();
+        let lumped = self.lumped_weights().map(|weight| (weight / scale) as f32).collect();
         Ok(Some(Single { equilibrium: self, scale, frozen, pressures: self.frozen_pressures(dphi), lumped }))
     }
 
@@ -63,7 +62,10 @@ impl<const D: usize, L: Law> Single<'_, D, L> {
     /// K_II/s of every active node; a prescribed degree of freedom has the identity's row and column.
     fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut single: Vec<Tensor<f32, D>> = self.lumped.iter().map(|&m| scaled(&identity(), m)).collect();
+        let mut single = vec![Tensor::zeros(); eq.dead_load.len()];
+        for (block, &m) in single.iter_mut().zip(&self.lumped) {
+            *block = scaled(&identity::<f32, D>(), m);
+        }
         eq.supports.add_single_blocks(&self.frozen, &mut single);
         let mut blocks: Vec<Tensor<f64, D>> = single.iter().map(|block| block.map(f64::from)).collect();
         let mut pressure = vec![Tensor::zeros(); if self.pressures.is_empty() { 0 } else { blocks.len() }];
@@ -80,6 +82,7 @@ impl<const D: usize, L: Law> Single<'_, D, L> {
     /// K u/s on the free degrees of freedom (u is taken as zero on the prescribed ones).
     pub fn product(&self, u: &[Vector<f32, D>], out: &mut [Vector<f32, D>]) {
         let eq = self.equilibrium;
+        out.fill(Vector::zeros());
         for ((out, u), &m) in out.iter_mut().zip(u).zip(&self.lumped) {
             *out = u * m;
         }

@@ -124,9 +124,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 
     /// out += α₁ ε m_I u_I
     fn add_lumped_inertia(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let weight = self.alphas.a1 * self.lumping;
-        for ((out, u), &m) in out.iter_mut().zip(u).zip(&self.nodal.mass) {
-            *out += u * (weight * m);
+        for ((out, u), weight) in out.iter_mut().zip(u).zip(self.lumped_weights()) {
+            *out += u * weight;
         }
     }
 
@@ -298,8 +297,10 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
     /// K_II of every active node; a prescribed degree of freedom has the identity's row and column.
     pub fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut blocks: Vec<Tensor<f64, D>> =
-            eq.nodal.mass.iter().map(|&m| scaled(&identity(), eq.alphas.a1 * eq.lumping * m)).collect();
+        let mut blocks = vec![Tensor::zeros(); eq.dead_load.len()];
+        for (block, weight) in blocks.iter_mut().zip(eq.lumped_weights()) {
+            *block = scaled(&identity(), weight);
+        }
         match &self.frozen {
             Frozen::Closed(tangents) => eq.supports.add_blocks(tangents, &mut blocks),
             Frozen::Each(tangents) => eq.supports.scatter_blocks(

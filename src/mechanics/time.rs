@@ -1,4 +1,15 @@
-//! Incremental Newmark-β (the paper's Table 1).
+//! What a step in time is: incremental Newmark-β (the paper's Table 1), or a load step without inertia.
+
+/// Whether bodies have inertia.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Inertia {
+    /// They have, integrated in time by [`Newmark`].
+    #[default]
+    Newmark,
+    /// They have none: every step ends in static equilibrium under the loads at its end. Time says which loads those are, and no
+    /// velocity, acceleration or mass matrix exists.
+    None,
+}
 
 /// Newmark's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +42,8 @@ pub struct Alphas {
 impl Alphas {
     /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
     pub const START: Self = Self { a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a5: 1.0, a6: 0.0 };
+    /// a = 0 and v = 0 for every Δφ: nothing has inertia.
+    pub const NONE: Self = Self { a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a5: 0.0, a6: 0.0 };
 }
 
 impl Newmark {

@@ -1,5 +1,6 @@
 //! What can go wrong while results are written.
 
+use crate::field::Field;
 use crate::material::NonPositiveJacobian;
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,9 @@ pub enum OutputError {
         /// The determinant found.
         source: NonPositiveJacobian,
     },
+    /// A velocity or an acceleration of bodies without inertia.
+    #[error("particles without inertia have no {}", .0.name())]
+    Inertia(Field),
     /// A probe at a particle that does not exist.
     #[error("probe {name:?} is at particle {particle}; there are {particles}, numbered from 0")]
     ProbeParticle {

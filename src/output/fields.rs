@@ -13,7 +13,7 @@ impl Field {
     /// Appends the components at one particle (which must exist in the simulation and the reference) to `out`.
     ///
     /// # Errors
-    /// A stress is asked for where det F ≤ 0.
+    /// A stress is asked for where det F ≤ 0, or a velocity or acceleration where there is no inertia.
     pub fn append<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
@@ -30,8 +30,10 @@ impl Field {
             Self::Displacement => {
                 out.extend(padded(&(particles.position[particle] - reference.position[particle])));
             }
-            Self::Velocity => out.extend(padded(&particles.velocity[particle])),
-            Self::Acceleration => out.extend(padded(&particles.acceleration[particle])),
+            Self::Velocity => out.extend(padded(particles.velocity.get(particle).ok_or(OutputError::Inertia(self))?)),
+            Self::Acceleration => {
+                out.extend(padded(particles.acceleration.get(particle).ok_or(OutputError::Inertia(self))?));
+            }
             Self::DeformationGradient => {
                 let f = crate::tensor::identity::<f64, 3>() + crate::material::embed(&h());
                 out.extend(f.transpose().iter());

@@ -214,7 +214,9 @@ impl<const D: usize> Recorder<D> {
         let energies = self.write_state(simulation, cost)?;
         let (time, number) = (simulation.clock.time(), simulation.clock.steps());
         let newton_limit = simulation.settings.newton.max_iterations;
-        let seen = Watched { time, step: number, energies, cost, failed: step.failed.len(), newton_limit };
+        let failed = step.failed.iter().filter(|attempt| !attempt.inaccurate).count();
+        let error = step.error.zip(simulation.settings.error_tolerance);
+        let seen = Watched { time, step: number, energies, cost, failed, error, newton_limit };
         self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
         let Cost { newton, krylov, .. } = cost;
         self.progress.show(time, Shown { step: number, newton, krylov, balance: energies.balance });
@@ -249,7 +251,7 @@ impl<const D: usize> Recorder<D> {
             time,
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
-            momentum_scale: particles.mass.iter().zip(&particles.velocity).map(|(m, v)| m * v.norm()).sum(),
+            momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
             counts,
             seconds,
         })

@@ -49,8 +49,11 @@ pub struct Counts {
     pub max_active_nodes: usize,
     /// Steps taken.
     pub steps: u64,
-    /// Attempts at a step that failed: it was repeated with half of its length, or the run ended.
+    /// Attempts at a step that failed, or erred more than the tolerance allows: it was repeated with half of its length, or the run
+    /// ended.
     pub failed_attempts: u64,
+    /// Passes over all particles, of steps that succeeded.
+    pub particle_passes: u64,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// The most Newton iterations of a step that succeeded.
@@ -71,6 +74,7 @@ impl Counts {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
+        self.particle_passes += step.seconds.passes().iter().sum::<u64>();
         self.max_newton_iterations = self.max_newton_iterations.max(newton.iterations.len());
         self.projection_iterations += step.projection_iterations as u64;
         self.add_newton(newton);

@@ -21,8 +21,10 @@ const CLIMB: (f64, f64) = (5.0, 100.0);
 pub enum Kind {
     /// The balance of energy is positive.
     EnergyCreated,
-    /// A step was taken with less than its nominal length.
+    /// A step was taken with less than its nominal length, because a longer one failed.
     StepHalved,
+    /// The local error of a step is above the tolerance, and it could not be halved.
+    StepInaccurate,
     /// Newton's method takes more than half of the iterations it may.
     NewtonClimbs,
     /// The linear solver takes many more iterations than it used to.
@@ -63,8 +65,10 @@ pub(crate) struct Watched {
     pub step: u64,
     pub energies: Energies,
     pub cost: Cost,
-    /// Attempts that failed before it.
+    /// Attempts before it that failed for another reason than their error.
     pub failed: usize,
+    /// Its local error, and the tolerance, if there is one.
+    pub error: Option<(f64, f64)>,
     /// Newton iterations allowed.
     pub newton_limit: usize,
 }
@@ -78,7 +82,7 @@ impl Watch {
     /// Looks at a step; what is new.
     pub(crate) fn see(&mut self, step: &Watched) -> &[Warning] {
         let known = self.warnings.len();
-        let Watched { energies, cost, failed, newton_limit, .. } = *step;
+        let Watched { energies, cost, failed, error, newton_limit, .. } = *step;
         let Energies { kinetic, strain, external, balance, .. } = energies;
         let energy = kinetic.abs() + strain.abs() + external.abs();
         if energy.is_finite() {
@@ -94,6 +98,12 @@ impl Watch {
             let dt = cost.dt;
             self.warn(step, Kind::StepHalved, || {
                 format!("the step had to be halved {failed} times, to dt = {dt:.3e}; report.json says why")
+            });
+        }
+        if let Some((error, tolerance)) = error.filter(|(error, tolerance)| error > tolerance) {
+            self.warn(step, Kind::StepInaccurate, || {
+                let dt = cost.dt;
+                format!("a step of dt = {dt:.3e} errs by {error:.2e} grid spacings, {tolerance:.2e} are allowed, and time.max_halvings is reached")
             });
         }
         if 2 * cost.newton > newton_limit && newton_limit > 1 {
@@ -127,7 +137,7 @@ mod tests {
     fn step(number: u64) -> Watched {
         let energies = Energies { kinetic: 2.0, strain: 1.0, external: -1.0, total: 3.0, balance: -0.5 };
         let cost = Cost { dt: 0.1, newton: 3, krylov: 30 };
-        Watched { time: 0.1 * number as f64, step: number, energies, cost, failed: 0, newton_limit: 30 }
+        Watched { time: 0.1 * number as f64, step: number, energies, cost, failed: 0, error: None, newton_limit: 30 }
     }
 
     #[test]
@@ -144,12 +154,15 @@ mod tests {
         assert!(watch.see(&balance(3.0)).is_empty(), "once");
         let halved = Watched { failed: 2, ..step(22) };
         assert!(watch.see(&halved).iter().any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1")));
+        let inaccurate = Watched { error: Some((2e-3, 1e-3)), ..step(22) };
+        assert!(watch.see(&Watched { error: Some((1e-3, 1e-3)), ..step(22) }).is_empty());
+        assert!(watch.see(&inaccurate).iter().any(|warning| warning.message.contains("errs by 2.00e-3 grid spacings")));
         let newton = Watched { cost: Cost { newton: 16, ..step(0).cost }, ..step(23) };
         assert!(watch.see(&newton).iter().any(|warning| warning.message.contains("16 of 30")));
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
         assert!(watch.see(&krylov(180)).iter().any(|warning| warning.message.contains("180 iterations in a step; 35")));
-        assert_eq!(watch.warnings().len(), 4);
+        assert_eq!(watch.warnings().len(), 5);
         // what it knows survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);

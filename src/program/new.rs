@@ -13,13 +13,14 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The problems, and the scene of each.
-const PROBLEMS: [(&str, &str); 6] = [
+const PROBLEMS: [(&str, &str); 7] = [
     ("rebound", include_str!("../../scenes/rebound.json")),
     ("collision", include_str!("../../scenes/collision.json")),
     ("cantilever", include_str!("../../scenes/cantilever.json")),
     ("compaction", include_str!("../../scenes/compaction.json")),
     ("riemann_jump", include_str!("../../scenes/riemann_jump.json")),
     ("ball_drop", include_str!("../../scenes/ball_drop.json")),
+    ("column_static", include_str!("../../scenes/column_static.json")),
 ];
 
 /// The schema's file beside the scene.

@@ -85,11 +85,21 @@ impl SceneArguments {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
         let _ = write!(text, "{}", self.plan(&simulation)?);
+        let _ = write!(text, "\noutput        {}", written(scene));
         for bound in bound_probes(scene, &simulation) {
             let _ = write!(text, "\nprobe         {bound}");
             bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));
         }
         print(text)
+    }
+}
+
+/// What a run writes of the particles, beside the probes; no other field is computed.
+fn written(scene: &Scene) -> String {
+    let names: Vec<&str> = scene.output.fields(scene.time.inertia).iter().map(|field| field.name()).collect();
+    match scene.output.every {
+        Some(every) => format!("{} of all particles every {every}", names.join(", ")),
+        None => "no snapshots (output.every): no field is computed of all particles".into(),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::smoothing::Smoothing;
-use crate::mechanics::time::Newmark;
+use crate::mechanics::time::Inertia;
 use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
@@ -135,6 +135,14 @@ pub enum BuildError {
         /// The file.
         file: String,
     },
+    /// Velocities from a file, and no inertia.
+    #[error("{path}: {file} gives velocities, and time.inertia is \"none\"; remove its columns vx, … or that key")]
+    VelocityWithoutInertia {
+        /// The key.
+        path: String,
+        /// The file.
+        file: String,
+    },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
     InitialVelocity {
@@ -196,7 +204,7 @@ impl Scene {
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
             let path = format!("bodies[{i}]");
-            body.fill(&path, &means, &grid, i as u32, &mut particles, self.initial_velocity.is_some())?;
+            self.fill(body, &path, &means, &grid, i as u32, &mut particles)?;
             bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
         }
         let loads = self.loads(&grid, &particles)?;
@@ -236,17 +244,21 @@ impl Scene {
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
         Settings {
-            newmark: Newmark { beta: self.time.beta, gamma: self.time.gamma },
-            lumping: self.time.lumping,
-            initial_guess: match self.time.initial_guess {
+            inertia: match self.time.inertia {
+                time::Inertia::Newmark => Inertia::Newmark,
+                time::Inertia::None => Inertia::None,
+            },
+            newmark: self.time.newmark(),
+            lumping: self.time.lumping(),
+            initial_guess: match self.time.initial_guess.unwrap_or_default() {
                 time::InitialGuess::Zero => InitialGuess::Zero,
                 time::InitialGuess::Velocity => InitialGuess::Velocity,
             },
-            wall_update: match self.time.wall_update {
+            wall_update: match self.time.wall_update.unwrap_or_default() {
                 time::WallUpdate::Literal => WallUpdate::Literal,
                 time::WallUpdate::Consistent => WallUpdate::Consistent,
             },
-            smoothing: match &self.transfer {
+            smoothing: match self.transfer.unwrap_or_default() {
                 Transfer::Flip => None,
                 Transfer::Pic(pic) => Some(Smoothing::uniform(pic.order, f64::INFINITY)),
                 Transfer::Blend(blend) => Some(Smoothing::uniform(blend.order, blend.rate)),
@@ -267,6 +279,7 @@ impl Scene {
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },
+            error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),
             check_tangent: None,
         }
     }
@@ -381,6 +394,67 @@ impl Scene {
         Ok(points)
     }
 
+    fn fill<const D: usize>(
+        &self,
+        body: &Body,
+        path: &str,
+        means: &Means<'_>,
+        grid: &Grid<D>,
+        number: u32,
+        particles: &mut Particles<D>,
+    ) -> Result<(), BuildError> {
+        let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
+            let mass = body.density * volume;
+            match self.time.inertia {
+                time::Inertia::Newmark => particles.push(x, velocity, volume, mass, number),
+                time::Inertia::None => particles.push_without_inertia(x, volume, mass, number),
+            }
+        };
+        let common = match &body.velocity {
+            Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
+            None => None,
+        };
+        if let Some(shape) = &body.shape {
+            let path = format!("{path}.shape");
+            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let volume = (grid.spacing / f64::from(body.particles_per_cell)).powi(D as i32);
+            let velocity = common.unwrap_or_else(Vector::zeros);
+            let positions = fill(grid, &shape, body.particles_per_cell, body.fill.into())
+                .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
+            means.make_room(&path, particles, positions.len())?;
+            for x in positions {
+                push(particles, x, velocity, volume);
+            }
+        } else if let Some(file) = &body.particles {
+            let path = format!("{path}.particles.file");
+            let place = means.folder.join(&file.file);
+            let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
+                path: path.clone(),
+                file: place.display().to_string(),
+                source: Box::new(source),
+            })?;
+            if read.velocities.is_some() {
+                let file = place.display().to_string();
+                match self.time.inertia {
+                    time::Inertia::None => return Err(BuildError::VelocityWithoutInertia { path, file }),
+                    _ if self.initial_velocity.is_some() => return Err(BuildError::TwoVelocities { path, file }),
+                    time::Inertia::Newmark => {}
+                }
+            }
+            means.make_room(&path, particles, read.positions.len())?;
+            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
+                if !grid.contains(x) {
+                    let position = x.iter().copied().collect();
+                    return Err(BuildError::Outside { path, particle: k + 1, position });
+                }
+                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
+                let velocity = common.or(own).unwrap_or_else(Vector::zeros);
+                push(particles, *x, velocity, volume);
+            }
+        }
+        Ok(())
+    }
+
     fn set_initial_velocity<const D: usize>(&self, simulation: &mut Simulation<D>) -> Result<(), BuildError> {
         let Some(initial) = &self.initial_velocity else { return Ok(()) };
         let mut regions: Vec<(Shape<D>, Vector<f64, D>)> = Vec::new();
@@ -420,55 +494,6 @@ impl Body {
             Material::NeoHookeanLogarithmic(_) => NeoHookean::logarithmic(lame).into(),
             Material::StVenantKirchhoff(_) => StVenantKirchhoff { lame }.into(),
         })
-    }
-
-    fn fill<const D: usize>(
-        &self,
-        path: &str,
-        means: &Means<'_>,
-        grid: &Grid<D>,
-        number: u32,
-        particles: &mut Particles<D>,
-        velocity_on_nodes: bool,
-    ) -> Result<(), BuildError> {
-        let common = match &self.velocity {
-            Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
-            None => None,
-        };
-        if let Some(shape) = &self.shape {
-            let path = format!("{path}.shape");
-            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
-            let volume = (grid.spacing / f64::from(self.particles_per_cell)).powi(D as i32);
-            let velocity = common.unwrap_or_else(Vector::zeros);
-            let positions = fill(grid, &shape, self.particles_per_cell, self.fill.into())
-                .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
-            means.make_room(&path, particles, positions.len())?;
-            for x in positions {
-                particles.push(x, velocity, volume, self.density * volume, number);
-            }
-        } else if let Some(file) = &self.particles {
-            let path = format!("{path}.particles.file");
-            let place = means.folder.join(&file.file);
-            let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
-                path: path.clone(),
-                file: place.display().to_string(),
-                source: Box::new(source),
-            })?;
-            if velocity_on_nodes && read.velocities.is_some() {
-                return Err(BuildError::TwoVelocities { path, file: place.display().to_string() });
-            }
-            means.make_room(&path, particles, read.positions.len())?;
-            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
-                if !grid.contains(x) {
-                    let position = x.iter().copied().collect();
-                    return Err(BuildError::Outside { path, particle: k + 1, position });
-                }
-                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
-                let velocity = common.or(own).unwrap_or_else(Vector::zeros);
-                particles.push(*x, velocity, volume, self.density * volume, number);
-            }
-        }
-        Ok(())
     }
 }
 

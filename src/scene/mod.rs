@@ -51,8 +51,7 @@ pub struct Scene {
     /// Time stepping.
     pub time: time::Time,
     /// From nodes to particles. Default: `"flip"`, as in the paper.
-    #[serde(default)]
-    pub transfer: transfer::Transfer,
+    pub transfer: Option<transfer::Transfer>,
     /// The bodies, at least one.
     #[schemars(length(min = 1))]
     pub bodies: Vec<body::Body>,
@@ -116,7 +115,7 @@ impl Scene {
         }
         self.approximation.check(&mut problems, dimension);
         self.time.check(&mut problems);
-        self.transfer.check(&mut problems);
+        self.transfer.iter().for_each(|transfer| transfer.check(&mut problems));
         self.check_bodies(&mut problems);
         self.boundary.check(&mut problems, dimension);
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
@@ -155,7 +154,35 @@ impl Scene {
         }
         self.solver.check(&mut problems, !self.pressures.is_empty());
         self.output.check(&mut problems, &self.bodies, &self.grid);
+        if self.time.inertia == time::Inertia::None {
+            self.refuse_inertia(&mut problems);
+        }
         problems
+    }
+
+    /// Without inertia, keys that speak of it say what nobody would do.
+    fn refuse_inertia(&self, problems: &mut Problems) {
+        let mut refuse = |path: &str, value: &str| {
+            let allowed = "time.inertia is \"none\", and without inertia it means nothing: remove one of the two";
+            problems.refuse(path, value, allowed);
+        };
+        self.time.of_inertia().for_each(|(path, value)| refuse(path, &value));
+        self.transfer.iter().for_each(|transfer| refuse("transfer", &time::word(transfer)));
+        for (i, velocity) in self.bodies.iter().enumerate().filter_map(|(i, body)| Some((i, body.velocity.as_ref()?))) {
+            refuse(&format!("bodies[{i}].velocity"), &time::word(velocity));
+        }
+        self.initial_velocity.iter().for_each(|_| refuse("initial_velocity", "a velocity"));
+        self.output.of_inertia().for_each(|(path, value)| refuse(&path, &value));
+    }
+
+    /// Gives every key its value, of those that mean something.
+    fn complete(mut self) -> Self {
+        self.time.complete();
+        if self.time.inertia == time::Inertia::Newmark {
+            self.transfer.get_or_insert_default();
+        }
+        self.output.fields = Some(self.output.fields(self.time.inertia));
+        self
     }
 
     fn check_bodies(&self, problems: &mut Problems) {

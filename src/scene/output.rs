@@ -4,13 +4,14 @@ use super::body::Body;
 use super::check::Problems;
 use super::grid::GridBox;
 use super::load::check_body;
+use super::time::{Inertia, word};
 use crate::field::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
 /// What a run writes.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// The time between two snapshots of all particles, > 0. Default: no snapshots.
@@ -20,18 +21,11 @@ pub struct Output {
     /// bits. One more is written at the start, at the end and on Ctrl-C; the last two are kept. Default: no checkpoints.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub checkpoint: Option<f64>,
-    /// The fields of a snapshot, each at most once. Default: displacement, velocity, stress, jacobian.
-    #[serde(default = "Output::default_fields")]
-    pub fields: Vec<Field>,
+    /// The fields of a snapshot, each at most once. Default: displacement, velocity, stress, jacobian; without inertia no velocity.
+    pub fields: Option<Vec<Field>>,
     /// Histories of one field at one place, written every step.
     #[serde(default)]
     pub probes: Vec<Probe>,
-}
-
-impl Default for Output {
-    fn default() -> Self {
-        Self { every: None, checkpoint: None, fields: Self::default_fields(), probes: Vec::new() }
-    }
 }
 
 /// The history of one field at one place.
@@ -61,8 +55,21 @@ pub enum At {
 }
 
 impl Output {
-    fn default_fields() -> Vec<Field> {
-        vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian]
+    /// The fields of a snapshot of bodies with or without inertia.
+    pub fn fields(&self, inertia: Inertia) -> Vec<Field> {
+        self.fields.clone().unwrap_or_else(|| {
+            let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
+            fields.retain(|field| inertia == Inertia::Newmark || !field.needs_inertia());
+            fields
+        })
+    }
+
+    /// The keys that are given and that only inertia gives a meaning.
+    pub(super) fn of_inertia(&self) -> impl Iterator<Item = (String, String)> {
+        let fields = self.fields.iter().flatten().enumerate().map(|(i, &field)| (format!("output.fields[{i}]"), field));
+        let probes =
+            self.probes.iter().enumerate().map(|(i, probe)| (format!("output.probes[{i}].field"), probe.field));
+        fields.chain(probes).filter(|(_, field)| field.needs_inertia()).map(|(key, field)| (key, word(field)))
     }
 
     pub(super) fn check(&self, problems: &mut Problems, bodies: &[Body], grid: &GridBox) {
@@ -72,8 +79,9 @@ impl Output {
         if let Some(checkpoint) = self.checkpoint {
             problems.positive("output.checkpoint", checkpoint);
         }
-        for (i, field) in problems.few("output.fields", &self.fields).iter().enumerate() {
-            let again = self.fields.iter().take(i).any(|earlier| earlier == field);
+        let fields = self.fields.as_deref().unwrap_or_default();
+        for (i, field) in problems.few("output.fields", fields).iter().enumerate() {
+            let again = fields.iter().take(i).any(|earlier| earlier == field);
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),

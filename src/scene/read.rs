@@ -171,7 +171,7 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     for problem in &mut problems.list {
         problem.place = place(&steps(&problem.path));
     }
-    if problems.is_empty() { Ok(scene) } else { Err(SceneError::Values(problems)) }
+    if problems.is_empty() { Ok(scene.complete()) } else { Err(SceneError::Values(problems)) }
 }
 
 /// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in

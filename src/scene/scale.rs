@@ -6,6 +6,7 @@ use super::build::{BuildError, FACES};
 use super::load::Curve;
 use crate::mechanics::loads::Pressing;
 use crate::simulation::Simulation;
+use crate::tensor::Vector;
 
 /// No force may be larger: its square is summed over all nodes.
 const MOST: f64 = 1e120;
@@ -18,13 +19,14 @@ type Quantity = (&'static str, f64, f64, f64);
 
 /// Refuses a simulation whose masses, volumes, forces or energies are not representable.
 pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Result<(), BuildError> {
-    let alphas = simulation.settings.newmark.alphas(simulation.clock.nominal());
+    let alphas = simulation.settings.alphas(simulation.clock.nominal());
     let (particles, h) = (&simulation.particles, simulation.grid.spacing);
     let mut heaviest: f64 = 0.0;
     for (i, body) in scene.bodies.iter().enumerate() {
         let mut extremes = Extremes::default();
         for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i) {
-            extremes.add(particles.volume[p], particles.mass[p], particles.velocity[p].amax());
+            let speed = particles.velocity.get(p).map_or(0.0, Vector::amax);
+            extremes.add(particles.volume[p], particles.mass[p], speed);
         }
         let Extremes { volume, mass, speed } = extremes;
         heaviest = heaviest.max(mass.1);

@@ -2,6 +2,7 @@
 
 use super::check::{Number, Problems};
 use crate::clock::MAX_HALVINGS;
+use crate::mechanics::time::Newmark;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,28 +19,52 @@ pub struct Time {
     /// The end of the simulation (time), at least one step; it starts at 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
+    /// Whether the bodies have inertia. Without it there are load steps: each ends in static equilibrium under the loads at its
+    /// end, and whatever speaks of velocities or of the mass matrix is refused.
+    #[serde(default)]
+    pub inertia: Inertia,
     /// Newmark's β (no unit), > 0, with 2β ≥ γ. Default 0.25, the trapezoidal rule.
-    #[serde(default = "Time::default_beta")]
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub beta: f64,
+    pub beta: Option<f64>,
     /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps. Default 0.5.
-    #[serde(default = "Time::default_gamma")]
     #[schemars(range(min = 0.5))]
-    pub gamma: f64,
+    pub gamma: Option<f64>,
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.
-    #[serde(default = "Time::default_lumping")]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub lumping: f64,
-    /// Where Newton's iteration of a step starts.
-    #[serde(default)]
-    pub initial_guess: InitialGuess,
-    /// How particles see prescribed nodes in their update.
-    #[serde(default)]
-    pub wall_update: WallUpdate,
+    pub lumping: Option<f64>,
+    /// Where Newton's iteration of a step starts. Default: `"zero"`.
+    pub initial_guess: Option<InitialGuess>,
+    /// How particles see prescribed nodes in their update. Default: `"literal"`.
+    pub wall_update: Option<WallUpdate>,
+    /// Steps as long as a tolerance allows: `step` is the longest, and it is halved `max_halvings` times at most. Default: all are `step`
+    /// long.
+    pub adaptive: Option<Adaptive>,
     /// How often a step that fails may be halved, 0 to 20. Default 10.
     #[serde(default = "Time::default_max_halvings")]
     #[schemars(range(min = 0, max = MAX_HALVINGS))]
     pub max_halvings: u32,
+}
+
+/// Steps as long as a tolerance allows.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptive {
+    /// The most that the displacement may err in one step, in grid spacings: (β − 1/6) Δt² |Δa| (Zienkiewicz and Xie), the root of the
+    /// mean square over the mass, > 0 and at most 1. A step that errs more is taken back and halved; after one that errs a tenth of
+    /// it, the next is twice as long. The time at the end of each whole `step` is met.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
+    pub tolerance: f64,
+}
+
+/// Whether the bodies have inertia.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Inertia {
+    /// Dynamics, by Newmark's method.
+    #[default]
+    Newmark,
+    /// Quasi-statics: time only says which loads act and how far prescribed motions have come.
+    None,
 }
 
 /// Where Newton's iteration of a step starts.
@@ -65,20 +90,44 @@ pub enum WallUpdate {
 }
 
 impl Time {
-    fn default_beta() -> f64 {
-        0.25
-    }
-
-    fn default_gamma() -> f64 {
-        0.5
-    }
-
-    fn default_lumping() -> f64 {
-        1.0
-    }
-
     fn default_max_halvings() -> u32 {
         10
+    }
+
+    /// β and γ.
+    pub fn newmark(&self) -> Newmark {
+        let default = Newmark::default();
+        Newmark { beta: self.beta.unwrap_or(default.beta), gamma: self.gamma.unwrap_or(default.gamma) }
+    }
+
+    /// ε of the mass matrix.
+    pub fn lumping(&self) -> f64 {
+        self.lumping.unwrap_or(1.0)
+    }
+
+    /// Gives every key its value, of those that mean something.
+    pub(super) fn complete(&mut self) {
+        if self.inertia == Inertia::Newmark {
+            let Newmark { beta, gamma } = self.newmark();
+            (self.beta, self.gamma, self.lumping) = (Some(beta), Some(gamma), Some(self.lumping()));
+            self.initial_guess.get_or_insert_default();
+            self.wall_update.get_or_insert_default();
+        }
+    }
+
+    /// The keys that are given and that only inertia gives a meaning.
+    pub(super) fn of_inertia(&self) -> impl Iterator<Item = (&'static str, String)> {
+        let number = |x: Option<f64>| x.map(|x| Number(x).to_string());
+        [
+            ("time.beta", number(self.beta)),
+            ("time.gamma", number(self.gamma)),
+            ("time.lumping", number(self.lumping)),
+            ("time.initial_guess", self.initial_guess.map(word)),
+            ("time.wall_update", self.wall_update.map(word)),
+            ("time.adaptive", self.adaptive.map(word)),
+        ]
+        .into_iter()
+        .filter_map(|(key, value)| Some((key, value?)))
     }
 
     /// The same with the end that the command line asks for, by the option `option`.
@@ -116,21 +165,36 @@ impl Time {
             );
         }
         // 2β ≥ γ ≥ ½, up to the rounding of β = (γ + ½)²/4 and the like
-        let gamma_ok = self.gamma >= 0.5 && self.gamma <= 2.0;
+        let Newmark { beta, gamma } = self.newmark();
+        let gamma_ok = (0.5..=2.0).contains(&gamma);
         problems.require(
             gamma_ok,
             "time.gamma",
-            Number(self.gamma),
+            Number(gamma),
             "must lie between 0.5 and 2 (stability: 2 beta >= gamma >= 0.5)",
         );
-        let lowest = 0.5 * self.gamma.clamp(0.5, 2.0);
+        let lowest = 0.5 * gamma.clamp(0.5, 2.0);
         problems.require(
-            self.beta >= lowest * (1.0 - 1e-12) && self.beta <= 2.0,
+            beta >= lowest * (1.0 - 1e-12) && beta <= 2.0,
             "time.beta",
-            Number(self.beta),
+            Number(beta),
             format_args!("must lie between gamma/2 = {lowest} and 2 (stability: 2 beta >= gamma >= 0.5)"),
         );
-        problems.between("time.lumping", self.lumping, 0.0, 1.0);
+        problems.between("time.lumping", self.lumping(), 0.0, 1.0);
+        if let Some(Adaptive { tolerance }) = self.adaptive {
+            let ok = problems.positive("time.adaptive.tolerance", tolerance);
+            problems.require(
+                !ok || tolerance <= 1.0,
+                "time.adaptive.tolerance",
+                Number(tolerance),
+                "must be at most 1",
+            );
+        }
         problems.whole("time.max_halvings", self.max_halvings, 0, MAX_HALVINGS);
     }
+}
+
+/// The word of a choice.
+pub(super) fn word(choice: impl Serialize) -> String {
+    serde_json::to_string(&choice).unwrap_or_default()
 }

@@ -1,11 +1,13 @@
 //! Promises of the library, in one program: what is generic is compiled once.
 
+mod adaptive;
 mod approximation;
 mod compaction;
 mod dynamics;
 mod equilibrium;
 mod examples;
 mod hostile;
+mod ladder;
 mod loads;
 mod output;
 mod points;
@@ -15,6 +17,7 @@ mod restart;
 mod runs;
 mod scenes;
 mod smoothing;
+mod statics;
 mod support;
 mod sweep;
 mod transfer;

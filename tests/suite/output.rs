@@ -6,7 +6,7 @@ use bfree::field::Field;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::time::Newmark;
+use bfree::mechanics::time::{Inertia, Newmark};
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::output::plot::plot_run;
 use bfree::output::vtu::{Snapshot, Values};
@@ -39,11 +39,13 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
         particles,
         loads: Loads::default(),
         settings: Settings {
+            inertia: Inertia::Newmark,
             newmark: Newmark::default(),
             lumping: 1.0,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,
             smoothing: None,
+            error_tolerance: None,
             check_tangent: None,
             newton: NewtonSettings::default(),
         },

@@ -39,9 +39,8 @@ impl<const D: usize> Prepared<D> {
         let (supports, nodes) =
             Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
         let prescribed = simulation.prescribed(&nodes);
-        let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), simulation.settings.lumping)?
-            .with_prescribed(&prescribed);
-        Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.newmark.alphas(dt), end: t + dt })
+        let nodal = simulation.project(&supports)?.with_prescribed(&prescribed);
+        Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.alphas(dt), end: t + dt })
     }
 
     /// The equilibrium of the step.

@@ -202,6 +202,22 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
         place: usize,
         end: usize,
     }
+    /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
+    fn apart(mut line: &[Row]) -> Vec<&[Row]> {
+        let mut parts = Vec::new();
+        while let Some(first) = line.first() {
+            let mut reach = first.x;
+            let gap = line.iter().position(|row| {
+                let beyond = row.x > reach;
+                reach = reach.max(row.x + row.end - row.place);
+                beyond
+            });
+            let (part, rest) = line.split_at(gap.unwrap_or(line.len()));
+            parts.push(part);
+            line = rest;
+        }
+        parts
+    }
     let mut rows = Vec::new();
     for (b, block) in blocks.iter().enumerate() {
         let [nx, ny, nz] = block.size;
@@ -218,7 +234,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
     let mut ids = Vec::new();
     let mut numbers: Vec<u32> = Vec::new();
-    for same in rows.chunk_by(|a, b| a.start == b.start) {
+    for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {
         let low = same[0].x;
         numbers.clear();
         for row in same {

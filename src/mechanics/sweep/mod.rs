@@ -13,6 +13,7 @@ mod lanes;
 mod of_block;
 mod order;
 mod plain;
+mod tally;
 mod tiled;
 mod waves;
 
@@ -29,6 +30,7 @@ use num_traits::Zero;
 use plain::Plain;
 use rayon::prelude::*;
 use std::ops::AddAssign;
+use tally::Tally;
 use tiled::Tiled;
 
 /// Particles per block of the plain sweep: large enough to pay for a task, small enough to keep a block's nodes in cache.
@@ -39,7 +41,7 @@ const WIDEST: usize = 16;
 
 /// Shape functions of all particles at the last converged positions, and the active nodes they name.
 #[derive(Clone, Debug)]
-pub struct Supports<const D: usize>(Way<D>);
+pub struct Supports<const D: usize>(Way<D>, Tally);
 
 #[derive(Clone, Debug)]
 enum Way<const D: usize> {
@@ -111,7 +113,7 @@ impl<const D: usize> Supports<D> {
             Some(product) if product.width() <= WIDEST => {
                 let single = precision == Precision::Mixed;
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, single)?;
-                Ok((Self(Way::Tiled(tiled)), nodes))
+                Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
             }
             _ => Self::plain(approximation, grid, positions),
         }
@@ -127,12 +129,22 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
-        Ok((Self(Way::Plain(plain)), nodes))
+        Ok((Self(Way::Plain(plain), Tally::of(nodes.len())), nodes))
     }
 
     /// Number of particles.
     pub fn particles(&self) -> usize {
         either!(self, way => way.particles())
+    }
+
+    /// Number of active nodes.
+    pub fn nodes(&self) -> usize {
+        self.1.nodes
+    }
+
+    /// How often the methods below have gone through all particles so far.
+    pub fn passes(&self) -> u64 {
+        self.1.passes()
     }
 
     /// The groups of particles that share a window of nodes in vector lanes: nodes along each axis, and particles; none where the
@@ -181,6 +193,7 @@ impl<const D: usize> Supports<D> {
         point: impl Fn(usize, Vector<f64, D>, Tensor<f64, D>) -> R + Sync,
         mut take: impl FnMut(usize, R),
     ) {
+        self.1.pass();
         match &self.0 {
             Way::Plain(plain) => {
                 let results = infallible(plain.interpolate(field, |p, value, gradient| Ok(point(p, value, gradient))));
@@ -201,6 +214,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
+        self.1.pass();
         either!(self, way => way.assemble(field, out, Magnitude::No, point))
     }
 
@@ -214,6 +228,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
+        self.1.pass();
         either!(self, way => way.assemble(field, out, Magnitude::Yes, point))
     }
 
@@ -222,11 +237,13 @@ impl<const D: usize> Supports<D> {
     where
         O: Copy + Zero + AddAssign + Send + Sync,
     {
+        self.1.pass();
         either!(self, way => way.scatter(out, scatter));
     }
 
     /// `out_I += Σ_p value(p) N_I`
     pub fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
+        self.1.pass();
         match &self.0 {
             Way::Plain(plain) => plain.scatter(out, |p, n, _| value(p) * n),
             Way::Tiled(tiled) => tiled.spread(out, value),
@@ -240,6 +257,7 @@ impl<const D: usize> Supports<D> {
         bilinear: impl Fn(usize, &Vector<f64, D>, &Vector<f64, D>) -> Tensor<f64, D> + Sync,
         mass: impl Fn(usize) -> f64 + Sync,
     ) {
+        self.1.pass();
         match &self.0 {
             Way::Plain(plain) => {
                 plain.scatter(out, |p, n, grad_n| bilinear(p, grad_n, grad_n) + Tensor::identity() * (mass(p) * n * n))
@@ -262,7 +280,10 @@ impl<const D: usize> Supports<D> {
     ) -> Option<Result<ClosedTangents<D>, E>> {
         match &self.0 {
             Way::Plain(_) => None,
-            Way::Tiled(tiled) => Some(tiled.closed(field, both, inertia, point)),
+            Way::Tiled(tiled) => {
+                self.1.pass();
+                Some(tiled.closed(field, both, inertia, point))
+            }
         }
     }
 
@@ -270,6 +291,7 @@ impl<const D: usize> Supports<D> {
     /// tangents must be those of these supports.
     pub fn product(&self, tangents: &ClosedTangents<D>, field: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         if let Way::Tiled(tiled) = &self.0 {
+            self.1.pass();
             tiled.product(tangents, field, out);
         }
     }
@@ -277,6 +299,7 @@ impl<const D: usize> Supports<D> {
     /// `out_I += Σ_p K_II` of each tangent and its inertia. The tangents must be those of these supports.
     pub fn add_blocks(&self, tangents: &ClosedTangents<D>, out: &mut [Tensor<f64, D>]) {
         if let Way::Tiled(tiled) = &self.0 {
+            self.1.pass();
             tiled.add_blocks(tangents, out);
         }
     }
@@ -303,13 +326,17 @@ impl<const D: usize> Supports<D> {
     ) -> Option<Result<SingleTangents<D>, E>> {
         match &self.0 {
             Way::Plain(_) => None,
-            Way::Tiled(tiled) => tiled.closed_single(field, both, inertia, point),
+            Way::Tiled(tiled) => {
+                self.1.pass();
+                tiled.closed_single(field, both, inertia, point)
+            }
         }
     }
 
     /// [`Self::product`] in single precision, gradients in units of 1/h.
     pub fn single_product(&self, tangents: &SingleTangents<D>, field: &[Vector<f32, D>], out: &mut [Vector<f32, D>]) {
         if let Way::Tiled(tiled) = &self.0 {
+            self.1.pass();
             tiled.product_single(tangents, field, out);
         }
     }
@@ -317,6 +344,7 @@ impl<const D: usize> Supports<D> {
     /// [`Self::add_blocks`] in single precision, gradients in units of 1/h.
     pub fn add_single_blocks(&self, tangents: &SingleTangents<D>, out: &mut [Tensor<f32, D>]) {
         if let Way::Tiled(tiled) = &self.0 {
+            self.1.pass();
             tiled.add_blocks_single(tangents, out);
         }
     }
@@ -338,6 +366,7 @@ impl<const D: usize> Supports<D> {
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
+        self.1.pass();
         either!(self, way => way.interpolate(field, point))
     }
 }

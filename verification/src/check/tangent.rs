@@ -50,11 +50,13 @@ pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simu
     let count = prepared.nodes.len();
     let size = 0.01 * simulation.grid.spacing;
     let dt = simulation.clock.step();
-    let increments = [
+    let mut increments = vec![
         ("zero", vec![Vector::zeros(); count]),
-        ("dt v_n", prepared.nodal.velocity.iter().map(|v| v * dt).collect()),
         ("random", random.field(count).iter().map(|x: &Vector<f64, D>| x * size).collect()),
     ];
+    if !prepared.nodal.is_static() {
+        increments.push(("dt v_n", prepared.nodal.velocity.iter().map(|v| v * dt).collect()));
+    }
     for (name, mut dphi) in increments {
         prepared.prescribe(&mut dphi);
         let mut halvings = 0;

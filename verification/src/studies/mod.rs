@@ -78,6 +78,7 @@ studies!(
     order,
     riemann,
     compaction,
+    column,
     rebound,
     mutants
 );

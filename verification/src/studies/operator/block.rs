@@ -7,7 +7,7 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::time::Newmark;
+use bfree::mechanics::time::{Inertia, Newmark};
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
@@ -57,11 +57,13 @@ pub(super) fn block<const D: usize>(
             prescribed: vec![floor],
         },
         settings: Settings {
+            inertia: Inertia::Newmark,
             newmark: Newmark::default(),
             lumping,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::default(),
             smoothing: None,
+            error_tolerance: None,
             check_tangent: None,
             newton: NewtonSettings {
                 relative_tolerance: 1e-8,

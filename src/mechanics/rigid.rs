@@ -1,0 +1,165 @@
+//! Rigid motions that nothing holds. With inertia they are motions like others; without it, a load along one has no equilibrium.
+
+use crate::grid::Grid;
+use crate::material::Law;
+use crate::mechanics::residual::Equilibrium;
+use crate::nodes::Nodes;
+use crate::tensor::Vector;
+use nalgebra::{DMatrix, DVector};
+use std::fmt::{Display, Formatter};
+
+/// A motion counts as free if the prescribed degrees of freedom see less than this part of it, as loaded if so much of the loads
+/// acts along it.
+const NOTHING: f64 = 1e-9;
+
+/// Bodies that the loads push along a rigid motion which no prescribed degree of freedom holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loose {
+    /// Names of the bodies; several if they touch.
+    pub bodies: Vec<String>,
+    /// The axis along which they are pushed; `None` if they are turned.
+    pub axis: Option<usize>,
+}
+
+impl Display for Loose {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let bodies = self.bodies.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+        match self.axis {
+            Some(axis) => {
+                write!(f, "nothing holds {bodies} along {}, and the loads push there", ["x", "y", "z"][axis.min(2)])
+            }
+            None => write!(f, "nothing keeps {bodies} from turning, and the loads turn it"),
+        }
+    }
+}
+
+/// The first group of bodies that touch (share nodes) which is loose.
+pub fn loose<const D: usize, L: Law>(
+    grid: &Grid<D>,
+    equilibrium: &Equilibrium<'_, D, L>,
+    nodes: &Nodes,
+) -> Option<Loose> {
+    let positions: Vec<Vector<f64, D>> = nodes.positions(grid).map(|(_, x)| x).collect();
+    let group = groups(equilibrium, positions.len());
+    let force = equilibrium.external_force(&vec![Vector::zeros(); positions.len()]);
+    let mut of_group = vec![Vec::new(); positions.len()];
+    group.iter().enumerate().for_each(|(node, &root)| of_group[root].push(node));
+    for (root, members) in of_group.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
+        let held = equilibrium.prescribed.iter().filter(|dof| group[dof.node] == root);
+        let held = held.map(|dof| (dof.node, dof.component));
+        if let Some(axis) = pushed(&positions, members, held, &force) {
+            let mut bodies: Vec<u32> = (0..equilibrium.supports.particles())
+                .filter(|&p| equilibrium.supports.of(p).next().is_some_and(|(node, ..)| group[node] == root))
+                .map(|p| equilibrium.particles.body[p])
+                .collect();
+            bodies.sort_unstable();
+            bodies.dedup();
+            let bodies = bodies.into_iter().map(|body| equilibrium.bodies[body as usize].name.clone()).collect();
+            return Some(Loose { bodies, axis });
+        }
+    }
+    None
+}
+
+/// Of each node, the least node that particles connect it with.
+fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: usize) -> Vec<usize> {
+    fn root(parent: &mut [usize], mut node: usize) -> usize {
+        while parent[node] != node {
+            parent[node] = parent[parent[node]];
+            node = parent[node];
+        }
+        node
+    }
+    let mut parent: Vec<usize> = (0..count).collect();
+    for p in 0..equilibrium.supports.particles() {
+        let mut last = None;
+        for (node, ..) in equilibrium.supports.of(p) {
+            let one = root(&mut parent, node);
+            let other = last.map_or(one, |last| root(&mut parent, last));
+            parent[one.max(other)] = one.min(other);
+            last = Some(node);
+        }
+    }
+    (0..count).map(|node| root(&mut parent, node)).collect()
+}
+
+/// The rigid motions as fields at x: translations, then rotations about `centre` in units of `size`.
+fn rigid_motions<const D: usize>(x: &Vector<f64, D>, centre: &Vector<f64, D>, size: f64) -> Vec<Vector<f64, D>> {
+    let arm = (x - centre) / size;
+    let axes = (0..D).map(|k| Vector::from_fn(|i, _| f64::from(i == k)));
+    let planes = (0..D).flat_map(|i| (i + 1..D).map(move |k| (i, k)));
+    let turns = planes.map(|(i, k)| {
+        Vector::from_fn(|c, _| match c {
+            _ if c == i => -arm[k],
+            _ if c == k => arm[i],
+            _ => 0.0,
+        })
+    });
+    axes.chain(turns).collect()
+}
+
+/// Whether a rigid motion of the nodes `members` that the degrees of freedom `held` leave free is loaded; if it is a translation,
+/// along which axis.
+fn pushed<const D: usize>(
+    positions: &[Vector<f64, D>],
+    members: &[usize],
+    held: impl Iterator<Item = (usize, usize)>,
+    force: &[Vector<f64, D>],
+) -> Option<Option<usize>> {
+    let centre = members.iter().map(|&node| positions[node]).sum::<Vector<f64, D>>() / members.len() as f64;
+    let size = members.iter().map(|&node| (positions[node] - centre).norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let motions = |node: usize| rigid_motions(&positions[node], &centre, size);
+    let count = D * (D + 1) / 2;
+    // G = Σ m mᵀ over the held degrees of freedom, m being the rigid motions there: what is held of a motion q is q·Gq.
+    let mut gram = DMatrix::<f64>::zeros(count, count);
+    for (node, component) in held {
+        let seen = DVector::from_iterator(count, motions(node).iter().map(|motion| motion[component]));
+        gram += &seen * seen.transpose();
+    }
+    let mut work = DVector::<f64>::zeros(count);
+    let mut most = 0.0;
+    for &node in members {
+        for (work, motion) in work.iter_mut().zip(motions(node)) {
+            *work += force[node].dot(&motion);
+        }
+        most += force[node].norm();
+    }
+    let loaded = |work: f64| work.abs() > NOTHING * most;
+    // What is held is held along an axis: a translation is free along one, or not at all.
+    if let Some(axis) = (0..D).find(|&k| gram[(k, k)] == 0.0 && loaded(work[k])) {
+        return Some(Some(axis));
+    }
+    let bound = NOTHING * gram.trace();
+    let modes = gram.symmetric_eigen();
+    let free = modes.eigenvalues.iter().zip(modes.eigenvectors.column_iter()).filter(|(held, _)| **held <= bound);
+    free.into_iter().any(|(_, mode)| loaded(mode.dot(&work))).then_some(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners of a unit square, held at `held` and loaded at one corner.
+    fn square(held: &[(usize, usize)], corner: usize, load: [f64; 2]) -> Option<Option<usize>> {
+        let positions = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Vector::from);
+        let mut force = [Vector::zeros(); 4];
+        force[corner] = Vector::from(load);
+        pushed(&positions, &[0, 1, 2, 3], held.iter().copied(), &force)
+    }
+
+    #[test]
+    fn a_square_is_loose_only_where_it_is_pushed() {
+        let floor = [(0, 1), (1, 1)];
+        // On a smooth floor it stands, slides when pushed sideways, and stands again against a wall.
+        assert_eq!(square(&floor, 3, [0.0, -1.0]), None);
+        assert_eq!(square(&floor, 3, [1.0, 0.0]), Some(Some(0)));
+        assert_eq!(square(&[(0, 0), (0, 1), (1, 1)], 3, [1.0, 0.0]), None);
+        // On a hinge it turns, unless the load points at the hinge.
+        let hinge = [(0, 0), (0, 1)];
+        assert_eq!(square(&hinge, 1, [0.0, -1.0]), Some(None));
+        assert_eq!(square(&hinge, 3, [1.0, 1.0]), None);
+        // Held by nothing.
+        assert_eq!(square(&[], 2, [0.0, -2.0]), Some(Some(1)));
+        assert_eq!(square(&[], 2, [0.0, 0.0]), None);
+    }
+}

@@ -1,0 +1,130 @@
+//! Steps as long as a tolerance allows.
+
+use crate::support::{Failure, scene};
+use bfree::approximation::{Approximation, Bspline};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
+use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{Settings, Simulation};
+use bfree::tensor::Vector;
+use std::f64::consts::PI;
+
+/// A bar of length 1 and wave speed 1 between two walls, at rest in its straight state, with the speed V sin πx: it swings as
+/// u = (V/ω) sin(πx) sin(ωt) with ω = π, as long as V is tiny.
+const SPEED: f64 = 1e-6;
+
+fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
+    let cells = 64;
+    let h = 1.0 / f64::from(cells);
+    let mut particles = Particles::<1>::default();
+    for p in 0..2 * cells {
+        let x = (f64::from(p) + 0.5) * 0.5 * h;
+        particles.push(Vector::from([x]), Vector::from([SPEED * (PI * x).sin()]), 0.5 * h, 0.5 * h, 0);
+    }
+    let wall = |upper| Prescribed {
+        name: "wall".into(),
+        on: Selection::Face { axis: 0, upper },
+        motion: [Some(Motion::Rest)],
+    };
+    Ok(Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: h, cells: [cells] },
+        approximation: Approximation::from(Bspline::Quadratic),
+        bodies: vec![Body {
+            name: "bar".into(),
+            law: Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?)),
+            density: 1.0,
+        }],
+        particles,
+        loads: Loads { prescribed: vec![wall(false), wall(true)], ..Loads::default() },
+        settings: Settings { lumping: 0.0, error_tolerance: Some(1.0), ..Settings::default() },
+        clock: Clock::new(dt, 10),
+        external_work: 0.0,
+    })
+}
+
+/// The trapezoidal rule errs by Δt³ u‴/12 in a step, in the mean square by V ω² cos(ωt) √½ of it: the estimate says so, and is of third
+/// order.
+#[test]
+fn the_estimate_is_the_local_error_of_an_oscillation() -> Result<(), Failure> {
+    let mut last = None;
+    for steps in [10, 20, 40] {
+        let dt = 0.2 / f64::from(steps);
+        let mut simulation = bar(dt)?;
+        let mut estimate = 0.0;
+        for _ in 0..steps {
+            estimate = simulation.advance()?.error.ok_or("no error")? * simulation.grid.spacing;
+        }
+        let middle = simulation.clock.time() - 0.5 * dt;
+        let third = SPEED * PI * PI * (PI * middle).cos() * 0.5_f64.sqrt();
+        let effectivity = estimate / (dt.powi(3) * third / 12.0);
+        assert!((0.97..1.03).contains(&effectivity), "dt = {dt}: {effectivity}");
+        if let Some(last) = last {
+            let order = f64::log2(last / estimate);
+            assert!((2.9..3.1).contains(&order), "{order}");
+        }
+        last = Some(estimate);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_step_that_errs_too_much_is_taken_back_and_the_next_ones_grow_when_they_may() -> Result<(), Failure> {
+    // The error of a step of 0.1 is near 0.1³ V π² √½ / 12 / h = 3.7e-8 spacings at first.
+    let mut simulation = bar(0.1)?;
+    let tolerance = 1e-9;
+    simulation.settings.error_tolerance = Some(tolerance);
+    let before = simulation.particles.clone();
+    assert!(simulation.clone().step().is_err() && simulation.particles == before);
+    let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
+    while simulation.clock.time() < 1.0 {
+        let report = simulation.advance()?;
+        assert!(report.error.is_some_and(|error| error <= tolerance), "{:?}", report.error);
+        assert!(report.failed.iter().all(|attempt| attempt.inaccurate && attempt.why.contains("grid spacings")));
+        (shortest, longest) = (shortest.min(report.dt), longest.max(report.dt));
+    }
+    // u‴ vanishes at the turning point, t = ½: steps there are longer. Every whole step is met.
+    assert!(longest >= 2.0 * shortest, "{shortest} {longest}");
+    assert_eq!(simulation.clock.time(), 1.0);
+    // At the limit of halvings the step is taken all the same, and says what it errs.
+    let mut limited = bar(0.1)?;
+    limited.settings.error_tolerance = Some(tolerance);
+    limited.clock = Clock::new(0.1, 1);
+    assert!(limited.advance()?.error.is_some_and(|error| error > tolerance));
+    Ok(())
+}
+
+/// An impact needs short steps, the flight before it none.
+#[test]
+fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failure> {
+    let end = 25.6;
+    let run = |overrides: &[&str]| -> Result<(Simulation<2>, usize), Failure> {
+        let mut simulation = scene::<2>("rebound.json", overrides)?;
+        let mut attempts = 0;
+        while simulation.clock.time() < end - 1e-9 {
+            attempts += 1 + simulation.advance()?.failed.len();
+        }
+        Ok((simulation, attempts))
+    };
+    let distance = |a: &Simulation<2>, b: &Simulation<2>| {
+        let squares = a.particles.position.iter().zip(&b.particles.position).map(|(x, y)| (x - y).norm_squared());
+        (squares.sum::<f64>() / a.particles.len() as f64).sqrt()
+    };
+    let (exact, _) = run(&["time.step=0.00625"])?;
+    let (uniform, all) = run(&["time.step=0.025"])?;
+    let adaptive = ["time.step=0.8", r#"time.adaptive={"tolerance":1e-5}"#];
+    let (one, few) = run(&adaptive)?;
+    println!("uniform {all} {:e}, adaptive {few} {:e}", distance(&uniform, &exact), distance(&one, &exact));
+    assert!(
+        distance(&one, &exact) <= distance(&uniform, &exact),
+        "{} {}",
+        distance(&one, &exact),
+        distance(&uniform, &exact)
+    );
+    assert!(3 * few < 2 * all, "{few} attempts, {all} steps");
+    // Once more, the same bits.
+    let (again, same) = run(&adaptive)?;
+    assert_eq!((again.particles, same), (one.particles, few));
+    Ok(())
+}

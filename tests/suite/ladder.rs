@@ -1,0 +1,177 @@
+//! Only what a scene requires: each thing left out makes a step cheaper in passes over the particles or in bytes, and dearer in
+//! neither; and the box around a body costs nothing.
+
+use crate::support::{Failure, scene};
+use bfree::field::Field;
+use bfree::material::{ClosedTangent, Lame, Law, NeoHookean};
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::phases::Phase;
+use bfree::plan::Plan;
+use bfree::scalar::Real;
+use bfree::simulation::Simulation;
+use bfree::tensor::{Deformation, Tensor};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What a step costs, iterations apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cost {
+    /// Passes over the particles outside Newton's method.
+    passes: u64,
+    /// Bytes of all arrays.
+    bytes: u64,
+}
+
+/// What the first step costs.
+fn cost<const D: usize>(simulation: &Simulation<D>) -> Result<Cost, Failure> {
+    let plan = Plan::of(simulation)?;
+    let report = simulation.clone().advance()?;
+    let passes = report.seconds.passes();
+    // An iteration of the projection takes two passes for each of the two fields it is run for; how many there are is no plan.
+    let iterations = 2 * report.projection_iterations as u64;
+    let outside = passes.iter().sum::<u64>() - passes[Phase::Newton as usize] - iterations;
+    Ok(Cost { passes: outside, bytes: plan.arrays.iter().map(|array| array.bytes).sum() })
+}
+
+const LADDER: [(&str, &str); 8] = [
+    ("limited smoothing", r#"transfer="flip""#),
+    ("consistent mass", "time.lumping=1"),
+    ("moving floor", r#"boundary={"bottom":"sliding","left":"sliding","right":"sliding"}"#),
+    ("pressure", "pressures=[]"),
+    ("inertia", r#"time={"step":0.01,"end":5,"inertia":"none"}"#),
+    ("gravity", "gravity=null"),
+    ("double precision", r#"solver.krylov.precision="mixed""#),
+    ("restarts after 30 vectors", r#"solver.krylov.method="conjugate_gradient""#),
+];
+
+/// A block with everything.
+const ALL: [&str; 5] = [
+    r#"transfer={"limited":{"rate":1}}"#,
+    "time.lumping=0.5",
+    r#"boundary={"bottom":{"velocity":[[0,[null,0]],[1,[null,0.01]]]},"left":"sliding","right":"sliding"}"#,
+    r#"pressures=[{"body":"block","region":{"box":{"min":[0,0.999],"max":[1,1.1]}},"pressure":10}]"#,
+    "output={}",
+];
+
+#[test]
+fn each_step_down_the_ladder_is_cheaper() -> Result<(), Failure> {
+    let mut overrides = ALL.to_vec();
+    let mut above = cost(&scene::<2>("compaction_confined.json", &overrides)?)?;
+    for (without, key) in LADDER {
+        if without == "inertia" {
+            // It takes the keys with it that speak of it.
+            overrides.retain(|key| !key.starts_with("transfer") && !key.starts_with("time"));
+        }
+        overrides.push(key);
+        let below = cost(&scene::<2>("compaction_confined.json", &overrides)?)?;
+        assert!(below.passes <= above.passes && below.bytes <= above.bytes, "without {without}: {above:?}, {below:?}");
+        assert!(below != above, "without {without} nothing is cheaper: {above:?}");
+        above = below;
+    }
+    // What is left: one pass to move the particles, one for the reactions of the walls.
+    assert_eq!(above.passes, 2);
+    Ok(())
+}
+
+#[test]
+fn a_dimension_less_is_fewer_bytes_of_each_particle() -> Result<(), Failure> {
+    fn particles_of<const D: usize>(simulation: &Simulation<D>) -> Result<f64, Failure> {
+        let plan = Plan::of(simulation)?;
+        let bytes: u64 =
+            plan.arrays.iter().filter(|array| array.name.starts_with("particles")).map(|one| one.bytes).sum();
+        Ok(bytes as f64 / plan.particles as f64)
+    }
+    let [one, two, three] = [
+        particles_of(&scene::<1>("riemann.json", &[])?)?,
+        particles_of(&scene::<2>("rebound.json", &[])?)?,
+        particles_of(&scene::<3>("ball_drop.json", &[])?)?,
+    ];
+    // x, v, a and what they become, 6 vectors; H and what it becomes, 2 tensors; volume, mass, body.
+    let expected = |d: f64| 8.0 * (6.0 * d + 2.0 * d * d) + 20.0;
+    // The bar has a mass that is partly consistent: another vector.
+    assert_eq!([one, two, three], [expected(1.0) + 8.0, expected(2.0), expected(3.0)]);
+    Ok(())
+}
+
+#[test]
+fn the_box_around_a_body_costs_nothing() -> Result<(), Failure> {
+    // Two discs in flight, in a box, and in one a hundred times as large.
+    let mut small = scene::<2>("collision.json", &[])?;
+    let mut large = scene::<2>("collision.json", &["grid.size=[100, 50]"])?;
+    let (of_small, of_large) = (Plan::of(&small)?, Plan::of(&large)?);
+    assert!(of_large.grid_nodes > 90 * of_small.grid_nodes, "{} {}", of_large.grid_nodes, of_small.grid_nodes);
+    assert_eq!((of_small.active_nodes, of_small.unknowns), (of_large.active_nodes, of_large.unknowns));
+    assert_eq!(of_small.arrays, of_large.arrays);
+    for _ in 0..3 {
+        let (a, b) = (small.advance()?, large.advance()?);
+        assert_eq!(a.seconds.passes(), b.seconds.passes());
+        assert_eq!(a.newton.history.counts, b.newton.history.counts);
+    }
+    assert_eq!(small.particles, large.particles);
+    Ok(())
+}
+
+/// Ciarlet's law, counting how often energies and stresses are asked for.
+#[derive(Clone, Debug)]
+struct Counting {
+    law: NeoHookean,
+    energies: Arc<AtomicU64>,
+    stresses: Arc<AtomicU64>,
+}
+
+impl Law for Counting {
+    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.energies.fetch_add(1, Ordering::Relaxed);
+        self.law.energy(at)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.stresses.fetch_add(1, Ordering::Relaxed);
+        self.law.stress(at)
+    }
+
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        self.law.elasticity(at, x)
+    }
+
+    fn freeze<T: Real, const D: usize>(&self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, v: T) -> ClosedTangent<T, D> {
+        self.law.freeze(f_n, at, v)
+    }
+}
+
+#[test]
+fn fields_not_asked_for_are_not_computed() -> Result<(), Failure> {
+    let (energies, stresses) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
+    let law = NeoHookean::ciarlet(Lame::new(5e4, 3e4)?);
+    let counting = |_: &_| Counting { law, energies: Arc::clone(&energies), stresses: Arc::clone(&stresses) };
+    let simulation = scene::<2>("column_static.json", &[])?.with_laws(counting);
+    let particles = simulation.particles.len() as u64;
+    let folder = tempfile::tempdir()?;
+    // (fields, stresses of a snapshot: one in the plane and one out of it)
+    for (fields, expected) in [
+        (None, 0),
+        (Some(vec![Field::Displacement, Field::Jacobian]), 0),
+        (Some(vec![Field::Stress]), 2 * particles),
+        (Some(vec![Field::Stress, Field::Pressure]), 4 * particles),
+    ] {
+        let settings = OutputSettings {
+            directory: folder.path().to_owned(),
+            snapshot_every: fields.as_ref().map(|_| 0.1),
+            fields: fields.unwrap_or_default(),
+            probes: Vec::new(),
+            end_time: 1.0,
+            audience: Audience::Nobody,
+        };
+        let reference = Reference::of(&simulation);
+        energies.store(0, Ordering::Relaxed);
+        stresses.store(0, Ordering::Relaxed);
+        // Writes the state before the first step.
+        Recorder::start(settings, &simulation, reference)?;
+        assert_eq!(stresses.load(Ordering::Relaxed), expected);
+        // For history.csv.
+        assert_eq!(energies.load(Ordering::Relaxed), particles);
+    }
+    Ok(())
+}

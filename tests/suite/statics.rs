@@ -1,0 +1,215 @@
+//! Load steps without inertia.
+
+use crate::support::{Failure, scene};
+use bfree::causes;
+use bfree::field::Field;
+use bfree::material::{Law, first_piola};
+use bfree::output::Reference;
+use bfree::scene;
+use bfree::simulation::{Simulation, StepError};
+use bfree::tensor::Tensor;
+
+const COLUMN: &str = "column_static.json";
+const FREE: &str = r#"boundary={"left":"free"}"#;
+
+/// λ with P(λ) = `stress` in uniaxial strain, by bisection.
+fn stretch(law: &impl Law, stress: f64) -> f64 {
+    let piola = |stretch: f64| {
+        let (f, h) = (Tensor::<f64, 1>::new(stretch), Tensor::<f64, 1>::new(stretch - 1.0));
+        first_piola(law, &f, h).map_or(f64::NAN, |p| p[0])
+    };
+    let (mut low, mut high) = (0.01, 10.0);
+    for _ in 0..100 {
+        let middle: f64 = 0.5 * (low + high);
+        if piola(middle) < stress { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// Runs to `end`; Newton iterations of each step.
+fn run<const D: usize>(simulation: &mut Simulation<D>, end: u64) -> Result<Vec<usize>, Failure> {
+    let mut iterations = Vec::new();
+    while simulation.clock.nominal_steps() < end {
+        iterations.push(simulation.advance()?.newton.history.iterations.len());
+    }
+    Ok(iterations)
+}
+
+/// P(X) = −ρ₀ g (H − X): nothing but the weight above, whatever the law; λ(X) from the law, u(X) = ∫ (λ − 1) dX.
+#[test]
+fn a_column_carries_the_weight_above() -> Result<(), Failure> {
+    let (density, g, height) = (2700.0, 9.81, 1.0);
+    let laws = ["neo_hookean", "neo_hookean_logarithmic", "st_venant_kirchhoff"];
+    for (law, krylov) in laws.into_iter().zip(["double", "mixed", "double"]) {
+        let material = format!(r#"bodies.0.material={{"{law}":{{"lambda":5e4,"shear":3e4}}}}"#);
+        let precision = format!("solver.krylov.precision=\"{krylov}\"");
+        // In one step from rest: the particles are where the quadrature wants them.
+        let one_step = ["time.step=1", "gravity.curve=null", r#"approximation={"bspline":{"degree":2}}"#];
+        let overrides = [material.as_str(), &precision, one_step[0], one_step[1], one_step[2]];
+        let mut simulation = scene::<2>(COLUMN, &overrides)?;
+        let start = simulation.particles.position.clone();
+        run(&mut simulation, 1)?;
+        let law = &simulation.bodies[0].law;
+        // Quadratic B-splines err by a part of (h/H)².
+        let bound = (simulation.grid.spacing / height).powi(2);
+        let strain = |x: f64| stretch(law, -density * g * (height - x)) - 1.0;
+        for (p, x) in start.iter().enumerate() {
+            let h = simulation.particles.displacement_gradient[p];
+            // Confined: no strain across.
+            assert!(h[(0, 0)].abs() < 1e-12 && h[(0, 1)].abs() < 1e-12 && h[(1, 0)].abs() < 1e-12, "{h}");
+            assert!((h[(1, 1)] - strain(x[1])).abs() < bound, "H = {} at {}, {}", h[(1, 1)], x[1], strain(x[1]));
+        }
+        // Simpson's rule up to the top particle.
+        let (top, x) = start.iter().enumerate().max_by(|a, b| a.1[1].total_cmp(&b.1[1])).ok_or("no particles")?;
+        let n = 200;
+        let weight = |k: usize| if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
+        let sum: f64 = (0..=n).map(|k| weight(k) * strain(x[1] * k as f64 / n as f64)).sum();
+        let u = simulation.particles.position[top][1] - x[1];
+        let exact = sum * x[1] / (3.0 * n as f64);
+        assert!((u - exact).abs() < bound * exact.abs(), "{u} instead of {exact}");
+        // A weight put on at once does about twice the work that is stored: exactly twice for a linear law.
+        let ratio = simulation.external_work / simulation.strain_energy();
+        assert!((1.8..2.2).contains(&ratio), "{ratio}");
+    }
+    Ok(())
+}
+
+#[test]
+fn nothing_of_motion_is_stored_and_newton_is_quadratic() -> Result<(), Failure> {
+    let mut simulation = scene::<2>(COLUMN, &[])?;
+    simulation.settings.check_tangent = std::num::NonZeroU64::new(1);
+    let iterations = run(&mut simulation, 10)?;
+    assert!(iterations.iter().all(|&count| count <= 6), "{iterations:?}");
+    let particles = &simulation.particles;
+    assert_eq!((particles.velocity.capacity(), particles.acceleration.capacity()), (0, 0));
+    let velocity = Field::Velocity.values(&simulation, &Reference::of(&simulation)).expect_err("there is none");
+    assert_eq!(velocity.to_string(), "particles without inertia have no velocity");
+    // A slow load does the work that is stored.
+    let (work, stored) = (simulation.external_work, simulation.strain_energy());
+    assert!((work - stored).abs() < 5e-3 * stored, "{work} {stored}");
+    Ok(())
+}
+
+#[test]
+fn a_load_on_the_end_of_a_bar_is_its_stress() -> Result<(), Failure> {
+    // P = T; and P = −p under a follower pressure, since uniaxial strain leaves the area as it is. The load enters at the particles of
+    // the surface, so through the last cell the stress grows to that.
+    let end = r#""body":"column","region":{"box":{"min":[0,0.999],"max":[0.4,1.1]}}"#;
+    let traction = format!(r#"tractions=[{{{end},"traction":[0,2e4]}}]"#);
+    let pressure = format!(r#"pressures=[{{{end},"pressure":2e4}}]"#);
+    for (load, stress) in [(traction, 2e4), (pressure, -2e4)] {
+        let overrides = ["grid.size=[0.4, 1.5]", "approximation=\"linear\"", "gravity=null", &load, "time.step=1"];
+        let mut simulation = scene::<2>(COLUMN, &overrides)?;
+        let start = simulation.particles.position.clone();
+        run(&mut simulation, 1)?;
+        let exact = stretch(&simulation.bodies[0].law, stress) - 1.0;
+        for (x, h) in start.iter().zip(&simulation.particles.displacement_gradient).filter(|(x, _)| x[1] < 0.95) {
+            assert!((h[(1, 1)] / exact - 1.0).abs() < 1e-7, "{} at {}, {exact}", h[(1, 1)], x[1]);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn what_nothing_holds_is_said() -> Result<(), Failure> {
+    for (boundary, words) in [
+        (FREE, "nothing holds \"column\" along y, and the loads push there"),
+        (r#"boundary={"left":"sliding","right":"sliding"}"#, "nothing holds \"column\" along y"),
+    ] {
+        let mut simulation = scene::<2>(COLUMN, &[boundary])?;
+        let before = simulation.particles.clone();
+        let error = simulation.advance().expect_err("it would fall");
+        assert!(matches!(*error.cause, StepError::Loose { .. }), "{error:?}");
+        assert_eq!(error.failed.len(), 1, "a shorter step would not help");
+        let text = causes::on_one_line(&error);
+        assert!(text.contains(words) && text.contains("boundary condition"), "{text}");
+        assert_eq!(simulation.particles, before);
+    }
+    // On a hinge below a corner.
+    let hinge = r#"prescribed=[{"region":{"box":{"min":[-0.01,-0.01],"max":[0.01,0.01]}},"displacement":[[0,[0,0]]]}]"#;
+    let mut simulation = scene::<2>(COLUMN, &[FREE, hinge])?;
+    let error = simulation.advance().expect_err("it would turn");
+    assert!(causes::on_one_line(&error).contains("nothing keeps \"column\" from turning"), "{error:?}");
+    Ok(())
+}
+
+#[test]
+fn what_nothing_pushes_needs_no_hold() -> Result<(), Failure> {
+    // A block too flat to buckle, on a smooth floor between no walls: the tangent is singular, and the loads ask nothing of its null space.
+    let floor = r#"boundary={"bottom":"sliding"}"#;
+    let mut found: Vec<f64> = Vec::new();
+    for method in [r#"{"gmres":{}}"#, r#""conjugate_gradient""#] {
+        let method = format!("solver.krylov.method={method}");
+        let wide = ["grid.size=[1.2, 1]", r#"bodies.0.shape={"box":{"min":[0.2,0],"max":[1,0.5]}}"#];
+        let mut simulation = scene::<2>(COLUMN, &[floor, &method, wide[0], wide[1], "output.probes=[]"])?;
+        run(&mut simulation, 10)?;
+        let particles = &simulation.particles;
+        let mean: f64 = particles.position.iter().map(|x| x[0]).sum::<f64>() / particles.len() as f64;
+        assert!((mean - 0.6).abs() < 1e-9, "it does not wander: {mean}");
+        found.push(particles.position.iter().map(|x| x[1]).sum());
+    }
+    assert!((found[0] - found[1]).abs() < 1e-8 * found[0], "{found:?}");
+    Ok(())
+}
+
+#[test]
+fn keys_of_inertia_are_refused() -> Result<(), Failure> {
+    for (key, path) in [
+        ("time.beta=0.25", "time.beta"),
+        ("time.gamma=0.5", "time.gamma"),
+        ("time.lumping=1", "time.lumping"),
+        ("time.initial_guess=\"zero\"", "time.initial_guess"),
+        ("time.wall_update=\"literal\"", "time.wall_update"),
+        ("transfer=\"flip\"", "transfer"),
+        ("bodies.0.velocity=[0,0]", "bodies[0].velocity"),
+        (
+            r#"initial_velocity={"nodes":[{"region":{"box":{"min":[0,0],"max":[1,1]}},"velocity":[0,0]}]}"#,
+            "initial_velocity",
+        ),
+        (r#"output.fields=["stress","velocity"]"#, "output.fields[1]"),
+        ("output.probes.0.field=\"acceleration\"", "output.probes[0].field"),
+    ] {
+        let error = scene::<2>(COLUMN, &[key]).expect_err(key).to_string();
+        let words = "time.inertia is \"none\", and without inertia it means nothing";
+        assert!(error.contains(path) && error.contains(words) && error.contains(key), "{key}: {error}");
+        // With inertia they are welcome.
+        scene::<2>(COLUMN, &[key, "time.inertia=\"newmark\""])?;
+    }
+    // What is not given is not there, and what is written can be read again.
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(COLUMN);
+    let read = scene::read_file(&path, &["output.fields=null".parse()?])?;
+    assert_eq!((read.time.beta, read.transfer), (None, None));
+    assert_eq!(read.output.fields, Some(vec![Field::Displacement, Field::Stress, Field::Jacobian]));
+    assert_eq!(scene::read(&serde_json::to_string(&read)?, &[])?, read);
+    Ok(())
+}
+
+#[test]
+fn units_do_not_matter_to_load_steps() -> Result<(), Failure> {
+    // Length and stress by powers of two, time by any factor: without inertia it is a name of the load alone.
+    let (length, stress) = (2.0_f64.powi(-20), 2.0_f64.powi(30));
+    let mut plain = scene::<2>(COLUMN, &[])?;
+    let mut scaled = plain.clone();
+    scaled.grid.origin *= length;
+    scaled.grid.spacing *= length;
+    for body in &mut scaled.bodies {
+        let bfree::material::Material::NeoHookean(law) = &mut body.law else { return Err("another law".into()) };
+        law.lame.lambda *= stress;
+        law.lame.shear *= stress;
+    }
+    let particles = &mut scaled.particles;
+    particles.position.iter_mut().for_each(|x| *x *= length);
+    particles.volume.iter_mut().for_each(|volume| *volume *= length * length);
+    if let Some(gravity) = &mut scaled.loads.gravity {
+        gravity.acceleration *= length * stress;
+        gravity.curve = bfree::mechanics::loads::Curve::new(vec![[0.0, 0.0], [8.0, 1.0]])?;
+    }
+    scaled.clock = bfree::clock::Clock::new(0.8, 10);
+    run(&mut plain, 10)?;
+    run(&mut scaled, 10)?;
+    assert_eq!(plain.particles.displacement_gradient, scaled.particles.displacement_gradient);
+    for (x, y) in plain.particles.position.iter().zip(&scaled.particles.position) {
+        assert_eq!(x.map(|x| (x * length).to_bits()), y.map(f64::to_bits));
+    }
+    Ok(())
+}
