@@ -6,6 +6,7 @@ mod dynamics;
 mod equilibrium;
 mod examples;
 mod hostile;
+mod laws;
 mod loads;
 mod output;
 mod points;
