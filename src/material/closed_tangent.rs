@@ -91,23 +91,16 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
     }
 }
 
-impl<const D: usize> ClosedTangent<f64, D> {
-    /// The tangent times `factor`.
-    pub fn times(&self, factor: f64) -> Self {
-        let by_factor = |a: [[f64; D]; D]| a.map(|row| row.map(|x| x * factor));
-        Self {
-            a: self.a,
-            right: by_factor(self.right),
-            bulk: self.bulk * factor,
-            q: self.q * factor,
-            both: self.both.map(|[b, c]| [b, by_factor(c)]),
+/// A tensor by rows.
+#[inline(always)]
+pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
+    let mut rows = [[T::zero(); D]; D];
+    for i in 0..D {
+        for k in 0..D {
+            rows[i][k] = a[(i, k)];
         }
     }
-}
-
-/// A tensor by rows.
-pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
-    std::array::from_fn(|i| std::array::from_fn(|k| a[(i, k)]))
+    rows
 }
 
 /// A tensor from its rows.
@@ -135,6 +128,7 @@ impl<T: Real, const D: usize> FrozenTangent<T, D> for ClosedTangent<T, D> {
         }
     }
 
+    #[inline(always)]
     fn closed(&self) -> Option<ClosedTangent<T, D>> {
         Some(*self)
     }

@@ -71,6 +71,11 @@ pub trait Law: Send + Sync {
         volume: T,
     ) -> Self::Frozen<T, D>;
 
+    /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
+    fn shipped(&self) -> Option<&Material> {
+        None
+    }
+
     /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
     /// By embedding into 3D.
     fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>) -> f64 {
@@ -78,6 +83,12 @@ pub trait Law: Send + Sync {
         // σ_zz = P_zz F_zz / J with F_zz = 1
         self.stress(&embedded)[(2, 2)] / at.jacobian
     }
+}
+
+/// Something to be done with a law of whatever type.
+pub(crate) trait LawVisitor {
+    /// Does it.
+    fn visit<L: Law>(self, law: &L);
 }
 
 /// The tangent of one particle, frozen: everything its product needs and nothing more.
@@ -97,15 +108,53 @@ pub trait FrozenTangent<T: Real, const D: usize>: Clone + Send + Sync {
     }
 }
 
+/// Whether a body can have this det F.
+#[inline(always)]
+fn possible(det_f: f64) -> bool {
+    det_f > 0.0 && det_f.is_finite()
+}
+
+impl NonPositiveJacobian {
+    /// Checks det F > 0; refuses NaN and infinity.
+    ///
+    /// # Errors
+    /// `det_f` is none of a body.
+    #[inline(always)]
+    pub fn check(det_f: f64) -> Result<(), Self> {
+        if possible(det_f) { Ok(()) } else { Err(Self { det_f }) }
+    }
+}
+
 /// Checks det F > 0, on J and never on J²; refuses NaN.
+///
+/// # Errors
+/// det F ≤ 0.
 #[inline(always)]
 pub fn admissible<T: Real, const D: usize>(h: Tensor<T, D>) -> Result<Deformation<T, D>, NonPositiveJacobian> {
     let at = Deformation::new(h);
-    let det_f = at.jacobian.value();
-    if det_f > 0.0 && det_f.is_finite() { Ok(at) } else { Err(NonPositiveJacobian { det_f }) }
+    NonPositiveJacobian::check(at.jacobian.value())?;
+    Ok(at)
 }
 
-/// `P = F S` (eq. 7), with the F on the left and the H = F − I inside S given separately. The only place that forms P.
+/// The deformation, or that of the body at rest where det F is none of a body; and det F, for the caller to judge.
+#[inline(always)]
+pub(crate) fn admissible_or_rest<T: Real, const D: usize>(h: Tensor<T, D>) -> (Deformation<T, D>, f64) {
+    let at = Deformation::new(h);
+    let det_f = at.jacobian.value();
+    (if possible(det_f) { at } else { Deformation::new(Tensor::zeros()) }, det_f)
+}
+
+/// `P = F S` (eq. 7), F and S of different deformations if derivatives ask for it. The only place that forms P.
+#[inline(always)]
+pub(crate) fn piola<L: Law, T: Real, const D: usize>(
+    law: &L,
+    f_left: &Tensor<T, D>,
+    at: &Deformation<T, D>,
+) -> Tensor<T, D> {
+    f_left * law.stress(at)
+}
+
+/// `P = F S` (eq. 7), with the F on the left and the H = F − I inside S given separately.
 ///
 /// # Errors
 /// det F ≤ 0 of the F inside S.
@@ -115,7 +164,7 @@ pub fn first_piola<L: Law, T: Real, const D: usize>(
     f_left: &Tensor<T, D>,
     h_inside: Tensor<T, D>,
 ) -> Result<Tensor<T, D>, NonPositiveJacobian> {
-    Ok(f_left * law.stress(&admissible(h_inside)?))
+    Ok(piola(law, f_left, &admissible(h_inside)?))
 }
 
 /// A D×D tensor as the upper left part of a 3×3 one, the rest zero.
@@ -176,6 +225,16 @@ macro_rules! materials {
                 &self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, volume: T,
             ) -> Self::Frozen<T, D> {
                 match self { $(Self::$law(law) => FrozenMaterial::$law(law.freeze(f_n, at, volume))),* }
+            }
+            fn shipped(&self) -> Option<&Material> {
+                Some(self)
+            }
+        }
+
+        impl Material {
+            /// Calls `visitor` with the law, by a type that leaves no branch in a loop over particles.
+            pub(crate) fn with(&self, visitor: impl LawVisitor) {
+                match self { $(Self::$law(law) => law.with(visitor)),* }
             }
         }
 

@@ -1,7 +1,7 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Lame, Law};
+use super::{ClosedTangent, Lame, Law, LawVisitor};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled};
 
@@ -25,13 +25,23 @@ pub struct NeoHookean {
 
 impl NeoHookean {
     /// Ciarlet's law, the one of the paper.
+    #[inline(always)]
     pub fn ciarlet(lame: Lame) -> Self {
         Self { lame, volumetric: Volumetric::Ciarlet }
     }
 
     /// The law with a logarithmic volumetric energy.
+    #[inline(always)]
     pub fn logarithmic(lame: Lame) -> Self {
         Self { lame, volumetric: Volumetric::Logarithmic }
+    }
+
+    /// Calls `visitor` with a type for each volumetric response.
+    pub(super) fn with(&self, visitor: impl LawVisitor) {
+        match self.volumetric {
+            Volumetric::Ciarlet => visitor.visit(&Of::<false>(self.lame)),
+            Volumetric::Logarithmic => visitor.visit(&Of::<true>(self.lame)),
+        }
     }
 
     /// J U'(J): Λ/2 (J²−1), or Λ ln J
@@ -121,5 +131,44 @@ impl Law for NeoHookean {
             q: (self.volumetric_stress(at) - shear) * volume,
             both: None,
         }
+    }
+}
+
+/// The solid whose volumetric response is known to the compiler: no branch is left in a loop over particles.
+struct Of<const LOGARITHMIC: bool>(Lame);
+
+impl<const LOGARITHMIC: bool> Of<LOGARITHMIC> {
+    #[inline(always)]
+    fn law(&self) -> NeoHookean {
+        if LOGARITHMIC { NeoHookean::logarithmic(self.0) } else { NeoHookean::ciarlet(self.0) }
+    }
+}
+
+impl<const LOGARITHMIC: bool> Law for Of<LOGARITHMIC> {
+    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
+
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.law().energy(at)
+    }
+
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.law().stress(at)
+    }
+
+    #[inline(always)]
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        self.law().elasticity(at, x)
+    }
+
+    #[inline(always)]
+    fn freeze<T: Real, const D: usize>(
+        &self,
+        f_n: &Tensor<T, D>,
+        at: &Deformation<T, D>,
+        volume: T,
+    ) -> ClosedTangent<T, D> {
+        self.law().freeze(f_n, at, volume)
     }
 }

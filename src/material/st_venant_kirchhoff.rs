@@ -1,7 +1,7 @@
 //! St. Venant–Kirchhoff solid (the paper's appendix B.2).
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Lame, Law};
+use super::{ClosedTangent, Lame, Law, LawVisitor};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
@@ -10,6 +10,13 @@ use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scal
 pub struct StVenantKirchhoff {
     /// Λ and G.
     pub lame: Lame,
+}
+
+impl StVenantKirchhoff {
+    /// Calls `visitor`.
+    pub(super) fn with(&self, visitor: impl LawVisitor) {
+        visitor.visit(self);
+    }
 }
 
 /// Λ tr(X) I + 2G X for a symmetric X: S from E, and ℂ:X.

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod loads;
+mod point;
 pub mod residual;
 pub mod rigid;
 pub mod single;

@@ -1,24 +1,17 @@
 //! The residual R(Δφ) of one step, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 
-use crate::material::{Law, NonPositiveJacobian, admissible, first_piola};
+use crate::material::{Law, NonPositiveJacobian, admissible};
 use crate::mechanics::loads::{PrescribedDof, PressurePoint};
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::point::{self, carried};
+use crate::mechanics::sweep::{Inertia, Laws, Supports};
 use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+use crate::tensor::{Tensor, Vector, cofactor, identity};
 use std::sync::OnceLock;
 
-/// A particle whose deformation is impossible.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("particle {particle} cannot be deformed so")]
-pub struct Inadmissible {
-    /// Number of the particle.
-    pub particle: usize,
-    /// The determinant found.
-    pub source: NonPositiveJacobian,
-}
+pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
@@ -48,40 +41,6 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
     /// The same for systems in single precision.
     pub(super) single_inverse_blocks: OnceLock<Vec<Tensor<f32, D>>>,
-}
-
-/// Which occurrences of Δφ carry derivatives. In the code that computes `F S`, letting only the left F carry the dual part gives the
-/// geometric term of the tangent, only the F inside S the material term, and so on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Carry {
-    /// Δφ in the acceleration.
-    pub inertia: bool,
-    /// F on the left of P = F S.
-    pub left: bool,
-    /// F inside S.
-    pub inside: bool,
-    /// F in the follower pressure.
-    pub pressure: bool,
-}
-
-impl Carry {
-    /// All of them: the residual itself.
-    pub const ALL: Self = Self { inertia: true, left: true, inside: true, pressure: true };
-    /// None of them.
-    pub const NONE: Self = Self { inertia: false, left: false, inside: false, pressure: false };
-}
-
-/// `x`, or its real part alone.
-#[inline(always)]
-fn carried<T: Real>(x: T, carries: bool) -> T {
-    if carries { x } else { T::lit(x.value()) }
-}
-
-/// H_{n+1} of F = ΔF F_n with ΔF = I + G: H = G + H_n + G H_n, which loses no digits (eq. 45).
-#[inline(always)]
-pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) -> Tensor<T, D> {
-    let h_n = h_n.map(T::lit);
-    g + h_n + g * h_n
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
@@ -167,13 +126,15 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         g: &Tensor<T, D>,
         carry: Carry,
     ) -> Result<Tensor<T, D>, Inadmissible> {
-        let h_n = &self.particles.displacement_gradient[p];
-        let h = compose(g, h_n);
-        let f_left = identity::<T, D>() + h.map(|x| carried(x, carry.left));
-        let piola = first_piola(self.law(p), &f_left, h.map(|x| carried(x, carry.inside)))
-            .map_err(|source| Inadmissible { particle: p, source })?;
-        let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
-        Ok(scaled(&(piola * f_n_t), T::lit(self.particles.volume[p])))
+        let (h_n, volume) = (&self.particles.displacement_gradient[p], self.particles.volume[p]);
+        let (stress, det_f) = point::internal(self.law(p), g, h_n, volume, carry);
+        NonPositiveJacobian::check(det_f).map_err(|source| Inadmissible { particle: p, source })?;
+        Ok(stress)
+    }
+
+    /// The laws of the particles, for the sweep.
+    pub(super) fn laws(&self) -> Laws<'_, D, L> {
+        Laws { particles: self.particles, bodies: self.bodies }
     }
 
     /// Σ N p A cof(F) N: adds minus the force of the follower pressure, T = −p J F⁻ᵀ N (reference normal N).
@@ -204,9 +165,14 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 motion.map_or_else(Vector::zeros, |(m, a)| a * m) - self.dead_load[node].map(T::lit)
             })
             .collect();
-        self.supports.assemble(dphi, &mut out, |p, u, g| {
-            Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
-        })?;
+        let inertia = |p: usize, u: &Vector<f64, D>| self.consistent_inertia(p, u);
+        let inertia: Option<Inertia<'_, D>> = if self.lumping < 1.0 { Some(&inertia) } else { None };
+        match self.supports.forces(&self.laws(), dphi, inertia, &mut out) {
+            Some(done) => done?,
+            None => self.supports.assemble(dphi, &mut out, |p, u, g| {
+                Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
+            })?,
+        }
         self.add_pressure(dphi, carry, &mut out);
         Ok(out)
     }
@@ -237,9 +203,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 inertia + self.dead_load[node].abs()
             })
             .collect();
-        self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
-            Ok((Vector::zeros(), self.internal(p, &g, Carry::ALL)?.abs()))
-        })?;
+        match self.supports.force_magnitudes(&self.laws(), dphi, &mut out) {
+            Some(done) => done?,
+            None => self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
+                Ok((Vector::zeros(), self.internal(p, &g, Carry::ALL)?.abs()))
+            })?,
+        }
         for point in &self.pressures {
             for (node, n, _) in self.supports.of(point.particle) {
                 out[node] += point.force.abs() * n.abs();

@@ -32,11 +32,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let scale = self.size(h);
         let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0) / scale;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-        let frozen = self.supports.single_tangents(dphi, both, inertia, |p, g| {
-            let closed = self.freeze_at(p, &g).map_err(Some)?.closed();
-            let closed = closed.filter(|form| both || form.both.is_none()).ok_or(None)?;
-            Ok(closed.times(1.0 / (scale * h * h)))
-        });
+        let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale);
         let frozen = match frozen {
             Some(Ok(frozen)) => frozen,
             Some(Err(Some(inadmissible))) => return Err(inadmissible),

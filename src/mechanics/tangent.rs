@@ -1,6 +1,7 @@
 //! The consistent tangent K(Δφ)·u, matrix-free: frozen at Δφ, applied, never stored (eqs. 30, 34, 38).
 
-use crate::material::{FrozenTangent, Law, admissible};
+use crate::material::{FrozenTangent, Law, NonPositiveJacobian, admissible};
+use crate::mechanics::point;
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
 use crate::mechanics::sweep::{ClosedTangents, Supports};
 use crate::particles::Body;
@@ -169,20 +170,18 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 
     /// The law of particle `p` frozen at ∇u_p = `g`.
-    pub(super) fn freeze_at(&self, p: usize, g: &Tensor<f64, D>) -> Result<L::Frozen<f64, D>, Inadmissible> {
-        let at = admissible(compose(g, &self.particles.displacement_gradient[p]))
-            .map_err(|source| Inadmissible { particle: p, source })?;
-        Ok(self.law(p).freeze(&self.f_n(p), &at, self.particles.volume[p]))
+    fn freeze_at(&self, p: usize, g: &Tensor<f64, D>) -> Result<L::Frozen<f64, D>, Inadmissible> {
+        let (h_n, volume) = (&self.particles.displacement_gradient[p], self.particles.volume[p]);
+        let (frozen, det_f) = point::freeze(self.law(p), g, h_n, volume);
+        NonPositiveJacobian::check(det_f).map_err(|source| Inadmissible { particle: p, source })?;
+        Ok(frozen)
     }
 
     fn freeze(&self, dphi: &[Vector<f64, D>]) -> Result<Frozen<D, L>, Inadmissible> {
         if let Some(both) = closed_form::<D, L>(self.bodies) {
             let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
             let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-            let closed = self.supports.closed_tangents(dphi, both, inertia, |p, g| {
-                let closed = self.freeze_at(p, &g).map_err(Some)?.closed();
-                closed.filter(|form| both || form.both.is_none()).ok_or(None)
-            });
+            let closed = self.supports.closed_tangents(&self.laws(), dphi, both, inertia);
             match closed {
                 Some(Ok(closed)) => return Ok(Frozen::Closed(closed)),
                 Some(Err(Some(inadmissible))) => return Err(inadmissible),

@@ -8,6 +8,7 @@ mod equilibrium;
 mod examples;
 mod hostile;
 mod ladder;
+mod laws;
 mod loads;
 mod output;
 mod points;

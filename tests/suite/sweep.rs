@@ -2,13 +2,13 @@
 
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{FrozenTangent, Lame, Law, Material, NeoHookean, StVenantKirchhoff, admissible};
-use bfree::mechanics::sweep::Supports;
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::sweep::{Laws, Supports};
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::nodes::Nodes;
-use bfree::particles::Body;
+use bfree::particles::{Body, Particles};
 use bfree::solver::Precision;
-use bfree::tensor::{Tensor, Vector, identity};
+use bfree::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 use std::convert::Infallible;
 
@@ -272,17 +272,16 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0 }];
     let (tiled, nodes) = Supports::with_precision(&shape, &grid, &positions, Precision::Mixed)?;
     let field = vec![Vector::zeros(); nodes.len()];
+    let mut particles = Particles::default();
+    positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
     for lumping in [1.0, 0.5] {
         let both = matches!(law, Material::StVenantKirchhoff(_));
         let weight = |_: usize| 1.0;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = if lumping < 1.0 { Some(&weight) } else { None };
-        let closed = |_: usize, g| {
-            admissible(g)
-                .map_err(|error| error.to_string())
-                .and_then(|at| law.freeze(&identity(), &at, 1.0).closed().ok_or_else(|| "no closed form".to_string()))
-        };
-        let frozen = tiled.closed_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
-        let single = tiled.single_tangents(&field, both, inertia, closed).ok_or("no vector lanes")??;
+        let laws = Laws { particles: &particles, bodies: &bodies };
+        let frozen = tiled.closed_tangents(&laws, &field, both, inertia).ok_or("no vector lanes")?;
+        let single = tiled.single_tangents(&laws, &field, both, inertia, 1.0).ok_or("no vector lanes")?;
+        let (frozen, single) = (frozen.map_err(|_| "no closed form")?, single.map_err(|_| "no closed form")?);
         assert!(frozen.bytes() > 0 && single.bytes() > 0);
         for (precision, bytes) in [(Precision::Double, frozen.bytes()), (Precision::Mixed, single.bytes())] {
             let counted = frozen_bytes(&bodies, &tiled, lumping, precision);

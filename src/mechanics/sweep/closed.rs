@@ -1,14 +1,16 @@
 //! Tangents in closed form, the particles of a group side by side.
 
 use super::block::{Block, Groups};
-use super::kernel::of_lane;
 use super::lanes::{LANES, Lanes, Number, SINGLE_LANES};
+use super::laws::{Laws, Tangents};
 use super::of_block;
 use super::tiled::{Tiled, first_error, keep_first};
 use super::waves;
-use crate::material::ClosedTangent;
+use crate::material::{ClosedTangent, Law};
+use crate::mechanics::point::Inadmissible;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
+use std::ops::Range;
 
 /// Tangents of all particles in closed form, for the supports they were made with.
 #[derive(Clone, Debug)]
@@ -47,31 +49,6 @@ impl Form {
         let symmetric = dimension * (dimension + 1) / 2;
         let both = if self.both { 2 * symmetric } else { 0 };
         dimension * dimension + symmetric + 2 + both + self.inertia as usize
-    }
-
-    /// Puts the entries of a tangent, in the order of the rows.
-    fn write<const D: usize>(self, tangent: &ClosedTangent<f64, D>, weight: f64, mut put: impl FnMut(f64)) {
-        #[inline(always)]
-        fn upper<const D: usize>(a: &[[f64; D]; D], put: &mut impl FnMut(f64)) {
-            for k in 0..D {
-                for i in 0..=k {
-                    put(a[i][k]);
-                }
-            }
-        }
-        tangent.a.as_flattened().iter().for_each(|&x| put(x));
-        upper(&tangent.right, &mut put);
-        put(tangent.bulk);
-        put(tangent.q);
-        if self.both {
-            // Beside laws that have the term, those that have not take b = c = 0.
-            let [b, c] = tangent.both.unwrap_or([[[0.0; D]; D]; 2]);
-            upper(&b, &mut put);
-            upper(&c, &mut put);
-        }
-        if self.inertia {
-            put(weight);
-        }
     }
 
     /// The tangent from the rows of a group.
@@ -126,52 +103,59 @@ impl<const D: usize> SingleTangents<D> {
 }
 
 /// The weight of a particle's consistent inertia.
-type Inertia<'a> = Option<&'a (dyn Fn(usize) -> f64 + Sync)>;
+type Weight<'a> = Option<&'a (dyn Fn(usize) -> f64 + Sync)>;
+
+/// Copies some of the lanes of a row. What comes behind them in `to` is still to be written, or belongs to no particle.
+#[inline(always)]
+fn copy<X: Real>(from: &[f64; LANES], lanes: Range<usize>, to: &mut [X]) {
+    match to.first_chunk_mut::<LANES>() {
+        Some(to) if lanes.start == 0 => *to = from.map(X::lit),
+        _ => to.iter_mut().zip(&from[lanes]).for_each(|(to, &from)| *to = X::lit(from)),
+    }
+}
 
 impl<const D: usize> Tiled<D> {
-    /// The tangents `point(p, ∇u_p)` of all particles, and their consistent inertia if there is one.
-    pub(super) fn closed<E: Send>(
+    /// The tangents of all particles at ∇u, and their consistent inertia if there is one.
+    pub(super) fn closed<L: Law>(
         &self,
+        laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
-        inertia: Inertia<'_>,
-        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
-    ) -> Result<ClosedTangents<D>, E> {
-        Ok(ClosedTangents(self.frozen(
-            |block| Some(&block.groups),
-            field,
-            Form { both, inertia: inertia.is_some() },
-            inertia,
-            point,
-        )?))
+        inertia: Weight<'_>,
+    ) -> Result<ClosedTangents<D>, Option<Inadmissible>> {
+        let form = Form { both, inertia: inertia.is_some() };
+        Ok(ClosedTangents(self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0)?))
     }
 
     /// As [`Self::closed`], in single precision; `None` if the blocks are not prepared for it.
-    pub(super) fn closed_single<E: Send>(
+    pub(super) fn closed_single<L: Law>(
         &self,
+        laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
-        inertia: Inertia<'_>,
-        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
-    ) -> Option<Result<SingleTangents<D>, E>> {
-        self.unit?;
+        inertia: Weight<'_>,
+        scale: f64,
+    ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
+        let h = self.unit?;
         let form = Form { both, inertia: inertia.is_some() };
-        let numbers = self.frozen(|block| block.single.as_ref(), field, form, inertia, point);
+        let factor = 1.0 / (scale * h * h);
+        let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor);
         Some(numbers.map(SingleTangents))
     }
 
-    /// The numbers of the groups that `groups` picks; the deformation is gathered in double precision.
-    fn frozen<X: Number<L>, const L: usize, E: Send>(
+    /// The numbers of the groups that `groups` picks, tangents times `factor`; the deformation is gathered in double precision.
+    fn frozen<L: Law, X: Number<N>, const N: usize>(
         &self,
-        groups: impl Fn(&Block) -> Option<&Groups<X, L>> + Sync,
+        laws: &Laws<'_, D, L>,
+        groups: impl Fn(&Block) -> Option<&Groups<X, N>> + Sync,
         field: &[Vector<f64, D>],
         form: Form,
-        inertia: Inertia<'_>,
-        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
-    ) -> Result<Numbers<X, L>, E> {
+        inertia: Weight<'_>,
+        factor: f64,
+    ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
-        let mut numbers = vec![[X::zero(); L]; count * rows];
+        let mut numbers = vec![[X::zero(); N]; count * rows];
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = numbers.as_mut_slice();
         for block in &self.blocks {
@@ -180,23 +164,38 @@ impl<const D: usize> Tiled<D> {
             rest = behind;
         }
         let results = waves::gathered(self, field, chunks, |block, chunk, gathered| {
+            let Some(groups) = groups(block) else { return Ok(()) };
             let mut failure = None;
-            let mut slots = groups(block).into_iter().flat_map(Groups::slots);
-            block.groups.each(|group, lane, p| {
-                let (_, gradient) = of_lane::<f64, D>(&gathered[group], lane);
-                let Some((to, lane)) = slots.next() else { return };
-                match point(p, gradient) {
-                    Ok(tangent) => {
-                        let mut places = chunk[to * rows..(to + 1) * rows].iter_mut();
-                        form.write(&tangent, inertia.map_or(0.0, |weight| weight(p)), |x| {
-                            if let Some(row) = places.next() {
-                                row[lane] = X::lit(x);
-                            }
-                        });
-                    }
-                    Err(error) => keep_first(&mut failure, p, error),
+            let mut tangents: Tangents = [[0.0; LANES]; 32];
+            // Where the particle goes: a group and a lane of it.
+            let (mut to, mut at) = (0, 0);
+            for group in 0..block.groups.len() {
+                let particles = block.groups.particles(group);
+                match laws.tangents(particles, &gathered[group], form.both, factor, &mut tangents) {
+                    Ok(()) => {}
+                    Err(Some(error)) => keep_first(&mut failure, error.particle, Some(error)),
+                    // What has no closed form anywhere is no error of a particle.
+                    Err(None) => keep_first(&mut failure, usize::MAX, None),
                 }
-            });
+                if let Some(weight) = inertia {
+                    for (lane, &p) in particles.iter().enumerate() {
+                        tangents[rows - 1][lane] = weight(p as usize);
+                    }
+                }
+                let mut start = 0;
+                while start < particles.len() {
+                    let lanes = groups.particles(to).len();
+                    let end = particles.len().min(start + lanes - at);
+                    for (row, tangents) in chunk[to * rows..(to + 1) * rows].iter_mut().zip(&tangents) {
+                        copy(tangents, start..end, &mut row[at..]);
+                    }
+                    at += end - start;
+                    start = end;
+                    if at == lanes {
+                        (to, at) = (to + 1, 0);
+                    }
+                }
+            }
             failure.map_or(Ok(()), Err)
         });
         first_error(results)?;

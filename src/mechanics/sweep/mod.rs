@@ -10,6 +10,7 @@ mod builder;
 mod closed;
 mod kernel;
 mod lanes;
+mod laws;
 mod of_block;
 mod order;
 mod plain;
@@ -18,10 +19,12 @@ mod tiled;
 mod waves;
 
 pub use closed::{ClosedTangents, SingleTangents};
+pub use laws::Laws;
 
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
-use crate::material::ClosedTangent;
+use crate::material::Law;
+use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::solver::Precision;
@@ -58,6 +61,9 @@ pub struct SupportError {
     /// What went wrong.
     pub source: ApproximationError,
 }
+
+/// q of a particle from its number and u.
+pub type Inertia<'a, const D: usize> = &'a (dyn Fn(usize, &Vector<f64, D>) -> Vector<f64, D> + Sync);
 
 /// Whether the weights of a scatter are taken as they are or by their magnitude.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -266,23 +272,57 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// The closed tangents `point(p, ∇u_p)` of all particles, `both` telling whether they have the term b L c, with the weights of
+    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with σ_p = V₀ F S F_nᵀ of the particle's law at ∇u_p, and q_p = `inertia`(p, u_p) if there
+    /// is one: the laws in vector lanes. `None` where the sweep has none, or `T` is not the number they hold.
+    ///
+    /// # Errors
+    /// The first particle, in their order, with det F ≤ 0.
+    pub fn forces<T: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, D, L>,
+        field: &[Vector<T, D>],
+        inertia: Option<Inertia<'_, D>>,
+        out: &mut [Vector<T, D>],
+    ) -> Option<Result<(), Inadmissible>> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => tiled.forces(laws, field, inertia, out).inspect(|_| self.1.pass()),
+        }
+    }
+
+    /// As [`Self::forces`] without inertia, with |σ_p| and |∇_n N_I| in the sum.
+    ///
+    /// # Errors
+    /// As [`Self::forces`].
+    pub fn force_magnitudes<T: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, D, L>,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+    ) -> Option<Result<(), Inadmissible>> {
+        match &self.0 {
+            Way::Plain(_) => None,
+            Way::Tiled(tiled) => tiled.force_magnitudes(laws, field, out).inspect(|_| self.1.pass()),
+        }
+    }
+
+    /// The closed tangents of all particles at ∇u_p, `both` telling whether they have the term b L c, with the weights of
     /// a consistent inertia if there is one; `None` where the sweep has no vector lanes.
     ///
     /// # Errors
-    /// The error of the first particle, in their order, whose `point` fails.
-    pub fn closed_tangents<E: Send>(
+    /// The first particle, in their order, with det F ≤ 0; `None` in its place if a law has no closed tangent at its state.
+    pub fn closed_tangents<L: Law>(
         &self,
+        laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
-        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
-    ) -> Option<Result<ClosedTangents<D>, E>> {
+    ) -> Option<Result<ClosedTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                Some(tiled.closed(field, both, inertia, point))
+                Some(tiled.closed(laws, field, both, inertia))
             }
         }
     }
@@ -312,23 +352,24 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// As [`Self::closed_tangents`], in single precision: for gradients in units of 1/h; `None` also where the supports are not
-    /// prepared for it.
+    /// As [`Self::closed_tangents`], divided by `scale`, in single precision: for gradients in units of 1/h. `None` also where the
+    /// supports are not prepared for it.
     ///
     /// # Errors
     /// As [`Self::closed_tangents`].
-    pub fn single_tangents<E: Send>(
+    pub fn single_tangents<L: Law>(
         &self,
+        laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
-        point: impl Fn(usize, Tensor<f64, D>) -> Result<ClosedTangent<f64, D>, E> + Sync,
-    ) -> Option<Result<SingleTangents<D>, E>> {
+        scale: f64,
+    ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                tiled.closed_single(field, both, inertia, point)
+                tiled.closed_single(laws, field, both, inertia, scale)
             }
         }
     }

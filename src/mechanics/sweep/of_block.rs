@@ -49,6 +49,11 @@ pub(super) fn magnitudes(groups: &Double, nodal: &[f64], buffer: &mut [f64], poi
     by_dimension!(f64, groups, Magnitudes { groups, nodal, buffer, point });
 }
 
+/// As [`each`], for point functions of L alone that give σ alone.
+pub(super) fn stresses(groups: &Double, nodal: &[f64], buffer: &mut [f64], point: &Point<'_>) {
+    by_dimension!(f64, groups, Stresses { groups, nodal, buffer, point });
+}
+
 /// Scatters q alone; nothing is gathered.
 pub(super) fn spread(groups: &Double, buffer: &mut [f64], point: &Point<'_>) {
     by_dimension!(f64, groups, Spread { groups, buffer, point });
@@ -124,7 +129,7 @@ impl Terms for OnlyGradient {
 }
 
 macro_rules! each_particle {
-    ($name:ident, $terms:ident) => {
+    ($name:ident, $terms:ident, $value:expr) => {
         struct $name<'a, const D: usize> {
             groups: &'a Double,
             nodal: &'a [f64],
@@ -140,7 +145,7 @@ macro_rules! each_particle {
                 let mut rows = [[0.0; LANES]; 12];
                 for group in 0..self.groups.len() {
                     let window = self.groups.window(group);
-                    store(s, &gather::<S, D, LANES, true>(s, &window, self.nodal), &mut rows);
+                    store(s, &gather::<S, D, LANES, $value>(s, &window, self.nodal), &mut rows);
                     (self.point)(self.groups.particles(group), &mut rows);
                     scatter::<S, $terms, D, LANES>(s, &window, &load(s, &rows), self.buffer);
                 }
@@ -149,8 +154,9 @@ macro_rules! each_particle {
     };
 }
 
-each_particle!(Each, Signed);
-each_particle!(Magnitudes, Absolute);
+each_particle!(Each, Signed, true);
+each_particle!(Magnitudes, Absolute, true);
+each_particle!(Stresses, OnlyGradient, false);
 
 struct Spread<'a, const D: usize> {
     groups: &'a Double,

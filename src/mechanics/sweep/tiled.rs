@@ -3,16 +3,19 @@
 //! Particles are taken in the order (cell, number). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
-use super::block::Block;
+use super::block::{Block, Groups};
 use super::builder::{block, number};
 use super::kernel::{Quadratic, Rows, of_lane, pair, set_lane};
 use super::lanes::LANES;
+use super::laws::Laws;
 use super::of_block;
 use super::order::{self, Key};
 use super::waves;
-use super::{Magnitude, SupportError, infallible, ordered};
+use super::{Inertia, Magnitude, SupportError, infallible, ordered};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
+use crate::material::Law;
+use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
@@ -20,6 +23,9 @@ use num_traits::Zero;
 use std::any::TypeId;
 use std::ops::AddAssign;
 use std::sync::{Mutex, PoisonError};
+
+/// The sums of a block from the field in its box and a point function.
+type Kernel = fn(&Groups<f64, LANES>, &[f64], &mut [f64], &of_block::Point<'_>);
 
 /// Shape functions of all particles, by axis.
 #[derive(Clone, Debug)]
@@ -160,25 +166,85 @@ impl<const D: usize> Tiled<D> {
         magnitude: Magnitude,
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        let failure = Mutex::new(None);
         let one_by_one = |particles: &[u32], rows: &mut Rows| {
+            let mut failure = None;
             for (lane, &p) in particles.iter().enumerate() {
                 let (value, gradient) = of_lane(rows, lane);
                 match point(p as usize, value, gradient) {
                     Ok((force, stress)) => set_lane(rows, lane, &force, &stress),
-                    Err(error) => {
-                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
-                        keep_first(&mut first, p as usize, error);
-                    }
+                    Err(error) => keep_first(&mut failure, p as usize, error),
                 }
             }
+            failure.map_or(Ok(()), Err)
         };
-        waves::run(self, Some(field), out, &|block, nodal, buffer| match magnitude {
-            Magnitude::No => of_block::each(&block.groups, nodal, buffer, &one_by_one),
-            Magnitude::Yes => of_block::magnitudes(&block.groups, nodal, buffer, &one_by_one),
-        });
+        let kernel = match magnitude {
+            Magnitude::No => of_block::each,
+            Magnitude::Yes => of_block::magnitudes,
+        };
+        self.by_group(field, out, kernel, one_by_one)
+    }
+
+    /// The sums of `kernel` with what `point` puts in the rows of each group.
+    fn by_group<T: Real, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+        kernel: Kernel,
+        point: impl Fn(&[u32], &mut Rows) -> Result<(), (usize, E)> + Sync,
+    ) -> Result<(), E> {
+        let failure = Mutex::new(None);
+        let point = |particles: &[u32], rows: &mut Rows| {
+            if let Err((p, error)) = point(particles, rows) {
+                keep_first(&mut failure.lock().unwrap_or_else(PoisonError::into_inner), p, error);
+            }
+        };
+        waves::run(self, Some(field), out, &|block, nodal, buffer| kernel(&block.groups, nodal, buffer, &point));
         let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
         failure.map_or(Ok(()), |(_, error)| Err(error))
+    }
+
+    /// As [`super::Supports::forces`].
+    pub(super) fn forces<T: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, D, L>,
+        field: &[Vector<T, D>],
+        inertia: Option<Inertia<'_, D>>,
+        out: &mut [Vector<T, D>],
+    ) -> Option<Result<(), Inadmissible>> {
+        is_f64::<T>().then(|| {
+            let stresses = |particles: &[u32], rows: &mut Rows| {
+                laws.stresses(particles, rows).map_err(|error| (error.particle, error))
+            };
+            let Some(inertia) = inertia else {
+                return self.by_group(field, out, of_block::stresses, stresses);
+            };
+            self.by_group(field, out, of_block::each, |particles, rows| {
+                for (lane, &p) in particles.iter().enumerate() {
+                    let q = inertia(p as usize, &Vector::from_fn(|i, _| rows[i][lane]));
+                    for i in 0..D {
+                        rows[i][lane] = q[i];
+                    }
+                }
+                stresses(particles, rows)
+            })
+        })
+    }
+
+    /// As [`super::Supports::force_magnitudes`].
+    pub(super) fn force_magnitudes<T: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, D, L>,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+    ) -> Option<Result<(), Inadmissible>> {
+        is_f64::<T>().then(|| {
+            self.by_group(field, out, of_block::magnitudes, |particles, rows| {
+                laws.stresses(particles, rows).map_err(|error| (error.particle, error))?;
+                rows[..D].fill([0.0; LANES]);
+                rows[D..D + D * D].as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
+                Ok(())
+            })
+        })
     }
 
     pub(super) fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)

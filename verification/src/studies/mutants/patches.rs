@@ -61,6 +61,7 @@ const fn patch(
     Patch { name, file, find, replace, fate }
 }
 
+const PARTICLE: &str = "src/mechanics/point.rs";
 const RESIDUAL: &str = "src/mechanics/residual.rs";
 const PRODUCT: &str = "src/mechanics/tangent.rs";
 const TRANSFER: &str = "src/mechanics/transfer.rs";
@@ -97,11 +98,11 @@ pub(super) const PATCHES: &[Patch] = &[
         "T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i])",
         "T::lit(self.alphas.a3 * v[i] + self.alphas.a2 * a[i])",
         Killed(&[DYNAMICS, BALANCE], &[TANGENT])),
-    patch("transposed F_n in the internal force", RESIDUAL,
+    patch("transposed F_n in the internal force", PARTICLE,
         "(piola * f_n_t)",
         "(piola * f_n_t.transpose())",
         Killed(&[TANGENT, DYNAMICS], &[POINTS, BALANCE])),
-    patch("F without G H_n", RESIDUAL,
+    patch("F without G H_n", PARTICLE,
         "g + h_n + g * h_n",
         "g + h_n",
         Killed(&[TANGENT, PATCH, DYNAMICS], &[POINTS, BALANCE])),
@@ -294,16 +295,16 @@ pub(super) const PATCHES: &[Patch] = &[
         "self.0.energy(&seeded(e, &direction(i, k))).eps * T::lit(if i == k { 1.0 } else { 2.0 })",
         Killed(&[TANGENT], &[DYNAMICS, POINTS])),
     patch("P = S F for F S", MATERIAL,
-        "f_left * law.stress(&admissible(h_inside)?)",
-        "law.stress(&admissible(h_inside)?) * f_left",
+        "f_left * law.stress(at)",
+        "law.stress(at) * f_left",
         Killed(&[TANGENT, POINTS, DYNAMICS], &[DIGITS])),
     patch("a coefficient of the energy's series", TENSOR,
         "T::lit(1.0 / (2 * k + 1) as f64)",
         "T::lit(1.0 / (2 * k + 3) as f64)",
         Killed(&[TANGENT], &[DIGITS])),
     patch("ln J for ln(1 + j) at small j", TENSOR,
-        "self.j.ln_1p()",
-        "self.jacobian.ln()",
+        "if k == 0 { self.j } else { self.jacobian * T::lit(scale) - T::one() }",
+        "self.jacobian * T::lit(scale) - T::one()",
         Killed(&[DIGITS], &[TANGENT, POINTS, DYNAMICS])),
     patch("J^2 - 1 by J", TENSOR,
         "self.j * (T::lit(2.0) + self.j)",
