@@ -79,5 +79,6 @@ studies!(
     riemann,
     compaction,
     rebound,
+    tradeoff,
     mutants
 );
