@@ -1,7 +1,7 @@
 //! `bfree run`.
 
 use super::probes::{Bound, bound_probes};
-use super::scene_arguments::{SceneArguments, steps_until};
+use super::scene_arguments::{SceneArguments, steps_until, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
@@ -119,6 +119,9 @@ impl Run {
         let directory = self.out.clone().unwrap_or_else(|| {
             Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))
         });
+        if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
+            self.say("accuracy", &format!("accuracy {set}"));
+        }
         let probes = bound_probes(scene, &simulation);
         probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
@@ -126,6 +129,10 @@ impl Run {
         let mut asked = Map::new();
         asked.insert("command".to_owned(), self.options(&directory));
         asked.insert("settings".to_owned(), settings);
+        if let Some(accuracy) = scene.accuracy {
+            let sets = serde_json::to_value(&scene.chosen).map_err(Failure::run)?;
+            asked.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
+        }
         asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {

@@ -83,6 +83,9 @@ impl SceneArguments {
         let mut text = scene.title.as_ref().map_or_else(String::new, |title| format!("{title}\n"));
         let steps = steps_until(&simulation, scene.time.end);
         // Writing to a string cannot fail.
+        if let Some(set) = what_accuracy_sets(scene) {
+            let _ = writeln!(text, "accuracy      {set}");
+        }
         let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
         let _ = write!(text, "{}", self.plan(&simulation)?);
         let _ = write!(text, "\noutput        {}", written(scene));
@@ -101,6 +104,14 @@ fn written(scene: &Scene) -> String {
         Some(every) => format!("{} of all particles every {every}", names.join(", ")),
         None => "no snapshots (output.every): no field is computed of all particles".into(),
     }
+}
+
+/// What the accuracy of a scene has set, on one line; nothing without that key.
+pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
+    let accuracy = scene.accuracy?;
+    let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();
+    let set = if set.is_empty() { "nothing: the scene gives every key".to_owned() } else { set.join(", ") };
+    Some(format!("{accuracy} sets {set}"))
 }
 
 /// Whole steps that reach `end`, to within a billionth of a step; a last step may lead beyond it.

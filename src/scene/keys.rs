@@ -6,7 +6,7 @@ use super::place::Step;
 use serde_json::{Map, Value};
 use std::sync::LazyLock;
 
-static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::schema().to_value());
+static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::complete_schema().to_value());
 
 /// What serde would say of each key, in serde's words.
 pub(super) fn wrong(written: &Value) -> Vec<(Vec<Step>, String)> {

@@ -4,6 +4,7 @@
 //! consistent set. [`read`] either gives a scene in which everything has been checked that can be without particles, or says
 //! where the text is wrong, or lists all values that are not allowed.
 
+pub mod accuracy;
 pub mod approximation;
 pub mod body;
 pub mod boundary;
@@ -33,6 +34,7 @@ pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -45,6 +47,13 @@ pub struct Scene {
     pub title: Option<String>,
     /// The box and its background grid.
     pub grid: grid::GridBox,
+    /// How accurate the results should be: sets, from a measured table, what the scene leaves open of `grid.spacing`, `time.step`,
+    /// `approximation`, `time.lumping`, `bodies[].particles_per_cell` and `solver.newton.tolerance`. What the scene gives
+    /// stays. Default: nothing is set.
+    pub accuracy: Option<accuracy::Accuracy>,
+    /// What the accuracy has set.
+    #[serde(skip)]
+    pub chosen: Vec<accuracy::Chosen>,
     /// The shape functions. Default: `{"lme": {}}`.
     #[serde(default)]
     pub approximation: approximation::Approximation,
@@ -100,6 +109,21 @@ pub struct NodeVelocity {
 
 /// The JSON schema of a scene.
 pub fn schema() -> schemars::Schema {
+    let mut schema = complete_schema();
+    // With an accuracy they may be absent.
+    for (part, key) in [("GridBox", "spacing"), ("Time", "step")] {
+        if let Some(Value::Array(required)) = schema.pointer_mut(&format!("/$defs/{part}/required")) {
+            required.retain(|one| one != key);
+        }
+    }
+    let given = json!({ "grid": { "required": ["spacing"] }, "time": { "required": ["step"] } });
+    let chosen = json!({ "required": ["accuracy"], "properties": { "accuracy": { "not": { "type": "null" } } } });
+    schema.insert("anyOf".to_owned(), json!([{ "properties": given }, chosen]));
+    schema
+}
+
+/// The schema of a scene in which everything required is there.
+fn complete_schema() -> schemars::Schema {
     schemars::schema_for!(Scene)
 }
 

@@ -3,7 +3,7 @@
 use super::check::{KEPT, Problems};
 use super::overrides::{Override, OverrideError};
 use super::place::{Place, Step, locate, path, steps};
-use super::{Scene, keys, suggest};
+use super::{Scene, accuracy, keys, suggest};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use serde_path_to_error::Segment;
@@ -106,8 +106,8 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 
 /// Reads and checks a scene, with `overrides` applied in order.
 ///
-/// The text becomes JSON, in which a key given twice is an error; the overrides replace values; JSON becomes a [`Scene`], where
-/// unknown keys and wrong types are errors; then all values are checked.
+/// The text becomes JSON, in which a key given twice is an error; the overrides replace values; what the accuracy sets is laid under
+/// that; JSON becomes a [`Scene`], where unknown keys and wrong types are errors; then all values are checked.
 ///
 /// ```
 /// let text = r#"{"grid": {"size": [1, 1], "spacing": 0.25}, "time": {"step": 0.1, "end": 1},
@@ -142,6 +142,13 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     }
 
     let place = |steps: &[Step]| find(steps, text, overrides);
+    let placed = |mut problems: Problems| {
+        for problem in &mut problems.list {
+            problem.place = place(&steps(&problem.path));
+        }
+        SceneError::Values(problems)
+    };
+    let chosen = accuracy::lay_under(&mut json).map_err(placed)?;
     let scene: Scene = serde_path_to_error::deserialize(&json).map_err(|error| {
         let malformed = |steps: &[Step], message: &str| Malformed {
             path: path(steps),
@@ -167,11 +174,8 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         }
         .into());
     }
-    let mut problems = scene.check();
-    for problem in &mut problems.list {
-        problem.place = place(&steps(&problem.path));
-    }
-    if problems.is_empty() { Ok(scene.complete()) } else { Err(SceneError::Values(problems)) }
+    let problems = scene.check();
+    if problems.is_empty() { Ok(Scene { chosen, ..scene.complete() }) } else { Err(placed(problems)) }
 }
 
 /// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in

@@ -1,5 +1,6 @@
 //! Promises of the library, in one program: what is generic is compiled once.
 
+mod accuracy;
 mod adaptive;
 mod approximation;
 mod compaction;

@@ -7,8 +7,8 @@ use plotters::prelude::*;
 use std::ops::Range;
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito, 2008), the yellow left out: too pale for a line.
-/// Black, blue, vermillion, green, purple, orange, sky.
-pub(crate) const COLORS: [RGBColor; 7] = [
+/// Black, blue, vermillion, green, purple, orange, sky; grey for what stands behind.
+pub(crate) const COLORS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -16,6 +16,7 @@ pub(crate) const COLORS: [RGBColor; 7] = [
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(170, 170, 170),
 ];
 
 /// Width of a line; each one is thinner than those below it, so that lines that coincide are all seen.

@@ -1,13 +1,14 @@
-//! A step of Algorithm 1 under a body force that varies in space: what manufactured solutions need and scenes do not.
+//! A step of Algorithm 1 under a body force that varies in space, or with another solver of its equilibrium: what studies need and
+//! scenes do not.
 
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
 use bfree::mechanics::loads::prescribed_dofs;
-use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::{Moved, Nodal};
 use bfree::simulation::{InitialGuess, Simulation, StepError};
-use bfree::solver::{NewtonReport, newton};
+use bfree::solver::{NewtonError, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
 
 /// One step of `simulation` with the force `force(p, t)` per unit mass on particle `p`, in place of all its loads but the
@@ -19,11 +20,40 @@ pub fn step<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &mut Simulation<D, L, A>,
     force: impl Fn(usize, f64) -> Vector<f64, D> + Sync,
 ) -> Result<NewtonReport, StepError> {
+    let solve = |equilibrium: &Equilibrium<'_, D, L>, dphi: &mut [f64], settings: &NewtonSettings| {
+        newton(equilibrium, dphi, settings)
+    };
+    Ok(step_by(simulation, force, solve)?.newton)
+}
+
+/// What a step did.
+#[derive(Clone, Debug)]
+pub struct Forced {
+    /// Newton's iterations and residuals.
+    pub newton: NewtonReport,
+    /// Iterations of the projection (42), 0 for a lumped mass.
+    pub projection_iterations: usize,
+}
+
+/// As [`step`], with `solve` in place of [`newton`]: it finds Δφ with R(Δφ) = 0 from the initial guess.
+///
+/// # Errors
+/// As [`step`].
+pub fn step_by<const D: usize, L: Law, A: ShapeFunction>(
+    simulation: &mut Simulation<D, L, A>,
+    force: impl Fn(usize, f64) -> Vector<f64, D> + Sync,
+    solve: impl FnOnce(
+        &Equilibrium<'_, D, L>,
+        &mut [f64],
+        &NewtonSettings,
+    ) -> Result<NewtonReport, NewtonError<Inadmissible>>,
+) -> Result<Forced, StepError> {
     let (t, dt) = (simulation.clock.time(), simulation.clock.step());
     let (particles, settings) = (&simulation.particles, &simulation.settings);
     let alphas = settings.newmark.alphas(dt);
 
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let (grid, precision) = (&simulation.grid, settings.newton.precision);
+    let (supports, nodes) = Supports::with_precision(&simulation.approximation, grid, &particles.position, precision)?;
     let prescribed = prescribed_dofs(&simulation.loads.prescribed, &simulation.grid, &nodes, t, dt);
     let projected = Nodal::project(particles, &supports, nodes.len(), settings.lumping)?;
     let nodal = projected.with_prescribed(&prescribed);
@@ -50,7 +80,7 @@ pub fn step<const D: usize, L: Law, A: ShapeFunction>(
     for dof in &prescribed {
         dphi[dof.node][dof.component] = dof.step.increment;
     }
-    let report = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
+    let newton = solve(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
 
     let walls = settings.wall_update;
     let mut moved = Moved::new(particles, &supports, &alphas, &projected, &nodal, &prescribed, walls, &dphi);
@@ -59,5 +89,5 @@ pub fn step<const D: usize, L: Law, A: ShapeFunction>(
     }
     moved.commit(&mut simulation.particles);
     simulation.clock.advance();
-    Ok(report)
+    Ok(Forced { newton, projection_iterations: projected.iterations })
 }

@@ -21,6 +21,7 @@ pub mod report;
 pub mod riemann;
 pub mod sheet;
 pub mod shipped;
+pub mod start;
 pub mod studies;
 pub mod table;
 

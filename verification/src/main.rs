@@ -16,7 +16,7 @@ use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 struct Arguments {
     /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the paper, kept in
     /// verification/FULL.md, `results` the studies of the paper with their tables and pictures, kept in
-    /// verification/RESULTS.md and verification/results
+    /// verification/RESULTS.md and verification/results. `tradeoff` with full effort rewrites verification/TRADEOFF.md
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
     /// How much each study does; `full` as a study asks for full effort
@@ -122,9 +122,13 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
         if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
             write_files(directory, study.name, outcome)?;
         }
-        chapters.push(chapter(study, &result, seconds));
+        chapters.push(chapter(study, &result, seconds, "results"));
         if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
-            draw(&results_folder(), outcome)?;
+            draw(&kept_folder("results"), outcome)?;
+        }
+        if let (Ok(outcome), "tradeoff", Effort::Full) = (&result, study.name, effort) {
+            draw(&kept_folder("tradeoff"), outcome)?;
+            keep_tradeoff(&chapter(study, &result, seconds, "tradeoff"))?;
         }
         documents.push(document(study, &result, passed, seconds));
         verdicts.push((study.name, passed, seconds));
@@ -159,9 +163,19 @@ fn asked_for(arguments: &Arguments, word: &str) -> bool {
     arguments.studies.iter().any(|one| one == word)
 }
 
-/// Where the pictures of the paper's studies are kept.
-fn results_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("results")
+/// Where pictures are kept.
+fn kept_folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// Leaves the measured trade of speed against accuracy in the repository.
+fn keep_tradeoff(chapter: &str) -> Result<(), Failure> {
+    let path = kept_folder("TRADEOFF.md");
+    let date = humantime::format_rfc3339_seconds(SystemTime::now());
+    let header = format!(
+        "# Speed against accuracy, measured\n\nWritten by `cargo verify tradeoff --effort full`, {date}; nothing is edited by hand.\n"
+    );
+    fs::write(&path, header + chapter).map_err(writing(path.display().to_string()))
 }
 
 /// Leaves the results of the paper's studies in the repository.
@@ -175,8 +189,8 @@ fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
     fs::write(&path, header + &chapters.concat()).map_err(writing(path.display().to_string()))
 }
 
-/// A study as a chapter in Markdown, with its pictures by reference.
-fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) -> String {
+/// A study as a chapter in Markdown, with its pictures, in `folder`, by reference.
+fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, folder: &str) -> String {
     let mut text = format!("\n## {}: {}\n\n", study.name, study.about);
     match result {
         Ok(outcome) => {
@@ -184,7 +198,7 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64) ->
                 text += &format!("{remark}\n\n");
             }
             for sheet in &outcome.sheets {
-                text += &format!("![{}](results/{}.png)\n\n{}\n\n", sheet.name, sheet.name, sheet.caption);
+                text += &format!("![{}]({folder}/{}.png)\n\n{}\n\n", sheet.name, sheet.name, sheet.caption);
             }
             for table in &outcome.tables {
                 text += &format!("{}\n", table.markdown());

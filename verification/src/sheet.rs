@@ -149,10 +149,40 @@ impl Ranged for Scale {
 }
 
 impl Panel {
+    /// A panel with the names of `curves` alone: a key that hides nothing, for charts that share it.
+    pub fn key(curves: Vec<Curve>) -> Self {
+        let curves = curves.into_iter().map(|curve| Curve { points: Vec::new(), ..curve }).collect();
+        let [x, y] = [Axis::linear(""), Axis::linear("")];
+        Self { title: String::new(), x, y, window: None, curves, legend: None }
+    }
+
+    /// The names, one below the other.
+    fn draw_key(
+        &self,
+        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let fine = FINE as i32;
+        for (k, curve) in self.curves.iter().enumerate() {
+            let (color, height) = (COLORS[curve.color % COLORS.len()], (60 + 26 * k as i32) * fine);
+            if curve.mark != Mark::Dots {
+                let line = vec![(40 * fine, height), (70 * fine, height)];
+                area.draw(&PathElement::new(line, color.stroke_width(3 * FINE / 2)))?;
+            }
+            if matches!(curve.mark, Mark::Dots | Mark::Joined) {
+                area.draw(&Circle::new((55 * fine, height), 3 * FINE, color.filled()))?;
+            }
+            area.draw(&Text::new(curve.name.clone(), (82 * fine, height - 7 * fine), LABEL))?;
+        }
+        Ok(())
+    }
+
     fn draw(
         &self,
         area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     ) -> Result<(), Box<dyn std::error::Error>> {
+        if self.curves.iter().all(|curve| curve.points.is_empty()) {
+            return self.draw_key(area);
+        }
         let placed: Vec<Vec<(f64, f64)>> = (self.curves.iter())
             .map(|curve| {
                 let place = |&(x, y): &(f64, f64)| Some((self.x.place(x)?, self.y.place(y)?));

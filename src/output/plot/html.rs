@@ -53,9 +53,12 @@ pub(super) fn page(report: Option<&Value>, pictures: &[(&str, String)]) -> Strin
         let svg = svg.find("<svg").and_then(|start| svg.get(start..)).unwrap_or(svg);
         let _ = writeln!(out, "<figure id=\"{name}\">{svg}</figure>");
     }
-    for (key, caption) in
-        [("settings", "The scene, with all defaults"), ("command", "The command line"), ("probes", "Probes")]
-    {
+    for (key, caption) in [
+        ("accuracy", "What the accuracy has set"),
+        ("settings", "The scene, with all defaults"),
+        ("command", "The command line"),
+        ("probes", "Probes"),
+    ] {
         if report[key].as_array().map_or(!report[key].is_null(), |list| !list.is_empty()) {
             let json = serde_json::to_string_pretty(&report[key]).unwrap_or_default();
             let _ = writeln!(out, "<details><summary>{caption}</summary><pre>{}</pre></details>", escaped(&json));

@@ -4,8 +4,8 @@ use super::Motion;
 use bfree::scalar::Real;
 use bfree::tensor::Vector;
 
-/// u₁ = A sin(2πX₁) sin(ωt), u₂ = −A sin(2πX₂) sin(ωt) in the unit square: no normal displacement at its walls, F diagonal
-/// with stretches 1 ± 2πA.
+/// u₁ = A sin(2πX₁) sin(ωt), u₂ = −A sin(2πX₂) sin(ωt), and u₃ as u₁, in the unit square or cube: no normal displacement at its
+/// walls, F diagonal with stretches 1 ± 2πA.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisAligned {
     /// A, a length.
@@ -21,10 +21,10 @@ impl Default for AxisAligned {
     }
 }
 
-impl Motion<2> for AxisAligned {
-    fn displacement<T: Real>(&self, x: &Vector<T, 2>, t: T) -> Vector<T, 2> {
+impl<const D: usize> Motion<D> for AxisAligned {
+    fn displacement<T: Real>(&self, x: &Vector<T, D>, t: T) -> Vector<T, D> {
         let amplitude = T::lit(self.amplitude) * (T::lit(self.frequency) * t).sin();
         let wave = |x: T| amplitude * (T::lit(std::f64::consts::TAU) * x).sin();
-        Vector::from([wave(x[0]), -wave(x[1])])
+        Vector::from_fn(|k, _| if k == 1 { -wave(x[k]) } else { wave(x[k]) })
     }
 }

@@ -80,5 +80,6 @@ studies!(
     compaction,
     column,
     rebound,
+    tradeoff,
     mutants
 );

@@ -3,6 +3,7 @@
 use crate::elements::Elements;
 use crate::riemann::{PSystem, Riemann, State};
 use crate::shipped;
+use crate::start::velocity_by_masses;
 use crate::studies::StudyError;
 use bfree::clock::Clock;
 use bfree::material::{Lame, Material, NeoHookean};
@@ -261,16 +262,10 @@ pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, St
     Ok(measured)
 }
 
-/// The jump at X = 50 m, given to the nodes by the masses on both sides and interpolated once to the particles, as the independent
-/// program does: what the nodes cannot represent is not there, and the jump lies as far to the left as to the right.
+/// The jump at X = 50 m.
 fn start_with(simulation: &mut Simulation<1>, jump: &Jump) -> Result<(), StudyError> {
-    let particles = &mut simulation.particles;
     let side = |x: f64| if x <= MIDDLE { jump.left } else { jump.right };
-    particles.velocity = particles.position.iter().map(|x| x.map(side)).collect();
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
-    particles.velocity = supports.values(&nodal.velocity);
-    Ok(())
+    Ok(velocity_by_masses(simulation, |x| x.map(side))?)
 }
 
 /// Kinetic energy in the frame that moves with `middle`, and strain energy.

@@ -1,0 +1,194 @@
+//! Speed against accuracy in one key: what a scene leaves open is set from a measured table.
+//!
+//! What is set is laid under the JSON of a scene before it becomes a [`Scene`](super::Scene): every key that the scene gives stays as it is.
+
+mod spacing;
+mod table;
+
+pub use table::{Level, levels};
+
+use super::body::Body;
+use super::check::Problems;
+use super::grid::GridBox;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use spacing::Unknown;
+use std::fmt::{self, Display};
+
+/// How accurate the results should be.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Accuracy {
+    /// To see whether a scene does what it is meant to.
+    Draft,
+    /// For everyday work.
+    Standard,
+    /// To compare others with.
+    Reference,
+    /// An error to aim for, relative to the size of the displacement, between the least and the greatest of the table. Smooth
+    /// problems of the size of a body have met it; jumps and contact do not.
+    Error(f64),
+}
+
+impl Accuracy {
+    /// The knobs that it stands for; `None` for an error outside the table.
+    pub fn level(self) -> Option<Level> {
+        let named = |word: &str| levels().iter().find(|level| level.name == Some(word)).copied();
+        match self {
+            Self::Draft => named("draft"),
+            Self::Standard => named("standard"),
+            Self::Reference => named("reference"),
+            Self::Error(error) => table::between(error),
+        }
+    }
+}
+
+/// As a scene writes it.
+impl Display for Accuracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Draft => f.write_str("\"draft\""),
+            Self::Standard => f.write_str("\"standard\""),
+            Self::Reference => f.write_str("\"reference\""),
+            Self::Error(error) => write!(f, "{{\"error\": {error}}}"),
+        }
+    }
+}
+
+/// A key that the accuracy has set.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Chosen {
+    /// The key, such as `grid.spacing`.
+    pub key: String,
+    /// Its value.
+    pub value: Value,
+}
+
+impl Display for Chosen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.key, self.value)
+    }
+}
+
+/// Keys that speak of inertia, and that a scene without inertia refuses.
+const OF_INERTIA: [&str; 2] = ["time.", "transfer"];
+
+/// Lays what the key `accuracy` sets under a scene. A scene that is not of the types of a scene is left as it is: whoever reads it
+/// says why.
+///
+/// # Errors
+/// The error is not in the table, or a length or a speed that the scene does not tell is needed.
+pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
+    let Some(accuracy) = part::<Accuracy>(&scene["accuracy"]) else { return Ok(Vec::new()) };
+    let level = accuracy.level().ok_or_else(|| outside(accuracy))?;
+    let Some(bodies) = part::<Vec<Body>>(&scene["bodies"]) else { return Ok(Vec::new()) };
+    let mut under = Under { scene, chosen: Vec::new() };
+    for (key, value) in level.keys() {
+        let refused = under.scene["time"]["inertia"] == "none" && OF_INERTIA.iter().any(|word| key.starts_with(word));
+        if !refused {
+            under.set(key, value);
+        }
+    }
+    for (i, _) in bodies.iter().enumerate().filter(|(_, body)| body.shape.is_some()) {
+        under.set(&format!("bodies.{i}.particles_per_cell"), level.particles_per_cell.into());
+    }
+    if under.lacks("grid", "spacing") {
+        let mut with_any = under.scene["grid"].clone();
+        with_any["spacing"] = 1.into();
+        let Some(grid) = part::<GridBox>(&with_any) else { return Ok(under.chosen) };
+        let spacing =
+            spacing::fitting(&grid, &bodies, level.cells).map_err(|why| needed("grid.spacing", accuracy, &why))?;
+        under.set("grid.spacing", spacing.into());
+    }
+    if under.lacks("time", "step") {
+        let spacing = under.scene["grid"]["spacing"].as_f64().filter(|h| *h > 0.0 && h.is_finite());
+        let (Some(spacing), Some(end)) = (spacing, under.scene["time"]["end"].as_f64().filter(|end| *end > 0.0)) else {
+            return Ok(under.chosen);
+        };
+        if under.scene["time"]["inertia"] == "none" {
+            return Err(needed("time.step", accuracy, &Unknown::NoInertia));
+        }
+        let speed = spacing::speed(&bodies).map_err(|why| needed("time.step", accuracy, &why))?;
+        let longest = level.courant * spacing / speed;
+        // A whole number of steps to the end.
+        under.set("time.step", (end / (end / longest).ceil().max(1.0)).into());
+    }
+    Ok(under.chosen)
+}
+
+/// A part of a scene, if it is of its type.
+fn part<T: for<'de> Deserialize<'de>>(value: &Value) -> Option<T> {
+    T::deserialize(value).ok()
+}
+
+fn outside(accuracy: Accuracy) -> Problems {
+    let Accuracy::Error(error) = accuracy else { return Problems::default() };
+    let mut problems = Problems::default();
+    let [least, greatest] = table::range();
+    problems.between("accuracy.error", error, least, greatest);
+    problems
+}
+
+fn needed(key: &str, accuracy: Accuracy, why: &Unknown) -> Problems {
+    let mut problems = Problems::default();
+    problems.refuse("accuracy", accuracy, format_args!("it would choose {key}, but {why}; give {key}"));
+    problems
+}
+
+/// A scene, and what was laid under it.
+struct Under<'a> {
+    scene: &'a mut Value,
+    chosen: Vec<Chosen>,
+}
+
+impl Under<'_> {
+    /// Whether the section is there, or may be, and the key is not.
+    fn lacks(&self, section: &str, key: &str) -> bool {
+        self.scene.get(section).is_some_and(|section| section.is_object() && section.get(key).is_none())
+    }
+
+    /// Sets a key, `a.b.c`, that is not given, nor any section that it lies in as something else than an object.
+    fn set(&mut self, key: &str, value: Value) {
+        let mut here = &mut *self.scene;
+        let mut steps = key.split('.').peekable();
+        while let Some(step) = steps.next() {
+            let next = match here {
+                Value::Array(list) => step.parse().ok().and_then(|i: usize| list.get_mut(i)),
+                Value::Object(object) if steps.peek().is_none() => {
+                    if !object.contains_key(step) {
+                        object.insert(step.to_owned(), value.clone());
+                        self.chosen.push(Chosen { key: key.to_owned(), value });
+                    }
+                    return;
+                }
+                Value::Object(object) => Some(object.entry(step).or_insert_with(|| json!({}))),
+                _ => None,
+            };
+            let Some(next) = next else { return };
+            here = next;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_that_is_given_stays_and_so_does_what_holds_it() {
+        let mut scene = json!({"time": {"end": 1}, "transfer": "flip", "bodies": [{}]});
+        let mut under = Under { scene: &mut scene, chosen: Vec::new() };
+        for key in
+            ["time.end", "time.lumping", "transfer.blend.rate", "solver.newton.tolerance", "bodies.0.x", "bodies.7.x"]
+        {
+            under.set(key, 7.into());
+        }
+        let keys: Vec<_> = under.chosen.iter().map(|chosen| chosen.key.as_str()).collect();
+        assert_eq!(keys, ["time.lumping", "solver.newton.tolerance", "bodies.0.x"]);
+        let expected = json!({
+            "time": {"end": 1, "lumping": 7}, "transfer": "flip", "bodies": [{"x": 7}], "solver": {"newton": {"tolerance": 7}}
+        });
+        assert_eq!(scene, expected);
+    }
+}

@@ -1,0 +1,109 @@
+//! The lengths and speeds of a scene, from which spacing and time step follow.
+
+use crate::scene::body::Body;
+use crate::scene::grid::GridBox;
+use crate::scene::shape::Shape;
+use crate::tensor::Vector;
+
+/// How far a place may be from a node, in spacings.
+const ON_NODE: f64 = 1e-6;
+
+/// Cells tried along the shortest edge of the box, over the fewest: a spacing is at most so much finer than asked for.
+const FINER: usize = 2;
+
+/// Cells along the shortest edge of the box, at most.
+const MOST_CELLS: f64 = 1e5;
+
+/// Why a spacing or a time step cannot be chosen.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(super) enum Unknown {
+    /// A body from a file.
+    #[error("how large the body {0:?} is stands in its file of particles")]
+    Extent(String),
+    /// Edges without a common divisor.
+    #[error("no spacing between {finest:.4e} and {coarsest:.4e} divides every edge of the grid")]
+    NoDivisor { finest: f64, coarsest: f64 },
+    /// A box without an extent, or with more cells than any.
+    #[error("the box of the grid has no extent, or too many cells")]
+    NoBox,
+    /// A body without an extent.
+    #[error("the body {0:?} has no extent inside the grid")]
+    NoExtent(String),
+    /// Nothing to be as fine as.
+    #[error("there is no body")]
+    NoBody,
+    /// A law without a speed of sound.
+    #[error("the constants or the density of the body {0:?} give no speed of sound")]
+    NoSpeed(String),
+    /// Load steps.
+    #[error("load steps of a scene without inertia have no natural length")]
+    NoInertia,
+}
+
+/// The largest spacing that puts at least `cells` cells across the least extent of every body, divides all edges of the box, and puts
+/// nodes on the faces of boxes, if a spacing up to twice as fine can.
+pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, Unknown> {
+    match grid.dimension() {
+        1 => fitting_in::<1>(grid, bodies, cells),
+        2 => fitting_in::<2>(grid, bodies, cells),
+        3 => fitting_in::<3>(grid, bodies, cells),
+        _ => Err(Unknown::NoBox),
+    }
+}
+
+fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, Unknown> {
+    let origin = grid.origin();
+    let sound = origin.len() == D && grid.size.iter().all(|&size| size > 0.0 && size.is_finite());
+    if !sound || !origin.iter().all(|x| x.is_finite()) {
+        return Err(Unknown::NoBox);
+    }
+    let mut extent = f64::INFINITY;
+    // Faces of boxes, as distances from the lower corner of the grid.
+    let mut faces: Vec<f64> = Vec::new();
+    for body in bodies {
+        let shape = body.shape.as_ref().ok_or_else(|| Unknown::Extent(body.name.clone()))?;
+        let no_extent = || Unknown::NoExtent(body.name.clone());
+        let built = shape.build::<D>().ok_or_else(no_extent)?;
+        let (min, max): (Vector<f64, D>, Vector<f64, D>) = built.bounding_box();
+        for k in 0..D {
+            let (low, high) = ((min[k] - origin[k]).max(0.0), (max[k] - origin[k]).min(grid.size[k]));
+            if !(high > low) {
+                return Err(no_extent());
+            }
+            extent = extent.min(high - low);
+            if let Shape::Box(_) = shape {
+                faces.extend([low, high]);
+            }
+        }
+    }
+    let coarsest = extent / cells;
+    let shortest = grid.size.iter().copied().fold(f64::INFINITY, f64::min);
+    let fewest = (shortest / coarsest - ON_NODE).ceil().max(1.0);
+    if bodies.is_empty() {
+        return Err(Unknown::NoBody);
+    }
+    if !(fewest < MOST_CELLS) {
+        return Err(Unknown::NoBox);
+    }
+    let fewest = fewest as usize;
+    let divides = |h: f64| GridBox { spacing: h, ..grid.clone() }.cells().is_some();
+    let on_node = |x: f64, h: f64| (x / h - (x / h).round()).abs() < ON_NODE;
+    let mut candidates = (fewest..=FINER * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h)).peekable();
+    let first = candidates.peek().copied();
+    let found = candidates.find(|&h| faces.iter().all(|&x| on_node(x, h))).or(first);
+    found.ok_or(Unknown::NoDivisor { finest: coarsest / FINER as f64, coarsest })
+}
+
+/// The greatest speed of pressure waves at rest, c = √((Λ + 2G)/ρ).
+pub(super) fn speed(bodies: &[Body]) -> Result<f64, Unknown> {
+    let mut greatest: f64 = 0.0;
+    for body in bodies {
+        let lame = body.material.constants().lame().and_then(Result::ok);
+        let speed = lame.map_or(f64::NAN, |lame| (lame.p_wave_modulus() / body.density).sqrt());
+        if !(speed > 0.0 && speed.is_finite()) {
+            return Err(Unknown::NoSpeed(body.name.clone()));
+        }
+        greatest = greatest.max(speed);
+    }
+    if greatest > 0.0 { Ok(greatest) } else { Err(Unknown::NoBody) }
+}

@@ -1,0 +1,153 @@
+//! The key `accuracy`: what it sets, what it leaves, and what it refuses.
+
+use crate::support::Failure;
+use bfree::scene::accuracy::levels;
+use bfree::scene::{self, Scene};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A block of 1 × 0.5 on a floor, without any knob; c = √(12/3) = 2.
+fn open_scene() -> Value {
+    json!({
+        "grid": { "size": [2, 1] },
+        "time": { "end": 1 },
+        "bodies": [{
+            "name": "block", "shape": { "box": { "min": [0.5, 0], "max": [1.5, 0.5] } }, "density": 3,
+            "material": { "neo_hookean": { "lambda": 4, "shear": 4 } },
+        }],
+        "boundary": { "bottom": "sliding" },
+        "gravity": { "acceleration": [0, -1] },
+    })
+}
+
+fn read(scene: &Value) -> Result<Scene, Failure> {
+    Ok(scene::read(&scene.to_string(), &[])?)
+}
+
+fn with(changes: &[(&str, Value)]) -> Value {
+    let mut scene = open_scene();
+    for (pointer, value) in changes {
+        let (parent, key) = pointer.rsplit_once('/').unwrap_or(("", pointer));
+        if let Some(parent) = scene.pointer_mut(parent) {
+            parent[key] = value.clone();
+        }
+    }
+    scene
+}
+
+#[test]
+fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
+    for level in levels() {
+        let asked = level.name.map_or(json!({ "error": level.error }), |name| name.into());
+        let scene = read(&with(&[("/accuracy", asked)]))?;
+        // The least extent is 0.5; the box and the block allow h = 0.5/n.
+        let cells = 0.5 / scene.grid.spacing;
+        assert!(cells >= level.cells - 1e-9 && cells < level.cells + 1.0 + 1e-9, "{cells} cells for {level:?}");
+        let courant = 2.0 * scene.time.step / scene.grid.spacing;
+        assert!(courant <= level.courant * (1.0 + 1e-12) && courant > 0.8 * level.courant, "{courant} for {level:?}");
+        let steps = scene.time.end / scene.time.step;
+        assert!((steps - steps.round()).abs() < 1e-9, "{steps} steps");
+        let written = serde_json::to_value(&scene)?;
+        assert_eq!(written["time"]["lumping"], level.lumping);
+        assert_eq!(written["approximation"]["lme"]["gamma"], level.gamma);
+        assert_eq!(written["solver"]["newton"]["tolerance"], level.tolerance);
+        assert_eq!(scene.bodies[0].particles_per_cell, level.particles_per_cell);
+        // What it says it has set, given by hand, is the same scene.
+        assert!(!scene.chosen.is_empty());
+        let set = scene.chosen.iter().map(|chosen| format!("{}={}", chosen.key, chosen.value).parse());
+        let given = scene::read(&open_scene().to_string(), &set.collect::<Result<Vec<_>, _>>()?)?;
+        assert_eq!(Scene { accuracy: None, chosen: Vec::new(), ..scene }, given);
+    }
+    Ok(())
+}
+
+#[test]
+fn it_yields_to_every_key_that_is_given() -> Result<(), Failure> {
+    let given = with(&[
+        ("/accuracy", "reference".into()),
+        ("/grid/spacing", 0.25.into()),
+        ("/time/step", 0.1.into()),
+        ("/time/lumping", 1.into()),
+        ("/approximation", "linear".into()),
+        ("/solver", json!({ "newton": { "tolerance": 1e-3 } })),
+        ("/bodies/0/particles_per_cell", 1.into()),
+    ]);
+    let scene = read(&given)?;
+    assert_eq!(scene.chosen, []);
+    let mut without = given;
+    without["accuracy"] = Value::Null;
+    assert_eq!(Scene { accuracy: None, ..scene }, read(&without)?);
+
+    // Given one by one, from the text or from an override; the step then follows the spacing that is given.
+    let scene = scene::read(&with(&[("/accuracy", "draft".into())]).to_string(), &["grid.spacing=0.125".parse()?])?;
+    assert_eq!(scene.grid.spacing, 0.125);
+    assert!(scene.chosen.iter().all(|chosen| chosen.key != "grid.spacing"));
+    let draft = levels()[0];
+    assert!((scene.time.step - 1.0 / (1.0 / (draft.courant * 0.125 / 2.0)).ceil()).abs() < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn what_it_cannot_choose_is_told() -> Result<(), Failure> {
+    let draft = || ("/accuracy", Value::from("draft"));
+    let steel = json!({ "neo_hookean": { "young": -1, "poisson": 0.3 } });
+    let from_file = json!([{ "name": "cloud", "particles": { "file": "cloud.csv" }, "density": 1,
+        "material": { "neo_hookean": { "lambda": 4, "shear": 4 } } }]);
+    let cases: [(Value, &[&str]); 8] = [
+        (with(&[("/accuracy", "fine".into())]), &["accuracy", "unknown variant `fine`", "`draft`"]),
+        (with(&[("/accuracy", json!({ "error": 7 }))]), &["accuracy.error", "7 is not allowed", "between"]),
+        (with(&[("/accuracy", json!({ "error": -0.01 }))]), &["accuracy.error", "-0.01 is not allowed"]),
+        (
+            with(&[draft(), ("/grid/size", json!([2, std::f64::consts::SQRT_2]))]),
+            &["accuracy", "divides every edge", "give grid.spacing"],
+        ),
+        (with(&[draft(), ("/bodies", from_file)]), &["accuracy", "\"cloud\"", "file", "give grid.spacing"]),
+        (
+            with(&[draft(), ("/bodies/0/material", steel)]),
+            &["accuracy", "\"block\"", "speed of sound", "give time.step"],
+        ),
+        (with(&[draft(), ("/bodies/0/shape/box/max", json!([0.1, 0.5]))]), &["accuracy", "\"block\" has no extent"]),
+        (open_scene(), &["missing field `spacing`"]),
+    ];
+    for (scene, words) in cases {
+        let error = read(&scene).map(|_| ()).unwrap_err().to_string();
+        for word in words {
+            assert!(error.contains(word), "no {word:?} in {error}");
+        }
+    }
+    Ok(())
+}
+
+fn program(arguments: &[&str], folder: &Path) -> Result<Output, Failure> {
+    Ok(Command::new(env!("CARGO_BIN_EXE_bfree")).args(arguments).current_dir(folder).output()?)
+}
+
+#[test]
+fn check_run_and_report_show_it_and_a_restart_holds_it() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let scene = with(&[("/accuracy", "draft".into()), ("/output", json!({ "checkpoint": 0.1 }))]);
+    std::fs::write(folder.path().join("block.json"), scene.to_string())?;
+    let said = |output: &Output| {
+        let text = [&output.stdout[..], &output.stderr].concat();
+        String::from_utf8_lossy(&text).into_owned()
+    };
+    let check = said(&program(&["check", "block.json"], folder.path())?);
+    assert!(check.contains("\"draft\" sets ") && check.contains("grid.spacing = 0."), "{check}");
+    let run = program(&["run", "block.json", "--steps", "2", "--out", "out", "--plot"], folder.path())?;
+    assert!(run.status.success(), "{}", said(&run));
+    assert!(said(&run).contains("accuracy \"draft\" sets ") && said(&run).contains("time.step = 0."), "{}", said(&run));
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.path().join("out/report.json"))?)?;
+    assert_eq!((&report["accuracy"]["asked"], &report["settings"]["accuracy"]), (&json!("draft"), &json!("draft")));
+    let keys: Vec<_> = report["accuracy"]["sets"].as_array().into_iter().flatten().map(|set| &set["key"]).collect();
+    assert!(keys.contains(&&json!("grid.spacing")) && keys.contains(&&json!("time.lumping")), "{report}");
+    assert!(std::fs::read_to_string(folder.path().join("out/report.html"))?.contains("What the accuracy has set"));
+
+    let other = ["run", "block.json", "--out", "out", "--restart", "--set", "accuracy=standard"];
+    let refused = program(&other, folder.path())?;
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    assert!(said(&refused).contains("accuracy was \"draft\" and is \"standard\""), "{}", said(&refused));
+    let same = program(&["run", "block.json", "--out", "out", "--restart", "--steps", "4"], folder.path())?;
+    assert!(same.status.success(), "{}", said(&same));
+    Ok(())
+}

@@ -1,0 +1,25 @@
+//! Velocities at the start.
+
+use bfree::approximation::ShapeFunction;
+use bfree::material::Law;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::simulation::{Simulation, StepError};
+use bfree::tensor::Vector;
+
+/// Gives the particles `velocity(x_p)`, projects it to the nodes by the masses, and interpolates that once to the particles, as the
+/// independent program does: what the nodes cannot represent is not there, and a jump lies as far to the left as to the right.
+///
+/// # Errors
+/// A particle without shape functions.
+pub fn velocity_by_masses<const D: usize, L: Law, A: ShapeFunction>(
+    simulation: &mut Simulation<D, L, A>,
+    velocity: impl Fn(&Vector<f64, D>) -> Vector<f64, D>,
+) -> Result<(), StepError> {
+    let particles = &mut simulation.particles;
+    particles.velocity = particles.position.iter().map(velocity).collect();
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    particles.velocity = supports.values(&nodal.velocity);
+    Ok(())
+}

@@ -1,0 +1,231 @@
+//! A run of a simulation, and what it cost.
+
+use super::setting::Setting;
+use crate::baseline::{Assembled, BFree, Pattern, assemble};
+use crate::forced;
+use crate::prepared::Prepared;
+use crate::studies::StudyError;
+use bfree::mechanics::residual::Carry;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::plan::Plan;
+use bfree::simulation::Simulation;
+use bfree::solver::{NewtonHistory, newton};
+use bfree::tensor::Vector;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// The most blocks assembled: 0.4 GB in 3D.
+const MOST_BLOCKS: usize = 5_000_000;
+
+/// An iteration keeps Newton's method quadratic if the linear solver leaves at most this part of what is left: the rest is the second
+/// order of Newton's own step.
+const LINEAR_SHARE: f64 = 0.5;
+
+/// … and a run does, if this part of its iterations does, the last of each step left out.
+const QUADRATIC_SHARE: f64 = 0.9;
+
+/// What the round-off of a residual is, in units of eps times its magnitude.
+const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+
+/// Systems may update the time that a thread has had a processor no more often.
+const TICK: Duration = Duration::from_millis(10);
+
+/// What was evaluated.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tally {
+    pub steps: u64,
+    pub iterations: usize,
+    pub residuals: usize,
+    pub linearizations: usize,
+    pub products: usize,
+    projections: usize,
+    /// Iterations but the last of each step.
+    decisive: usize,
+    /// Those of them that the linear solver limits.
+    limited: usize,
+}
+
+impl Tally {
+    fn add(&mut self, newton: &NewtonHistory, projection_iterations: usize) {
+        self.steps += 1;
+        self.projections += projection_iterations;
+        self.add_newton(newton);
+    }
+
+    fn add_newton(&mut self, newton: &NewtonHistory) {
+        self.iterations += newton.iterations.len();
+        self.residuals += newton.counts.residuals;
+        self.linearizations += newton.counts.linearizations;
+        self.products += newton.counts.tangent_products;
+        let round_off = ROUND_OFF * newton.magnitude.unwrap_or(0.0);
+        let limited = |one: &&bfree::solver::NewtonIteration| {
+            one.residual > round_off && one.krylov.relative_residual > LINEAR_SHARE * one.ratio
+        };
+        // The last one ends below the tolerance whatever limits it.
+        let before_last = newton.iterations.split_last().map_or(&[][..], |(_, before)| before);
+        self.decisive += before_last.len();
+        self.limited += before_last.iter().filter(limited).count();
+    }
+
+    /// Whether Newton's method converged quadratically.
+    pub fn quadratic(&self) -> bool {
+        self.limited as f64 <= (1.0 - QUADRATIC_SHARE) * self.decisive as f64
+    }
+}
+
+/// What a run cost.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    pub tally: Tally,
+    /// CPU seconds of its one thread, without the making of forces and the measuring of errors.
+    pub seconds: f64,
+    /// What was evaluated, each times what it takes at the start, in seconds: untouched by what else the machine does.
+    pub counted: f64,
+    /// Seconds of one product with the tangent, a particle.
+    pub product: f64,
+    /// The most bytes at one time, by the plan.
+    pub bytes: u64,
+}
+
+/// The force of a manufactured solution per unit mass, on a particle at a time.
+pub(super) type Force<'a, const D: usize> = &'a (dyn Fn(usize, f64) -> Vector<f64, D> + Sync);
+
+/// Takes `steps` steps of the nominal length, and shows the simulation to `watch` after each.
+pub(super) fn drive<const D: usize>(
+    simulation: &mut Simulation<D>,
+    setting: &Setting,
+    steps: u64,
+    force: Option<Force<'_, D>>,
+    mut watch: impl FnMut(&Simulation<D>) -> Result<(), StudyError>,
+) -> Result<Cost, StudyError> {
+    let units = Units::of(simulation, setting.assembled)?;
+    let mut tally = Tally::default();
+    let mut seconds = 0.0;
+    while simulation.clock.nominal_steps() < steps {
+        if force.is_none() && !setting.assembled {
+            let start = Thread::now();
+            let report = simulation.advance()?;
+            seconds += start.elapsed();
+            report.failed.iter().for_each(|attempt| tally.add_newton(&attempt.newton));
+            tally.add(&report.newton.history, report.projection_iterations);
+        } else {
+            let end = simulation.clock.time() + simulation.clock.step();
+            let gravity = simulation.loads.gravity.clone();
+            let of_gravity = gravity.map_or_else(Vector::zeros, |g| g.acceleration * g.curve.value(end));
+            let forces: Vec<_> =
+                (0..simulation.particles.len()).map(|p| force.map_or(of_gravity, |force| force(p, end))).collect();
+            let start = Thread::now();
+            let step = forced::step_by(simulation, |p, _| forces[p], |equilibrium, dphi, settings| {
+                if !setting.assembled {
+                    return newton(equilibrium, dphi, settings);
+                }
+                // The pattern had fewer blocks at the start; a body that outgrows it goes on matrix-free.
+                match Pattern::new(equilibrium.supports, equilibrium.nodal.mass.len(), MOST_BLOCKS) {
+                    Ok(pattern) => newton(&Assembled { equilibrium, pattern: &pattern }, dphi, settings),
+                    Err(_) => newton(equilibrium, dphi, settings),
+                }
+            })?;
+            seconds += start.elapsed();
+            tally.add(&step.newton.history, step.projection_iterations);
+        }
+        watch(simulation)?;
+    }
+    let counted = units.shapes * tally.steps as f64
+        + units.projection * tally.projections as f64
+        + units.residual * tally.residuals as f64
+        + units.linearization * tally.linearizations as f64
+        + units.product * tally.products as f64;
+    let product = units.product / simulation.particles.len() as f64;
+    Ok(Cost { tally, seconds, counted, product, bytes: units.bytes })
+}
+
+/// Seconds of one evaluation of each kind, at the start.
+struct Units {
+    shapes: f64,
+    projection: f64,
+    residual: f64,
+    linearization: f64,
+    product: f64,
+    bytes: u64,
+}
+
+impl Units {
+    fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<Self, StudyError> {
+        let prepared = Prepared::new(simulation)?;
+        let equilibrium = prepared.equilibrium(simulation);
+        let (count, lumping) = (prepared.nodes.len(), simulation.settings.lumping);
+        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
+        let mut dphi = vec![Vector::zeros(); count];
+        prepared.prescribe(&mut dphi);
+        let u: Vec<Vector<f64, D>> = vec![Vector::repeat(1e-3); count];
+        let mut out = vec![Vector::zeros(); count];
+        let shapes =
+            best(|| Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision).map(drop));
+        let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, count, lumping).map(drop));
+        let residual = best(|| equilibrium.residual::<f64>(&dphi, Carry::ALL).map(drop));
+        let mut bytes = Plan::of(simulation)?.bytes();
+        let (linearization, product) = if assembled {
+            let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
+            let matrix = assemble(&equilibrium, &dphi, &pattern, &BFree)?;
+            let matrix_free = Plan::of(simulation)?.arrays.iter().find(|array| array.name == "frozen tangent").map_or(0, |a| a.bytes);
+            bytes += matrix.bytes() as u64 - matrix_free.min(matrix.bytes() as u64);
+            let made = best(|| {
+                let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
+                black_box(assemble(&equilibrium, &dphi, &pattern, &BFree)?);
+                Ok::<_, StudyError>(())
+            });
+            (made, best(|| matrix.product(&u, &mut out)))
+        } else {
+            let free = best(|| equilibrium.tangent(&dphi).map(drop));
+            match equilibrium.single_tangent(&dphi)? {
+                Some(single) => {
+                    let u: Vec<Vector<f32, D>> = vec![Vector::repeat(1e-3); count];
+                    let mut out = vec![Vector::zeros(); count];
+                    let made = best(|| equilibrium.single_tangent(&dphi).map(drop));
+                    (made, best(|| single.product(&u, &mut out)))
+                }
+                None => {
+                    let tangent = equilibrium.tangent(&dphi)?;
+                    (free, best(|| tangent.product(&u, &mut out)))
+                }
+            }
+        };
+        let projection = projection / prepared.nodal.iterations.max(1) as f64;
+        Ok(Self { shapes, projection, residual, linearization, product, bytes })
+    }
+}
+
+/// The shortest of a few runs, in seconds.
+fn best<R>(mut run: impl FnMut() -> R) -> f64 {
+    (0..4).fold(f64::INFINITY, |best: f64, _| {
+        let start = Thread::now();
+        black_box(run());
+        let wall = start.wall.elapsed();
+        // What takes long is interrupted every time; what is short, the system's clock of processors does not see.
+        best.min(if wall < TICK { wall.as_secs_f64() } else { start.elapsed() })
+    })
+}
+
+/// The time that this thread has had a processor; where the system does not say, the time of the clock on the wall.
+struct Thread {
+    wall: Instant,
+    processor: Option<Duration>,
+}
+
+impl Thread {
+    fn now() -> Self {
+        Self { wall: Instant::now(), processor: processor_time() }
+    }
+
+    fn elapsed(&self) -> f64 {
+        let used = self.processor.zip(processor_time()).map(|(start, end)| end.saturating_sub(start));
+        used.unwrap_or_else(|| self.wall.elapsed()).as_secs_f64()
+    }
+}
+
+/// The first number of Linux's schedstat: nanoseconds on a processor.
+fn processor_time() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(Duration::from_nanos(text.split_whitespace().next()?.parse().ok()?))
+}

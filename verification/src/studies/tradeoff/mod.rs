@@ -1,0 +1,134 @@
+//! Speed against accuracy: error, work, seconds and bytes over every knob of a scene, on four problems with known answers.
+
+mod cost;
+mod levels;
+mod measured;
+mod pictures;
+mod problem;
+mod sentences;
+mod setting;
+
+use super::{Effort, Outcome, StudyError};
+use crate::report::{Bound, Report, chain};
+use crate::table::Table;
+use measured::{Measured, Point};
+use problem::{Bar, Compaction, Manufactured, Problem};
+use setting::{BASE_LEVEL, COURANT, KNOBS, Origin, design, knobs, one_at_a_time};
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "speed against accuracy: error, work, seconds and bytes over every knob of a scene, on four problems with known answers";
+
+/// A default is beaten by a setting that is better in error and in work by more than 10 %.
+const SLACK: f64 = 0.9;
+
+fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
+    let (plane, space) = ([6.0, 8.0, 12.0, 16.0, 24.0], [3.0, 4.0, 6.0, 8.0, 12.0]);
+    Ok(match effort {
+        Effort::Short => vec![
+            Box::new(Manufactured::<2> { name: "manufactured 2D", cells: plane, end: 0.3 }),
+            Box::new(Bar { end: 1e-3 }),
+            Box::new(Compaction::new(0.4, 6)?),
+            Box::new(Manufactured::<3> { name: "manufactured 3D", cells: space, end: 0.3 }),
+        ],
+        Effort::Full => vec![
+            Box::new(Manufactured::<2> { name: "manufactured 2D", cells: plane, end: 1.0 }),
+            Box::new(Bar { end: 3e-3 }),
+            Box::new(Compaction::new(1.5, 12)?),
+            Box::new(Manufactured::<3> { name: "manufactured 3D", cells: space, end: 1.0 }),
+        ],
+    })
+}
+
+/// Runs the study: on one thread, so that seconds are those of one core.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    Ok(one.install(|| study(*effort).map_err(|error| chain(&*error)))?)
+}
+
+fn study(effort: Effort) -> Result<Outcome, StudyError> {
+    let problems = problems(effort)?;
+    let all: Vec<Measured> = (problems.iter())
+        .map(|problem| {
+            let problem = &**problem;
+            let chosen = levels::settings(problem, effort);
+            let settings = [one_at_a_time(problem, effort), design(problem, effort), chosen].concat();
+            Measured::of(problem, &settings)
+        })
+        .collect::<Result<_, _>>()?;
+    let mut outcome = Outcome { reports: vec![defaults(&all), levels::report(&all, effort)], ..Outcome::default() };
+    let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
+    outcome.remarks.push(base(&*problems));
+    outcome.remarks.extend(defaults.iter().map(|(knob, default)| sentences::sentence(&all, knob, default)));
+    outcome.remarks.push(sentences::cheaper_at_equal_error(&all, &defaults));
+    outcome.tables.extend(all.iter().map(front));
+    outcome.tables.extend(defaults.iter().map(|(knob, default)| sentences::table(&all, knob, default)));
+    outcome.tables.extend(all.iter().map(everything));
+    outcome.sheets = if effort == Effort::Full { pictures::sheets(&all, &defaults) } else { Vec::new() };
+    Ok(outcome)
+}
+
+/// What the base is, in words.
+fn base(problems: &[Box<dyn Problem>]) -> String {
+    let sizes: Vec<_> = problems.iter().map(|one| format!("h = 1/{:.4} ({})", one.cells()[BASE_LEVEL], one.name())).collect();
+    format!(
+        "The base: what a scene has that gives no knob, at cΔt/h = {COURANT} and {}. Errors are relative to the size of the answer. Work is \
+         what was counted (shape functions, residuals, linearisations, products with the tangent, iterations of the projection), each times what it \
+         took, the best of four, at the start of that run; its unit is the product with the tangent of one particle with the defaults. It has no part in \
+         it for the vectors of the Krylov method. CPU seconds are those of one thread. Bytes are those of the plan.",
+        sizes.join(", ")
+    )
+}
+
+/// Whether anything beats the defaults: one knob at a time, and the combinations.
+fn defaults(all: &[Measured]) -> Report {
+    let title = "how far the defaults are from being beaten: the larger ratio of error and work, among what keeps Newton's method quadratic";
+    let mut report = Report::new(title, &["knob", "problem", "by"]);
+    for measured in all {
+        let base = &measured.base;
+        let mut least = |what: &str, bound: Bound, chosen: &dyn Fn(&Point) -> bool| {
+            let others = measured.points.iter().filter(|point| point.cost.tally.quadratic() && chosen(point));
+            let nearest = others.min_by(|a, b| base.beaten(a).total_cmp(&base.beaten(b)));
+            if let Some(nearest) = nearest {
+                report.push(&[what, measured.problem, &nearest.setting.name()], base.beaten(nearest), bound);
+            }
+        };
+        for knob in KNOBS {
+            least(knob.key, Bound::AtLeast(SLACK), &|point| point.setting.of_knob(knob.key).is_some());
+        }
+        least("combinations", Bound::AtLeast(SLACK), &|point| matches!(point.setting.origin, Origin::Design(..)));
+        let quadratic = if base.cost.tally.quadratic() { 1.0 } else { 0.0 };
+        report.push(&["Newton quadratic with the defaults", measured.problem, "-"], quadratic, Bound::AtLeast(1.0));
+    }
+    report
+}
+
+const HEADER: [&str; 8] = ["setting", "error", "work (1e6)", "CPU s", "KiB", "steps", "products / step", "Newton"];
+
+fn row(point: &Point) -> [String; 8] {
+    let tally = &point.cost.tally;
+    [
+        point.setting.name(),
+        format!("{:.3e}", point.error),
+        format!("{:.3}", point.work / 1e6),
+        format!("{:.3}", point.cost.seconds),
+        (point.cost.bytes / 1024).to_string(),
+        tally.steps.to_string(),
+        format!("{:.1}", tally.products as f64 / tally.steps as f64),
+        if tally.quadratic() { "quadratic" } else { "linear" }.to_owned(),
+    ]
+}
+
+fn front(measured: &Measured) -> Table {
+    let mut table = Table::new(format!("{}: the front, cheap to accurate", measured.problem), HEADER);
+    measured.front().into_iter().for_each(|point| table.push(row(point)));
+    table
+}
+
+fn everything(measured: &Measured) -> Table {
+    let mut table = Table::new(format!("{}: everything measured", measured.problem), HEADER);
+    measured.points.iter().for_each(|point| table.push(row(point)));
+    for (setting, why) in &measured.failures {
+        table.push([setting.name(), format!("fails: {why}")]);
+    }
+    table
+}

@@ -1,0 +1,83 @@
+//! Large strain along the axes of a square or a cube, under the body force that makes it a solution.
+
+use super::{LEVELS, Problem, steps};
+use crate::manufactured::{AxisAligned, body_force, state};
+use crate::studies::StudyError;
+use crate::studies::tradeoff::cost::{Cost, drive};
+use crate::studies::tradeoff::setting::Setting;
+use bfree::material::Lame;
+use bfree::scene::Scene;
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+use std::path::Path;
+
+const YOUNG: f64 = 1.0;
+const POISSON: f64 = 0.3;
+
+/// In `D` dimensions up to the time `end`; the error is the rms of the position there over the rms of the displacement.
+pub(in crate::studies::tradeoff) struct Manufactured<const D: usize> {
+    pub name: &'static str,
+    pub cells: [f64; LEVELS],
+    pub end: f64,
+}
+
+/// Faces of a box, along each axis.
+const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+
+impl<const D: usize> Problem for Manufactured<D> {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn cells(&self) -> [f64; LEVELS] {
+        self.cells
+    }
+
+    fn speed(&self) -> f64 {
+        Lame::from_young_poisson(YOUNG, POISSON).map_or(1.0, |lame| lame.p_wave_modulus().sqrt())
+    }
+
+    fn end(&self) -> f64 {
+        self.end
+    }
+
+    fn scene(&self) -> Value {
+        let walls: serde_json::Map<_, _> =
+            FACES.iter().take(D).flatten().map(|face| ((*face).to_owned(), json!("sliding"))).collect();
+        let corner = |x: f64| vec![x; D];
+        json!({
+            "grid": { "size": corner(1.0) },
+            "bodies": [{
+                "name": "body", "shape": { "box": { "min": corner(0.0), "max": corner(1.0) } }, "density": 1,
+                "material": { "neo_hookean": { "young": YOUNG, "poisson": POISSON } },
+            }],
+            "boundary": walls,
+        })
+    }
+
+    fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
+        let motion = AxisAligned::default();
+        let mut simulation: Simulation<D> = scene.build(Path::new("."))?;
+        let reference = simulation.particles.position.clone();
+        let law = simulation.bodies.first().ok_or("a scene without a body")?.law.clone();
+        for (p, x) in reference.iter().enumerate() {
+            let start = state(&motion, x, 0.0);
+            simulation.particles.velocity[p] = start.velocity;
+            simulation.particles.acceleration[p] = start.acceleration;
+        }
+        let force = |p: usize, t: f64| -> Vector<f64, D> { body_force(&motion, &law, 1.0, &reference[p], t) };
+        let cost = drive(&mut simulation, setting, steps(scene), Some(&force), |_| Ok(()))?;
+        let (mut error, mut size) = (0.0, 0.0);
+        for (x, found) in reference.iter().zip(&simulation.particles.position) {
+            let exact = state(&motion, x, simulation.clock.time()).position;
+            error += (found - exact).norm_squared();
+            size += (exact - x).norm_squared();
+        }
+        Ok(((error / size).sqrt(), cost))
+    }
+}

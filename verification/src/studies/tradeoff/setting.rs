@@ -1,0 +1,263 @@
+//! What is varied: one knob at a time from the defaults, and a designed set of combinations.
+
+use super::problem::{LEVELS, Problem};
+use crate::studies::Effort;
+use serde_json::Value;
+
+/// cΔt/h of the base.
+pub(super) const COURANT: f64 = 1.0;
+
+/// The level of h of the base.
+pub(super) const BASE_LEVEL: usize = 2;
+
+/// Where a setting comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Origin {
+    /// The defaults of the scene's types.
+    Default,
+    /// One knob turned: its name, and its value.
+    Knob(&'static str, String),
+    /// A combination: its shape functions, and ε.
+    Design(&'static str, f64),
+    /// A value of the key `accuracy`.
+    Accuracy(String),
+}
+
+/// One way to run a problem.
+#[derive(Clone, Debug)]
+pub(super) struct Setting {
+    pub origin: Origin,
+    /// `KEY.PATH=JSON` of the scene.
+    pub keys: Vec<String>,
+    /// Number of the spacing h in the problem's list; the key `accuracy` may choose it instead.
+    pub level: Option<usize>,
+    /// cΔt/h; the key `accuracy` may choose it instead.
+    pub courant: Option<f64>,
+    /// Whether the tangent is assembled.
+    pub assembled: bool,
+}
+
+impl Setting {
+    pub fn base() -> Self {
+        Self { origin: Origin::Default, keys: Vec::new(), level: Some(BASE_LEVEL), courant: Some(COURANT), assembled: false }
+    }
+
+    fn turned(knob: &'static str, value: impl Into<String>) -> Self {
+        Self { origin: Origin::Knob(knob, value.into()), ..Self::base() }
+    }
+
+    /// In a table.
+    pub fn name(&self) -> String {
+        match &self.origin {
+            Origin::Default => "defaults".into(),
+            Origin::Knob(knob, value) => format!("{knob} = {value}"),
+            Origin::Design(shape, lumping) => {
+                let (level, courant) = (self.level.unwrap_or(BASE_LEVEL), self.courant.unwrap_or(COURANT));
+                format!("{shape}, eps {lumping}, h level {level}, Courant {courant}")
+            }
+            Origin::Accuracy(value) => format!("accuracy = {value}"),
+        }
+    }
+
+    /// The value of the knob, if this is one.
+    pub fn of_knob(&self, name: &str) -> Option<&str> {
+        match &self.origin {
+            Origin::Knob(knob, value) if *knob == name => Some(value),
+            _ => None,
+        }
+    }
+}
+
+/// A knob that is a key of the scene.
+pub(super) struct Knob {
+    /// Its path.
+    pub key: &'static str,
+    /// Its values as JSON; `$x` stands for x c/h.
+    values: &'static [&'static str],
+    /// How many of them are tried at short effort.
+    short: usize,
+    /// In how many dimensions it is tried.
+    dimensions: std::ops::RangeInclusive<usize>,
+}
+
+/// The knobs that are keys of a scene, but h and Δt. A value that is the default is passed over: that is the base.
+pub(super) const KNOBS: &[Knob] = &[
+    Knob {
+        key: "approximation",
+        values: &[r#""linear""#, r#""gimp""#, r#"{"bspline":{"degree":2}}"#, r#"{"bspline":{"degree":3}}"#],
+        short: 1,
+        dimensions: 1..=3,
+    },
+    Knob { key: "approximation.lme.gamma", values: &["1.4", "0.8", "2", "3", "4", "6"], short: 1, dimensions: 1..=3 },
+    Knob { key: "approximation.lme.tolerance", values: &["1e-3", "1e-6", "1e-9", "1e-12"], short: 0, dimensions: 1..=3 },
+    Knob { key: "approximation.lme.support", values: &[r#""separable""#, r#""circle""#], short: 0, dimensions: 2..=2 },
+    Knob { key: "bodies.0.particles_per_cell", values: &["3", "1", "2"], short: 1, dimensions: 1..=3 },
+    Knob { key: "time.lumping", values: &["0.1", "0", "0.02", "0.5", "1"], short: 1, dimensions: 1..=3 },
+    Knob { key: "time.gamma", values: &["0.5", "0.6"], short: 0, dimensions: 1..=3 },
+    Knob { key: "time.initial_guess", values: &[r#""zero""#, r#""velocity""#], short: 0, dimensions: 1..=3 },
+    Knob { key: "time.wall_update", values: &[r#""literal""#, r#""consistent""#], short: 0, dimensions: 2..=3 },
+    Knob {
+        key: "transfer",
+        values: &[
+            r#"{"blend":{"rate":$0.1}}"#,
+            r#"{"pic":{"order":1}}"#,
+            r#"{"pic":{"order":2}}"#,
+            r#"{"blend":{"rate":$0.1,"order":2}}"#,
+            r#"{"limited":{"rate":$0.8}}"#,
+            r#""flip""#,
+        ],
+        short: 1,
+        dimensions: 1..=3,
+    },
+    Knob {
+        key: "solver.newton.tolerance",
+        values: &["1e-4", "1e-1", "1e-2", "1e-3", "1e-6", "1e-9", "1e-12"],
+        short: 1,
+        dimensions: 1..=3,
+    },
+    Knob {
+        key: "solver.krylov.forcing",
+        values: &[
+            r#""eisenstat_walker""#,
+            r#"{"fixed":1e-1}"#,
+            r#"{"fixed":1e-2}"#,
+            r#"{"fixed":1e-4}"#,
+            r#"{"fixed":1e-6}"#,
+            r#"{"fixed":1e-8}"#,
+            r#"{"fixed":1e-10}"#,
+        ],
+        short: 1,
+        dimensions: 1..=3,
+    },
+    Knob {
+        key: "solver.krylov.method",
+        values: &[r#""conjugate_gradient""#, r#"{"gmres":{"restart":30}}"#],
+        short: 1,
+        dimensions: 1..=3,
+    },
+    Knob { key: "solver.krylov.precision", values: &[r#""mixed""#, r#""double""#], short: 1, dimensions: 1..=3 },
+];
+
+/// Names of the knobs that are no key with a default.
+pub(super) const SPACING: &str = "grid.spacing";
+pub(super) const STEP: &str = "time.step";
+pub(super) const TANGENT: &str = "tangent";
+
+const ASSEMBLED: &str = "assembled";
+
+/// All knobs, each with the value that the base has.
+pub(super) fn knobs(problem: &dyn Problem) -> Vec<(&'static str, String)> {
+    let of_key = |knob: &Knob| {
+        let default = problem.default_of(knob.key).map_or_else(String::new, |value| value.to_string());
+        (knob.key, default.replace('"', ""))
+    };
+    let mut knobs = vec![(SPACING, "× 1".to_owned()), (STEP, "× 1".to_owned())];
+    knobs.extend(KNOBS.iter().map(of_key));
+    knobs.push((TANGENT, "matrix-free".to_owned()));
+    knobs
+}
+
+/// The base, and one knob turned at a time.
+pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
+    let full = effort == Effort::Full;
+    let mut settings = vec![Setting::base()];
+    let cells = problem.cells();
+    // The finest level takes minutes in three dimensions.
+    let finest = if problem.dimension() < 3 { LEVELS } else { LEVELS - 1 };
+    for level in if full { 0..finest } else { 1..2 } {
+        if level != BASE_LEVEL {
+            // The time step stays.
+            let courant = COURANT * cells[level] / cells[BASE_LEVEL];
+            let value = format!("× {:.2}", cells[BASE_LEVEL] / cells[level]);
+            let turned = Setting::turned(SPACING, value);
+            settings.push(Setting { level: Some(level), courant: Some(courant), ..turned });
+        }
+    }
+    for factor in if full { &[8.0, 4.0, 2.0, 0.5, 0.25][..] } else { &[2.0] } {
+        let turned = Setting::turned(STEP, format!("× {factor}"));
+        settings.push(Setting { courant: Some(COURANT * factor), ..turned });
+    }
+    for knob in KNOBS.iter().filter(|knob| knob.dimensions.contains(&problem.dimension())) {
+        let default = problem.default_of(knob.key);
+        for value in knob.values.iter().take(if full { knob.values.len() } else { knob.short }) {
+            let label = value.replace('$', "c/h × ").replace('"', "");
+            let value = scaled(value, problem.speed() / problem.spacing(BASE_LEVEL));
+            if default.as_ref().is_some_and(|default| is(default, &value)) {
+                continue;
+            }
+            let mut keys = vec![format!("{}={value}", knob.key)];
+            if knob.key == "time.gamma" {
+                // β = (γ + ½)²/4
+                let beta = value.parse().map_or(0.25, |gamma: f64| 0.25 * (gamma + 0.5).powi(2));
+                keys.push(format!("time.beta={beta}"));
+            }
+            settings.push(Setting { keys, ..Setting::turned(knob.key, label) });
+        }
+    }
+    // In three dimensions the study `baseline` compares them: whole runs take minutes.
+    if problem.dimension() < 3 || !full {
+        settings.push(Setting { assembled: true, ..Setting::turned(TANGENT, ASSEMBLED) });
+    }
+    settings
+}
+
+/// Whether a value of a scene is what stands in the JSON: 3 is 3.0.
+fn is(value: &Value, json: &str) -> bool {
+    serde_json::from_str(json).is_ok_and(|other: Value| *value == other || (value.is_f64() && value.as_f64() == other.as_f64()))
+}
+
+/// A value in which `$x` has become x c/h.
+fn scaled(value: &str, rate: f64) -> String {
+    let Some((before, after)) = value.split_once('$') else { return value.to_owned() };
+    let end = after.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(after.len());
+    let factor: f64 = after[..end].parse().unwrap_or(1.0);
+    format!("{before}{:.4e}{}", factor * rate, &after[end..])
+}
+
+/// The shape functions of the design.
+pub(super) const SHAPES: [(&str, &str); 6] = [
+    ("linear", r#""linear""#),
+    ("uGIMP", r#""gimp""#),
+    ("B-spline 3", r#"{"bspline":{"degree":3}}"#),
+    ("LME 0.8", r#"{"lme":{"gamma":0.8}}"#),
+    ("LME 1.4", r#"{"lme":{"gamma":1.4}}"#),
+    ("LME 3", r#"{"lme":{"gamma":3}}"#),
+];
+
+/// Shape functions × ε × h × Δt.
+pub(super) fn design(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
+    let (shapes, lumpings, levels, courants): (&[usize], &[f64], &[usize], &[f64]) = match (effort, problem.dimension()) {
+        (Effort::Short, _) => (&[4, 5], &[1.0], &[1, 2], &[1.0]),
+        (Effort::Full, 3) => (&[0, 1, 4, 5], &[1.0, 0.1], &[1, 2], &[1.0]),
+        (Effort::Full, _) => (&[0, 1, 2, 3, 4, 5], &[1.0, 0.1], &[1, 2, 3], &[2.0, 1.0]),
+    };
+    let mut settings = Vec::new();
+    for &shape in shapes {
+        for &lumping in lumpings {
+            for &level in levels {
+                for &courant in courants {
+                    let (name, json) = SHAPES[shape];
+                    settings.push(Setting {
+                        origin: Origin::Design(name, lumping),
+                        keys: vec![format!("approximation={json}"), format!("time.lumping={lumping}")],
+                        level: Some(level),
+                        courant: Some(courant),
+                        assembled: false,
+                    });
+                }
+            }
+        }
+    }
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_is_a_multiple_of_c_over_h() {
+        assert_eq!(scaled(r#"{"limited":{"rate":$0.8}}"#, 50.0), r#"{"limited":{"rate":4.0000e1}}"#);
+        assert_eq!(scaled("0.1", 50.0), "0.1");
+    }
+}
