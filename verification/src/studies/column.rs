@@ -17,14 +17,17 @@ pub(super) const ABOUT: &str = "a column compacted by its own weight without ine
 /// ρ₀, g and H of the scene.
 const WEIGHT: (f64, f64, f64) = (2700.0, 9.81, 1.0);
 
-/// (name, scene key, least order of stress and displacement in one load step, largest error of the stress in ten on the finest grid)
+/// (name, scene key, least order of the stress in one load step, largest error of the stress in ten)
 const SHAPES: [(&str, &str, f64, f64); 5] = [
-    ("linear", "\"linear\"", 0.95, 0.5),
-    ("uGIMP", "\"gimp\"", 0.95, 0.1),
-    ("quadratic B-splines", r#"{"bspline":{"degree":2}}"#, 1.5, 0.05),
-    ("cubic B-splines", r#"{"bspline":{"degree":3}}"#, 1.5, 0.05),
-    ("LME 3", r#"{"lme":{"gamma":3}}"#, 1.5, 0.05),
+    ("linear", "\"linear\"", 0.95, 0.2),
+    ("uGIMP", "\"gimp\"", 0.95, 0.03),
+    ("quadratic B-splines", r#"{"bspline":{"degree":2}}"#, 1.45, 0.03),
+    ("cubic B-splines", r#"{"bspline":{"degree":3}}"#, 1.45, 0.01),
+    ("LME 3", r#"{"lme":{"gamma":3}}"#, 0.95, 0.07),
 ];
+
+/// Least order of the displacement in one load step.
+const ORDER_OF_DISPLACEMENT: f64 = 1.95;
 
 /// Errors relative to ρ₀ g H, in the mean square over the particles, and to the displacement of the top.
 struct Errors {
@@ -100,9 +103,13 @@ fn column(shape: &str, cells: u32, steps: u32) -> Result<Errors, StudyError> {
 /// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let cells: &[u32] = if *effort == Effort::Full { &[10, 20, 40, 80] } else { &[10, 20, 40] };
-    let mut report = Report::new("static compaction of a column against its analytical stress", &["of", "shape", "load steps"]);
+    let mut report =
+        Report::new("static compaction of a column against its analytical stress", &["of", "shape", "load steps"]);
     let header = ["shape", "load steps", "cells", "stress", "order", "top displacement", "order", "Newton", "Krylov"];
-    let mut table = Table::new("errors relative to the stress at the foot (mean square) and to the displacement of the top", header);
+    let mut table = Table::new(
+        "errors relative to the stress at the foot (mean square) and to the displacement of the top",
+        header,
+    );
     for (name, shape, least_order, largest) in SHAPES {
         for steps in [1, 10] {
             let mut before: Option<Errors> = None;
@@ -124,11 +131,12 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
                     errors.krylov.to_string(),
                 ]);
                 if Some(&n) == cells.last() {
-                    let asked = |one: Bound| if steps == 1 { one } else { Bound::Reported };
                     let label = steps.to_string();
-                    for (what, order) in ["order of the stress", "order of the displacement"].iter().zip(orders) {
+                    let least =
+                        [("order of the stress", least_order), ("order of the displacement", ORDER_OF_DISPLACEMENT)];
+                    for ((what, least), order) in least.into_iter().zip(orders).filter(|_| steps == 1) {
                         let order = order.ok_or("one grid alone has no order")?;
-                        report.push(&[what, name, &label], order, asked(Bound::AtLeast(least_order)));
+                        report.push(&[what, name, &label], order, Bound::AtLeast(least));
                     }
                     let bound = if steps == 1 { Bound::Reported } else { Bound::AtMost(largest) };
                     report.push(&["error of the stress", name, &label], errors.stress, bound);
@@ -137,5 +145,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             }
         }
     }
+    report.note(NOTE);
     Ok(Outcome { reports: vec![report], tables: vec![table], ..Outcome::default() })
 }
+
+const NOTE: &str = "In one load step from rest the particles stay where they are good quadrature points, and errors fall with h. In several, particles cross \
+     cells between the steps: the quadrature error that this makes in the stress does not fall with h, for any shape function; the smoother it is, the less.";
