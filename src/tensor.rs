@@ -197,15 +197,37 @@ impl<T: Real, const D: usize> Deformation<T, D> {
         s * series + T::lit(f64::from(k) * LN_2)
     }
 
-    /// tr E − j, of second order with nothing to cancel:
-    /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D)
+    /// tr E − j, of second order.
+    ///
+    /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D) has nothing to cancel while H is small because the strain is.
+    /// Where a rotation makes H much larger than E, those terms do cancel, and from J² = det(I + 2E) follows
+    /// (j tr E − 4 I₂(E) − 8 det E)/(2 + j), of strains alone (in 2D without the det E of 3D).
     #[inline(always)]
     pub fn trace_e_minus_j(&self) -> T {
-        let half_hh = contract(&self.h, &self.h) * T::lit(0.5);
+        let (h, e) = (&self.h, self.green_lagrange());
+        let turned = D > 1 && contract(&e, &e).value() < 0.25 * contract(h, h).value();
+        if turned {
+            let minors = match D {
+                2 => T::lit(4.0) * determinant(&e),
+                _ => T::lit(4.0) * second_invariant(&e) + T::lit(8.0) * determinant(&e),
+            };
+            return (self.j * trace(&e) - minors) / (T::lit(2.0) + self.j);
+        }
+        let half_hh = contract(h, h) * T::lit(0.5);
         match D {
             1 => half_hh,
-            2 => half_hh - determinant(&self.h),
-            _ => half_hh - second_invariant(&self.h) - determinant(&self.h),
+            2 => half_hh - determinant(h),
+            _ => half_hh - second_invariant(h) - determinant(h),
+        }
+    }
+
+    /// tr E − ln J, of second order: by the two differences below and above while J is not large, where both would be much larger than it.
+    #[inline(always)]
+    pub fn trace_e_minus_log_jacobian(&self) -> T {
+        if self.j.value() < 2.0 {
+            self.trace_e_minus_j() + self.j_minus_log_jacobian()
+        } else {
+            trace(&self.green_lagrange()) - self.log_jacobian()
         }
     }
 

@@ -3,7 +3,7 @@
 use super::closed_tangent::rows;
 use super::{ClosedTangent, Lame, Law, LawVisitor};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled};
+use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 
 /// How the volume resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,21 +70,22 @@ impl Law for NeoHookean {
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         let half_lambda = T::lit(0.5 * self.lame.lambda);
-        let j_minus_log = at.j_minus_log_jacobian();
         let volumetric = match self.volumetric {
-            Volumetric::Ciarlet => T::lit(0.5) * at.j * at.j + j_minus_log,
+            Volumetric::Ciarlet => T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian(),
             Volumetric::Logarithmic => at.log_jacobian() * at.log_jacobian(),
         };
-        half_lambda * volumetric + T::lit(self.lame.shear) * (at.trace_e_minus_j() + j_minus_log)
+        half_lambda * volumetric + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
     }
 
-    /// S = C⁻¹ [J U'(J) I + 2G E]
+    /// S = F⁻¹ P,  P = J U'(J) F⁻ᵀ + G (H + F⁻ᵀ Hᵀ)
+    ///
+    /// H + F⁻ᵀHᵀ = F − F⁻ᵀ is small where strain and rotation are, and no larger than F where F is large: as C⁻¹ [J U' I + 2G E],
+    /// shear is a difference of products of size ‖F‖², as G (I − C⁻¹) one of numbers of size 1.
     #[inline(always)]
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();
-        let c_inv = f_inv_t.transpose() * f_inv_t;
-        let two_g_e = scaled(&at.green_lagrange(), T::lit(2.0 * self.lame.shear));
-        c_inv * (scaled(&identity(), self.volumetric_stress(at)) + two_g_e)
+        let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.lame.shear));
+        f_inv_t.transpose() * (scaled(&f_inv_t, self.volumetric_stress(at)) + shear)
     }
 
     /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹, with q = J U'(J) − G

@@ -11,6 +11,7 @@
 
 pub mod baseline;
 mod check;
+pub mod double_double;
 pub mod elements;
 pub mod figure;
 pub mod forced;

@@ -73,6 +73,7 @@ studies!(
     patch,
     balance,
     digits,
+    extremes,
     manufactured,
     minimiser,
     order,

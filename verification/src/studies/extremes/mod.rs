@@ -1,0 +1,74 @@
+//! The extremes: whether rows said beforehand to be solvable are solved, and to what accuracy, and the others refused for the right reason.
+//!
+//! A solvable row ends with its error against arithmetic of higher precision, an exact answer or a balance, and a bound from theory;
+//! a row to be refused with the number of answers that were not the one error expected: none.
+
+mod deformations;
+mod double;
+mod places;
+mod points;
+mod strains;
+
+use super::{Effort, Outcome, StudyError};
+use crate::report::{Bound, Report, chain};
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "strains, deformations and places at their extremes, against double-double arithmetic; what is impossible is refused";
+
+/// What is written in the column `beforehand` of a row that must be solved.
+const SOLVABLE: &str = "solvable";
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut outcome = Outcome::default();
+    outcome.reports.push(double::run());
+    strains::run(effort, &mut outcome);
+    deformations::run(&mut outcome);
+    outcome.reports.push(places::run());
+    Ok(outcome)
+}
+
+/// A report of rows: what is done, to what, and what was said of it beforehand.
+fn rows(title: &str) -> Report {
+    Report::new(title, &["what", "case", "beforehand"])
+}
+
+/// A row that must be solved: its error against a bound, or why it failed.
+fn solvable<E: Into<StudyError>>(report: &mut Report, what: &str, case: &str, measured: Result<f64, E>, bound: f64) {
+    let labels = [what, case, SOLVABLE];
+    match measured {
+        Ok(error) => report.push(&labels, error, Bound::AtMost(bound)),
+        Err(error) => report.push_error(&labels, error.into().as_ref()),
+    }
+}
+
+/// A row that must be refused with the error named: the value counts answers that are another one.
+fn refused<T, E: std::error::Error>(
+    report: &mut Report,
+    what: &str,
+    case: &str,
+    error: &str,
+    answers: impl IntoIterator<Item = Result<T, E>>,
+    expected: impl Fn(&E) -> bool,
+) {
+    let beforehand = format!("refused: {error}");
+    let (mut answered, mut wrong) = (0, 0);
+    for answer in answers {
+        answered += 1;
+        let found = match &answer {
+            Err(found) if expected(found) => continue,
+            Err(found) => chain(found),
+            Ok(_) => "accepted".into(),
+        };
+        wrong += 1;
+        report.note(format!("{what}, {case}: {found}"));
+    }
+    // Without an answer nothing was refused.
+    let value = if answered > 0 { f64::from(wrong) } else { f64::NAN };
+    report.push(&[what, case, &beforehand], value, Bound::AtMost(0.0));
+}
+
+/// The larger one, and NaN if either is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}

@@ -1,0 +1,190 @@
+//! Energy and stress at one deformation, in a precision to be judged, in double-double, and by the formulas of textbooks.
+
+use crate::double_double::DoubleDouble;
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff, Volumetric};
+use bfree::scalar::Real;
+use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
+use num_traits::Signed;
+
+/// A precision to be judged.
+pub(super) trait Precision: Real {
+    const NAME: &'static str;
+    /// The distance from 1 to the next number.
+    const EPSILON: f64;
+}
+
+impl Precision for f64 {
+    const NAME: &'static str = "f64";
+    const EPSILON: f64 = Self::EPSILON;
+}
+
+impl Precision for f32 {
+    const NAME: &'static str = "f32";
+    const EPSILON: f64 = Self::EPSILON as f64;
+}
+
+/// ν = 0.3; the constants have few digits, so that they are the same in every precision.
+pub(super) fn laws() -> [(&'static str, Material); 3] {
+    let lame = Lame { lambda: 576.0, shear: 384.0 };
+    [
+        ("Ciarlet", NeoHookean::ciarlet(lame).into()),
+        ("logarithmic", NeoHookean::logarithmic(lame).into()),
+        ("St.V.-Kirchhoff", StVenantKirchhoff { lame }.into()),
+    ]
+}
+
+/// What a rounding of the input is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rounding {
+    /// H changes by eps ‖H‖ in any direction: what storing H, and composing it from increments, does.
+    Displacement,
+    /// Every entry of F changes by eps of itself: for deformations along the axes, whose F is exact.
+    Entries,
+    /// H changes by eps ‖H‖, and det F by eps of the six products it is the sum of: they are as large as ‖F‖³, and where one stretch is
+    /// much larger than the others and not along an axis, so that they cancel, no smaller error can be had without pivoting.
+    Products,
+}
+
+/// Errors at one deformation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Errors {
+    /// |δW| and ‖δS‖ over what rounding of result and input implies, eps (|W| + κ) and eps (‖S‖ + κ): a number of roundings.
+    pub energy: f64,
+    pub stress: f64,
+    /// The same relative to the result.
+    pub relative_energy: f64,
+    pub relative_stress: f64,
+    /// The formulas of textbooks, relative to the result.
+    pub naive_energy: f64,
+    pub naive_stress: f64,
+}
+
+impl Errors {
+    pub const NONE: Self = Self {
+        energy: 0.0,
+        stress: 0.0,
+        relative_energy: 0.0,
+        relative_stress: 0.0,
+        naive_energy: 0.0,
+        naive_stress: 0.0,
+    };
+
+    pub fn worse(self, other: Self) -> Self {
+        let worse = super::worse;
+        Self {
+            energy: worse(self.energy, other.energy),
+            stress: worse(self.stress, other.stress),
+            relative_energy: worse(self.relative_energy, other.relative_energy),
+            relative_stress: worse(self.relative_stress, other.relative_stress),
+            naive_energy: worse(self.naive_energy, other.naive_energy),
+            naive_stress: worse(self.naive_stress, other.naive_stress),
+        }
+    }
+}
+
+/// Judges `law` in precision `T` at `h`, rounded to `T`.
+///
+/// First-order in eps the rounding of the input changes S by ‖∂S/∂H‖ eps ‖H‖ and W by ‖P‖ eps ‖H‖; where W itself is of second order in
+/// a strain below eps, by ½ ‖∂P/∂H‖ (eps ‖H‖)² too.
+pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
+    let given: Tensor<T, D> = h.map(T::lit);
+    let h = given.map(T::value);
+    let at = Deformation::new(given);
+    let exact_at = Deformation::new(h.map(DoubleDouble::from));
+    let (exact_w, exact_s) = (law.energy(&exact_at), law.stress(&exact_at));
+    let error = |w: T, s: Tensor<T, D>| {
+        let w = (DoubleDouble::from(w.value()) - exact_w).magnitude();
+        let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s.value()) - exact).magnitude()).norm();
+        (w, s)
+    };
+    let (energy, stress) = error(law.energy(&at), law.stress(&at));
+    let (naive_w, naive_s) = naive(law, &given);
+    let (naive_energy, naive_stress) = error(naive_w, naive_s);
+
+    let near = Deformation::new(h);
+    let (w, s) = (exact_w.magnitude(), exact_s.map(DoubleDouble::value));
+    let piola = near.f * s;
+    let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+    let response = |i: usize, k: usize| law.elasticity(&near, &(near.f.transpose() * outer(&unit(i), &unit(k)))).norm();
+    let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
+    let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
+    let (change_w, change_s) = match rounding {
+        Rounding::Displacement => (piola.norm() * h.norm(), stiffness * h.norm()),
+        Rounding::Products => {
+            // δF = F δJ/(D J) is a change of volume alone.
+            let volume = permanent(&near.f.abs()) / (D as f64 * near.jacobian);
+            let response = law.elasticity(&near, &(near.f.transpose() * near.f)).norm();
+            let change_w = piola.norm() * h.norm() + contract(&piola, &near.f).abs() * volume;
+            (change_w, stiffness * h.norm() + response * volume)
+        }
+        Rounding::Entries => (
+            contract(&piola.abs(), &near.f.abs()),
+            pairs().map(|(i, k)| near.f[(i, k)].abs() * response(i, k)).sum(),
+        ),
+    };
+    let second = 0.5 * (near.f.norm() * stiffness + s.norm()) * (T::EPSILON * h.norm()).powi(2);
+    Errors {
+        energy: ratio(energy, T::EPSILON * (w + change_w) + second),
+        stress: ratio(stress, T::EPSILON * (s.norm() + change_s)),
+        relative_energy: ratio(energy, w),
+        relative_stress: ratio(stress, s.norm()),
+        naive_energy: ratio(naive_energy, w),
+        naive_stress: ratio(naive_stress, s.norm()),
+    }
+}
+
+/// The generic formulas in double-double against those of textbooks in double-double, relative to the result.
+pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f64 {
+    let h = h.map(DoubleDouble::from);
+    let at = Deformation::new(h);
+    let (w, s) = (law.energy(&at), law.stress(&at));
+    let (naive_w, naive_s) = naive(law, &h);
+    let stress = s.zip_map(&naive_s, |a, b| (a - b).magnitude()).norm() / s.map(DoubleDouble::magnitude).norm();
+    super::worse((w - naive_w).abs().magnitude() / w.magnitude(), stress)
+}
+
+/// The sum of the products that make the determinant, all with the sign +.
+fn permanent<const D: usize>(a: &Tensor<f64, D>) -> f64 {
+    let minor = |i: usize, k: usize| a[(1, i)] * a[(2, k)] + a[(1, k)] * a[(2, i)];
+    match D {
+        1 => a[(0, 0)],
+        2 => a[(0, 0)] * a[(1, 1)] + a[(0, 1)] * a[(1, 0)],
+        _ => a[(0, 0)] * minor(1, 2) + a[(0, 1)] * minor(0, 2) + a[(0, 2)] * minor(0, 1),
+    }
+}
+
+fn ratio(error: f64, size: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { error / size }
+}
+
+/// W and S by way of C = FᵀF, with ln J = ½ ln det C and tr C − 3: what is usually written.
+fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tensor<T, D>) {
+    let one = identity::<T, D>();
+    let f = one + h;
+    let c = f.transpose() * f;
+    let (lit, d) = (T::lit, T::lit(D as f64));
+    match law {
+        Material::NeoHookean(NeoHookean { lame, volumetric }) => {
+            let (lambda, shear) = (lit(lame.lambda), lit(lame.shear));
+            let det_c = determinant(&c);
+            let ln_j = det_c.ln() * lit(0.5);
+            let c_inverse = inverse(&c);
+            let (u, pressure) = match volumetric {
+                Volumetric::Ciarlet => (
+                    lambda * lit(0.25) * (det_c - T::one()) - lambda * lit(0.5) * ln_j,
+                    lambda * lit(0.5) * (det_c - T::one()),
+                ),
+                Volumetric::Logarithmic => (lambda * lit(0.5) * ln_j * ln_j, lambda * ln_j),
+            };
+            let w = u - shear * ln_j + shear * lit(0.5) * (trace(&c) - d);
+            (w, scaled(&c_inverse, pressure) + scaled(&(one - c_inverse), shear))
+        }
+        Material::StVenantKirchhoff(StVenantKirchhoff { lame }) => {
+            let (lambda, shear) = (lit(lame.lambda), lit(lame.shear));
+            let e = scaled(&(c - one), lit(0.5));
+            let tr_e = trace(&e);
+            let w = lambda * lit(0.5) * tr_e * tr_e + shear * contract(&e, &e);
+            (w, scaled(&one, lambda * tr_e) + scaled(&e, lit(2.0) * shear))
+        }
+    }
+}

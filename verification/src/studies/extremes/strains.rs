@@ -1,0 +1,195 @@
+//! Strains from 1e-15 to 10: all laws, in every dimension, in both precisions.
+
+use super::points::{Errors, Precision, Rounding, judge, laws, reference};
+use super::{Effort, Outcome, SOLVABLE};
+use crate::check::regime::rotation;
+use crate::figure::Axis;
+use crate::random::Random;
+use crate::report::{Bound, Report, short};
+use crate::sheet::{Curve, Mark, Panel, Sheet};
+use crate::table::Table;
+use bfree::material::Material;
+use bfree::tensor::{Tensor, determinant, identity};
+use plotters::prelude::SeriesLabelPosition;
+
+/// Roundings on the longest way from H to S in 3D: 8 in j, 5 in a cofactor, 3 in C⁻¹, 5 in E, 5 in their product; each is half an eps.
+pub(super) const ROUNDINGS: f64 = 13.0;
+
+/// Constants such as 1/3 in a series are written in double precision: double-double is then good to a rounding, a tenth of what it judges.
+const REFERENCE: f64 = f64::EPSILON;
+
+/// Deformations tried of each kind and size.
+const TRIES: usize = 20;
+
+/// From where on to 1 the formulas of textbooks keep enough digits in double-double to check the reference by them.
+const RESOLVED: f64 = 1e-3;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Random,
+    Shear,
+    Turned,
+}
+
+impl Kind {
+    const ALL: [Self; 3] = [Self::Random, Self::Shear, Self::Turned];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Shear => "shear",
+            Self::Turned => "turned by 2 to 3 rad",
+        }
+    }
+
+    /// H of the given size with det F > 0; `None` where there is none of this kind.
+    fn displacement<const D: usize>(self, size: f64, random: &mut Random) -> Option<Tensor<f64, D>> {
+        if D == 1 && self != Self::Random {
+            return None;
+        }
+        if self == Self::Shear {
+            let mut h = Tensor::zeros();
+            h[(0, D - 1)] = size * random.signed();
+            return Some(h);
+        }
+        loop {
+            let strained = random.tensor::<D>() * size;
+            let f = identity::<f64, D>() + strained;
+            if determinant(&f) > 0.0 {
+                // Q (I + X) − I = (Q − I) + Q X keeps the digits of X as far as H can.
+                let q = if self == Self::Turned { rotation::<D>(random) } else { identity() };
+                return Some((q - identity::<f64, D>()) + q * strained);
+            }
+        }
+    }
+}
+
+pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
+    let sizes: Vec<f64> = match effort {
+        Effort::Short => vec![1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0],
+        Effort::Full => (-30..=2).map(|k| 10.0_f64.powf(0.5 * f64::from(k))).collect(),
+    };
+    let columns = ["quantity", "numbers", "beforehand", "law", "D", "strain", "kind"];
+    let mut report = Report::new("strains 1e-15 to 10: roundings, in eps, that the errors of W and S amount to", &columns)
+        .as_matrix(&[0, 1, 2], 5, 6);
+    let mut judge_of_judge = super::rows("the reference against textbook formulas in double-double, strains 1e-3 to 10");
+    let (mut double, mut single) = (Vec::new(), Vec::new());
+    let mut worst_reference: f64 = 0.0;
+    for &size in &sizes {
+        let (mut here, mut here_single) = (Errors::NONE, Errors::NONE);
+        for (name, law) in &laws() {
+            let mut cell = Cells { name, law, size, report: &mut report };
+            cell.all::<f64>(&mut here);
+            cell.all::<f32>(&mut here_single);
+            if size >= RESOLVED {
+                for error in [check::<1>(law, size), check::<2>(law, size), check::<3>(law, size)] {
+                    worst_reference = super::worse(worst_reference, error);
+                }
+            }
+        }
+        double.push((size, here));
+        single.push((size, here_single));
+    }
+    report.note("An error is judged by what rounding H to the same precision changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
+    report.note("body turned by 2 rad is below the last digit of H itself, and no formula can know it.");
+    super::solvable(&mut judge_of_judge, "W and S", "random", Ok::<_, std::convert::Infallible>(worst_reference), REFERENCE);
+    outcome.reports.extend([judge_of_judge, report]);
+    outcome.tables.push(table(&double, &single));
+    outcome.sheets.push(sheet(&double, &single));
+}
+
+/// The generic code in double-double against other formulas.
+fn check<const D: usize>(law: &Material, size: f64) -> f64 {
+    let mut random = Random::new(43);
+    (0..TRIES).filter_map(|_| Kind::Random.displacement::<D>(size, &mut random)).fold(0.0, |worst, h| {
+        // Close to det F = 0 the formulas of textbooks lose digits.
+        let resolved = determinant(&(identity::<f64, D>() + h)) > 0.01;
+        if resolved { super::worse(worst, reference(law, &h)) } else { worst }
+    })
+}
+
+struct Cells<'a> {
+    name: &'a str,
+    law: &'a Material,
+    size: f64,
+    report: &'a mut Report,
+}
+
+impl Cells<'_> {
+    /// All kinds in all dimensions; `random` gathers the worst of those that are not turned.
+    fn all<T: Precision>(&mut self, random: &mut Errors) {
+        for kind in Kind::ALL {
+            for errors in [self.one::<T, 1>(kind), self.one::<T, 2>(kind), self.one::<T, 3>(kind)].into_iter().flatten() {
+                if kind == Kind::Random {
+                    *random = random.worse(errors);
+                }
+            }
+        }
+    }
+
+    fn one<T: Precision, const D: usize>(&mut self, kind: Kind) -> Option<Errors> {
+        let mut random = Random::new(47);
+        let tried = (0..TRIES).map(|_| {
+            let h = kind.displacement::<D>(self.size, &mut random)?;
+            Some(judge::<T, D>(self.law, &h, Rounding::Displacement))
+        });
+        let worst = tried.collect::<Option<Vec<_>>>()?.into_iter().fold(Errors::NONE, Errors::worse);
+        let (dimension, size) = (D.to_string(), short(self.size));
+        for (quantity, value) in [("W", worst.energy), ("S", worst.stress)] {
+            let labels = [quantity, T::NAME, SOLVABLE, self.name, &dimension, &size, kind.name()];
+            self.report.push(&labels, value, Bound::AtMost(ROUNDINGS));
+        }
+        Some(worst)
+    }
+}
+
+type Series = [(f64, Errors)];
+
+/// What is shown of a series: a name, and the value.
+type Shown = (&'static str, fn(&Errors) -> f64);
+
+const SHOWN: [[Shown; 2]; 2] = [
+    [("W", |e| e.relative_energy), ("W, textbook", |e| e.naive_energy)],
+    [("S", |e| e.relative_stress), ("S, textbook", |e| e.naive_stress)],
+];
+
+fn table(double: &Series, single: &Series) -> Table {
+    let header = ["quantity".into(), "numbers".into()].into_iter().chain(double.iter().map(|(size, _)| short(*size)));
+    let mut table =
+        Table::new("relative errors at random strains, all laws and dimensions; by textbook: C = F^T F, ln det C, tr C - 3", header);
+    for (name, value) in SHOWN.into_iter().flatten() {
+        for (numbers, series) in [("f64", double), ("f32", single)] {
+            let values = series.iter().map(|(_, errors)| short(value(errors)));
+            table.push([name.into(), numbers.into()].into_iter().chain(values));
+        }
+    }
+    table
+}
+
+fn sheet(double: &Series, single: &Series) -> Sheet {
+    let panels = SHOWN.into_iter().zip(["energy W", "stress S"]).map(|(shown, title)| {
+        let curves = [("f64", double, 1), ("f32", single, 2)].into_iter().flat_map(|(numbers, series, color)| {
+            shown.into_iter().zip([Mark::Joined, Mark::Dashed]).map(move |((name, value), mark)| {
+                let points = series.iter().map(|(size, errors)| (*size, value(errors))).collect();
+                Curve::new(format!("{name}, {numbers}"), color, mark, points)
+            })
+        });
+        Panel {
+            title: title.into(),
+            x: Axis::logarithmic("strain"),
+            y: Axis::logarithmic("relative error"),
+            window: Some([(3e-16, 30.0), (1e-17, 1e4)]),
+            curves: curves.collect(),
+            legend: Some(SeriesLabelPosition::UpperRight),
+        }
+    });
+    Sheet {
+        name: "extremes_strain",
+        caption: "Relative error of energy and stress at random strains, the worst of all laws and dimensions, against double-double; \
+                  broken: the formulas of textbooks, by way of C, ln det C and tr C − 3."
+            .into(),
+        columns: 2,
+        size: (520, 380),
+        panels: panels.collect(),
+    }
+}
