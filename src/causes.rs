@@ -4,6 +4,15 @@ use std::error::Error;
 
 /// The messages of an error and of its causes, outermost first. A message that already ends with its cause, as "cannot write
 /// a.csv: disk full" does, is not followed by it.
+///
+/// ```
+/// use bfree::causes::{messages, on_one_line};
+///
+/// let error = bfree::scene::read_file("nowhere.json".as_ref(), &[]).unwrap_err();
+/// // The message ends with its cause, what the system says; that is not told again.
+/// assert_eq!(messages(&error).len(), 1);
+/// assert!(on_one_line(&error).starts_with("cannot read nowhere.json: "));
+/// ```
 pub fn messages(error: &dyn Error) -> Vec<String> {
     let mut messages = vec![error.to_string()];
     let mut cause = error.source();
@@ -18,6 +27,19 @@ pub fn messages(error: &dyn Error) -> Vec<String> {
 }
 
 /// All of them on one line.
+///
+/// ```
+/// use bfree::causes::{messages, on_one_line};
+///
+/// // A particle outside the box: that the step failed, and why.
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// simulation.particles.position[3][0] = -1.0;
+/// let error = simulation.step().unwrap_err();
+/// assert!(messages(&error).len() > 1);
+/// assert!(on_one_line(&error).contains(": particle 3 has no shape functions: position [-1.0, "), "{}", on_one_line(&error));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn on_one_line(error: &dyn Error) -> String {
     messages(error).join(": ")
 }

@@ -9,6 +9,18 @@ pub const MAX_HALVINGS: u32 = 20;
 const TICKS: u64 = 1 << MAX_HALVINGS;
 
 /// What a clock inherits from step to step.
+///
+/// ```
+/// use bfree::clock::{Clock, Reached};
+///
+/// let mut clock = Clock::new(0.1, 2);
+/// clock.advance();
+/// clock.advance();
+/// // A round trip through a file.
+/// let read: Reached = serde_json::from_str(&serde_json::to_string(&clock.reached())?)?;
+/// assert_eq!((read.steps(), Clock::new(0.1, 2).at(read)), (2, Some(clock)));
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reached {
@@ -25,6 +37,24 @@ impl Reached {
 }
 
 /// Where a run is in time.
+///
+/// ```
+/// use bfree::clock::Clock;
+///
+/// let mut clock = Clock::new(0.1, 20);
+/// for _ in 0..1000 {
+///     clock.advance();
+/// }
+/// // No drift: a sum of a thousand steps of 0.1 is not 100.
+/// assert_eq!((clock.time(), clock.steps()), (100.0, 1000));
+/// assert_ne!((0..1000).map(|_| 0.1).sum::<f64>(), 100.0);
+/// // A halved step is counted as a step, and half of it as time.
+/// assert!(clock.halve());
+/// clock.advance();
+/// assert_eq!((clock.step(), clock.nominal()), (0.05, 0.1));
+/// assert_eq!((clock.steps(), clock.nominal_steps(), clock.on_nominal()), (1001, 1000, false));
+/// assert_eq!(Clock::new(0.1, 20).at(clock.reached()), Some(clock));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     nominal: f64,
@@ -50,6 +80,20 @@ impl Clock {
     }
 
     /// The same clock where another of the same steps has come to; `None` if this one could not come there.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// // What a checkpoint keeps, and where a run goes on from it.
+    /// let mut clock = Clock::new(0.1, 2);
+    /// clock.halve();
+    /// clock.advance();
+    /// let reached = clock.reached();
+    /// assert_eq!(reached.steps(), 1);
+    /// assert_eq!(Clock::new(0.1, 2).at(reached), Some(clock));
+    /// // A run that may not halve its steps cannot be in the middle of one.
+    /// assert_eq!(Clock::new(0.1, 0).at(reached), None);
+    /// ```
     pub fn at(self, reached: Reached) -> Option<Self> {
         let Reached { ticks, level, steps } = reached;
         // Far below an overflow of the ticks, far above any number of steps.
@@ -94,6 +138,20 @@ impl Clock {
     }
 
     /// As [`Self::advance`], but a halved step grows back only if it `may` do so.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// // Halved once: two halves fill a step, and the third begins the next one.
+    /// let mut clock = Clock::new(1.0, 3);
+    /// assert!(clock.halve() && clock.can_halve());
+    /// for may_grow in [true, false, false] {
+    ///     clock.advance_and_grow_if(may_grow);
+    /// }
+    /// assert_eq!((clock.time(), clock.step()), (1.5, 0.5));
+    /// clock.advance_and_grow_if(true);
+    /// assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
+    /// ```
     pub fn advance_and_grow_if(&mut self, may: bool) {
         self.ticks += TICKS >> self.level;
         self.steps += 1;
@@ -103,6 +161,15 @@ impl Clock {
     }
 
     /// Whether the step can be halved once more.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// let mut clock = Clock::new(1.0, 1);
+    /// assert!(clock.can_halve() && clock.halve());
+    /// assert!(!clock.can_halve() && !clock.halve());
+    /// assert_eq!(clock.step(), 0.5);
+    /// ```
     pub fn can_halve(&self) -> bool {
         self.level < self.max_halvings
     }

@@ -57,6 +57,14 @@ pub enum Kind {
 
 impl Kind {
     /// Names of the components; that of a scalar is empty.
+    ///
+    /// ```
+    /// use bfree::field::Kind;
+    ///
+    /// // A symmetric tensor has D (D + 1)/2 components, and is always given in three dimensions.
+    /// assert_eq!(Kind::Symmetric.components().len(), 3 * (3 + 1) / 2);
+    /// assert_eq!(Kind::Vector.components(), ["x", "y", "z"]);
+    /// ```
     pub const fn components(self) -> &'static [&'static str] {
         match self {
             Self::Scalar | Self::Index => &[""],
@@ -69,6 +77,16 @@ impl Kind {
 
 impl Field {
     /// The name, as in scenes and files.
+    ///
+    /// ```
+    /// use bfree::field::Field;
+    ///
+    /// // One name, in scenes and in files.
+    /// let read: Field = serde_json::from_str(r#""von_mises""#)?;
+    /// assert_eq!(read, Field::VonMises);
+    /// assert_eq!(read.name(), "von_mises");
+    /// # Ok::<(), serde_json::Error>(())
+    /// ```
     pub const fn name(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -89,11 +107,26 @@ impl Field {
     }
 
     /// Whether particles have it only where bodies have inertia.
+    ///
+    /// ```
+    /// use bfree::field::Field;
+    ///
+    /// // Time derivatives need it, what follows from the position alone does not.
+    /// assert!(Field::Velocity.needs_inertia() && Field::Acceleration.needs_inertia());
+    /// assert!(!Field::Displacement.needs_inertia() && !Field::Stress.needs_inertia());
+    /// ```
     pub const fn needs_inertia(self) -> bool {
         matches!(self, Self::Velocity | Self::Acceleration)
     }
 
     /// What its components are.
+    ///
+    /// ```
+    /// use bfree::field::{Field, Kind};
+    ///
+    /// // F is not symmetric, E is.
+    /// assert_eq!((Field::DeformationGradient.kind(), Field::Strain.kind()), (Kind::Tensor, Kind::Symmetric));
+    /// ```
     pub const fn kind(self) -> Kind {
         match self {
             Self::Position | Self::Displacement | Self::Velocity | Self::Acceleration => Kind::Vector,

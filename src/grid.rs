@@ -3,6 +3,17 @@
 use crate::tensor::Vector;
 
 /// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
+///
+/// ```
+/// use bfree::grid::Grid;
+/// use bfree::tensor::Vector;
+///
+/// let grid = Grid { origin: Vector::from([0.0, -1.0]), spacing: 0.5, cells: [4, 2] };
+/// assert_eq!(grid.node_count(), 5 * 3);
+/// // The first axis runs fastest; number and index are inverse to each other.
+/// assert_eq!((grid.id([1, 0]), grid.id([0, 1]), grid.index(grid.id([3, 2]))), (1, 5, [3, 2]));
+/// assert_eq!(grid.position([4, 2]), Vector::from([2.0, 0.0]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid<const D: usize> {
     /// The lower corner of the box.
@@ -28,6 +39,14 @@ impl Axis {
     /// `x` in units of the spacing, from node 0; `None` outside the axis (or if `x` is not a number).
     ///
     /// The upper end is where the last node is: rounding in (x − origin)/h does not push it out.
+    ///
+    /// ```
+    /// use bfree::grid::Axis;
+    ///
+    /// let axis = Axis { origin: -1.0, spacing: 0.5, cells: 4 };
+    /// assert_eq!((axis.local(-1.0), axis.local(0.25), axis.local(1.0)), (Some(0.0), Some(2.5), Some(4.0)));
+    /// assert_eq!((axis.local(1.0 + 1e-15), axis.local(f64::NAN)), (None, None));
+    /// ```
     #[inline]
     pub fn local(&self, x: f64) -> Option<f64> {
         let cells = f64::from(self.cells);
@@ -36,6 +55,14 @@ impl Axis {
     }
 
     /// Last node of the axis.
+    ///
+    /// ```
+    /// use bfree::grid::Axis;
+    ///
+    /// // n cells have n + 1 nodes, 0 to n.
+    /// let axis = Axis { origin: 0.0, spacing: 0.5, cells: 4 };
+    /// assert_eq!(axis.origin + axis.last() as f64 * axis.spacing, 2.0);
+    /// ```
     #[inline]
     pub fn last(&self) -> i64 {
         i64::from(self.cells)
@@ -44,6 +71,15 @@ impl Axis {
 
 impl<const D: usize> Grid<D> {
     /// Axis `k`.
+    ///
+    /// ```
+    /// use bfree::grid::Grid;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let grid = Grid { origin: Vector::from([0.0, -1.0]), spacing: 0.5, cells: [4, 2] };
+    /// let (y, node) = (grid.axis(1), grid.position([3, 2]));
+    /// assert_eq!(y.local(node[1]), Some(2.0));
+    /// ```
     #[inline]
     pub fn axis(&self, k: usize) -> Axis {
         Axis { origin: self.origin[k], spacing: self.spacing, cells: self.cells[k] }
@@ -79,11 +115,29 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Whether `x` lies in the box, its faces included.
+    ///
+    /// ```
+    /// use bfree::grid::Grid;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [4, 2] };
+    /// assert!(grid.contains(&Vector::from([2.0, 1.0])) && !grid.contains(&Vector::from([2.0, 1.001])));
+    /// ```
     pub fn contains(&self, x: &Vector<f64, D>) -> bool {
         (0..D).all(|k| self.axis(k).local(x[k]).is_some())
     }
 
     /// The cell that holds `x`; a point on the upper face belongs to the last cell. `None` outside the box.
+    ///
+    /// ```
+    /// use bfree::grid::Grid;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [4, 2] };
+    /// assert_eq!(grid.cell(&Vector::from([0.5, 0.3])), Some([1, 0]));
+    /// assert_eq!(grid.cell(&Vector::from([2.0, 1.0])), Some([3, 1]));
+    /// assert_eq!(grid.cell(&Vector::from([-0.1, 0.3])), None);
+    /// ```
     pub fn cell(&self, x: &Vector<f64, D>) -> Option<[u32; D]> {
         let mut cell = [0; D];
         for k in 0..D {

@@ -4,6 +4,22 @@ use crate::grid::Grid;
 use crate::tensor::Vector;
 
 /// The active nodes of one step. Memory goes with the body, not with the box.
+///
+/// ```
+/// use bfree::grid::Grid;
+/// use bfree::nodes::Nodes;
+/// use bfree::tensor::Vector;
+///
+/// // Two particles in neighbouring cells of a grid of 100 × 100 cells share two of their nodes.
+/// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [100, 100] };
+/// let cell = |i| [grid.id([i, 7]), grid.id([i + 1, 7]), grid.id([i, 8]), grid.id([i + 1, 8])];
+/// let nodes = Nodes::new([cell(3), cell(4)].iter().map(|ids| ids.as_slice()));
+/// assert_eq!((nodes.len(), nodes.is_empty()), (6, false));
+/// // Unknowns are numbered by active nodes, in the order of the grid.
+/// assert_eq!(nodes.number(grid.id([5, 7])), Some(2));
+/// assert_eq!((nodes.ids()[2], nodes.number(grid.id([6, 7]))), (grid.id([5, 7]), None));
+/// assert_eq!(nodes.positions(&grid).nth(2), Some(([5, 7], Vector::from([5.0, 7.0]))));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Nodes {
     /// Grid numbers of the active nodes, ascending.

@@ -15,6 +15,21 @@ pub struct Body<L> {
 
 /// State of all particles at the last converged step; one entry per particle in each array. Without inertia those of velocity and
 /// acceleration are empty.
+///
+/// ```
+/// use bfree::particles::Particles;
+/// use bfree::tensor::Vector;
+///
+/// // Two particles that meet: Σ ½ m v·v = p·p/(2M) + ½ (m₁m₂/M) |v₁ − v₂|²   (König)
+/// let mut particles = Particles::<1>::default();
+/// assert!(particles.is_empty());
+/// particles.push(Vector::from([0.0]), Vector::from([2.0]), 1.0, 3.0, 0);
+/// particles.push(Vector::from([4.0]), Vector::from([-4.0]), 1.0, 1.0, 0);
+/// assert_eq!((particles.len(), particles.momentum()), (2, Vector::from([2.0])));
+/// let (mass, reduced, relative) = (4.0, 0.75, 6.0);
+/// let of_center = particles.momentum().norm_squared() / (2.0 * mass);
+/// assert_eq!(particles.kinetic_energy(), of_center + 0.5 * reduced * relative * relative);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Particles<const D: usize> {
     /// Position x.
@@ -64,6 +79,8 @@ impl<const D: usize> Particles<D> {
 
     /// Makes room for `more` particles, and no more than that: arrays that double need for a moment three times their size. Those of
     /// velocity and acceleration grow when there is one.
+    ///
+    /// Example: [`Self::push_without_inertia`].
     pub fn reserve(&mut self, more: usize) {
         let Self { position, velocity: _, acceleration: _, displacement_gradient, volume, mass, body } = self;
         position.reserve_exact(more);
@@ -80,6 +97,20 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Adds an undeformed particle to those that have no inertia; its mass is what gravity acts on.
+    ///
+    /// ```
+    /// use bfree::particles::Particles;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let mut particles = Particles::<2>::default();
+    /// particles.reserve(100);
+    /// for i in 0..100 {
+    ///     particles.push_without_inertia(Vector::from([f64::from(i), 0.0]), 0.5, 2.0, 0);
+    /// }
+    /// // They weigh something, and do not move.
+    /// assert_eq!((particles.len(), particles.mass.iter().sum::<f64>()), (100, 200.0));
+    /// assert!(particles.velocity.is_empty() && particles.kinetic_energy() == 0.0);
+    /// ```
     pub fn push_without_inertia(&mut self, position: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
         self.position.push(position);
         self.displacement_gradient.push(Tensor::zeros());

@@ -26,6 +26,22 @@ impl Phase {
 }
 
 /// Measures phases one after the other.
+///
+/// ```
+/// use bfree::phases::{Phase, Stopwatch};
+/// use std::time::Instant;
+///
+/// let start = Instant::now();
+/// let mut watch = Stopwatch::start();
+/// let sum: f64 = (1..10_000).map(|i| f64::from(i).recip()).sum();
+/// watch.lap(Phase::Newton, 3);
+/// watch.lap(Phase::Update, 5);
+/// // No time is lost, and none is counted twice.
+/// assert_eq!(watch.passes().iter().sum::<u64>(), 5);
+/// let seconds = watch.seconds();
+/// assert!(sum > 9.0 && seconds[Phase::Newton as usize] > 0.0 && seconds[Phase::Projection as usize] == 0.0);
+/// assert!(seconds.iter().sum::<f64>() <= start.elapsed().as_secs_f64());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     last: (Instant, u64),

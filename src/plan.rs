@@ -68,6 +68,18 @@ pub struct SurfaceUse {
 
 impl SurfaceUse {
     /// Of each surface load of a simulation.
+    ///
+    /// ```
+    /// use bfree::plan::SurfaceUse;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
+    /// let surfaces = SurfaceUse::of(&scene.build::<2>("scenes".as_ref())?);
+    /// // The end of a beam of height 1, in particles of ⅛ whose centres lie half of that below it.
+    /// let [end] = surfaces.as_slice() else { return Err("one load".into()) };
+    /// assert_eq!((end.load, end.faces), ("traction", 8));
+    /// assert!((end.area - 1.0).abs() < 1e-14 && (end.greatest_offset - 0.0625).abs() < 1e-14);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<Self> {
         let describe = |load: &SurfaceLoad<D>| {
             let particles: HashSet<usize> = load.points.iter().map(|point| point.particle).collect();
@@ -110,6 +122,21 @@ pub struct TooLarge {
 }
 
 /// What a run of a simulation requires, at its present state.
+///
+/// ```
+/// use bfree::plan::{Lifetime, Plan};
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let plan = Plan::of(&scene.build::<2>("scenes".as_ref())?)?;
+/// assert_eq!((plan.particles, plan.grid_nodes), (112, 31 * 11));
+/// // Two unknowns for each active node, but for those on walls.
+/// assert!(plan.active_nodes < 341 && plan.unknowns <= 2 * plan.active_nodes);
+/// // Not all arrays live at the same time.
+/// let all: u64 = plan.arrays.iter().map(|array| array.bytes).sum();
+/// let step: u64 = plan.arrays.iter().filter(|one| one.lifetime == Lifetime::Step).map(|array| array.bytes).sum();
+/// assert!(step < plan.bytes() && plan.bytes() < all);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// 1, 2 or 3.
@@ -163,6 +190,17 @@ impl Plan {
     }
 
     /// Whether the arrays fit into `memory` bytes.
+    ///
+    /// ```
+    /// use bfree::plan::Plan;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let plan = Plan::of(&scene.build::<2>("scenes".as_ref())?)?;
+    /// assert_eq!(plan.check_fits(plan.bytes()), Ok(()));
+    /// let short = plan.check_fits(plan.bytes() - 1).unwrap_err();
+    /// assert_eq!(short.needed, short.memory + 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// They do not.

@@ -38,6 +38,22 @@ impl<T: DualNumCopy> Real for T {
 }
 
 /// Sums and products of one kind of number, so that a formula written once serves single numbers and vector lanes.
+///
+/// ```
+/// use bfree::scalar::{Arithmetic, Single};
+///
+/// /// a·b
+/// fn dot<A: Arithmetic>(with: A, a: &[A::N], b: &[A::N]) -> A::N {
+///     a.iter().zip(b).fold(with.zero(), |sum, (&a, &b)| with.mul_add(a, b, sum))
+/// }
+///
+/// let with = Single::<f64>::default();
+/// assert_eq!(dot(with, &[1.0, 2.0], &[3.0, 4.0]), 11.0);
+/// // (a + b)² − 2ab = a² + b², in one formula for numbers and lanes
+/// let (a, b) = (3.0, 4.0);
+/// let (sum, twice) = (with.add(a, b), with.add(a, a));
+/// assert_eq!(with.mul_sub(twice, b, with.mul(sum, sum)), dot(with, &[a, b], &[a, b]));
+/// ```
 pub trait Arithmetic: Copy {
     /// The number, or the lanes.
     type N: Copy;

@@ -49,6 +49,17 @@ pub enum Shape<const D: usize> {
 
 impl<const D: usize> Shape<D> {
     /// Whether `x` lies in the solid, its surface included.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A ring: its inner circle is part of its surface, its centre is not part of it.
+    /// let disc = |radius| Box::new(Shape::Ball { center: Vector::from([0.0, 0.0]), radius });
+    /// let ring = Shape::Difference { of: disc(2.0), minus: disc(1.0) };
+    /// assert!(ring.contains(&Vector::from([1.5, 0.0])) && ring.contains(&Vector::from([0.0, 1.0])));
+    /// assert!(!ring.contains(&Vector::from([0.0, 0.0])));
+    /// ```
     pub fn contains(&self, x: &Vector<f64, D>) -> bool {
         self.signed_distance(x) <= 0.0
     }
@@ -72,11 +83,34 @@ impl<const D: usize> Shape<D> {
     ///
     /// Where ∇d does not exist (the centre of a ball, points equally near to two faces) it is the normal of one of the
     /// nearest surfaces.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let hole = Box::new(Shape::Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 });
+    /// let plate = Box::new(Shape::Box { min: Vector::from([-2.0, -2.0]), max: Vector::from([2.0, 2.0]) });
+    /// let plate = Shape::Difference { of: plate, minus: hole };
+    /// assert_eq!(plate.normal(&Vector::from([0.0, 1.9])), Vector::from([0.0, 1.0]));
+    /// assert_eq!(plate.normal(&Vector::from([0.0, 1.1])), Vector::from([0.0, -1.0]));
+    /// ```
     pub fn normal(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
         self.distance_and_normal(x).1
     }
 
     /// d and ∇d together.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // x − d ∇d is the nearest point of the surface.
+    /// let disc = Shape::Ball { center: Vector::from([1.0, 0.0]), radius: 5.0 };
+    /// let x = Vector::from([4.0, 4.0]);
+    /// let (d, n) = disc.distance_and_normal(&(x + Vector::from([3.0, 4.0])));
+    /// assert_eq!((d, n), (5.0, Vector::from([0.6, 0.8])));
+    /// assert_eq!(disc.signed_distance(&x), 0.0);
+    /// ```
     pub fn distance_and_normal(&self, x: &Vector<f64, D>) -> (f64, Vector<f64, D>) {
         match self {
             Self::Box { min, max } => box_distance(x, min, max),
@@ -112,6 +146,17 @@ impl<const D: usize> Shape<D> {
     /// The pieces of surface that a point `x` of the solid lies less than `depth` below: none deep inside, one below a face,
     /// several in an edge or a corner. Each with its signed distance −`depth` < d ≤ 0 and its outward unit normal n; the foot
     /// x − d n lies on the surface.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let square = Shape::Box { min: Vector::from([0.0, 0.0]), max: Vector::from([1.0, 1.0]) };
+    /// assert_eq!(square.faces(&Vector::from([0.5, 0.5]), 0.25), []);
+    /// assert_eq!(square.faces(&Vector::from([0.5, 0.875]), 0.25), [(-0.125, Vector::from([0.0, 1.0]))]);
+    /// // A particle in a corner stands for a piece of both faces.
+    /// assert_eq!(square.faces(&Vector::from([0.875, 0.875]), 0.25).len(), 2);
+    /// ```
     pub fn faces(&self, x: &Vector<f64, D>, depth: f64) -> Vec<(f64, Vector<f64, D>)> {
         let mut candidates = Vec::new();
         self.primitive_faces(x, 1.0, &mut candidates);
@@ -160,6 +205,17 @@ impl<const D: usize> Shape<D> {
     ///
     /// Tight for the primitives (for a half-space if its plane is axis-parallel), for unions of them, and an upper bound for
     /// differences and intersections.
+    ///
+    /// ```
+    /// use bfree::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // The lower half of a disc; for an intersection the bound is that of the planes and balls in it.
+    /// let disc = Shape::Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 };
+    /// let below = Shape::HalfSpace { point: Vector::from([0.0, 0.0]), normal: Vector::from([0.0, 3.0]) };
+    /// let half = Shape::Intersection(vec![disc, below]);
+    /// assert_eq!(half.bounding_box(), (Vector::from([-1.0, -1.0]), Vector::from([1.0, 0.0])));
+    /// ```
     pub fn bounding_box(&self) -> (Vector<f64, D>, Vector<f64, D>) {
         let everywhere = (Vector::repeat(f64::NEG_INFINITY), Vector::repeat(f64::INFINITY));
         let nowhere = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));

@@ -60,6 +60,18 @@ pub struct Settings {
 
 impl Settings {
     /// The α-parameters of a step of length `dt`.
+    ///
+    /// ```
+    /// use bfree::mechanics::time::Inertia;
+    /// use bfree::simulation::Settings;
+    ///
+    /// // v = α₄ Δφ + α₅ vₙ + α₆ aₙ: twice the mean velocity less the last, by the trapezoidal rule; nothing without inertia.
+    /// let settings = Settings::default();
+    /// let alphas = settings.alphas(0.5);
+    /// assert_eq!((alphas.a4, alphas.a5, alphas.a6), (2.0 / 0.5, -1.0, 0.0));
+    /// let alphas = Settings { inertia: Inertia::None, ..settings }.alphas(0.5);
+    /// assert_eq!((alphas.a1, alphas.a4), (0.0, 0.0));
+    /// ```
     pub fn alphas(&self, dt: f64) -> Alphas {
         match self.inertia {
             Inertia::Newmark => self.newmark.alphas(dt),
@@ -88,6 +100,22 @@ impl Default for Settings {
 /// An implicit material point simulation in `D` dimensions.
 ///
 /// The fields are the state at the last converged step; [`Simulation::step`] advances it or leaves it untouched.
+///
+/// ```
+/// let falling = "gravity={\"acceleration\": [0, -0.01]}".parse()?;
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[falling])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (start, mass) = (simulation.particles.clone(), simulation.particles.mass.iter().sum::<f64>());
+/// while simulation.clock.time() < 0.5 {
+///     let step = simulation.advance()?;
+///     assert!(step.failed.is_empty());
+/// }
+/// // Free flight: the momentum that weight has given, M g t, and no strain.
+/// let given = simulation.particles.momentum() - start.momentum();
+/// assert!((given[1] / (-0.01 * mass * simulation.clock.time()) - 1.0).abs() < 1e-10 && given[0].abs() < 1e-12);
+/// assert!(simulation.strain_energy() < 1e-20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     /// The background grid.
@@ -223,6 +251,18 @@ pub struct AdvanceError {
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
     ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// simulation.particles.velocity.iter_mut().for_each(|v| *v *= 1e4);
+    /// let before = simulation.particles.clone();
+    /// // A step that would carry particles out of the box fails, and leaves the state as it was.
+    /// let error = simulation.step().err().ok_or("out of the box")?;
+    /// assert!(error.to_string().contains("leaves the grid"), "{error}");
+    /// assert_eq!((simulation.particles, simulation.clock.steps()), (before, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
@@ -288,6 +328,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// As [`Self::step`], halving Δt while Newton fails or the error is too large, down to the clock's limit; Δt grows back afterwards.
     ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let step = simulation.advance()?;
+    /// assert_eq!((step.dt, simulation.clock.time()), (0.05, 0.05));
+    /// // One particle of 112 torn away at 200 times its speed, and Newton's method is not given the time to follow.
+    /// simulation.particles.velocity[50] *= 200.0;
+    /// simulation.settings.newton.max_iterations = 2;
+    /// let step = simulation.advance()?;
+    /// assert!(!step.failed.is_empty());
+    /// assert_eq!(step.dt, 0.05 / f64::from(1 << step.failed.len()));
+    /// assert_eq!(simulation.clock.time(), 0.05 + step.dt);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The last failure, once Δt cannot be halved further, or a failure that a shorter step does not mend.
     pub fn advance(&mut self) -> Result<StepReport<D>, AdvanceError> {
@@ -312,11 +367,46 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The degrees of freedom prescribed in the coming step.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let held = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+    ///     let (_, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+    ///     Ok(of.prescribed(&nodes))
+    /// };
+    /// // Only active nodes count: near the right wall, the disc sees nodes of it, and they may slide but not leave.
+    /// let before = held(&simulation)?.len();
+    /// simulation.particles.position.iter_mut().for_each(|x| x[0] += 11.0);
+    /// let at_wall = held(&simulation)?;
+    /// assert!(at_wall.len() > before);
+    /// assert!(at_wall.iter().any(|dof| dof.component == 0 && dof.step.increment == 0.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn prescribed(&self, nodes: &Nodes) -> Vec<PrescribedDof> {
         prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, self.clock.time(), self.clock.step())
     }
 
     /// The equilibrium at time `t` on given supports.
+    ///
+    /// ```
+    /// use bfree::mechanics::{residual::Carry, sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), simulation.settings.lumping)?;
+    /// let alphas = simulation.settings.newmark.alphas(dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, dt);
+    /// // A body in free flight is in equilibrium at Δφ = Δt v.
+    /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
+    /// let residual = equilibrium.residual(&dphi, Carry::ALL)?;
+    /// assert!(residual.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt() < 1e-13 * equilibrium.magnitude(&dphi)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn equilibrium<'a>(
         &'a self,
         supports: &'a Supports<D>,
@@ -332,6 +422,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// let nodal = simulation.project(&supports)?;
+    /// let momentum: Vector<f64, 2> = nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum();
+    /// assert!((momentum - simulation.particles.momentum()).norm() < 1e-13);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// Particle velocities so large that the projection overflows.
@@ -434,6 +537,29 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The same simulation with other laws, one for each body.
+    ///
+    /// ```
+    /// use bfree::material::{Energy, FromEnergy};
+    /// use bfree::scalar::Real;
+    /// use bfree::tensor::{Tensor, contract, trace};
+    ///
+    /// /// St. Venant and Kirchhoff's solid with the constants of the scene, by its energy alone.
+    /// struct Quadratic;
+    ///
+    /// impl Energy for Quadratic {
+    ///     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+    ///         T::lit(75.0) * trace(e) * trace(e) + T::lit(30.0) * contract(e, e)
+    ///     }
+    /// }
+    ///
+    /// let law = "bodies.0.material={\"st_venant_kirchhoff\": {\"bulk\": 170, \"shear\": 30}}".parse()?;
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[law])?;
+    /// let mut shipped = scene.build::<2>("scenes".as_ref())?;
+    /// shipped.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(0.1, 0.05, 0.0, -0.1));
+    /// let mine = shipped.clone().with_laws(|_| FromEnergy(Quadratic));
+    /// assert!((mine.strain_energy() / shipped.strain_energy() - 1.0).abs() < 1e-14);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
         let bodies = self.bodies.iter();
         let bodies =
@@ -451,6 +577,20 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// Σ V₀ W, the strain energy of all particles.
+    ///
+    /// ```
+    /// use bfree::tensor::Tensor;
+    ///
+    /// // A small uniaxial strain ε: ½ (Λ + 2G) ε² times the volume; Λ + 2G = 170 + 4/3 · 30 = 210.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// assert_eq!(simulation.strain_energy(), 0.0);
+    /// let strain = 1e-8;
+    /// simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(strain, 0.0, 0.0, 0.0));
+    /// let linear = 0.5 * 210.0 * strain * strain * simulation.particles.volume.iter().sum::<f64>();
+    /// assert!((simulation.strain_energy() / linear - 1.0).abs() < 1e-7);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn strain_energy(&self) -> f64 {
         let particles = &self.particles;
         (0..particles.len())
@@ -462,6 +602,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// Gives `velocity(x_I)` to the nodes and interpolates it once to the particles, v_p = Σ N v_I (section 4.1).
+    ///
+    /// ```
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A linear field reaches the particles as it is; of a jump they get what the nodes can carry.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let rotation = |x: &Vector<f64, 2>| Vector::from([-(x[1] - 2.5), x[0] - 2.5]);
+    /// simulation.set_velocity_on_nodes(rotation)?;
+    /// let particles = &simulation.particles;
+    /// assert!(particles.position.iter().zip(&particles.velocity).all(|(x, v)| (v - rotation(x)).norm() < 1e-12));
+    /// simulation.set_velocity_on_nodes(|x| Vector::from([if x[0] < 2.5 { 1.0 } else { 0.0 }, 0.0]))?;
+    /// assert!(simulation.particles.velocity.iter().any(|v| v[0] > 0.1 && v[0] < 0.9));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// A particle without shape functions.
@@ -481,6 +636,23 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The lumped mass serves for every ε: it is exact for uniform loads, and of second order in h for others.
     ///
     /// Without inertia it does nothing.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Gravity};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let g = Vector::from([0.0, -10.0]);
+    /// simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
+    /// simulation.set_initial_acceleration()?;
+    /// assert!(simulation.particles.acceleration.iter().all(|a| (a - g).norm() < 1e-13));
+    /// // So the first step already falls by ½ g Δt², and not by half of it.
+    /// let (x, v, dt) = (simulation.particles.position[0], simulation.particles.velocity[0], simulation.clock.step());
+    /// simulation.step()?;
+    /// assert!((simulation.particles.position[0] - x - v * dt - g * (0.5 * dt * dt)).norm() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// A particle without shape functions, or with det F ≤ 0.

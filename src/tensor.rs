@@ -14,12 +14,27 @@ pub type Vector<T, const D: usize> = SVector<T, D>;
 pub type Tensor<T, const D: usize> = SMatrix<T, D, D>;
 
 /// The identity tensor.
+///
+/// ```
+/// use bfree::tensor::{Tensor, identity};
+///
+/// let (a, one) = (Tensor::<f64, 2>::new(1.0, 2.0, 3.0, 4.0), identity::<f64, 2>());
+/// assert_eq!((one * a, a * one), (a, a));
+/// ```
 #[inline(always)]
 pub fn identity<T: Real, const D: usize>() -> Tensor<T, D> {
     Tensor::from_fn(|i, k| if i == k { T::one() } else { T::zero() })
 }
 
 /// tr A
+///
+/// ```
+/// use bfree::tensor::{Vector, outer, trace};
+///
+/// // tr(a ⊗ b) = a·b
+/// let (a, b) = (Vector::from([1.0, 2.0, 3.0]), Vector::from([4.0, -5.0, 6.0]));
+/// assert_eq!(trace(&outer(&a, &b)), a.dot(&b));
+/// ```
 #[inline(always)]
 pub fn trace<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
     let mut sum = T::zero();
@@ -30,6 +45,15 @@ pub fn trace<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
 }
 
 /// A : B = Σ Aᵢⱼ Bᵢⱼ
+///
+/// ```
+/// use bfree::tensor::{Tensor, contract, trace};
+///
+/// // A : B = tr(AᵀB)
+/// let (a, b) = (Tensor::<f64, 2>::new(1.0, 2.0, 3.0, 4.0), Tensor::<f64, 2>::new(5.0, 6.0, 7.0, 8.0));
+/// assert_eq!(contract(&a, &b), 70.0);
+/// assert_eq!(contract(&a, &b), trace(&(a.transpose() * b)));
+/// ```
 #[inline(always)]
 pub fn contract<T: Real, const D: usize>(a: &Tensor<T, D>, b: &Tensor<T, D>) -> T {
     let mut sum = T::zero();
@@ -42,12 +66,30 @@ pub fn contract<T: Real, const D: usize>(a: &Tensor<T, D>, b: &Tensor<T, D>) -> 
 }
 
 /// a ⊗ b
+///
+/// ```
+/// use bfree::tensor::{Vector, outer};
+///
+/// // (a ⊗ b) c = (b·c) a
+/// let (a, b, c) = (Vector::from([1.0, 2.0]), Vector::from([3.0, 4.0]), Vector::from([5.0, 6.0]));
+/// assert_eq!(outer(&a, &b) * c, a * b.dot(&c));
+/// ```
 #[inline(always)]
 pub fn outer<T: Real, const D: usize>(a: &Vector<T, D>, b: &Vector<T, D>) -> Tensor<T, D> {
     Tensor::from_fn(|i, k| a[i] * b[k])
 }
 
 /// ½ (A + Aᵀ)
+///
+/// ```
+/// use bfree::tensor::{Tensor, contract, symmetric};
+///
+/// // The rest is skew, and its contraction with anything symmetric vanishes.
+/// let a = Tensor::<f64, 2>::new(1.0, 2.0, 4.0, 8.0);
+/// let (sym, skew) = (symmetric(&a), a - symmetric(&a));
+/// assert_eq!((sym, skew), (sym.transpose(), -skew.transpose()));
+/// assert_eq!(contract(&sym, &skew), 0.0);
+/// ```
 #[inline(always)]
 pub fn symmetric<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     let half = T::lit(0.5);
@@ -55,12 +97,31 @@ pub fn symmetric<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
 }
 
 /// s A
+///
+/// ```
+/// use bfree::tensor::{Tensor, determinant, scaled};
+///
+/// // det(s A) = s^D det A
+/// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
+/// assert_eq!(determinant(&scaled(&a, 2.0)), 8.0 * determinant(&a));
+/// ```
 #[inline(always)]
 pub fn scaled<T: Real, const D: usize>(a: &Tensor<T, D>, s: T) -> Tensor<T, D> {
     a.map(|x| x * s)
 }
 
 /// The cofactor, cof A = det(A) A⁻ᵀ, for D = 1, 2, 3; defined for singular A too.
+///
+/// ```
+/// use bfree::tensor::{Tensor, Vector, cofactor, determinant, identity};
+///
+/// // cof(A)ᵀ A = det(A) I
+/// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
+/// assert_eq!(cofactor(&a).transpose() * a, identity::<f64, 3>() * determinant(&a));
+/// // Nanson: cof F maps areas. Flattened along x, what faces x keeps its area and what faces y loses it.
+/// let flat = Tensor::<f64, 2>::from_diagonal(&Vector::from([0.0, 1.0]));
+/// assert_eq!(cofactor(&flat), Tensor::from_diagonal(&Vector::from([1.0, 0.0])));
+/// ```
 #[inline(always)]
 pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     match D {
@@ -78,6 +139,14 @@ pub fn cofactor<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
 }
 
 /// det A for D = 1, 2, 3.
+///
+/// ```
+/// use bfree::tensor::{Tensor, determinant};
+///
+/// // det(AB) = det A det B
+/// let (a, b) = (Tensor::<f64, 2>::new(1.0, 2.0, 3.0, 4.0), Tensor::<f64, 2>::new(5.0, 6.0, 7.0, 9.0));
+/// assert_eq!(determinant(&(a * b)), determinant(&a) * determinant(&b));
+/// ```
 #[inline(always)]
 pub fn determinant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
     match D {
@@ -93,6 +162,14 @@ pub fn determinant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
 }
 
 /// A⁻¹ = cof(A)ᵀ / det A. The caller makes sure that det A ≠ 0.
+///
+/// ```
+/// use bfree::tensor::{Tensor, identity, inverse};
+///
+/// let shear = Tensor::<f64, 2>::new(1.0, 0.5, 0.0, 1.0);
+/// assert_eq!(inverse(&shear), Tensor::<f64, 2>::new(1.0, -0.5, 0.0, 1.0));
+/// assert_eq!(inverse(&shear) * shear, identity::<f64, 2>());
+/// ```
 #[inline(always)]
 pub fn inverse<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     scaled(&cofactor(a).transpose(), determinant(a).recip())
@@ -161,18 +238,44 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     }
 
     /// Green–Lagrange strain, E = sym H + ½ HᵀH
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor, identity, scaled, symmetric};
+    ///
+    /// // E = (FᵀF − I)/2; a rotation strains nothing, though sym H is not zero.
+    /// let (sin, cos) = (0.6, 0.8);
+    /// let rotation = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(cos - 1.0, -sin, sin, cos - 1.0));
+    /// assert!(rotation.green_lagrange().norm() < 1e-16 && symmetric(&rotation.h).norm() > 0.2);
+    /// let shear = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.5, 0.0, 0.0));
+    /// assert_eq!(shear.green_lagrange(), scaled(&(shear.f.transpose() * shear.f - identity()), 0.5));
+    /// ```
     #[inline(always)]
     pub fn green_lagrange(&self) -> Tensor<T, D> {
         symmetric(&self.h) + scaled(&(self.h.transpose() * self.h), T::lit(0.5))
     }
 
     /// F⁻ᵀ = cof(F)/J
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor, identity};
+    ///
+    /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(1.0, 0.5, 0.0, -0.5));
+    /// assert_eq!(at.inverse_transpose().transpose() * at.f, identity::<f64, 2>());
+    /// ```
     #[inline(always)]
     pub fn inverse_transpose(&self) -> Tensor<T, D> {
         scaled(&cofactor(&self.f), self.jacobian.recip())
     }
 
     /// J² − 1 = j (2 + j)
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // At a strain of 1e-20, J² = 1 to the last bit, but J² − 1 = 2e-20.
+    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(1e-20));
+    /// assert_eq!((at.jacobian * at.jacobian - 1.0, at.jacobian_squared_minus_one()), (0.0, 2e-20));
+    /// ```
     #[inline(always)]
     pub fn jacobian_squared_minus_one(&self) -> T {
         self.j * (T::lit(2.0) + self.j)
@@ -181,6 +284,15 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     /// ln J = k ln 2 + 2 artanh s with s = (m − 1)/(m + 1) and m = J/2ᵏ between √½ and √2, m − 1 being j where k = 0.
     ///
     /// Arithmetic alone: a loop over it becomes vector instructions, and no two machines differ.
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // A small dilation, and one of e − 1.
+    /// let stretched = |h| Deformation::<f64, 1>::new(Tensor::from_element(h)).log_jacobian();
+    /// assert_eq!(stretched(1e-20), 1e-20);
+    /// assert!((stretched(1_f64.exp_m1()) - 1.0).abs() < 1e-15);
+    /// ```
     #[inline(always)]
     pub fn log_jacobian(&self) -> T {
         // The biased exponent of a positive number, and a power of two from it.
@@ -202,6 +314,16 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D) has nothing to cancel while H is small because the strain is.
     /// Where a rotation makes H much larger than E, those terms do cancel, and from J² = det(I + 2E) follows
     /// (j tr E − 4 I₂(E) − 8 det E)/(2 + j), of strains alone (in 2D without the det E of 3D).
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor, Vector, trace};
+    ///
+    /// let at = Deformation::<f64, 2>::new(Tensor::from_diagonal(&Vector::from([0.25, -0.5])));
+    /// assert_eq!(at.trace_e_minus_j(), trace(&at.green_lagrange()) - at.j);
+    /// // Where that difference is lost in round-off: uniaxial, tr E − j = ½ h².
+    /// let small = Deformation::<f64, 1>::new(Tensor::from_element(1e-10));
+    /// assert_eq!(small.trace_e_minus_j(), 0.5 * 1e-10 * 1e-10);
+    /// ```
     #[inline(always)]
     pub fn trace_e_minus_j(&self) -> T {
         let (h, e) = (&self.h, self.green_lagrange());
@@ -233,6 +355,16 @@ impl<T: Real, const D: usize> Deformation<T, D> {
 
     /// j − ln(1 + j), of second order. With s = j/(2+j), ln(1+j) = 2 artanh s, and
     /// j − ln(1+j) = j s − 2 s³ (1/3 + s²/5 + s⁴/7 + …) has nothing to cancel.
+    ///
+    /// ```
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // j − ln(1 + j) = ½ j² − ⅓ j³ + …, also where j and ln(1 + j) agree in nearly all digits.
+    /// let j = 1e-8;
+    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(j));
+    /// let series = j * j * (0.5 - j / 3.0 + j * j / 4.0);
+    /// assert!((at.j_minus_log_jacobian() / series - 1.0).abs() < 1e-15);
+    /// ```
     #[inline(always)]
     pub fn j_minus_log_jacobian(&self) -> T {
         let s = self.j / (T::lit(2.0) + self.j);

@@ -12,6 +12,19 @@ pub struct Gimp {
 
 impl Gimp {
     /// Particles that fill their cell, `count` along each axis: l_p = h / (2 count).
+    ///
+    /// ```
+    /// use bfree::approximation::{AxisWeights, Gimp, Separable};
+    /// use bfree::grid::Axis;
+    ///
+    /// // N is a hat averaged over a particle of half a cell: at a node ¾ + 2·⅛ in place of the hat's 1.
+    /// let gimp = Gimp::particles_per_axis(2);
+    /// assert_eq!(gimp.half_width, 0.25);
+    /// let mut weights = AxisWeights::default();
+    /// gimp.axis(&Axis { origin: 0.0, spacing: 1.0, cells: 8 }, 4.0, &mut weights)?;
+    /// assert_eq!(weights.values, [0.0625, 0.875, 0.0625]);
+    /// # Ok::<(), bfree::approximation::ApproximationError>(())
+    /// ```
     pub fn particles_per_axis(count: u32) -> Self {
         Self { half_width: 0.5 / f64::from(count) }
     }

@@ -37,6 +37,15 @@ use crate::grid::Grid;
 use crate::tensor::Vector;
 
 /// Parameters that can be judged before any particle is there.
+///
+/// ```
+/// use bfree::approximation::{Gimp, Lme, Validate};
+///
+/// assert_eq!(Lme::new(3.0, 1e-6).validate(3), Ok(()));
+/// // A particle wider than its cell.
+/// let refused = Gimp { half_width: 0.6 }.validate(2).unwrap_err();
+/// assert!(refused.to_string().contains("0.6"), "{refused}");
+/// ```
 pub trait Validate {
     /// Whether the family works with its parameters in `dimension` = 1, 2 or 3 dimensions.
     ///
@@ -46,6 +55,21 @@ pub trait Validate {
 }
 
 /// The nodes a particle sees: all with N ≠ 0 or ∇N ≠ 0. A buffer to be reused.
+///
+/// ```
+/// use bfree::approximation::Support;
+///
+/// // A shape function of one's own fills it: hats at x = 0.25 on a grid of spacing 1.
+/// let mut support = Support::<1>::default();
+/// support.clear();
+/// for (node, value, slope) in [(0, 0.75, -1.0), (1, 0.25, 1.0)] {
+///     support.push([node], value, [slope]);
+/// }
+/// assert_eq!(support.values.iter().sum::<f64>(), 1.0);
+/// let field = |node: [u32; 1]| 5.0 + 2.0 * f64::from(node[0]);
+/// let slope: f64 = support.nodes.iter().zip(&support.gradients).map(|(&node, grad)| field(node) * grad[0]).sum();
+/// assert_eq!(slope, 2.0);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Support<const D: usize> {
     /// Index along each axis, the first axis running fastest.
@@ -81,6 +105,30 @@ pub struct Scratch {
 }
 
 /// N and ∇N at a point, in `D` = 1, 2 or 3 dimensions.
+///
+/// ```
+/// use bfree::approximation::{AxisWeights, LmeCircle, Lme, Scratch, ShapeFunction, Support};
+/// use bfree::grid::Grid;
+/// use bfree::tensor::Vector;
+///
+/// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [12, 10] };
+/// let (x, mut scratch, mut support) = (Vector::from([2.61, 2.27]), Scratch::default(), Support::default());
+/// let lme = Lme::new(3.0, 1e-6);
+/// lme.evaluate(&grid, &x, &mut scratch, &mut support)?;
+/// // Σ N = 1, Σ N x_I = x, Σ ∇N = 0
+/// let entries = || support.nodes.iter().zip(&support.values).zip(&support.gradients);
+/// assert!((support.values.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+/// let place: Vector<f64, 2> = entries().map(|((&node, &n), _)| grid.position(node) * n).sum();
+/// assert!((place - x).norm() < 1e-13);
+/// assert!(entries().map(|(_, &grad)| Vector::from(grad)).sum::<Vector<f64, 2>>().norm() < 1e-12);
+/// // It is a product of functions of x and of y; on the paper's circle of nodes it is not.
+/// let product = lme.separable().ok_or("a product")?;
+/// let mut along_x = AxisWeights::default();
+/// product.axis(&grid.axis(0), x[0], &mut along_x)?;
+/// assert!(along_x.values.len() <= product.width());
+/// assert!(LmeCircle::new(3.0, 1e-6).separable().is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait ShapeFunction: Validate + Send + Sync {
     /// Fills `out` with the nodes seen from `x`; on an error its content means nothing.
     ///

@@ -5,6 +5,18 @@ use crate::grid::{Axis, Grid};
 use crate::tensor::Vector;
 
 /// The functions of one axis at one coordinate, nodes `first .. first + values.len()`. A buffer to be reused.
+///
+/// ```
+/// use bfree::approximation::AxisWeights;
+///
+/// // Hats at x = 7.25 on an axis of spacing 1.
+/// let mut weights = AxisWeights::default();
+/// weights.start(7);
+/// weights.push(0.75, -1.0);
+/// weights.push(0.25, 1.0);
+/// let place: f64 = (7..).zip(&weights.values).map(|(node, n)| f64::from(node) * n).sum();
+/// assert_eq!((place, weights.values.iter().sum(), weights.derivatives.iter().sum()), (7.25, 1.0, 0.0));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisWeights {
     /// The first node of the list.
@@ -41,6 +53,21 @@ impl AxisWeights {
 }
 
 /// A shape function that is a product of functions of one coordinate, N(x) = Π_k N_k(x_k).
+///
+/// ```
+/// use bfree::approximation::{AxisWeights, Bspline, Separable};
+/// use bfree::grid::Axis;
+///
+/// let axis = Axis { origin: 0.0, spacing: 1.0, cells: 8 };
+/// let mut weights = AxisWeights::default();
+/// // A quadratic spline on the middle of an axis, and at a wall: there its first node alone has N ≠ 0.
+/// Bspline::Quadratic.axis(&axis, 4.0, &mut weights)?;
+/// assert_eq!((weights.first, weights.values.as_slice()), (3, [0.125, 0.75, 0.125].as_slice()));
+/// assert!(weights.values.len() <= Bspline::Quadratic.width());
+/// Bspline::Quadratic.axis(&axis, 0.0, &mut weights)?;
+/// assert_eq!((weights.first, weights.values[0], weights.values[1]), (0, 1.0, 0.0));
+/// # Ok::<(), bfree::approximation::ApproximationError>(())
+/// ```
 pub trait Separable: Validate + Send + Sync {
     /// The functions of `axis` that do not vanish at `x`.
     ///

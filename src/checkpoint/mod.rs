@@ -4,6 +4,43 @@
 //! written under a temporary name, synced and renamed. A checkpoint holds what a step inherits (`state.rs`), the scene, and where
 //! the files of the results ended ([`Mark`]): [`restore`] puts the simulation back, [`Recorder::resume`] cuts the files off there.
 //! A new array has its place in `state.rs`.
+//!
+//! ```
+//! use bfree::checkpoint::{Checkpoints, Identity, forget, restore, unfinished};
+//! use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+//!
+//! let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
+//! let (start, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
+//! let identity = Identity::new(serde_json::to_value(&scene)?, &start.particles);
+//! let settings = OutputSettings {
+//!     directory: directory.clone(), fields: vec![], snapshot_every: None, probes: vec![], end_time: 1.0,
+//!     audience: Audience::Nobody,
+//! };
+//! // A run that is killed at t = 0.15, with a checkpoint every 0.1.
+//! let mut simulation = start.clone();
+//! let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+//! let mut checkpoints = Checkpoints::new(directory.clone(), identity.clone(), serde_json::Value::Null, 0.1, None);
+//! for _ in 0..3 {
+//!     let step = simulation.advance()?;
+//!     recorder.record(&simulation, &step)?;
+//!     checkpoints.write_if_due(&simulation, &mut recorder)?;
+//! }
+//! assert_eq!(unfinished(&directory).map(|run| run.steps), Some(2));
+//! // It goes on from t = 0.1, to the same bits.
+//! let mut continued = start.clone();
+//! restore(&directory, &identity, &mut continued)?;
+//! assert_eq!(continued.clock.time(), 0.1);
+//! continued.advance()?;
+//! assert_eq!((&continued.particles, continued.clock), (&simulation.particles, simulation.clock));
+//! // Or a checkpoint now, whether one is due or not; and none any more.
+//! checkpoints.write(&simulation, &mut recorder)?;
+//! let mut last = start.clone();
+//! restore(&directory, &identity, &mut last)?;
+//! assert_eq!(last.clock, simulation.clock);
+//! forget(&directory)?;
+//! assert!(restore(&directory, &identity, &mut last).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod container;
 mod difference;

@@ -7,6 +7,25 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N; B, b and c symmetric.
 ///
 /// `N` is a number, or a whole vector of lanes with a particle in each.
+///
+/// ```
+/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::scalar::Single;
+/// use bfree::tensor::{Deformation, Tensor, identity};
+///
+/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+/// let (closed, with) = (law.freeze(&identity(), &at, 1.0), Single::<f64>::default());
+/// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
+/// let (k, l, j) = (0, 1, 1);
+/// let mut unit = [[0.0; 2]; 2];
+/// unit[j][l] = 1.0;
+/// let (product, block) = (closed.product(with, &unit), closed.unit_block(with, k, l));
+/// for i in 0..2 {
+///     assert!((product[i][k] - block[i][j]).abs() < 1e-15);
+/// }
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedTangent<N, const D: usize> {
     /// A: ΔF⁻ᵀ of the neo-Hookean solids, F F_nᵀ of St. Venant and Kirchhoff's.

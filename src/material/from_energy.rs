@@ -12,9 +12,9 @@ use num_dual::Dual;
 /// are wrong or NaN at E = 0; use invariants.
 ///
 /// ```
-/// use bfree::material::{Energy, FromEnergy};
+/// use bfree::material::{Energy, FromEnergy, Law};
 /// use bfree::scalar::Real;
-/// use bfree::tensor::{contract, trace, Tensor};
+/// use bfree::tensor::{Deformation, Tensor, contract, trace};
 ///
 /// struct Hooke { lambda: f64, shear: f64 }
 ///
@@ -25,7 +25,9 @@ use num_dual::Dual;
 /// }
 ///
 /// let law = FromEnergy(Hooke { lambda: 1.0, shear: 1.0 });
-/// # let _ = law;
+/// // Stretched to twice the length, E = (F² − 1)/2 = 3/2: W = ½ (Λ + 2G) E², S = (Λ + 2G) E.
+/// let at = Deformation::<f64, 1>::new(Tensor::from_element(1.0));
+/// assert_eq!((law.energy(&at), law.stress(&at)[(0, 0)]), (0.5 * 3.0 * 1.5 * 1.5, 3.0 * 1.5));
 /// ```
 pub trait Energy: Send + Sync {
     /// Strain energy per unit reference volume.

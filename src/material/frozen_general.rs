@@ -16,6 +16,19 @@ pub struct FrozenGeneral<T: Real, const D: usize> {
 
 impl<T: Real, const D: usize> FrozenGeneral<T, D> {
     /// From the law's stress and `ℂ:X` at one state; the arguments are those of [`Law::freeze`].
+    ///
+    /// ```
+    /// use bfree::material::{FrozenGeneral, FrozenTangent, Lame, Law, NeoHookean};
+    /// use bfree::tensor::{Deformation, Tensor, identity};
+    ///
+    /// // From stress and ℂ alone it has what the law's own closed form has.
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+    /// let general = FrozenGeneral::new(&law, &identity(), &at, 1.0);
+    /// let (closed, l) = (law.freeze(&identity(), &at, 1.0), Tensor::<f64, 2>::new(1.0, 2.0, 3.0, 4.0));
+    /// assert!((general.apply(&l) - closed.apply(&l)).norm() < 1e-14 && general.closed().is_none());
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     pub fn new<L: Law>(law: &L, f_n: &Tensor<T, D>, at: &Deformation<T, D>, volume: T) -> Self {
         let unit = |i, k| Tensor::from_fn(|r, c| if (r, c) == (i, k) { T::one() } else { T::zero() });
         let elasticity =

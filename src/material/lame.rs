@@ -29,6 +29,16 @@ pub enum LameError {
 impl Lame {
     /// From Λ and G.
     ///
+    /// ```
+    /// use bfree::material::Lame;
+    ///
+    /// // Λ may be negative, as long as the bulk modulus Λ + 2G/3 is not.
+    /// let lame = Lame::new(-0.5, 1.0)?;
+    /// assert_eq!(lame.p_wave_modulus(), 1.5);
+    /// assert!(Lame::new(-0.7, 1.0).is_err());
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    ///
     /// # Errors
     /// G ≤ 0 or K = Λ + 2G/3 ≤ 0, or not finite.
     pub fn new(lambda: f64, shear: f64) -> Result<Self, LameError> {
@@ -67,6 +77,19 @@ impl Lame {
 
     /// From the bulk modulus K and the shear modulus G: Λ = K − 2G/3.
     ///
+    /// ```
+    /// use bfree::material::Lame;
+    ///
+    /// // The paper's rebound: K = 170, G = 30. The same solid by E = 9KG/(3K + G), ν = (3K − 2G)/(6K + 2G).
+    /// let (bulk, shear) = (170.0, 30.0);
+    /// let lame = Lame::from_bulk_shear(bulk, shear)?;
+    /// assert_eq!((lame.lambda, lame.shear), (150.0, 30.0));
+    /// let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
+    /// let same = Lame::from_young_poisson(young, (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear))?;
+    /// assert!((same.lambda - lame.lambda).abs() < 1e-12 * lame.lambda);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    ///
     /// # Errors
     /// K ≤ 0 or G ≤ 0, or not finite.
     pub fn from_bulk_shear(bulk: f64, shear: f64) -> Result<Self, LameError> {
@@ -77,6 +100,16 @@ impl Lame {
     }
 
     /// Λ + 2G, the modulus of plane compression waves.
+    ///
+    /// ```
+    /// use bfree::material::Lame;
+    ///
+    /// // Section 4.1: E = 1e10 Pa, ν = 0.3, ρ = 2600 kg/m³; waves run at c = √(M/ρ), M = E (1−ν)/((1+ν)(1−2ν)).
+    /// let modulus = Lame::from_young_poisson(1e10, 0.3)?.p_wave_modulus();
+    /// assert!((modulus / (1e10 * 0.7 / (1.3 * 0.4)) - 1.0).abs() < 1e-15);
+    /// assert_eq!((modulus / 2600.0).sqrt().round(), 2275.0);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     pub fn p_wave_modulus(&self) -> f64 {
         self.lambda + 2.0 * self.shear
     }

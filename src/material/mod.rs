@@ -34,6 +34,29 @@ pub struct NonPositiveJacobian {
 ///
 /// Every method takes the deformation as H = F − I wrapped in a [`Deformation`] whose Jacobian is positive (the callers in this
 /// module make sure of it). Stresses have the unit of the law's moduli; `W` is per unit reference volume.
+///
+/// ```
+/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Deformation, Tensor, Vector, contract, outer, symmetric};
+/// use num_dual::Dual64;
+///
+/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+/// let delta = Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0);
+/// // What δF makes of the strain: δE = sym(Fᵀ δF)
+/// let strain = symmetric(&(at.f.transpose() * delta));
+/// // S = ∂W/∂E and ℂ:δE = δS, by dual numbers through the law itself.
+/// let dual = Deformation::new(at.h.zip_map(&delta, Dual64::new));
+/// assert!((law.energy(&dual).eps - contract(&law.stress(&at), &strain)).abs() < 1e-15);
+/// let change = law.elasticity(&at, &strain);
+/// assert!((law.stress(&dual).map(|s| s.eps) - change).norm() < 1e-14);
+/// // ℂmat{v, b} a = [ℂ : (a ⊗ b)] v   (37)
+/// let (a, b, v) = (Vector::from([1.0, 2.0]), Vector::from([0.5, -1.0]), Vector::from([3.0, 1.0]));
+/// let (left, right) = (law.tangent_density(&at, &v, &b) * a, law.elasticity(&at, &outer(&a, &b)) * v);
+/// assert!((left - right).norm() < 1e-14);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
 pub trait Law: Send + Sync {
     /// The tangent frozen at one state, see [`FrozenTangent`].
     type Frozen<T: Real, const D: usize>: FrozenTangent<T, D>;
@@ -64,6 +87,21 @@ pub trait Law: Send + Sync {
 
     /// Freezes the whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`,
     /// for gradients taken in the configuration `n` whose deformation gradient is `f_n`.
+    ///
+    /// ```
+    /// use bfree::material::{FrozenTangent, Lame, Law, NeoHookean, first_piola};
+    /// use bfree::tensor::{Deformation, Tensor, identity};
+    /// use num_dual::Dual64;
+    ///
+    /// // V₀ δP, geometric and material together, is the derivative of V₀ P = V₀ F S. Here F_n = I, so that δF = L.
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let (h, l) = (Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1), Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0));
+    /// let frozen = law.freeze(&identity(), &Deformation::new(h), 3.0);
+    /// let dual = h.zip_map(&l, Dual64::new);
+    /// let delta = first_piola(&law, &Deformation::new(dual).f, dual)?.map(|x| 3.0 * x.eps);
+    /// assert!((frozen.apply(&l) - delta).norm() < 1e-14 * delta.norm());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     fn freeze<T: Real, const D: usize>(
         &self,
         f_n: &Tensor<T, D>,
@@ -72,12 +110,35 @@ pub trait Law: Send + Sync {
     ) -> Self::Frozen<T, D>;
 
     /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, Material, NeoHookean};
+    ///
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let material = Material::from(law);
+    /// // The law in the list is one of the shipped ones: itself.
+    /// assert_eq!(material.shipped(), Some(&material));
+    /// assert_eq!(law.shipped(), None);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     fn shipped(&self) -> Option<&Material> {
         None
     }
 
     /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
     /// By embedding into 3D.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, StVenantKirchhoff};
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
+    /// let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25)? };
+    /// let strain = 1e-9;
+    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
+    /// assert!((law.out_of_plane_stress(&at) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>) -> f64 {
         let embedded = Deformation::new(embed(&at.h));
         // σ_zz = P_zz F_zz / J with F_zz = 1
@@ -95,6 +156,25 @@ pub(crate) trait LawVisitor {
 ///
 /// With `L = Σ_J u_J ⊗ ∇_n N_J` and δF = L F_n the product is `L ↦ V₀ δP F_nᵀ`, where δP = δF S + F [ℂ : FᵀδF]: the
 /// nodal forces are that tensor times `∇_n N_I`.
+///
+/// ```
+/// use bfree::material::{FrozenTangent, Lame, Law, NeoHookean};
+/// use bfree::tensor::{Deformation, Tensor, Vector, contract, identity, outer};
+///
+/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+/// let frozen = law.freeze(&identity(), &at, 2.0);
+/// // A node's displacement u_J makes L = u_J ⊗ ∇N_J, and the force on node I is (V₀ δP) ∇N_I = K_IJ u_J.
+/// let (grad_i, grad_j) = (Vector::from([1.0, -0.5]), Vector::from([0.25, 2.0]));
+/// let u = Vector::from([3.0, 1.0]);
+/// let force = frozen.apply(&outer(&u, &grad_j)) * grad_i;
+/// assert!((force - frozen.block(&grad_i, &grad_j) * u).norm() < 1e-14);
+/// // The law has an energy, so its tangent is symmetric: A : K B = B : K A.
+/// let (a, b) = (Tensor::<f64, 2>::new(1.0, 2.0, 0.5, -1.0), Tensor::<f64, 2>::new(0.0, 1.0, 3.0, 0.5));
+/// assert!((contract(&a, &frozen.apply(&b)) - contract(&b, &frozen.apply(&a))).abs() < 1e-14);
+/// assert!(frozen.closed().is_some());
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
 pub trait FrozenTangent<T: Real, const D: usize>: Clone + Send + Sync {
     /// `V₀ (δF S + F [ℂ : Fᵀ δF]) F_nᵀ` with δF = L F_n.
     fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D>;
@@ -117,6 +197,15 @@ fn possible(det_f: f64) -> bool {
 impl NonPositiveJacobian {
     /// Checks det F > 0; refuses NaN and infinity.
     ///
+    /// ```
+    /// use bfree::material::NonPositiveJacobian;
+    ///
+    /// // A flat body is none, one that is nearly flat is.
+    /// assert_eq!(NonPositiveJacobian::check(1e-300), Ok(()));
+    /// assert_eq!(NonPositiveJacobian::check(0.0), Err(NonPositiveJacobian { det_f: 0.0 }));
+    /// assert!(NonPositiveJacobian::check(f64::NAN).is_err());
+    /// ```
+    ///
     /// # Errors
     /// `det_f` is none of a body.
     #[inline(always)]
@@ -126,6 +215,16 @@ impl NonPositiveJacobian {
 }
 
 /// Checks det F > 0, on J and never on J²; refuses NaN.
+///
+/// ```
+/// use bfree::material::admissible;
+/// use bfree::tensor::Tensor;
+///
+/// // Turned inside out in both directions, J² = 1 and even J = 1; in one direction J = −1.
+/// let turned = Tensor::<f64, 1>::from_element(-2.0);
+/// assert_eq!(admissible(turned).map_err(|error| error.det_f).unwrap_err(), -1.0);
+/// assert!(admissible(Tensor::<f64, 1>::from_element(-0.999)).is_ok());
+/// ```
 ///
 /// # Errors
 /// det F ≤ 0.
@@ -155,6 +254,20 @@ pub(crate) fn piola<L: Law, T: Real, const D: usize>(
 }
 
 /// `P = F S` (eq. 7), with the F on the left and the H = F − I inside S given separately.
+///
+/// ```
+/// use bfree::material::{Lame, Law, NeoHookean, first_piola};
+/// use bfree::tensor::{Deformation, Tensor, contract};
+/// use num_dual::Dual64;
+///
+/// // P = ∂W/∂F: P : δF is the derivative of W.
+/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let (h, delta) = (Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1), Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0));
+/// let piola = first_piola(&law, &Deformation::new(h).f, h)?;
+/// let energy = law.energy(&Deformation::new(h.zip_map(&delta, Dual64::new)));
+/// assert!((contract(&piola, &delta) - energy.eps).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// det F ≤ 0 of the F inside S.

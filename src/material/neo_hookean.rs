@@ -15,6 +15,24 @@ pub enum Volumetric {
 }
 
 /// Compressible neo-Hookean solid, W = U(J) − G ln J + G tr E.
+///
+/// ```
+/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::tensor::{Deformation, Tensor};
+///
+/// let lame = Lame::new(1.0, 1.0)?;
+/// let (ciarlet, logarithmic) = (NeoHookean::ciarlet(lame), NeoHookean::logarithmic(lame));
+/// let energies = |h| {
+///     let at = Deformation::<f64, 1>::new(Tensor::from_element(h));
+///     [ciarlet.energy(&at), logarithmic.energy(&at), 0.5 * lame.p_wave_modulus() * h * h]
+/// };
+/// // Both are linear elasticity, ½ (Λ + 2G) h², at small strain, and differ at large.
+/// let [a, b, linear] = energies(1e-9);
+/// assert!((a / linear - 1.0).abs() < 1e-8 && (b / linear - 1.0).abs() < 1e-8);
+/// let [a, b, _] = energies(1.0);
+/// assert!(a > 1.1 * b);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeoHookean {
     /// Λ and G.

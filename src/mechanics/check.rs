@@ -7,6 +7,17 @@ use crate::tensor::{Tensor, Vector, identity, inverse};
 use num_dual::Dual64;
 
 /// The largest relative difference accepted: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
+///
+/// ```
+/// use bfree::mechanics::check::tangent_bound;
+/// use bfree::tensor::{Tensor, Vector, identity};
+///
+/// // κ = ‖F‖ ‖F⁻¹‖ is 2 for F = I in 2D, and the same for any multiple of it; a flat particle is allowed more, but not anything.
+/// let bound = tangent_bound(&identity::<f64, 2>());
+/// assert!((bound / (64.0 * 4.0 * f64::EPSILON) - 1.0).abs() < 1e-14);
+/// assert_eq!(tangent_bound(&Tensor::<f64, 2>::from_diagonal(&Vector::from([8.0, 8.0]))), bound);
+/// assert_eq!(tangent_bound(&Tensor::<f64, 2>::from_diagonal(&Vector::from([1.0, 1e-6]))), 1e-10);
+/// ```
 pub fn tangent_bound<const D: usize>(f: &Tensor<f64, D>) -> f64 {
     let condition = f.norm() * inverse(f).norm();
     (64.0 * f64::EPSILON * condition * condition).min(1e-10)
@@ -67,6 +78,17 @@ pub enum CheckError {
 }
 
 /// A direction without pattern, entries in (−1, 1): the golden-ratio sequence from a start that differs with `seed`.
+///
+/// ```
+/// use bfree::mechanics::check::direction;
+/// use bfree::tensor::Vector;
+///
+/// // No two seeds give the same, and the entries fill (−1, 1) evenly: mean 0, mean square ⅓.
+/// let (u, w) = (direction::<1>(1000, 1), direction::<1>(1000, 2));
+/// assert!(u.iter().zip(&w).all(|(u, w)| u != w));
+/// assert!(u.iter().sum::<Vector<f64, 1>>().norm() < 2.0);
+/// assert!((u.iter().map(|u| u.norm_squared()).sum::<f64>() / 1000.0 - 1.0 / 3.0).abs() < 0.01);
+/// ```
 pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let start = (seed as f64 * 0.754_877_666_246_692_7).fract();
@@ -76,6 +98,24 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Compares, at Δφ and in the direction `u`, every term's formula and the solver's frozen product with dual numbers.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let u = direction::<2>(nodes.len(), 2);
+    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// equilibrium.check_tangent(&dphi, &u)?;
+    /// // Where a particle is turned inside out there is nothing to compare.
+    /// let far: Vec<_> = dphi.iter().map(|x| x * 1000.0).collect();
+    /// assert!(matches!(equilibrium.check_tangent(&far, &u), Err(CheckError::Inadmissible(_))));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The first mismatch, by particle for the geometric and the material term, by node for inertia and pressure.

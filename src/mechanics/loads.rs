@@ -7,6 +7,19 @@ use crate::shape::Shape;
 use crate::tensor::Vector;
 
 /// A piecewise-linear function of time, constant before its first and after its last point.
+///
+/// ```
+/// use bfree::mechanics::loads::Curve;
+///
+/// // Gravity that ramps up over 1 s: the velocity it gives is the integral of its value, which is that of its slope.
+/// let ramp = Curve::new(vec![[0.0, 0.0], [1.0, 9.81]])?;
+/// assert_eq!((ramp.slope(0.5), ramp.slope(2.0)), (9.81, 0.0));
+/// assert_eq!(ramp.value(0.5), 0.5 * ramp.slope(0.5));
+/// assert_eq!(ramp.integral(0.0, 1.0) + ramp.integral(1.0, 3.0), ramp.integral(0.0, 3.0));
+/// // From then on, as if it had always been there, half a second later.
+/// assert_eq!(ramp.integral(0.0, 3.0), Curve::constant(9.81).integral(0.5, 3.0));
+/// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     points: Vec<[f64; 2]>,
@@ -133,6 +146,19 @@ pub struct MotionStep {
 
 impl Motion {
     /// The motion over the step from `t` to `t + dt`.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Motion};
+    ///
+    /// // A wall that is set in motion: ġ = 4t up to t = 1, then 4. Over a step before and one behind the kink:
+    /// let wall = Motion::Velocity(Curve::new(vec![[0.0, 0.0], [1.0, 4.0]])?);
+    /// let (before, behind) = (wall.over(0.5, 0.5), wall.over(1.0, 0.5));
+    /// assert_eq!((before.increment, behind.increment), (0.5 * 4.0 * (1.0 - 0.25), 4.0 * 0.5));
+    /// // The acceleration at t = 1 is 4 from the left and 0 from the right; the velocity is continuous.
+    /// assert_eq!((before.acceleration_end, behind.acceleration_start), (4.0, 0.0));
+    /// assert_eq!(before.velocity_end, behind.velocity_start);
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
     pub fn over(&self, t: f64, dt: f64) -> MotionStep {
         // One-sided derivatives: looked up a little inside the step, so that a kink that round-off puts a hair
         // beyond t_n or before t_{n+1} does not bring in the neighbouring piece.
@@ -255,6 +281,23 @@ pub struct PressurePoint<const D: usize> {
 impl<const D: usize> Loads<D> {
     /// Nodal dead loads at time `t`: Σ_p m b N_I + Σ_Γ T N_I A, one vector per active node; `mass` is the lumped nodal mass, not
     /// looked at without gravity.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    ///
+    /// let falling = "gravity={\"acceleration\": [0, -10], \"curve\": [[0, 0], [2, 1]]}".parse()?;
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[falling])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let mass = Nodal::at_rest(particles, &supports, nodes.len()).mass;
+    /// // The nodes carry the weight of the particles, M g, half of it at half of the ramp.
+    /// let weight = -10.0 * particles.mass.iter().sum::<f64>();
+    /// let carried = |t| simulation.loads.dead(t, &mass, &supports).iter().map(|force| force[1]).sum::<f64>();
+    /// assert!((carried(2.0) / weight - 1.0).abs() < 1e-13);
+    /// assert!((carried(1.0) / weight - 0.5).abs() < 1e-13);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); supports.nodes()];
         if let Some(gravity) = &self.gravity {
@@ -276,6 +319,22 @@ impl<const D: usize> Loads<D> {
     }
 
     /// p A N of every particle under follower pressure at time `t`.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Loads, Pressing, SurfaceLoad, SurfacePoint};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // On a closed surface, Σ p A N = 0: here the four sides of a square, under p = 3 that doubles by t = 1.
+    /// let sides = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+    /// let side = |(particle, normal)| SurfacePoint { particle, normal: Vector::from(normal), area: 0.5, offset: 0.0 };
+    /// let points = sides.into_iter().enumerate().map(side).collect();
+    /// let curve = Curve::new(vec![[0.0, 1.0], [1.0, 2.0]])?;
+    /// let loads = Loads { surface: vec![SurfaceLoad { pressing: Pressing::Pressure(3.0), curve, points }], ..Loads::default() };
+    /// let pressures = loads.pressures(1.0);
+    /// assert_eq!(pressures[0].force, Vector::from([2.0 * 3.0 * 0.5, 0.0]));
+    /// assert_eq!(pressures.iter().map(|point| point.force).sum::<Vector<f64, 2>>().norm(), 0.0);
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
     pub fn pressures(&self, t: f64) -> Vec<PressurePoint<D>> {
         let mut points = Vec::new();
         for load in &self.surface {
@@ -307,6 +366,25 @@ pub struct PrescribedDof {
 }
 
 /// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component.
+///
+/// ```
+/// use bfree::grid::Grid;
+/// use bfree::mechanics::loads::{Curve, Motion, Prescribed, Selection, prescribed_dofs};
+/// use bfree::nodes::Nodes;
+/// use bfree::tensor::Vector;
+///
+/// // A floor on which bodies slide, and a wall at the left that pushes with velocity 2.
+/// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 1.0, cells: [4, 4] };
+/// let face = |axis| Selection::Face { axis, upper: false };
+/// let pushing = Some(Motion::Velocity(Curve::constant(2.0)));
+/// let floor = Prescribed { name: "floor".into(), on: face(1), motion: [None, Some(Motion::Rest)] };
+/// let wall = Prescribed { name: "wall".into(), on: face(0), motion: [pushing, None] };
+/// // The nodes of the cell in the corner: two on the floor, two at the wall, one of them the same.
+/// let nodes = Nodes::new([[[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index))].iter().map(|ids| ids.as_slice()));
+/// let dofs = prescribed_dofs(&[floor, wall], &grid, &nodes, 0.0, 0.5);
+/// let held: Vec<_> = dofs.iter().map(|dof| (dof.node, dof.component, dof.step.increment)).collect();
+/// assert_eq!(held, [(0, 0, 1.0), (0, 1, 0.0), (1, 1, 0.0), (2, 0, 1.0)]);
+/// ```
 pub fn prescribed_dofs<const D: usize>(
     prescribed: &[Prescribed<D>],
     grid: &Grid<D>,

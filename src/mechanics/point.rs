@@ -45,6 +45,16 @@ pub(super) fn carried<T: Real>(x: T, carries: bool) -> T {
 }
 
 /// H_{n+1} of F = ΔF F_n with ΔF = I + G: H = G + H_n + G H_n, which loses no digits (eq. 45).
+///
+/// ```
+/// use bfree::mechanics::residual::compose;
+/// use bfree::tensor::{Tensor, identity};
+///
+/// // I + H_{n+1} = (I + G)(I + H_n); and a strain of 1e-20 is kept beside I.
+/// let (g, h_n) = (Tensor::<f64, 2>::new(0.5, 0.25, 0.0, -0.5), Tensor::<f64, 2>::new(0.0, 0.5, 0.25, 1.0));
+/// assert_eq!(identity() + compose(&g, &h_n), (identity() + g) * (identity() + h_n));
+/// assert_eq!(compose(&Tensor::<f64, 1>::zeros(), &Tensor::from_element(1e-20))[(0, 0)], 1e-20);
+/// ```
 #[inline(always)]
 pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) -> Tensor<T, D> {
     let h_n = h_n.map(T::lit);

@@ -16,6 +16,29 @@ pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
 /// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ Δφ − α₂ v_n − α₃ a_n
+///
+/// ```
+/// use bfree::mechanics::{residual::{Carry, Equilibrium}, sweep::Supports, transfer::Nodal};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
+/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let nodal = Nodal::at_rest(particles, &supports, nodes.len());
+/// // Dropped: what Δφ = β Δt² g makes of a = α₁ Δφ is g, and all forces are in balance.
+/// let (newmark, dt, g) = (simulation.settings.newmark, 0.05, Vector::from([0.0, -10.0]));
+/// let weight: Vec<_> = nodal.mass.iter().map(|&m| g * m).collect();
+/// let equilibrium =
+///     Equilibrium::new(particles, bodies, &supports, newmark.alphas(dt), 1.0, &nodal, weight, vec![], &[]);
+/// let dphi = vec![g * (newmark.beta * dt * dt); nodes.len()];
+/// let residual = equilibrium.residual(&dphi, Carry::ALL)?;
+/// let largest = residual.iter().map(|r| r.norm()).fold(0.0, f64::max);
+/// assert!(largest < 1e-14 * equilibrium.magnitude(&dphi)?);
+/// // The law of each particle is that of its body.
+/// assert_eq!(equilibrium.law(0), &bodies[0].law);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Equilibrium<'a, const D: usize, L> {
     /// The particles at t_n.
     pub particles: &'a Particles<D>,
@@ -178,6 +201,22 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     /// f_ext: gravity, tractions and follower pressure at Δφ.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    ///
+    /// let falling = "gravity={\"acceleration\": [0, -10]}".parse()?;
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[falling])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let force = equilibrium.external_force(&nodal.velocity);
+    /// let weight = -10.0 * particles.mass.iter().sum::<f64>();
+    /// assert!((force.iter().map(|f| f[1]).sum::<f64>() / weight - 1.0).abs() < 1e-13);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut pressure = vec![Vector::zeros(); dphi.len()];
         self.add_pressure(dphi, Carry::ALL, &mut pressure);
@@ -221,6 +260,27 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// Π(Δφ) and the sum of the magnitudes of its contributions:
     /// Π = ½/α₁ a·M̃a + Σ_p V₀ W(F) − f_ext·Δφ, whose gradient is the residual. `None` under follower pressure.
     ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, residual::Carry, sweep::Supports, transfer::Nodal};
+    /// use num_dual::Dual64;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// // R = ∂Π/∂Δφ: along any u, the derivative of Π by dual numbers is R·u.
+    /// let u = direction::<2>(nodes.len(), 2);
+    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// let seeded: Vec<_> = dphi.iter().zip(&u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
+    /// let slope = equilibrium.potential(&seeded).ok_or("a follower pressure has no potential")??.0.eps;
+    /// let residual = equilibrium.residual(&dphi, Carry::ALL)?;
+    /// let work: f64 = residual.iter().zip(&u).map(|(r, u)| r.dot(u)).sum();
+    /// assert!((slope - work).abs() < 1e-11 * equilibrium.magnitude(&dphi)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The first particle with det F ≤ 0: there Π = +∞.
     pub fn potential<T: Real>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
@@ -252,6 +312,24 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     /// Zero at every prescribed degree of freedom.
+    ///
+    /// ```
+    /// use bfree::mechanics::{loads::{MotionStep, PrescribedDof}, residual::Carry, sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let wall = [PrescribedDof { node: 30, component: 0, owner: 0, moving: false, step: MotionStep::default() }];
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &wall, simulation.settings.newmark.alphas(dt), dt);
+    /// // Held where the body would fly on, the node meets a reaction; no unknown belongs to it.
+    /// let mut residual = equilibrium.residual::<f64>(&vec![Default::default(); nodes.len()], Carry::ALL)?;
+    /// assert!(residual[30][0] < 0.0);
+    /// equilibrium.clear_prescribed(&mut residual);
+    /// assert!(residual[30][0] == 0.0 && residual[31][0] < 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn clear_prescribed<T: Real>(&self, field: &mut [Vector<T, D>]) {
         for dof in self.prescribed {
             field[dof.node][dof.component] = T::zero();

@@ -34,6 +34,25 @@ impl Display for Loose {
 }
 
 /// The first group of bodies that touch (share nodes) which is loose.
+///
+/// ```
+/// use bfree::mechanics::{rigid::loose, sweep::Supports};
+///
+/// // A column that stands on the floor of its box, and the same without the floor.
+/// let scene = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+///     let (supports, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+///     let (nodal, prescribed, dt) = (of.project(&supports)?, of.prescribed(&nodes), of.clock.step());
+///     let equilibrium = of.equilibrium(&supports, &nodal, &prescribed, of.settings.alphas(dt), dt);
+///     Ok(loose(&of.grid, &equilibrium, &nodes))
+/// };
+/// assert_eq!(found(&simulation)?, None);
+/// simulation.loads.prescribed.clear();
+/// let falling = found(&simulation)?.ok_or("nothing holds it")?;
+/// assert_eq!(falling.axis, Some(1), "{falling}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn loose<const D: usize, L: Law>(
     grid: &Grid<D>,
     equilibrium: &Equilibrium<'_, D, L>,

@@ -11,6 +11,31 @@ use crate::solver::{LinearOperator, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
 /// K(Δφ)/s in single precision, frozen.
+///
+/// ```
+/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::solver::{Precision, SingleTangent};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+/// let (approximation, positions) = (&simulation.approximation, &particles.position);
+/// let (supports, nodes) = Supports::with_precision(approximation, grid, positions, Precision::Mixed)?;
+/// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+/// let (dphi, u) = (vec![Vector::zeros(); nodes.len()], direction::<2>(nodes.len(), 2));
+/// // s (K/s) u in single precision is K u to about 1e-6.
+/// let single = equilibrium.single_tangent(&dphi)?.ok_or("neo-Hooke has a closed tangent")?;
+/// let (mut rough, mut exact) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
+/// single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut rough);
+/// equilibrium.tangent(&dphi)?.product(&u, &mut exact);
+/// let error = |(a, b): (&Vector<f32, 2>, &Vector<f64, 2>)| (a.map(f64::from) * single.scale() - b).norm_squared();
+/// let size: f64 = exact.iter().map(|x| x.norm_squared()).sum();
+/// assert!((rough.iter().zip(&exact).map(error).sum::<f64>() / size).sqrt() < 1e-6);
+/// assert_eq!(single.scale().log2().fract(), 0.0); // a power of two
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Single<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
     /// s, a power of two.
@@ -23,6 +48,8 @@ pub struct Single<'a, const D: usize, L: Law> {
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Freezes the tangent at Δφ in single precision; `None` if the supports are not prepared for it, or a law has no closed tangent.
+    ///
+    /// Example: [`Single`].
     ///
     /// # Errors
     /// The first particle with det F ≤ 0.

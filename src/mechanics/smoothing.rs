@@ -35,6 +35,29 @@ const ROUND_OFF: f64 = 1e-12;
 /// The second term is the first of order 1 with a rate of its own at each node, θ_I = 1 − exp(−κ₁ min(1, (2 q_I)³) Δt), where q
 /// compares the curvature of the velocity with its slope:
 /// q_I = |v̄_I − v̿_I|² / σ_I²,  v̿ = M_L⁻¹ M v̄,  σ_I² = Σ_p m N_I |v_p − v̄_I|² / m_I.
+///
+/// ```
+/// use bfree::mechanics::{check::direction, smoothing::Smoothing, sweep::Supports, transfer::Nodal};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let particles = &mut simulation.particles;
+/// particles.velocity = direction(particles.len(), 1); // full of what nodes cannot see
+/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let mass = Nodal::at_rest(particles, &supports, nodes.len()).mass;
+///
+/// let (smoothing, dt) = (Smoothing::limited(40.0), 0.05);
+/// let at_kinks = smoothing.shares_at_kinks(particles, &supports, &mass, dt);
+/// let change = smoothing.change(particles, &supports, &mass, at_kinks.as_deref(), &particles.velocity, dt);
+/// // Momentum is conserved, energy is lost.
+/// let given: Vector<f64, 2> = change.iter().zip(&particles.mass).map(|(dv, &m)| dv * m).sum();
+/// assert!(given.norm() < 1e-13 * particles.mass.iter().sum::<f64>());
+/// let before = particles.kinetic_energy();
+/// particles.velocity.iter_mut().zip(&change).for_each(|(v, dv)| *v += dv);
+/// assert!(particles.kinetic_energy() < 0.5 * before);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
     /// k ≥ 1: 1 is PIC.
@@ -47,6 +70,13 @@ pub struct Smoothing {
 
 impl Smoothing {
     /// Of order `order` at the rate `rate`, everywhere the same.
+    ///
+    /// ```
+    /// use bfree::mechanics::smoothing::Smoothing;
+    ///
+    /// // The limited kind is this one, and more of it at kinks.
+    /// assert_eq!(Smoothing { at_kinks: 0.0, ..Smoothing::limited(8.0) }, Smoothing::uniform(2, 8.0));
+    /// ```
     pub const fn uniform(order: u32, rate: f64) -> Self {
         Self { order, rate, at_kinks: 0.0 }
     }
@@ -57,6 +87,17 @@ impl Smoothing {
     }
 
     /// θ = 1 − exp(−κΔt)
+    ///
+    /// ```
+    /// use bfree::mechanics::smoothing::Smoothing;
+    ///
+    /// // Two steps of half the length leave what one leaves: (1 − θ(Δt/2))² = 1 − θ(Δt).
+    /// let smoothing = Smoothing::uniform(2, 8.0);
+    /// let left = |dt| 1.0 - smoothing.share(dt);
+    /// assert!((left(0.05) * left(0.05) - left(0.1)).abs() < 1e-15);
+    /// // PIC proper: all of it, however short the step.
+    /// assert_eq!(Smoothing::uniform(1, f64::INFINITY).share(1e-9), 1.0);
+    /// ```
     pub fn share(&self, dt: f64) -> f64 {
         -(-self.rate * dt).exp_m1()
     }

@@ -28,6 +28,16 @@ impl Term {
     pub const ALL: [Self; 4] = [Self::Inertia, Self::Geometric, Self::Material, Self::Pressure];
 
     /// The occurrences of Δφ that make this term.
+    ///
+    /// ```
+    /// use bfree::mechanics::{residual::Carry, tangent::Term};
+    ///
+    /// // Each occurrence of Δφ belongs to one term, and together they are R's whole derivative.
+    /// let bits = |carry: Carry| [carry.inertia, carry.left, carry.inside, carry.pressure];
+    /// let terms = Term::ALL.map(|term| bits(term.carry()));
+    /// assert!((0..4).all(|k| terms.iter().filter(|bits| bits[k]).count() == 1));
+    /// assert_eq!(bits(Carry::ALL), [true; 4]);
+    /// ```
     pub fn carry(self) -> Carry {
         match self {
             Self::Inertia => Carry { inertia: true, ..Carry::NONE },
@@ -40,6 +50,8 @@ impl Term {
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// One term of K(Δφ)·u by its formula, on every active node.
+    ///
+    /// Example: [`Self::dual_product`].
     ///
     /// # Errors
     /// The first particle with det F ≤ 0.
@@ -93,6 +105,26 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 
     /// The same term by dual numbers through the residual: the derivative of R in the direction u.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports, tangent::Term, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let u = direction::<2>(nodes.len(), 2);
+    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+    /// // Every term by its formula, and as a derivative that knows nothing of it.
+    /// for term in [Term::Inertia, Term::Geometric, Term::Material] {
+    ///     let (formula, dual) = (equilibrium.product(term, &dphi, &u)?, equilibrium.dual_product(term, &dphi, &u)?);
+    ///     let error: f64 = formula.iter().zip(&dual).map(|(a, b)| (a - b).norm_squared()).sum();
+    ///     assert!(error.sqrt() < 1e-13 * dual.iter().map(|b| b.norm_squared()).sum::<f64>().sqrt(), "{term:?}");
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The first particle with det F ≤ 0.
@@ -163,6 +195,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 
     /// Freezes the tangent at Δφ.
     ///
+    /// Example: [`Tangent`].
+    ///
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D, L>, Inadmissible> {
@@ -210,11 +244,49 @@ pub(super) fn closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> Option<
 }
 
 /// Whether all laws have a closed form, which products in single precision need.
+///
+/// ```
+/// use bfree::material::{Energy, FromEnergy};
+/// use bfree::mechanics::tangent::has_closed_form;
+/// use bfree::particles::Body;
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Tensor, contract};
+///
+/// struct Quadratic;
+///
+/// impl Energy for Quadratic {
+///     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+///         contract(e, e)
+///     }
+/// }
+///
+/// // The shipped laws have one; a law known by its energy alone has ℂ, entry by entry.
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// assert!(has_closed_form::<2, _>(&scene.build::<2>("scenes".as_ref())?.bodies));
+/// assert!(!has_closed_form::<2, _>(&[Body { name: "mine".into(), law: FromEnergy(Quadratic), density: 1.0 }]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn has_closed_form<const D: usize, L: Law>(bodies: &[Body<L>]) -> bool {
     closed_form::<D, L>(bodies).is_some()
 }
 
 /// Bytes of the frozen tangent of all particles.
+///
+/// ```
+/// use bfree::mechanics::{sweep::Supports, tangent::frozen_bytes};
+/// use bfree::solver::Precision;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
+/// let (shape, grid, positions) = (&simulation.approximation, &simulation.grid, &particles.position);
+/// let (supports, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
+/// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers; in single precision they take less.
+/// let bytes = |precision| frozen_bytes(bodies, &supports, 1.0, precision);
+/// assert!(bytes(Precision::Double) >= 9 * size_of::<f64>() * particles.len());
+/// assert!(bytes(Precision::Mixed) < bytes(Precision::Double));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn frozen_bytes<const D: usize, L: Law>(
     bodies: &[Body<L>],
     supports: &Supports<D>,
@@ -262,6 +334,36 @@ impl<const D: usize> FrozenPressure<D> {
 
 /// K(Δφ), frozen: an operator, with d×d diagonal blocks as preconditioner, those of the first tangent frozen in the step: making
 /// them costs as much as a few products, and a step changes them little.
+///
+/// ```
+/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+/// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+/// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+/// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
+/// let tangent = equilibrium.tangent(&dphi)?;
+/// let times = |u: &[Vector<f64, 2>]| {
+///     let mut out = vec![Vector::zeros(); u.len()];
+///     tangent.product(u, &mut out);
+///     out
+/// };
+/// // All loads have a potential, so K is symmetric: w·Ku = u·Kw.
+/// let dot = |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+/// let (u, w) = (direction(nodes.len(), 2), direction(nodes.len(), 3));
+/// let (ku, kw) = (times(&u), times(&w));
+/// assert!((dot(&w, &ku) - dot(&u, &kw)).abs() < 1e-13 * (dot(&ku, &ku) * dot(&w, &w)).sqrt());
+/// // K_II is what node I feels of its own motion.
+/// let mut unit = vec![Vector::zeros(); nodes.len()];
+/// unit[30] = Vector::from([1.0, 0.0]);
+/// let column = tangent.diagonal_blocks()[30].column(0).into_owned();
+/// assert!((times(&unit)[30] - column).norm() < 1e-13 * column.norm());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Tangent<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
     frozen: Frozen<D, L>,

@@ -48,6 +48,17 @@ impl Alphas {
 
 impl Newmark {
     /// The α-parameters of a step of length `dt`.
+    ///
+    /// ```
+    /// use bfree::mechanics::time::Newmark;
+    ///
+    /// // Uniformly accelerated motion, Δφ = v Δt + ½ a Δt², is exact for every β and γ.
+    /// let (v, a, dt) = (3.0, -2.0, 0.25);
+    /// let alphas = Newmark { beta: 0.3025, gamma: 0.6 }.alphas(dt);
+    /// let dphi = v * dt + 0.5 * a * dt * dt;
+    /// assert!((alphas.a1 * dphi - alphas.a2 * v - alphas.a3 * a - a).abs() < 1e-12);
+    /// assert!((alphas.a4 * dphi + alphas.a5 * v + alphas.a6 * a - (v + a * dt)).abs() < 1e-12);
+    /// ```
     pub fn alphas(&self, dt: f64) -> Alphas {
         let Self { beta, gamma } = *self;
         Alphas {

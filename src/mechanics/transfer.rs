@@ -17,6 +17,27 @@ const PROJECTION_TOLERANCE: f64 = 1e-12;
 
 /// Lumped mass, velocity and acceleration at the active nodes: each array as long as there are nodes, or empty where nothing
 /// needs it.
+///
+/// ```
+/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let particles = &mut simulation.particles;
+/// particles.velocity = direction(particles.len(), 1);
+/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let momentum = |nodal: &Nodal<2>| nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum::<Vector<f64, 2>>();
+/// // Mass and momentum are those of the particles, with the lumped mass as with the consistent one.
+/// let rest = Nodal::at_rest(particles, &supports, nodes.len());
+/// assert!((rest.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+/// let lumped = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+/// let consistent = Nodal::project(particles, &supports, nodes.len(), 0.1)?;
+/// assert!((momentum(&lumped) - particles.momentum()).norm() < 1e-13);
+/// assert!((momentum(&consistent) - particles.momentum()).norm() < 1e-10);
+/// assert!(lumped.iterations == 0 && consistent.iterations > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nodal<const D: usize> {
     /// Σ_p m N_I; empty without inertia and gravity.
@@ -75,6 +96,20 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// The lumped mass, which gravity acts on, and no inertia.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// // The mass is there, and no motion that it could resist.
+    /// let nodal = Nodal::mass_alone(particles, &supports, nodes.len());
+    /// assert!((nodal.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+    /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports, nodes.len()).is_static());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
         let mut mass = vec![Vector::<f64, D>::zeros(); count];
         supports.spread(&mut mass, |p| Vector::from_fn(|i, _| if i == 0 { particles.mass[p] } else { 0.0 }));
@@ -82,11 +117,30 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// Whether there is no inertia.
+    ///
+    /// Example: [`Self::mass_alone`].
     pub fn is_static(&self) -> bool {
         self.velocity.is_empty()
     }
 
     /// a_I = −R_I / m_I, from the residual of the same state at rest.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let mut nodal = Nodal::at_rest(particles, &supports, nodes.len());
+    /// // An undeformed body under gravity: R_I = −m_I g, and all of it begins to fall.
+    /// let g = Vector::from([0.0, -10.0]);
+    /// let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| g * -m).collect();
+    /// nodal.accelerate(particles, &unbalanced);
+    /// assert!(nodal.acceleration.iter().all(|a| (a - g).norm() < 1e-14));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn accelerate(&mut self, particles: &Particles<D>, unbalanced: &[Vector<f64, D>]) {
         let light = light(particles);
         for ((a, r), &m) in self.acceleration.iter_mut().zip(unbalanced).zip(&self.mass) {
@@ -95,6 +149,22 @@ impl<const D: usize> Nodal<D> {
     }
 
     /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
+    ///
+    /// ```
+    /// use bfree::mechanics::{loads::{MotionStep, PrescribedDof}, sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let projected = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// // A wall holds the x component of node 3.
+    /// let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
+    /// let nodal = projected.with_prescribed(&[wall]);
+    /// assert_eq!((nodal.velocity[3][0], nodal.velocity[3][1]), (0.0, projected.velocity[3][1]));
+    /// assert_eq!(nodal.velocity[4], projected.velocity[4]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
         let mut overwritten = self.clone();
         for dof in prescribed.iter().filter(|_| !self.is_static()) {
@@ -170,6 +240,31 @@ pub enum WallUpdate {
 }
 
 /// Where the particles are after the step: computed first, checked, and only then committed.
+///
+/// ```
+/// use bfree::mechanics::{smoothing::Smoothing, sweep::Supports, transfer::{Moved, Nodal, WallUpdate}};
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (mut particles, dt) = (simulation.particles.clone(), 0.05);
+/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+/// // The cylinder flies with v = ½ and meets nothing: Δφ = v Δt at every node.
+/// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
+/// let alphas = simulation.settings.newmark.alphas(dt);
+/// let mut moved = Moved::new(&particles, &supports, &alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+/// moved.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
+/// assert!((moved.positions()[7] - particles.position[7] - particles.velocity[7] * dt).norm() < 1e-14);
+/// assert!(moved.impulses().is_empty()); // no walls
+/// moved.commit(&mut particles);
+/// assert!((particles.kinetic_energy() / simulation.particles.kinetic_energy() - 1.0).abs() < 1e-12);
+/// assert!(particles.displacement_gradient.iter().all(|h| h.norm() < 1e-13));
+/// // That is what the whole step finds.
+/// simulation.step()?;
+/// let apart = simulation.particles.position.iter().zip(&particles.position).map(|(a, b)| (a - b).norm());
+/// assert!(apart.fold(0.0, f64::max) < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Moved<const D: usize> {
     position: Vec<Vector<f64, D>>,
     delta_velocity: Vec<Vector<f64, D>>,
@@ -236,6 +331,24 @@ impl<const D: usize> Moved<D> {
     /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it: what Newmark's step differs from Taylor's series
     /// with a third derivative ȧ = Δa/Δt, e = (β − 1/6) Δt² Δa. The root of its mean square over the mass; exact to leading order in
     /// Δt. To be asked before smoothing.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::{Moved, Nodal, WallUpdate}};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, dt) = (&simulation.particles, 0.05);
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let (nodal, alphas) = (Nodal::at_rest(particles, &supports, nodes.len()), simulation.settings.newmark.alphas(dt));
+    /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
+    /// let (a, beta) = (Vector::from([3.0, 4.0]), simulation.settings.newmark.beta);
+    /// let dphi = vec![a * (beta * dt * dt); nodes.len()];
+    /// let moved = Moved::new(particles, &supports, &alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+    /// let error = moved.local_error(beta, dt, &particles.mass);
+    /// assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn local_error(&self, beta: f64, dt: f64, mass: &[f64]) -> f64 {
         let squares = self.delta_acceleration.iter().zip(mass).map(|(a, m)| m * a.norm_squared());
         let mean = squares.fold(0.0, |sum, one| sum + one) / mass.iter().sum::<f64>();

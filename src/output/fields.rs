@@ -12,6 +12,21 @@ const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), 
 impl Field {
     /// Appends the components at one particle (which must exist in the simulation and the reference) to `out`.
     ///
+    /// ```
+    /// use bfree::{field::Field, output::Reference, tensor::Tensor};
+    ///
+    /// // Uniaxial strain ε = 1e-9 in a plane: σ_xx = (Λ + 2G) ε, and Λ ε in the other two directions.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// simulation.particles.displacement_gradient[0] = Tensor::<f64, 2>::new(1e-9, 0.0, 0.0, 0.0);
+    /// let mut stress = Vec::new();
+    /// Field::Stress.append(&simulation, &Reference::of(&simulation), 0, &mut stress)?;
+    /// for (component, modulus) in [210.0, 150.0, 150.0, 0.0, 0.0, 0.0].into_iter().enumerate() {
+    ///     assert!((stress[component] / 1e-9 - modulus).abs() < 1e-5);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// A stress is asked for where det F ≤ 0, or a velocity or acceleration where there is no inertia.
     pub fn append<const D: usize, L: Law, A>(
@@ -58,6 +73,20 @@ impl Field {
     }
 
     /// The components at all particles, particle after particle.
+    ///
+    /// ```
+    /// use bfree::{field::Field, output::Reference};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let reference = Reference::of(&simulation);
+    /// simulation.step()?;
+    /// // In free flight every particle is displaced by v Δt = 0.025 along x.
+    /// let displacements = Field::Displacement.values(&simulation, &reference)?;
+    /// assert_eq!(displacements.len(), 3 * 112);
+    /// assert!(displacements.chunks(3).all(|u| (u[0] - 0.025).abs() < 1e-12 && u[1].abs() < 1e-12 && u[2] == 0.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Self::append`]; a reference with another number of particles.

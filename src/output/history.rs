@@ -27,6 +27,24 @@ pub struct Energies {
 
 impl Energies {
     /// Of the present state.
+    ///
+    /// ```
+    /// use bfree::output::{Reference, history::Energies};
+    ///
+    /// let falling = "gravity={\"acceleration\": [0, -1]}".parse()?;
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[falling])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let reference = Reference::of(&simulation);
+    /// for _ in 0..3 {
+    ///     simulation.step()?;
+    /// }
+    /// // What the weight has done is kinetic energy now, ½ M (g t)².
+    /// let energies = Energies::of(&simulation, &reference);
+    /// let (mass, t) = (simulation.particles.mass.iter().sum::<f64>(), simulation.clock.time());
+    /// assert!((energies.external / (0.5 * mass * t * t) - 1.0).abs() < 1e-10);
+    /// assert!(energies.balance.abs() < 1e-10 * energies.total);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
@@ -49,6 +67,23 @@ pub struct Cost {
 }
 
 /// Writes `history.csv`.
+///
+/// ```
+/// use bfree::output::{Reference, history::{Cost, History}};
+///
+/// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
+/// let simulation = scene.build::<2>("scenes".as_ref())?;
+/// let path = folder.path().join("history.csv");
+/// let mut history = History::open(path.clone(), 2, None)?;
+/// let energies = history.write(&simulation, &Reference::of(&simulation), Cost::default())?;
+/// history.flush()?;
+/// // The same bits come back from the file.
+/// let text = std::fs::read_to_string(path)?;
+/// let (names, row) = text.trim_end().split_once('\n').ok_or("two lines")?;
+/// let column = names.split(',').position(|name| name == "kinetic").ok_or("a column")?;
+/// assert_eq!(row.split(',').nth(column).ok_or("a value")?.parse::<f64>()?, energies.kinetic);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct History(Table);
 

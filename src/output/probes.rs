@@ -54,6 +54,20 @@ impl<const D: usize> Probe<D> {
 }
 
 /// The particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near ones, the first.
+///
+/// ```
+/// use bfree::output::nearest;
+/// use bfree::tensor::Vector;
+///
+/// // The disc's centre is a node; the four particles around it are equally near, and the first of them is taken.
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let particles = scene.build::<2>("scenes".as_ref())?.particles;
+/// let (particle, distance) = nearest(&particles, &Vector::from([2.5, 2.5]), None).ok_or("particles")?;
+/// assert_eq!(distance, 0.125 * 2_f64.sqrt());
+/// assert_eq!(particles.position[particle], Vector::from([2.375, 2.375]));
+/// assert_eq!(nearest(&particles, &Vector::from([2.5, 2.5]), Some(1)), None); // no such body
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn nearest<const D: usize>(
     particles: &Particles<D>,
     point: &Vector<f64, D>,

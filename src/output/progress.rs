@@ -23,6 +23,19 @@ const BAR_LENGTH: f64 = 1000.0;
 
 /// Predicts the time left from the simulated time per wall-clock second of the recent past: impacts and halved steps slow a
 /// run down, and an average since the start would hide it.
+///
+/// ```
+/// use bfree::output::progress::Pace;
+///
+/// let mut pace = Pace::default();
+/// pace.mark(0.0, 0.0);
+/// assert_eq!(pace.left(10.0), None);
+/// pace.mark(100.0, 5.0);
+/// assert_eq!(pace.left(10.0), Some(100.0));
+/// // An impact: the last 40 s were four times as slow, and so will the rest be.
+/// pace.mark(140.0, 5.5);
+/// assert_eq!(pace.left(10.0), Some(4.5 / 0.5 * 40.0));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Pace {
     /// (wall-clock seconds, simulated time), oldest first.
@@ -88,6 +101,24 @@ enum Display {
 }
 
 /// Shows how far a run is.
+///
+/// ```
+/// use bfree::output::progress::{Audience, Progress, Shown};
+/// use bfree::output::warnings::{Kind, Warning};
+///
+/// // From t = 0 to 1, for nobody: warnings are written all the same.
+/// let mut progress = Progress::new(0.0, 1.0, Audience::Nobody);
+/// let mut energy = 1.0;
+/// for step in 1..=10 {
+///     energy *= 1.01;
+///     let balance = energy - 1.0;
+///     progress.show(0.1 * step as f64, Shown { step, newton: 2, krylov: 12, balance });
+/// }
+/// assert!(energy > 1.1);
+/// let message = format!("{energy} of 1");
+/// progress.warn(&Warning { kind: Kind::EnergyCreated, time: 1.0, step: 10, message });
+/// progress.finish();
+/// ```
 #[derive(Debug)]
 pub struct Progress {
     display: Display,

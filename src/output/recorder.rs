@@ -72,6 +72,32 @@ pub struct Recorder<const D: usize> {
 }
 
 /// Where the files of a run end at one moment, and what was counted until then: all that it takes to continue them.
+///
+/// ```
+/// use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+///
+/// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
+/// let (mut simulation, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
+/// let settings = OutputSettings {
+///     directory, fields: vec![], snapshot_every: None, probes: vec![], end_time: 1.0, audience: Audience::Nobody,
+/// };
+/// let reference = Reference::of(&simulation);
+/// let mut recorder = Recorder::start(settings.clone(), &simulation, reference.clone())?;
+/// let (mark, marked, history) = (recorder.mark()?, simulation.clone(), folder.path().join("history.csv"));
+/// let length = std::fs::metadata(&history)?.len();
+/// let step = simulation.advance()?;
+/// recorder.record(&simulation, &step)?;
+/// drop(recorder);
+/// // Rows behind the mark are cut off.
+/// mark.check(folder.path())?;
+/// assert!(std::fs::metadata(&history)?.len() > length);
+/// drop(Recorder::resume(settings, &marked, reference, &mark)?);
+/// assert_eq!(std::fs::metadata(&history)?.len(), length);
+/// // A file that has lost some of what it had cannot be continued.
+/// std::fs::write(&history, "step\n")?;
+/// assert!(mark.check(folder.path()).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
@@ -118,6 +144,8 @@ impl<const D: usize> Recorder<D> {
 
     /// Continues the files of a run from `mark`, with the simulation as it was then and the reference of the start; what was
     /// written later is cut off.
+    ///
+    /// Example: [`Mark`].
     ///
     /// # Errors
     /// As [`Self::start`], and [`Mark::check`].
@@ -177,6 +205,8 @@ impl<const D: usize> Recorder<D> {
 
     /// Puts everything on the disk and says where the files end, so that [`Self::resume`] can continue them from here.
     /// `newton.jsonl` then stays when the run has ended.
+    ///
+    /// Example: [`Mark`].
     ///
     /// # Errors
     /// The system refuses.

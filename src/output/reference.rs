@@ -19,6 +19,16 @@ pub struct Reference<const D: usize> {
 
 impl<const D: usize> Reference<D> {
     /// The present state as reference.
+    ///
+    /// ```
+    /// use bfree::output::Reference;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let reference = Reference::of(&simulation);
+    /// assert_eq!((reference.energy, reference.momentum), (3.5, simulation.particles.momentum()));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Self {
         let particles = &simulation.particles;
         Self {

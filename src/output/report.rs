@@ -40,6 +40,25 @@ impl Outcome<'_> {
 }
 
 /// What was done, summed over all steps. Iterations, residuals and products of failed attempts at a step are counted too.
+///
+/// ```
+/// use bfree::output::report::Counts;
+/// use bfree::simulation::FailedAttempt;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (mut counts, step) = (Counts::default(), simulation.advance()?);
+/// counts.add(&step);
+/// counts.add(&simulation.advance()?);
+/// assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
+/// // An attempt that failed did something too.
+/// let newton = step.newton.history.clone();
+/// let before = counts.residual_evaluations;
+/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why: "no equilibrium was found".into(), newton }]);
+/// assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
+/// assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
@@ -96,6 +115,21 @@ impl Counts {
 }
 
 /// Seconds, summed over all steps.
+///
+/// ```
+/// use bfree::output::report::Seconds;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let (start, mut seconds) = (std::time::Instant::now(), Seconds::default());
+/// seconds.add(&simulation.step()?);
+/// seconds.add(&simulation.step()?);
+/// seconds.total = start.elapsed().as_secs_f64();
+/// // The phases and what is in none of them are the whole.
+/// let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
+/// assert!((sum / seconds.total - 1.0).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {

@@ -60,6 +60,23 @@ impl Background {
 }
 
 /// Points with arrays, at one time.
+///
+/// ```
+/// use bfree::output::vtu::{Array, Background, Snapshot, Values};
+///
+/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: Values::Float(vec![0.1 + 0.2, -0.0]) };
+/// let snapshot = Snapshot {
+///     time: 1.0 / 3.0,
+///     background: Background { dimension: 1, origin: [0.0; 3], spacing: 0.5, cells: [4, 0, 0] },
+///     points: vec![[0.25, 0.0, 0.0], [1e-300, 0.0, 0.0]],
+///     arrays: vec![speed],
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("particles_0.vtu");
+/// snapshot.write(&path)?;
+/// assert_eq!(Snapshot::read(&path)?, snapshot);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     /// Time.

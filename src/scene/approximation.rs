@@ -91,6 +91,17 @@ impl Lme {
     ///
     /// The worst point is next to the middle of a cell face, √(1 + (D−1)/4) h away from the nodes opposite to it; they must
     /// be nearer than R_a = h √(−ln TOL₀/γ̂), or the point leaves the hull of its nodes.
+    ///
+    /// ```
+    /// use bfree::approximation::LmeCircle;
+    /// use bfree::scene::approximation::Lme;
+    ///
+    /// // What a scene may ask for is what the shape functions can do.
+    /// let lme = Lme::default();
+    /// for dimension in 1..=3 {
+    ///     assert_eq!(lme.circle_limit(dimension), LmeCircle::largest_gamma(lme.tolerance, dimension));
+    /// }
+    /// ```
     pub fn circle_limit(&self, dimension: usize) -> f64 {
         -self.tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
     }

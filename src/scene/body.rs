@@ -79,6 +79,17 @@ pub enum Material {
 
 impl Material {
     /// The constants, whichever the law.
+    ///
+    /// ```
+    /// use bfree::scene::body::Material;
+    ///
+    /// // The same constants for two laws that differ at large strain only.
+    /// let material = |law: &str| serde_json::from_str::<Material>(&format!(r#"{{"{law}": {{"young": 100, "poisson": 0.3}}}}"#));
+    /// let (ciarlet, logarithmic) = (material("neo_hookean")?, material("neo_hookean_logarithmic")?);
+    /// assert_ne!(ciarlet, logarithmic);
+    /// assert_eq!(ciarlet.constants(), logarithmic.constants());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn constants(&self) -> &Constants {
         let (Self::NeoHookean(constants) | Self::NeoHookeanLogarithmic(constants) | Self::StVenantKirchhoff(constants)) =
             self;
@@ -117,6 +128,17 @@ pub struct Constants {
 
 impl Constants {
     /// Λ and G; `None` unless exactly one pair is given.
+    ///
+    /// ```
+    /// use bfree::scene::body::Constants;
+    ///
+    /// // The same solid by two pairs: E = 2.5, ν = ¼ is Λ = G = 1. Half of each pair is none.
+    /// let lame = |text| serde_json::from_str::<Constants>(text).map(|constants| constants.lame());
+    /// let by_young = lame(r#"{"young": 2.5, "poisson": 0.25}"#)?.ok_or("a pair")??;
+    /// assert_eq!(by_young, lame(r#"{"lambda": 1, "shear": 1}"#)?.ok_or("a pair")??);
+    /// assert!(lame(r#"{"young": 2.5, "shear": 1}"#)?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// Constants that no stable solid has.

@@ -71,6 +71,15 @@ enum Quantity {
 
 impl Boundary {
     /// The condition at the lower (`false`) or upper (`true`) face of an axis.
+    ///
+    /// ```
+    /// use bfree::scene::boundary::Face;
+    ///
+    /// // The cantilever is clamped at its left end, x = 0; what the scene does not mention is free.
+    /// let boundary = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?.boundary;
+    /// assert_eq!((boundary.face(0, false), boundary.face(1, true)), (&Face::Fixed, &Face::Free));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn face(&self, axis: usize, upper: bool) -> &Face {
         let face = match (axis, upper) {
             (0, false) => &self.left,

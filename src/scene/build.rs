@@ -180,11 +180,28 @@ impl Means<'_> {
 
 impl Scene {
     /// 1 (uniaxial strain), 2 (plane strain) or 3.
+    ///
+    /// ```
+    /// // The dimension is a number in a scene and a type in a simulation.
+    /// let scene = bfree::scene::read_file("scenes/ball_drop.json".as_ref(), &[])?;
+    /// assert_eq!(scene.dimension(), 3);
+    /// assert!(scene.build::<2>("scenes".as_ref()).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn dimension(&self) -> usize {
         self.grid.dimension()
     }
 
     /// The simulation at t = 0. Particle files are looked for in `folder`.
+    ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// // The paper's disc: 112 particles of the volume (h/2)², ρ = 4, v = ½: an energy of ½ m v² = 3.5.
+    /// assert_eq!((simulation.particles.len(), simulation.particles.volume[0]), (112, 0.0625));
+    /// assert_eq!(simulation.particles.kinetic_energy(), 3.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// What only shows once particles are there; and any scene whose dimension is not `D`.
@@ -193,6 +210,15 @@ impl Scene {
     }
 
     /// As [`Self::build`], where no more than so many bytes of memory can be had.
+    ///
+    /// ```
+    /// // 112 particles need more than 1 kB, and less than 1 GB.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// assert!(scene.build_within::<2>("scenes".as_ref(), 1 << 10).is_err());
+    /// let simulation = scene.build_within::<2>("scenes".as_ref(), 1 << 30)?;
+    /// assert_eq!(simulation.particles, scene.build::<2>("scenes".as_ref())?.particles);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Self::build`]; and particles that surely need more, before room is made for them.

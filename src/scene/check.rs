@@ -49,6 +49,15 @@ pub struct Problems {
 
 impl Problems {
     /// Whether nothing is wrong.
+    ///
+    /// ```
+    /// // γ and β of Newmark's method that would not be stable.
+    /// let mut scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// (scene.time.gamma, scene.time.beta) = (Some(0.5), Some(0.2)); // 2β ≥ γ is asked for
+    /// let problems = scene.check();
+    /// assert!(!problems.is_empty() && problems.to_string().contains("time.beta"), "{problems}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

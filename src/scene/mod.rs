@@ -108,6 +108,15 @@ pub struct NodeVelocity {
 }
 
 /// The JSON schema of a scene.
+///
+/// ```
+/// // Every key that a scene has, the schema describes.
+/// let (schema, text) = (bfree::scene::schema().to_value(), std::fs::read_to_string("scenes/cantilever.json")?);
+/// let scene: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&text)?;
+/// assert!(scene.len() > 5);
+/// assert!(scene.keys().all(|key| schema["properties"][key]["description"].is_string()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn schema() -> schemars::Schema {
     let mut schema = complete_schema();
     // With an accuracy they may be absent.
@@ -129,6 +138,17 @@ fn complete_schema() -> schemars::Schema {
 
 impl Scene {
     /// Everything that is wrong with the values of the scene, in the order of its sections.
+    ///
+    /// ```
+    /// // A scene that was read is right; one that is changed afterwards may be wrong in several places.
+    /// let mut scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// assert!(scene.check().is_empty());
+    /// scene.time.step = -0.1;
+    /// scene.bodies[0].density = 0.0;
+    /// let wrong: Vec<_> = scene.check().list.into_iter().map(|problem| problem.path).collect();
+    /// assert_eq!(wrong, ["time.step", "bodies[0].density"]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn check(&self) -> Problems {
         let mut problems = Problems::default();
         self.grid.check(&mut problems);

@@ -56,6 +56,16 @@ pub enum At {
 
 impl Output {
     /// The fields of a snapshot of bodies with or without inertia.
+    ///
+    /// ```
+    /// use bfree::field::Field;
+    /// use bfree::scene::{output::Output, time::Inertia};
+    ///
+    /// // Without inertia there are no velocities to show.
+    /// let (moving, still) = (Output::default().fields(Inertia::Newmark), Output::default().fields(Inertia::None));
+    /// let without: Vec<_> = moving.into_iter().filter(|&field| field != Field::Velocity).collect();
+    /// assert_eq!(still, without);
+    /// ```
     pub fn fields(&self, inertia: Inertia) -> Vec<Field> {
         self.fields.clone().unwrap_or_else(|| {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];

@@ -75,6 +75,15 @@ impl FromStr for Override {
 
 impl Override {
     /// The argument as it was given.
+    ///
+    /// ```
+    /// use bfree::scene::Override;
+    ///
+    /// // A round trip: what was given can be given again.
+    /// let given: Override = "bodies.0.velocity=[1, 0]".parse()?;
+    /// assert_eq!(given.argument().parse::<Override>()?, given);
+    /// # Ok::<(), bfree::scene::OverrideError>(())
+    /// ```
     pub fn argument(&self) -> &str {
         &self.argument
     }

@@ -89,6 +89,18 @@ pub enum ParticleFileError {
 
 /// Reads the particle file at `path`.
 ///
+/// ```
+/// use bfree::scene::particle_file::{read, read_file};
+///
+/// let text = "x,y,volume\n0.25,0.25,0.25\n0.75,0.25,0.25\n";
+/// let file = tempfile::NamedTempFile::new()?;
+/// std::fs::write(file.path(), text)?;
+/// let particles = read_file::<2>(file.path())?;
+/// assert_eq!(particles, read(text.as_bytes())?);
+/// assert_eq!(particles.volumes.iter().sum::<f64>(), 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// The first line, and in it the column, that is wrong.
 pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, ParticleFileError> {
@@ -97,6 +109,17 @@ pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, Partic
 }
 
 /// Reads particles from CSV text; blank lines are skipped.
+///
+/// ```
+/// use bfree::scene::particle_file::read;
+///
+/// let bar = read::<1>("x,volume,vx\n0.5,1,2\n1.5,1,-2\n".as_bytes())?;
+/// assert_eq!(bar.velocities.ok_or("velocities")?.iter().sum::<bfree::tensor::Vector<f64, 1>>()[0], 0.0);
+/// // An error names line and column.
+/// let error = read::<1>("x,volume\n0.5,1\n1.5,-1\n".as_bytes()).unwrap_err();
+/// assert!(error.to_string().starts_with("line 3, column 2 (volume): \"-1\" is not allowed"), "{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// The first line, and in it the column, that is wrong.

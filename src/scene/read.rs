@@ -81,6 +81,15 @@ impl Display for Malformed {
 
 /// Reads the scene file at `path`, see [`read`].
 ///
+/// ```
+/// let path = "scenes/rebound.json".as_ref();
+/// let (scene, changed) = (bfree::scene::read_file(path, &[])?, bfree::scene::read_file(path, &["time.end=1".parse()?])?);
+/// // The override changes that key, and no other.
+/// assert_eq!((scene.time.end, changed.time.end), (80.0, 1.0));
+/// assert_eq!(bfree::scene::Scene { time: scene.time.clone(), ..changed }, scene);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Also a file that cannot be read, or is not UTF-8.
 pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {

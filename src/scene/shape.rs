@@ -67,6 +67,19 @@ pub struct Difference {
 
 impl Shape {
     /// The geometry; `None` unless every vector has `D` components.
+    ///
+    /// ```
+    /// use bfree::scene::shape::Shape;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let ring = r#"{"difference": {"of": {"ball": {"center": [0, 0], "radius": 2}}, "minus": {"ball": {"center": [0, 0], "radius": 1}}}}"#;
+    /// let ring: Shape = serde_json::from_str(ring)?;
+    /// let solid = ring.build::<2>().ok_or("plane")?;
+    /// assert_eq!(solid.signed_distance(&Vector::from([1.25, 0.0])), -0.25);
+    /// // A disc is no ball.
+    /// assert!(ring.build::<3>().is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
         let all = |parts: &[Self]| parts.iter().map(Self::build).collect::<Option<Vec<_>>>();
         Some(match self {

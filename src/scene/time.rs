@@ -95,12 +95,26 @@ impl Time {
     }
 
     /// β and γ.
+    ///
+    /// ```
+    /// use bfree::mechanics::time::Newmark;
+    /// use bfree::scene::time::Time;
+    ///
+    /// // A scene that says nothing of them gets the trapezoidal rule and a lumped mass.
+    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1}"#)?;
+    /// assert_eq!((time.newmark(), time.lumping()), (Newmark::default(), 1.0));
+    /// let time: Time = serde_json::from_str(r#"{"step": 0.1, "end": 1, "beta": 0.3, "gamma": 0.6, "lumping": 0}"#)?;
+    /// assert_eq!((time.newmark(), time.lumping()), (Newmark { beta: 0.3, gamma: 0.6 }, 0.0));
+    /// # Ok::<(), serde_json::Error>(())
+    /// ```
     pub fn newmark(&self) -> Newmark {
         let default = Newmark::default();
         Newmark { beta: self.beta.unwrap_or(default.beta), gamma: self.gamma.unwrap_or(default.gamma) }
     }
 
     /// ε of the mass matrix.
+    ///
+    /// Example: [`Self::newmark`].
     pub fn lumping(&self) -> f64 {
         self.lumping.unwrap_or(1.0)
     }
@@ -131,6 +145,16 @@ impl Time {
     }
 
     /// The same with the end that the command line asks for, by the option `option`.
+    ///
+    /// ```
+    /// let time = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.time;
+    /// let shorter = time.until(30.0, "--until").map_err(bfree::scene::SceneError::Values)?;
+    /// assert_eq!((shorter.end, shorter.step), (30.0, time.step));
+    /// // Less than a step is wrong, and it is the option that is.
+    /// let problems = time.until(0.01, "--until").unwrap_err();
+    /// assert_eq!(problems.list[0].path, "--until");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// What the scene's own `end` may not be either.

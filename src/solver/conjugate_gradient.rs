@@ -41,6 +41,26 @@ impl Default for ConjugateGradientSettings {
 /// If A is singular and b in its range, x is the solution of least norm x·Mx (least length for M = I), for the iteration never
 /// leaves M⁻¹ range(A).
 ///
+/// ```
+/// use bfree::solver::{ConjugateGradientSettings, Identity, LinearOperator, conjugate_gradient};
+///
+/// /// Two masses on one spring, k = 1: singular, because both may move together.
+/// struct Spring;
+///
+/// impl LinearOperator for Spring {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         (y[0], y[1]) = (x[0] - x[1], x[1] - x[0]);
+///     }
+/// }
+///
+/// // Pulled apart by forces in balance; of all solutions x₁ − x₀ = 3, the shortest.
+/// let mut x = [0.0; 2];
+/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &ConjugateGradientSettings::default())?;
+/// assert!(report.converged());
+/// assert_eq!(x, [-1.5, 1.5]);
+/// # Ok::<(), bfree::solver::LinearError>(())
+/// ```
+///
 /// # Errors
 /// A setting out of range, lengths that differ, NaN or infinity.
 pub fn conjugate_gradient<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(

@@ -51,6 +51,26 @@ impl Default for GmresSettings {
 ///
 /// `solution` is overwritten; its former contents do not matter. b = 0 gives x = 0 without iterating.
 ///
+/// ```
+/// use bfree::solver::{GmresSettings, Identity, LinearOperator, gmres};
+///
+/// /// A quarter turn and a stretch: not symmetric, so conjugate gradients would not do.
+/// struct Turn;
+///
+/// impl LinearOperator for Turn {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         (y[0], y[1]) = (-2.0 * x[1], 2.0 * x[0]);
+///     }
+/// }
+///
+/// let mut x = [0.0; 2];
+/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default())?;
+/// // Without rounding, a matrix of order n takes n iterations.
+/// assert!(report.converged() && report.iterations == 2);
+/// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
+/// # Ok::<(), bfree::solver::LinearError>(())
+/// ```
+///
 /// # Errors
 /// A setting out of range, lengths that differ, NaN or infinity.
 pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(

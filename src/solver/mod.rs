@@ -20,18 +20,103 @@ pub use newton::{
 use vector::Entry;
 
 /// A square matrix known by its product, in double or single precision.
+///
+/// ```
+/// use bfree::solver::LinearOperator;
+///
+/// /// −u″ on a line of nodes, h = 1, with u = 0 beyond both ends.
+/// struct Laplacian;
+///
+/// impl LinearOperator for Laplacian {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         let at = |i: Option<usize>| i.and_then(|i| x.get(i)).copied().unwrap_or(0.0);
+///         for i in 0..x.len() {
+///             y[i] = 2.0 * x[i] - at(i.checked_sub(1)) - at(Some(i + 1));
+///         }
+///     }
+/// }
+///
+/// // sin(π i/n) is an eigenvector, with the eigenvalue 2 − 2 cos(π/n).
+/// let step = std::f64::consts::PI / 8.0;
+/// let x: Vec<f64> = (1..8).map(|i| (step * f64::from(i)).sin()).collect();
+/// let mut y = vec![0.0; 7];
+/// Laplacian.apply(&x, &mut y);
+/// assert!(x.iter().zip(&y).all(|(x, y)| (y - (2.0 - 2.0 * step.cos()) * x).abs() < 1e-15));
+/// ```
 pub trait LinearOperator<S = f64> {
     /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
     fn apply(&self, x: &[S], y: &mut [S]);
 }
 
 /// An approximate inverse M⁻¹, the same linear map at every call.
+///
+/// ```
+/// use bfree::solver::{GmresSettings, LinearOperator, Preconditioner, gmres};
+///
+/// /// A diagonal matrix, and as preconditioner its inverse.
+/// struct Diagonal(Vec<f64>);
+///
+/// impl LinearOperator for Diagonal {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         y.iter_mut().zip(x).zip(&self.0).for_each(|((y, x), a)| *y = a * x);
+///     }
+/// }
+///
+/// impl Preconditioner for Diagonal {
+///     fn precondition(&self, r: &[f64], z: &mut [f64]) {
+///         z.iter_mut().zip(r).zip(&self.0).for_each(|((z, r), a)| *z = r / a);
+///     }
+/// }
+///
+/// // M⁻¹A = I: one iteration, however far apart the entries lie.
+/// let (matrix, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), [0.0; 3]);
+/// let report = gmres(&matrix, &matrix, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default())?;
+/// assert_eq!(report.iterations, 1);
+/// assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15 * exact));
+/// # Ok::<(), bfree::solver::LinearError>(())
+/// ```
 pub trait Preconditioner<S = f64> {
     /// `z = M⁻¹ r`; `r` and `z` have the order of the operator, and `z` is overwritten.
     fn precondition(&self, r: &[S], z: &mut [S]);
 }
 
 /// A tangent in single precision, divided by a power of two that keeps its entries near 1, whatever the units.
+///
+/// ```
+/// use bfree::solver::{LinearOperator, Preconditioner, SingleTangent};
+///
+/// /// A stiffness that single precision does not hold: k = 3e40, over 2¹³⁵.
+/// struct Stiff;
+///
+/// impl Stiff {
+///     fn entry(&self) -> f32 {
+///         (3e40 / self.scale()) as f32
+///     }
+/// }
+///
+/// impl LinearOperator<f32> for Stiff {
+///     fn apply(&self, x: &[f32], y: &mut [f32]) {
+///         y[0] = self.entry() * x[0];
+///     }
+/// }
+///
+/// impl Preconditioner<f32> for Stiff {
+///     fn precondition(&self, r: &[f32], z: &mut [f32]) {
+///         z[0] = r[0] / self.entry();
+///     }
+/// }
+///
+/// impl SingleTangent for Stiff {
+///     fn scale(&self) -> f64 {
+///         2_f64.powi(135)
+///     }
+/// }
+///
+/// let (mut y, mut z) = ([0.0], [0.0]);
+/// Stiff.apply(&[2.0], &mut y);
+/// Stiff.precondition(&y, &mut z);
+/// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7 && (z[0] - 2.0).abs() < 1e-6);
+/// ```
 pub trait SingleTangent: LinearOperator<f32> + Preconditioner<f32> {
     /// That power of two.
     fn scale(&self) -> f64;
@@ -49,6 +134,65 @@ impl<S: Copy> Preconditioner<S> for Identity {
 
 /// A square system R(x) = 0 that is defined for admissible x only. The state is the argument: nothing is remembered
 /// between calls.
+///
+/// ```
+/// use bfree::solver::{LinearOperator, NewtonSettings, NonlinearProblem, Preconditioner, newton};
+///
+/// /// A charge on a spring: Π = ½ x² − ln x for x > 0, so that R = x − 1/x and K = 1 + 1/x².
+/// struct Charge;
+///
+/// #[derive(Debug, thiserror::Error)]
+/// #[error("x = {0} is not positive")]
+/// struct NotPositive(f64);
+///
+/// struct Stiffness(f64);
+///
+/// impl LinearOperator for Stiffness {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         y[0] = self.0 * x[0];
+///     }
+/// }
+///
+/// impl Preconditioner for Stiffness {
+///     fn precondition(&self, r: &[f64], z: &mut [f64]) {
+///         z[0] = r[0] / self.0;
+///     }
+/// }
+///
+/// fn admissible(x: f64) -> Result<f64, NotPositive> {
+///     if x > 0.0 { Ok(x) } else { Err(NotPositive(x)) }
+/// }
+///
+/// impl NonlinearProblem for Charge {
+///     type Inadmissible = NotPositive;
+///     type Tangent<'a> = Stiffness;
+///
+///     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), NotPositive> {
+///         r[0] = x[0] - 1.0 / admissible(x[0])?;
+///         Ok(())
+///     }
+///
+///     fn magnitude(&self, x: &[f64]) -> Result<f64, NotPositive> {
+///         Ok(x[0] + 1.0 / admissible(x[0])?)
+///     }
+///
+///     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), NotPositive>> {
+///         Some(admissible(x[0]).map(|x| (0.5 * x * x - x.ln(), 0.5 * x * x + x.ln().abs())))
+///     }
+///
+///     fn linearize(&self, x: &[f64]) -> Result<Stiffness, NotPositive> {
+///         Ok(Stiffness(1.0 + admissible(x[0])?.powi(-2)))
+///     }
+/// }
+///
+/// let problem = Charge;
+/// assert!(problem.linearize_single(&[1.0])?.is_none());
+/// // From far away Newton's full step would lead to x < 0; the line search does not.
+/// let mut x = [0.01];
+/// newton(&problem, &mut x, &NewtonSettings::default())?;
+/// assert!((x[0] - 1.0).abs() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait NonlinearProblem {
     /// Why R has no value somewhere, such as det F ≤ 0 at a particle.
     type Inadmissible: std::error::Error + 'static;
@@ -103,6 +247,24 @@ pub struct LinearReport {
 
 impl LinearReport {
     /// Whether the tolerance was met.
+    ///
+    /// ```
+    /// use bfree::solver::{Identity, LinearOperator, LinearOutcome, conjugate_gradient};
+    ///
+    /// /// A mirror, with the eigenvalues 1 and −1: not positive definite.
+    /// struct Mirror;
+    ///
+    /// impl LinearOperator for Mirror {
+    ///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+    ///         (y[0], y[1]) = (x[0], -x[1]);
+    ///     }
+    /// }
+    ///
+    /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &Default::default())?;
+    /// assert!(!report.converged());
+    /// assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
+    /// # Ok::<(), bfree::solver::LinearError>(())
+    /// ```
     pub fn converged(&self) -> bool {
         self.outcome == LinearOutcome::Converged
     }

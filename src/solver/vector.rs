@@ -3,6 +3,22 @@
 //! A reduction is cut into chunks of fixed length; the sums of the chunks are added in their order, whichever thread made
 //! them. Every function takes vectors of one length (the shorter one counts if they differ). Products are formed as they
 //! are: in [`dot`], entries should lie between 1e-150 and 1e150 in magnitude, or be zero; [`norm`] takes any.
+//!
+//! ```
+//! use bfree::solver::vector::{axpy, dot, norm, scaled, xpby};
+//!
+//! // One step of Gram and Schmidt: what is left of y is orthogonal to x.
+//! let (mut x, mut y) = (vec![0.0; 3], vec![2.0, 1.0, 5.0]);
+//! scaled(1.0 / norm(&[1.0, 2.0, 2.0]), &[1.0, 2.0, 2.0], &mut x);
+//! let along = dot(&x, &y);
+//! axpy(-along, &x, &mut y);
+//! assert!((norm(&x) - 1.0).abs() < 1e-15 && dot(&x, &y).abs() < 1e-14);
+//! // y ← x + β y, the next direction of conjugate gradients
+//! xpby(&x, 0.5, &mut y);
+//! assert!((dot(&x, &y) - 1.0).abs() < 1e-14);
+//! // Nothing overflows: ‖(3, 4)·1e200‖ = 5e200
+//! assert!((norm(&[3e200, 4e200]) / 5e200 - 1.0).abs() < 1e-15);
+//! ```
 
 use crate::scalar::Real;
 use rayon::prelude::*;

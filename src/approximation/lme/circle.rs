@@ -19,6 +19,26 @@ use argmin::solver::neldermead::NelderMead;
 /// A particle on a wall, where λ is infinite, is moved inside by [`LmeCircle::INSET`] h: an error of that size in the
 /// position, and none in Σ ∇N = 0 and Σ x ⊗ ∇N = I. For large γ̂ the circle holds too few nodes; see
 /// [`LmeCircle::largest_gamma`].
+///
+/// ```
+/// use bfree::approximation::{Lme, LmeCircle, Scratch, ShapeFunction, Support};
+/// use bfree::grid::Grid;
+/// use bfree::tensor::Vector;
+///
+/// let circle = LmeCircle::new(1.5, 1e-6);
+/// assert_eq!((circle.gamma(), circle.tolerance()), (1.5, 1e-6));
+/// // It leaves out the corners of the box, where N is of the size of TOL₀.
+/// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [20, 20] };
+/// let (x, mut scratch) = (Vector::from([10.3, 9.6]), Scratch::default());
+/// let (mut on_circle, mut on_box) = (Support::default(), Support::default());
+/// circle.evaluate(&grid, &x, &mut scratch, &mut on_circle)?;
+/// Lme::new(1.5, 1e-6).evaluate(&grid, &x, &mut scratch, &mut on_box)?;
+/// assert!(on_circle.nodes.len() < on_box.nodes.len());
+/// let value = |of: &Support<2>| of.nodes.iter().position(|&node| node == [10, 10]).map(|k| of.values[k]);
+/// let (a, b) = value(&on_circle).zip(value(&on_box)).ok_or("both see the nearest node")?;
+/// assert!((a - b).abs() < 1e-5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LmeCircle {
     gamma: f64,
@@ -57,6 +77,16 @@ impl LmeCircle {
 
     /// γ̂ must stay below −ln TOL₀ / (1 + (D−1)/4): then R_a² > (1 + (D−1)/4) h², the distance from the middle of a
     /// cell's side to the next nodes on either hand, and every particle lies in the hull of its nodes.
+    ///
+    /// ```
+    /// use bfree::approximation::{LmeCircle, Validate};
+    ///
+    /// // The smaller the circle, the fewer nodes: in 3D the limit comes first.
+    /// let [line, plane, space] = [1, 2, 3].map(|dimension| LmeCircle::largest_gamma(1e-6, dimension));
+    /// assert!(line > plane && plane > space);
+    /// assert!(LmeCircle::new(0.999 * plane, 1e-6).validate(2).is_ok());
+    /// assert!(LmeCircle::new(1.001 * plane, 1e-6).validate(2).is_err());
+    /// ```
     pub fn largest_gamma(tolerance: f64, dimension: usize) -> f64 {
         -tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
     }

@@ -32,6 +32,24 @@ use std::sync::Arc;
 ///
 /// Away from walls μ is a function of a alone. There q is tabulated, and one step of Newton's method from the table, written
 /// in q, needs no exponential and no logarithm.
+///
+/// ```
+/// use bfree::approximation::{AxisWeights, Lme, Separable};
+/// use bfree::grid::Axis;
+///
+/// let lme = Lme::new(3.0, 1e-6);
+/// assert_eq!((lme.gamma(), lme.tolerance()), (3.0, 1e-6));
+/// // The larger γ̂, the fewer nodes: R_a = h sqrt(−ln TOL₀ / γ̂), and in the limit the hats.
+/// let axis = Axis { origin: 0.0, spacing: 1.0, cells: 40 };
+/// let seen = |gamma: f64| {
+///     let mut weights = AxisWeights::default();
+///     Lme::new(gamma, 1e-6).axis(&axis, 20.3, &mut weights).map(|()| weights.values)
+/// };
+/// assert_eq!((seen(0.8)?.len(), seen(3.0)?.len()), (8, 4));
+/// let hats = seen(50.0)?;
+/// assert!(hats.len() == 2 && (hats[0] - 0.7).abs() < 1e-14, "{hats:?}");
+/// # Ok::<(), bfree::approximation::ApproximationError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lme {
     gamma: f64,

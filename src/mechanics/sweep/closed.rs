@@ -90,6 +90,8 @@ fn symmetric<S: Lanes<L>, const D: usize, const L: usize>(s: S, rows: &[[S::X; L
 
 impl<const D: usize> ClosedTangents<D> {
     /// Bytes of all arrays.
+    ///
+    /// Example: [`super::Supports::closed_tangents`].
     pub fn bytes(&self) -> usize {
         size_of_val(self.0.numbers.as_slice())
     }
@@ -97,6 +99,8 @@ impl<const D: usize> ClosedTangents<D> {
 
 impl<const D: usize> SingleTangents<D> {
     /// Bytes of all arrays.
+    ///
+    /// Example: [`super::Supports::single_tangents`].
     pub fn bytes(&self) -> usize {
         size_of_val(self.0.numbers.as_slice())
     }

@@ -78,6 +78,26 @@ pub enum PlotError {
 /// `convergence` once there are steps, and `particles` if there are snapshots; and writes `report.html`, with all of them in it.
 /// Returns the files written.
 ///
+/// ```
+/// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::plot_run};
+///
+/// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
+/// let (mut simulation, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
+/// let settings = OutputSettings {
+///     directory, fields: vec![], snapshot_every: None, probes: vec![], end_time: 0.1, audience: Audience::Nobody,
+/// };
+/// let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+/// let step = simulation.advance()?;
+/// recorder.record(&simulation, &step)?;
+/// recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
+/// // The page holds the pictures themselves: it opens wherever it is taken.
+/// let written = plot_run(folder.path())?;
+/// assert!(written.contains(&folder.path().join("energies.svg")));
+/// let page = std::fs::read_to_string(folder.path().join("report.html"))?;
+/// assert!(page.contains("<svg") && !page.contains("src=\"energies"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// `history.csv` is missing or damaged, or the report or the last snapshot is damaged; the system refuses.
 pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {

@@ -11,6 +11,15 @@ const FAMILY: &str = "DejaVu Sans";
 
 /// Renders an SVG on white, two pixels to its unit; `name` is for the error.
 ///
+/// ```
+/// use bfree::output::plot::png::from_svg;
+///
+/// let png = from_svg("a square", r#"<svg xmlns="http://www.w3.org/2000/svg" width="30" height="20"/>"#)?;
+/// // Width and height stand in the first chunk, at two pixels to a unit.
+/// assert_eq!((&png[..4], &png[16..24]), (b"\x89PNG".as_slice(), [0, 0, 0, 60, 0, 0, 0, 40].as_slice()));
+/// # Ok::<(), bfree::output::plot::PlotError>(())
+/// ```
+///
 /// # Errors
 /// An SVG that cannot be read or drawn.
 pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {

@@ -33,6 +33,17 @@ pub enum Accuracy {
 
 impl Accuracy {
     /// The knobs that it stands for; `None` for an error outside the table.
+    ///
+    /// ```
+    /// use bfree::scene::accuracy::{Accuracy, levels};
+    ///
+    /// // An error between those of two rows takes a number of cells between theirs.
+    /// let [.., coarse, fine] = levels() else { return Err("two rows") };
+    /// let between = Accuracy::Error((coarse.error * fine.error).sqrt()).level().ok_or("in the table")?;
+    /// assert!((between.cells / (coarse.cells * fine.cells).sqrt() - 1.0).abs() < 1e-14);
+    /// assert!(Accuracy::Error(0.1 * fine.error).level().is_none());
+    /// # Ok::<(), &str>(())
+    /// ```
     pub fn level(self) -> Option<Level> {
         let named = |word: &str| levels().iter().find(|level| level.name == Some(word)).copied();
         match self {

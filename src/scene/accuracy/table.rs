@@ -78,6 +78,13 @@ const LEVELS: [Level; 5] = [
 ];
 
 /// The rows of the table, by falling error.
+///
+/// ```
+/// use bfree::scene::accuracy::levels;
+///
+/// // A smaller error takes more cells.
+/// assert!(levels().windows(2).all(|pair| pair[1].error < pair[0].error && pair[1].cells > pair[0].cells));
+/// ```
 pub fn levels() -> &'static [Level] {
     &LEVELS
 }

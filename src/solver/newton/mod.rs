@@ -47,6 +47,8 @@ const DIVERGED: f64 = 1e8;
 /// Between calls into the problem: `x` holds accepted iterates only, also on error; every tangent is dropped before the
 /// next residual; the residual at an accepted iterate is not evaluated twice.
 ///
+/// Example: [`NonlinearProblem`].
+///
 /// # Errors
 /// See [`NewtonFailure`]; the history so far comes with it.
 pub fn newton<P: NonlinearProblem>(

@@ -64,6 +64,18 @@ pub struct NewtonHistory {
 
 impl NewtonHistory {
     /// ‖R‖ at the last accepted iterate.
+    ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &["boundary.left=fixed".parse()?])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let first = &mut simulation.particles.velocity[0];
+    /// *first *= 2.0; // one particle ahead of the others: the body must deform
+    /// let history = simulation.step()?.newton.history;
+    /// // From Δφ = 0 by eight orders at least.
+    /// let (first, last) = history.first_residual.zip(history.residual()).ok_or("residuals")?;
+    /// assert!(last <= 1e-8 * first);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn residual(&self) -> Option<f64> {
         self.iterations.last().map(|last| last.residual).or(self.first_residual)
     }
