@@ -229,6 +229,37 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn magnitude(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        Ok(self.free_norm(self.magnitudes(dphi)?))
+    }
+
+    /// As [`Self::magnitude`], with what a rounding of H, and of the Δφ it is made from, changes in the stresses: nearly incompressible
+    /// bodies, and stiff ones that move far, make much of the last bit of F.
+    ///
+    /// # Errors
+    /// The first particle with det F ≤ 0.
+    pub fn sensitivity(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        let mut out = self.magnitudes(dphi)?;
+        self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
+            let h_n = &self.particles.displacement_gradient[p];
+            let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: p, source })?;
+            let f_n = (identity::<f64, D>() + h_n).norm();
+            let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
+            // ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖, the response to a change of volume standing for all, and δF of size ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖
+            let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
+            let change = response * (at.h.norm() + moved * f_n) * f_n * self.particles.volume[p];
+            Ok((Vector::zeros(), Tensor::repeat(change)))
+        })?;
+        Ok(self.free_norm(out))
+    }
+
+    /// The norm over the free degrees of freedom.
+    fn free_norm(&self, mut field: Vec<Vector<f64, D>>) -> f64 {
+        self.clear_prescribed(&mut field);
+        field.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
+    }
+
+    /// The magnitudes of all contributions to R, summed at each node.
+    fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
         let Alphas { a1, a2, a3, .. } = self.alphas;
         let mut out: Vec<Vector<f64, D>> = dphi
             .iter()
@@ -253,8 +284,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
                 out[node] += point.force.abs() * n.abs();
             }
         }
-        self.clear_prescribed(&mut out);
-        Ok(out.iter().map(Vector::norm_squared).sum::<f64>().sqrt())
+        Ok(out)
     }
 
     /// Π(Δφ) and the sum of the magnitudes of its contributions:

@@ -471,6 +471,10 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self::magnitude(self, bytemuck::cast_slice(x))
     }
 
+    fn sensitivity(&self, x: &[f64]) -> Result<f64, Inadmissible> {
+        Self::sensitivity(self, bytemuck::cast_slice(x))
+    }
+
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Inadmissible>> {
         Self::potential::<f64>(self, bytemuck::cast_slice(x))
     }

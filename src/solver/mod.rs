@@ -213,6 +213,15 @@ pub trait NonlinearProblem {
     /// x is not admissible.
     fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible>;
 
+    /// The same with what rounding x, and the state that R starts from, changes in R(x), in units of eps. It is asked for only where ‖R‖ no
+    /// longer falls.
+    ///
+    /// # Errors
+    /// x is not admissible.
+    fn sensitivity(&self, x: &[f64]) -> Result<f64, Self::Inadmissible> {
+        self.magnitude(x)
+    }
+
     /// The potential Π whose gradient is R, and the sum of the magnitudes of its contributions; `None` if there is no
     /// potential (follower loads).
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>>;

@@ -40,7 +40,7 @@ const DIVERGED: f64 = 1e8;
 /// 5. Accept x + s d if ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
 /// 6. Otherwise, or where x + s d is inadmissible or R not finite, halve s and go to 5.
-/// 7. If no step is accepted, or none of the last 8 reduced ‖R‖ by a percent: converged if ‖R‖ ≤ 16 · floor · eps · magnitude, now
+/// 7. If no step is found or accepted, or none of the last 8 reduced ‖R‖ by a percent: converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, now
 ///    evaluated at x; an error if not.
 /// 8. x ← x + s d, and back to 1.
 ///
@@ -82,7 +82,7 @@ fn iterate<P: NonlinearProblem>(
     }
     history.first_residual = Some(first);
     let floor = settings.floor * f64::EPSILON;
-    let first_magnitude = measure(problem, x, 0, history)?;
+    let first_magnitude = measured(problem.magnitude(x), 0, history)?;
     let target = (settings.relative_tolerance * first).max(floor * first_magnitude);
     let too_large = DIVERGED * first.max(first_magnitude);
 
@@ -114,8 +114,18 @@ fn iterate<P: NonlinearProblem>(
             None => {
                 history.counts.linearizations += 1;
                 let tangent = problem.linearize(x).map_err(inadmissible)?;
-                solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts)
-                    .map_err(|source| NewtonFailure::LinearSolverFailed { iteration, residual, source })?
+                match solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts) {
+                    Ok(solved) => solved,
+                    Err(source) => {
+                        // What is left of R may be nothing that K could have made.
+                        if residual
+                            <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)?
+                        {
+                            return Ok(Convergence::RoundOff);
+                        }
+                        return Err(NewtonFailure::LinearSolverFailed { iteration, residual, source });
+                    }
+                }
             }
         };
         let at = Step { x, d: &d, residual, slope: dot(&r, &d), linear: krylov.relative_residual };
@@ -125,7 +135,7 @@ fn iterate<P: NonlinearProblem>(
             Search::Accepted(accepted) => accepted,
             Search::RoundOff => return Ok(Convergence::RoundOff),
             Search::Failed(failed) => {
-                if residual <= ROUND_OFF_MULTIPLE * floor * measure(problem, x, iteration - 1, history)? {
+                if residual <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)? {
                     return Ok(Convergence::RoundOff);
                 }
                 return Err(failed.into_failure(iteration, residual));
@@ -150,7 +160,7 @@ fn iterate<P: NonlinearProblem>(
         }
         stalled = if accepted.merit == Merit::Residual && ratio > STALL_RATIO { stalled + 1 } else { 0 };
         if stalled >= STALL_LENGTH && residual > target {
-            let round_off = ROUND_OFF_MULTIPLE * floor * measure(problem, x, iteration, history)?;
+            let round_off = ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration, history)?;
             if residual <= round_off {
                 return Ok(Convergence::RoundOff);
             }
@@ -159,15 +169,14 @@ fn iterate<P: NonlinearProblem>(
     }
 }
 
-/// Evaluates the magnitude at the accepted iterate x.
-fn measure<P: NonlinearProblem>(
-    problem: &P,
-    x: &[f64],
+/// The magnitude or sensitivity at an accepted iterate.
+fn measured<E: std::error::Error + 'static>(
+    magnitude: Result<f64, E>,
     iteration: usize,
     history: &mut NewtonHistory,
-) -> Result<f64, NewtonFailure<P::Inadmissible>> {
+) -> Result<f64, NewtonFailure<E>> {
     history.counts.magnitudes += 1;
-    let magnitude = problem.magnitude(x).map_err(|source| NewtonFailure::Inadmissible { iteration, source })?;
+    let magnitude = magnitude.map_err(|source| NewtonFailure::Inadmissible { iteration, source })?;
     if !magnitude.is_finite() {
         return Err(NewtonFailure::NotFinite { what: "the magnitude of the residual's contributions", iteration });
     }

@@ -3,17 +3,23 @@
 //! A solvable row ends with its error against arithmetic of higher precision, an exact answer or a balance, and a bound from theory;
 //! a row to be refused with the number of answers that were not the one error expected: none.
 
+mod bodies;
+mod contrast;
+mod crushed;
 mod deformations;
 mod double;
+mod impossible;
 mod places;
 mod points;
+mod sliding;
 mod strains;
+mod units;
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 
 /// What the study shows.
-pub(super) const ABOUT: &str = "strains, deformations and places at their extremes, against double-double arithmetic; what is impossible is refused";
+pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places and overlaps at their extremes; what is impossible is refused";
 
 /// What is written in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
@@ -24,7 +30,12 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.reports.push(double::run());
     strains::run(effort, &mut outcome);
     deformations::run(&mut outcome);
+    outcome.reports.push(impossible::run());
+    outcome.reports.push(crushed::run()?);
+    outcome.reports.push(contrast::run()?);
+    outcome.reports.push(units::run()?);
     outcome.reports.push(places::run());
+    sliding::run(effort, &mut outcome)?;
     Ok(outcome)
 }
 
