@@ -117,8 +117,8 @@ fn panel(name: &str, curves: [Vec<(f64, f64)>; 3]) -> Panel {
     Panel {
         title: name.into(),
         x: Axis::logarithmic("overlap / h"),
-        y: Axis::logarithmic("iterations"),
-        window: None,
+        y: Axis::linear("iterations"),
+        window: Some([(3e-13, 1.0), (0.0, 180.0)]),
         curves: curves.map(|((scaling, points), color)| Curve::new(scaling.name(), color, Mark::Joined, points)).collect(),
         legend: (name == "linear").then_some(SeriesLabelPosition::UpperRight),
     }

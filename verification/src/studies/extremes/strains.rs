@@ -178,7 +178,7 @@ fn sheet(double: &Series, single: &Series) -> Sheet {
             title: title.into(),
             x: Axis::logarithmic("strain"),
             y: Axis::logarithmic("relative error"),
-            window: Some([(3e-16, 30.0), (1e-17, 1e4)]),
+            window: Some([(3e-16, 30.0), (1e-17, 1e16)]),
             curves: curves.collect(),
             legend: Some(SeriesLabelPosition::UpperRight),
         }
