@@ -98,9 +98,15 @@ fn what_it_cannot_choose_is_told() -> Result<(), Failure> {
         (with(&[("/accuracy", "fine".into())]), &["accuracy", "unknown variant `fine`", "`draft`"]),
         (with(&[("/accuracy", json!({ "error": 7 }))]), &["accuracy.error", "7 is not allowed", "between"]),
         (with(&[("/accuracy", json!({ "error": -0.01 }))]), &["accuracy.error", "-0.01 is not allowed"]),
-        (with(&[draft(), ("/grid/size", json!([2, std::f64::consts::SQRT_2]))]), &["accuracy", "divides every edge", "give grid.spacing"]),
+        (
+            with(&[draft(), ("/grid/size", json!([2, std::f64::consts::SQRT_2]))]),
+            &["accuracy", "divides every edge", "give grid.spacing"],
+        ),
         (with(&[draft(), ("/bodies", from_file)]), &["accuracy", "\"cloud\"", "file", "give grid.spacing"]),
-        (with(&[draft(), ("/bodies/0/material", steel)]), &["accuracy", "\"block\"", "speed of sound", "give time.step"]),
+        (
+            with(&[draft(), ("/bodies/0/material", steel)]),
+            &["accuracy", "\"block\"", "speed of sound", "give time.step"],
+        ),
         (with(&[draft(), ("/bodies/0/shape/box/max", json!([0.1, 0.5]))]), &["accuracy", "\"block\" has no extent"]),
         (open_scene(), &["missing field `spacing`"]),
     ];

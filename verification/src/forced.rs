@@ -53,8 +53,7 @@ pub fn step_by<const D: usize, L: Law, A: ShapeFunction>(
     let alphas = settings.newmark.alphas(dt);
 
     let (grid, precision) = (&simulation.grid, settings.newton.precision);
-    let (supports, nodes) =
-        Supports::with_precision(&simulation.approximation, grid, &particles.position, precision)?;
+    let (supports, nodes) = Supports::with_precision(&simulation.approximation, grid, &particles.position, precision)?;
     let prescribed = prescribed_dofs(&simulation.loads.prescribed, &simulation.grid, &nodes, t, dt);
     let projected = Nodal::project(particles, &supports, nodes.len(), settings.lumping)?;
     let nodal = projected.with_prescribed(&prescribed);

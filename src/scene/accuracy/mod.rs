@@ -26,9 +26,9 @@ pub enum Accuracy {
     Standard,
     /// To compare others with.
     Reference,
-    /// An error to aim for, relative to the size of the displacement, between the least and the greatest of the table. Smooth
-    /// problems of the size of a body have met it; jumps and contact do not.
-    Error(f64),
+    /// An error to aim for, relative to the size of the displacement, 0.0014 to 0.035. Smooth problems of the size of a body have
+    /// met it; jumps and contact do not.
+    Error(#[schemars(range(min = 0.0014, max = 0.035))] f64),
 }
 
 impl Accuracy {
@@ -97,7 +97,8 @@ pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
         let mut with_any = under.scene["grid"].clone();
         with_any["spacing"] = 1.into();
         let Some(grid) = part::<GridBox>(&with_any) else { return Ok(under.chosen) };
-        let spacing = spacing::fitting(&grid, &bodies, level.cells).map_err(|why| needed("grid.spacing", accuracy, &why))?;
+        let spacing =
+            spacing::fitting(&grid, &bodies, level.cells).map_err(|why| needed("grid.spacing", accuracy, &why))?;
         under.set("grid.spacing", spacing.into());
     }
     if under.lacks("time", "step") {
@@ -178,7 +179,9 @@ mod tests {
     fn a_key_that_is_given_stays_and_so_does_what_holds_it() {
         let mut scene = json!({"time": {"end": 1}, "transfer": "flip", "bodies": [{}]});
         let mut under = Under { scene: &mut scene, chosen: Vec::new() };
-        for key in ["time.end", "time.lumping", "transfer.blend.rate", "solver.newton.tolerance", "bodies.0.x", "bodies.7.x"] {
+        for key in
+            ["time.end", "time.lumping", "transfer.blend.rate", "solver.newton.tolerance", "bodies.0.x", "bodies.7.x"]
+        {
             under.set(key, 7.into());
         }
         let keys: Vec<_> = under.chosen.iter().map(|chosen| chosen.key.as_str()).collect();
