@@ -51,7 +51,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut outcome = Outcome { reports: vec![defaults(&all), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
-    outcome.remarks.push(base(&*problems));
+    outcome.remarks.push(base(&problems));
     outcome.remarks.extend(defaults.iter().map(|(knob, default)| sentences::sentence(&all, knob, default)));
     outcome.remarks.push(sentences::cheaper_at_equal_error(&all, &defaults));
     outcome.tables.extend(all.iter().map(front));
