@@ -164,12 +164,17 @@ impl Panel {
         let fine = FINE as i32;
         for (k, curve) in self.curves.iter().enumerate() {
             let (color, height) = (COLORS[curve.color % COLORS.len()], (60 + 26 * k as i32) * fine);
-            if curve.mark != Mark::Dots {
-                let line = vec![(40 * fine, height), (70 * fine, height)];
+            let pieces: &[(i32, i32)] = match curve.mark {
+                Mark::Dots => &[],
+                Mark::Dashed => &[(40, 48), (52, 60), (64, 72)],
+                Mark::Line | Mark::Joined => &[(40, 72)],
+            };
+            for (start, end) in pieces {
+                let line = vec![(start * fine, height), (end * fine, height)];
                 area.draw(&PathElement::new(line, color.stroke_width(3 * FINE / 2)))?;
             }
             if matches!(curve.mark, Mark::Dots | Mark::Joined) {
-                area.draw(&Circle::new((55 * fine, height), 3 * FINE, color.filled()))?;
+                area.draw(&Circle::new((56 * fine, height), 3 * FINE, color.filled()))?;
             }
             area.draw(&Text::new(curve.name.clone(), (82 * fine, height - 7 * fine), LABEL))?;
         }

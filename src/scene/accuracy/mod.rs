@@ -26,9 +26,9 @@ pub enum Accuracy {
     Standard,
     /// To compare others with.
     Reference,
-    /// An error to aim for, relative to the size of the displacement, between the least and the greatest of the table. Smooth
-    /// problems of the size of a body have met it; jumps and contact do not.
-    Error(f64),
+    /// An error to aim for, relative to the size of the displacement, 0.0014 to 0.035. Smooth problems of the size of a body have
+    /// met it; jumps and contact do not.
+    Error(#[schemars(range(min = 0.0014, max = 0.035))] f64),
 }
 
 impl Accuracy {

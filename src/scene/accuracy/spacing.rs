@@ -67,7 +67,7 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
         let (min, max): (Vector<f64, D>, Vector<f64, D>) = built.bounding_box();
         for k in 0..D {
             let (low, high) = ((min[k] - origin[k]).max(0.0), (max[k] - origin[k]).min(grid.size[k]));
-            if !(high > low) {
+            if high <= low {
                 return Err(no_extent());
             }
             extent = extent.min(high - low);
@@ -82,7 +82,7 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
     if bodies.is_empty() {
         return Err(Unknown::NoBody);
     }
-    if !(fewest < MOST_CELLS) {
+    if fewest >= MOST_CELLS {
         return Err(Unknown::NoBox);
     }
     let fewest = fewest as usize;

@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 pub struct Level {
     /// Its word, if it has one.
     pub name: Option<&'static str>,
-    /// The error of the displacement, relative to its size: the largest of the study's smooth problems.
+    /// The error of the displacement, relative to its size: the largest of the study's smooth problems, rounded up; with more than 12
+    /// cells, of those in two dimensions.
     pub error: f64,
     /// Cells across the least extent of the smallest body.
     pub cells: f64,
@@ -27,7 +28,7 @@ pub struct Level {
 const LEVELS: [Level; 5] = [
     Level {
         name: Some("draft"),
-        error: 0.1,
+        error: 0.035,
         cells: 6.0,
         courant: 2.0,
         particles_per_cell: 2,
@@ -37,7 +38,7 @@ const LEVELS: [Level; 5] = [
     },
     Level {
         name: None,
-        error: 0.05,
+        error: 0.014,
         cells: 8.0,
         courant: 1.0,
         particles_per_cell: 2,
@@ -47,7 +48,7 @@ const LEVELS: [Level; 5] = [
     },
     Level {
         name: Some("standard"),
-        error: 0.02,
+        error: 0.005,
         cells: 12.0,
         courant: 1.0,
         particles_per_cell: 2,
@@ -57,7 +58,7 @@ const LEVELS: [Level; 5] = [
     },
     Level {
         name: None,
-        error: 0.01,
+        error: 0.0022,
         cells: 18.0,
         courant: 1.0,
         particles_per_cell: 2,
@@ -67,7 +68,7 @@ const LEVELS: [Level; 5] = [
     },
     Level {
         name: Some("reference"),
-        error: 0.005,
+        error: 0.0014,
         cells: 24.0,
         courant: 0.5,
         particles_per_cell: 2,
@@ -130,6 +131,13 @@ mod tests {
             assert!(middle > pair[0].cells && middle < pair[1].cells, "{middle}");
             assert_eq!(between(pair[1].error), Some(Level { name: None, ..pair[1] }));
         }
+        // What the schema says of the range.
+        let schema = schemars::schema_for!(super::super::Accuracy).to_value().to_string();
+        let [least, greatest] = range();
+        assert!(
+            schema.contains(&format!("\"minimum\":{least}")) && schema.contains(&format!("\"maximum\":{greatest}")),
+            "{schema}"
+        );
         assert_eq!((between(2.0 * LEVELS[0].error), between(f64::NAN), between(0.0)), (None, None, None));
     }
 }

@@ -39,25 +39,19 @@ fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
     })
 }
 
-/// Runs the study: on one thread, so that seconds are those of one core.
+/// Runs the study, each problem on a thread of its own.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    Ok(one.install(|| study(*effort).map_err(|error| chain(&*error)))?)
-}
-
-fn study(effort: Effort) -> Result<Outcome, StudyError> {
+    let effort = *effort;
     let problems = problems(effort)?;
-    let all: Vec<Measured> = (problems.iter())
-        .map(|problem| {
-            let problem = &**problem;
-            let chosen = levels::settings(problem, effort);
-            let settings = [one_at_a_time(problem, effort), design(problem, effort), chosen].concat();
-            Measured::of(problem, &settings)
-        })
-        .collect::<Result<_, _>>()?;
+    let all: Vec<Result<Measured, String>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = problems.iter().map(|problem| scope.spawn(|| measure(&**problem, effort))).collect();
+        let lost = |_| Err("a problem did not come to its end".to_owned());
+        threads.into_iter().map(|thread| thread.join().unwrap_or_else(lost)).collect()
+    });
+    let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
     let mut outcome = Outcome { reports: vec![defaults(&all), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
-    outcome.remarks.push(base(&*problems));
+    outcome.remarks.push(base(&problems));
     outcome.remarks.extend(defaults.iter().map(|(knob, default)| sentences::sentence(&all, knob, default)));
     outcome.remarks.push(sentences::cheaper_at_equal_error(&all, &defaults));
     outcome.tables.extend(all.iter().map(front));
@@ -65,6 +59,14 @@ fn study(effort: Effort) -> Result<Outcome, StudyError> {
     outcome.tables.extend(all.iter().map(everything));
     outcome.sheets = if effort == Effort::Full { pictures::sheets(&all, &defaults) } else { Vec::new() };
     Ok(outcome)
+}
+
+/// All runs of a problem. Its sweeps take no other thread, so that seconds are those of one core.
+fn measure(problem: &dyn Problem, effort: Effort) -> Result<Measured, String> {
+    let settings =
+        [one_at_a_time(problem, effort), design(problem, effort), levels::settings(problem, effort)].concat();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|error| chain(&error))?;
+    one.install(|| Measured::of(problem, &settings).map_err(|error| chain(&*error)))
 }
 
 /// What the base is, in words.

@@ -68,17 +68,18 @@ fn turned(all: &[Measured], knobs: &[(&'static str, String)]) -> Sheet {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         Curve::new(measured.problem, k + 1, Mark::Joined, points)
     };
-    let mut panels: Vec<Panel> = knobs
-        .iter()
-        .map(|(knob, default)| Panel {
-            title: format!("{knob} (default {default})"),
+    let panel = |(knob, _): &(&'static str, String)| {
+        let curves: Vec<Curve> = all.iter().enumerate().map(|(k, measured)| curve(k, measured, knob)).collect();
+        Panel {
+            title: (*knob).into(),
             x: Axis::logarithmic("work over that of the default"),
             y: Axis::logarithmic("error over that of the default"),
-            window: None,
-            curves: all.iter().enumerate().map(|(k, measured)| curve(k, measured, knob)).collect(),
+            window: Some([window(&curves, |point| point.0), window(&curves, |point| point.1)]),
+            curves,
             legend: None,
-        })
-        .collect();
+        }
+    };
+    let mut panels: Vec<Panel> = knobs.iter().map(panel).collect();
     let names = panels.first().map(|panel| panel.curves.clone()).unwrap_or_default();
     panels.push(Panel::key(names));
     Sheet {
@@ -88,4 +89,10 @@ fn turned(all: &[Measured], knobs: &[(&'static str, String)]) -> Sheet {
         size: (390, 330),
         panels,
     }
+}
+
+/// A range that holds all points, and is wide enough for a ratio of 1.01 to look like nothing.
+fn window(curves: &[Curve], of: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let ratios = curves.iter().flat_map(|curve| &curve.points).map(of);
+    ratios.fold((0.4, 2.5), |(low, high), ratio| (low.min(0.9 * ratio), high.max(1.1 * ratio)))
 }

@@ -10,6 +10,9 @@ const PAYS: f64 = 0.95;
 /// Less work by a tenth.
 const CHEAPER: f64 = 0.9;
 
+/// Less than a few ticks of the system's clock of processors says nothing.
+const LEAST_SECONDS: f64 = 0.02;
+
 /// Ratios to the base over the problems: the geometric mean, the least, the greatest.
 #[derive(Clone, Copy, Debug)]
 struct Ratio {
@@ -27,6 +30,9 @@ impl Ratio {
 
     fn text(&self) -> String {
         let Self { mean, least, greatest } = self;
+        if mean.is_nan() {
+            return "-".into();
+        }
         if greatest / least < 1.02 { format!("×{mean:.2}") } else { format!("×{mean:.2} ({least:.2} to {greatest:.2})") }
     }
 }
@@ -74,6 +80,9 @@ fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
                     (cost.bytes as f64, base.cost.bytes as f64),
                 ];
                 ratios.iter_mut().zip(pairs).for_each(|(list, (value, base))| list.push(value / base));
+                if cost.seconds.min(base.cost.seconds) < LEAST_SECONDS {
+                    ratios[2].pop();
+                }
                 quadratic &= cost.tally.quadratic();
             }
             if measured.failures.iter().any(|(setting, _)| matches(setting)) {

@@ -25,8 +25,13 @@ const FINE_COURANT: f64 = 0.5;
 /// The error is that of the displacement of all particles at ten times, over its size.
 pub(in crate::studies::tradeoff) struct Compaction {
     pub end: f64,
-    /// The elements, and the displacement of their nodes at the ten times.
-    reference: Mutex<(Elements<2, Material>, Vec<Vec<Vector<f64, 2>>>)>,
+    reference: Mutex<Reference>,
+}
+
+/// The elements, and the displacement of their nodes at the ten times.
+struct Reference {
+    block: Elements<2, Material>,
+    samples: Vec<Vec<Vector<f64, 2>>>,
 }
 
 impl Compaction {
@@ -48,7 +53,7 @@ impl Compaction {
             }
             samples.push(block.displacement.clone());
         }
-        Ok(Self { end, reference: Mutex::new((block, samples)) })
+        Ok(Self { end, reference: Mutex::new(Reference { block, samples }) })
     }
 }
 
@@ -110,7 +115,7 @@ impl Problem for Compaction {
             }
             // A run that panicked while it held the reference would have ended the study.
             let mut reference = self.reference.lock().map_err(|_| "the reference is lost")?;
-            let (block, samples) = &mut *reference;
+            let Reference { block, samples } = &mut *reference;
             let Some(sample) = samples.get((done / every - 1) as usize) else { return Ok(()) };
             block.displacement.clone_from(sample);
             let (error, size) = &mut *sums.borrow_mut();
