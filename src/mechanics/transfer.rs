@@ -330,7 +330,7 @@ impl<const D: usize> Moved<D> {
 
     /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it: what Newmark's step differs from Taylor's series
     /// with a third derivative ȧ = Δa/Δt, e = (β − 1/6) Δt² Δa. The root of its mean square over the mass; exact to leading order in
-    /// Δt. To be asked before smoothing.
+    /// Δt. Where a resting wall leaves the particles' acceleration alone, it counts as none. To be asked before smoothing.
     ///
     /// ```
     /// use bfree::mechanics::{sweep::Supports, transfer::{Moved, Nodal, WallUpdate}};

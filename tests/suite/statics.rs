@@ -121,6 +121,30 @@ fn a_load_on_the_end_of_a_bar_is_its_stress() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_column_pressed_by_its_end_has_one_strain_and_the_end_carries_its_stress() -> Result<(), Failure> {
+    let pressed = r#"boundary={"left":"sliding","right":"sliding","bottom":"sliding","top":{"displacement":[[0,[null,0]],[1,[null,-0.02]]]}}"#;
+    let mut simulation = scene::<2>(
+        COLUMN,
+        &["approximation=\"linear\"", "gravity=null", pressed, "time.step=1", "solver.newton.tolerance=1e-13"],
+    )?;
+    let report = simulation.advance()?;
+    for h in &simulation.particles.displacement_gradient {
+        assert!((h - Tensor::<f64, 2>::new(0.0, 0.0, 0.0, -0.02)).amax() < 1e-9, "{h}");
+    }
+    let h = simulation.particles.displacement_gradient[0];
+    let force = 0.4 * first_piola(&simulation.bodies[0].law, &(Tensor::identity() + h), h)?[(1, 1)];
+    // The walls in the order of the axes, lower before upper.
+    let [_, _, bottom, top] = report.reactions[..] else { return Err("four walls".into()) };
+    assert!(
+        (top[1] - force).abs() < 1e-9 * force.abs() && (bottom[1] + force).abs() < 1e-9 * force.abs(),
+        "{top} {bottom}"
+    );
+    // The trapezoid of a force that grows from nothing.
+    assert!((simulation.external_work + 0.5 * force * 0.02).abs() < 1e-9 * force.abs());
+    Ok(())
+}
+
+#[test]
 fn what_nothing_holds_is_said() -> Result<(), Failure> {
     for (boundary, words) in [
         (FREE, "nothing holds \"column\" along y, and the loads push there"),
