@@ -3,13 +3,13 @@
 use crate::material::{Law, NonPositiveJacobian, admissible};
 use crate::mechanics::loads::{PrescribedDof, PressurePoint};
 use crate::mechanics::point::{self, carried};
-use crate::mechanics::sweep::{Inertia, Laws, Supports};
+use crate::mechanics::sweep::{ClosedTangents, Inertia, Laws, SingleTangents, Supports};
 use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
@@ -64,6 +64,10 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
     /// The same for systems in single precision.
     pub(super) single_inverse_blocks: OnceLock<Vec<Tensor<f32, D>>>,
+    /// The tangents frozen last, whose arrays the next ones use: the largest of a step.
+    pub(super) spare: Mutex<Option<ClosedTangents<D>>>,
+    /// The same in single precision.
+    pub(super) single_spare: Mutex<Option<SingleTangents<D>>>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
@@ -102,6 +106,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             history,
             inverse_blocks: OnceLock::new(),
             single_inverse_blocks: OnceLock::new(),
+            spare: Mutex::default(),
+            single_spare: Mutex::default(),
         }
     }
 

@@ -6,7 +6,7 @@
 use crate::material::{ClosedTangent, FrozenTangent, Law};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::SingleTangents;
-use crate::mechanics::tangent::{FrozenPressure, closed_form, invert_block};
+use crate::mechanics::tangent::{FrozenPressure, closed_form, held, invert_block};
 use crate::solver::{LinearOperator, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
@@ -59,7 +59,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let scale = self.size(h);
         let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0) / scale;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-        let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale);
+        let spare = held(&self.single_spare).take();
+        let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale, spare);
         let frozen = match frozen {
             Some(Ok(frozen)) => frozen,
             Some(Err(Some(inadmissible))) => return Err(inadmissible),
@@ -78,6 +79,13 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let mass = self.nodal.mass.iter().fold(0.0, |largest: f64, m| largest.max(*m));
         let largest = stiffness.fold(0.0, f64::max) / (h * h) + self.alphas.a1 * mass;
         if largest > 0.0 && largest.is_finite() { largest.log2().round().exp2() } else { 1.0 }
+    }
+}
+
+/// Leaves the largest array of a step to the next tangent.
+impl<const D: usize, L: Law> Drop for Single<'_, D, L> {
+    fn drop(&mut self) {
+        *held(&self.equilibrium.single_spare) = Some(std::mem::take(&mut self.frozen));
     }
 }
 

@@ -9,6 +9,7 @@ use crate::scalar::Real;
 use crate::solver::{LinearOperator, NonlinearProblem, Precision, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
 use num_dual::Dual64;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The terms of the tangent, one for each way Δφ enters the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -215,7 +216,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         if let Some(both) = closed_form::<D, L>(self.bodies) {
             let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
             let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-            let closed = self.supports.closed_tangents(&self.laws(), dphi, both, inertia);
+            let closed = self.supports.closed_tangents(&self.laws(), dphi, both, inertia, held(&self.spare).take());
             match closed {
                 Some(Ok(closed)) => return Ok(Frozen::Closed(closed)),
                 Some(Err(Some(inadmissible))) => return Err(inadmissible),
@@ -225,6 +226,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         }
         Ok(Frozen::Each(self.supports.interpolate(dphi, |p, _, g| self.freeze_at(p, &g))?))
     }
+}
+
+/// What a lock holds, also where a thread has panicked.
+pub(super) fn held<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The point tangents of all particles.
@@ -368,6 +374,15 @@ pub struct Tangent<'a, const D: usize, L: Law> {
     equilibrium: &'a Equilibrium<'a, D, L>,
     frozen: Frozen<D, L>,
     pressures: Vec<FrozenPressure<D>>,
+}
+
+/// Leaves the largest array of a step to the next tangent.
+impl<const D: usize, L: Law> Drop for Tangent<'_, D, L> {
+    fn drop(&mut self) {
+        if let Frozen::Closed(tangents) = std::mem::replace(&mut self.frozen, Frozen::Each(Vec::new())) {
+            *held(&self.equilibrium.spare) = Some(tangents);
+        }
+    }
 }
 
 impl<const D: usize, L: Law> Tangent<'_, D, L> {

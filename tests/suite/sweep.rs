@@ -279,8 +279,8 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
         let weight = |_: usize| 1.0;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = if lumping < 1.0 { Some(&weight) } else { None };
         let laws = Laws { particles: &particles, bodies: &bodies };
-        let frozen = tiled.closed_tangents(&laws, &field, both, inertia).ok_or("no vector lanes")?;
-        let single = tiled.single_tangents(&laws, &field, both, inertia, 1.0).ok_or("no vector lanes")?;
+        let frozen = tiled.closed_tangents(&laws, &field, both, inertia, None).ok_or("no vector lanes")?;
+        let single = tiled.single_tangents(&laws, &field, both, inertia, 1.0, None).ok_or("no vector lanes")?;
         let (frozen, single) = (frozen.map_err(|_| "no closed form")?, single.map_err(|_| "no closed form")?);
         assert!(frozen.bytes() > 0 && single.bytes() > 0);
         for (precision, bytes) in [(Precision::Double, frozen.bytes()), (Precision::Mixed, single.bytes())] {

@@ -17,11 +17,11 @@ use std::ops::Range;
 pub struct ClosedTangents<const D: usize>(Numbers<f64, LANES>);
 
 /// The same in single precision and without units: divided by h² and by `scale`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SingleTangents<const D: usize>(Numbers<f32, SINGLE_LANES>);
 
 /// For each group its numbers, a row of lanes each.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Numbers<X, const L: usize> {
     numbers: Vec<[X; L]>,
     pub(super) form: Form,
@@ -35,7 +35,7 @@ impl<X, const L: usize> Numbers<X, L> {
 }
 
 /// Which numbers there are: A, B, κ, q, then b and c, then the weight of the inertia.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Form {
     /// Whether the laws have the term b L c.
     pub both: bool,
@@ -119,16 +119,18 @@ fn copy<X: Real>(from: &[f64; LANES], lanes: Range<usize>, to: &mut [X]) {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// The tangents of all particles at ∇u, and their consistent inertia if there is one.
+    /// The tangents of all particles at ∇u, and their consistent inertia if there is one; in the array of `spare`.
     pub(super) fn closed<L: Law>(
         &self,
         laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Weight<'_>,
+        spare: Option<ClosedTangents<D>>,
     ) -> Result<ClosedTangents<D>, Option<Inadmissible>> {
         let form = Form { both, inertia: inertia.is_some() };
-        Ok(ClosedTangents(self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0)?))
+        let array = spare.map_or_else(Vec::new, |spare| spare.0.numbers);
+        Ok(ClosedTangents(self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, array)?))
     }
 
     /// As [`Self::closed`], in single precision; `None` if the blocks are not prepared for it.
@@ -139,15 +141,18 @@ impl<const D: usize> Tiled<D> {
         both: bool,
         inertia: Weight<'_>,
         scale: f64,
+        spare: Option<SingleTangents<D>>,
     ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         let h = self.unit?;
         let form = Form { both, inertia: inertia.is_some() };
         let factor = 1.0 / (scale * h * h);
-        let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor);
+        let array = spare.map_or_else(Vec::new, |spare| spare.0.numbers);
+        let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, array);
         Some(numbers.map(SingleTangents))
     }
 
     /// The numbers of the groups that `groups` picks, tangents times `factor`; the deformation is gathered in double precision.
+    #[allow(clippy::too_many_arguments)] // the ingredients of one array
     fn frozen<L: Law, X: Number<N>, const N: usize>(
         &self,
         laws: &Laws<'_, D, L>,
@@ -156,10 +161,11 @@ impl<const D: usize> Tiled<D> {
         form: Form,
         inertia: Weight<'_>,
         factor: f64,
+        mut numbers: Vec<[X; N]>,
     ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
-        let mut numbers = vec![[X::zero(); N]; count * rows];
+        numbers.resize(count * rows, [X::zero(); N]);
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = numbers.as_mut_slice();
         for block in &self.blocks {

@@ -490,7 +490,8 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The closed tangents of all particles at ∇u_p, `both` telling whether they have the term b L c, with the weights of
-    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes.
+    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes. The array of `spare`, tangents no longer
+    /// needed, is used again.
     ///
     /// ```
     /// use bfree::material::{FrozenTangent, Law, NonPositiveJacobian, admissible};
@@ -507,7 +508,7 @@ impl<const D: usize> Supports<D> {
     ///     Ok::<_, NonPositiveJacobian>(law.freeze(&identity(), &admissible(g)?, particles.volume[p]))
     /// };
     /// let laws = Laws { particles, bodies: &simulation.bodies };
-    /// let tangents = supports.closed_tangents(&laws, &dphi, false, None).ok_or("LME has vector lanes")?;
+    /// let tangents = supports.closed_tangents(&laws, &dphi, false, None, None).ok_or("LME has vector lanes")?;
     /// let tangents = tangents.map_err(|_| "deformed too far")?;
     /// assert_eq!(Some(tangents.bytes()), supports.closed_bytes(false, false, Precision::Double));
     /// // In vector lanes as particle by particle: K u = Σ_p (V₀ δP F_nᵀ) ∇N, and its diagonal blocks.
@@ -531,12 +532,13 @@ impl<const D: usize> Supports<D> {
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
+        spare: Option<ClosedTangents<D>>,
     ) -> Option<Result<ClosedTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                Some(tiled.closed(laws, field, both, inertia))
+                Some(tiled.closed(laws, field, both, inertia, spare))
             }
         }
     }
@@ -589,8 +591,8 @@ impl<const D: usize> Supports<D> {
     /// assert_eq!(h, grid.spacing);
     /// // Gradients are in units of 1/h, and K comes divided by a number, h² to leave it as it is.
     /// let (laws, rest) = (Laws { particles, bodies: &simulation.bodies }, vec![Vector::zeros(); nodes.len()]);
-    /// let tangents = supports.closed_tangents(&laws, &rest, false, None).ok_or("LME has vector lanes")?;
-    /// let single = supports.single_tangents(&laws, &rest, false, None, 1.0).ok_or("and in single precision")?;
+    /// let tangents = supports.closed_tangents(&laws, &rest, false, None, None).ok_or("LME has vector lanes")?;
+    /// let single = supports.single_tangents(&laws, &rest, false, None, 1.0, None).ok_or("and in single precision")?;
     /// let (tangents, single) = (tangents.map_err(|_| "at rest")?, single.map_err(|_| "at rest")?);
     /// assert!(single.bytes() < tangents.bytes());
     /// let u = direction::<2>(nodes.len(), 2);
@@ -608,6 +610,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// As [`Self::closed_tangents`].
+    #[allow(clippy::too_many_arguments)] // as above, with a scale
     pub fn single_tangents<L: Law>(
         &self,
         laws: &Laws<'_, D, L>,
@@ -615,12 +618,13 @@ impl<const D: usize> Supports<D> {
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
         scale: f64,
+        spare: Option<SingleTangents<D>>,
     ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                tiled.closed_single(laws, field, both, inertia, scale)
+                tiled.closed_single(laws, field, both, inertia, scale, spare)
             }
         }
     }

@@ -138,7 +138,7 @@ fn gather_block<T: Real, const D: usize>(
 ) {
     nodal.resize(block.box_nodes() * D, 0.0);
     block.fill(field, nodal);
-    rows.clear();
+    // What is left of another block is written over.
     rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
     of_block::gather_all(&block.groups, nodal, rows);
 }
