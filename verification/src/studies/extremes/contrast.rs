@@ -22,10 +22,13 @@ pub(super) fn run() -> Result<Report, StudyError> {
     for poisson in [0.3, 0.49, 0.4999, 0.499_999_9] {
         // With these two the particles integrate a uniform stress exactly.
         for (name, shape) in [("linear", Approximation::from(Linear)), ("gimp", Gimp::particles_per_axis(2).into())] {
+            confined::<1>(poisson, name, &shape, &mut report)?;
             confined::<2>(poisson, name, &shape, &mut report)?;
+            confined::<3>(poisson, name, &shape, &mut report)?;
         }
         for (name, shape) in [("linear", Approximation::from(Linear)), ("LME 3", Lme::new(3.0, 1e-6).into())] {
             vibrating::<2>(poisson, name, &shape, &mut report)?;
+            vibrating::<3>(poisson, name, &shape, &mut report)?;
         }
     }
     for contrast in [1e2, 1e6, 1e10] {
@@ -34,6 +37,7 @@ pub(super) fn run() -> Result<Report, StudyError> {
     }
     for contrast in [1e2, 1e6] {
         for (name, shape) in [("linear", Approximation::from(Linear)), ("LME 3", Lme::new(3.0, 1e-6).into())] {
+            falling::<1>(contrast, name, &shape, &mut report)?;
             falling::<2>(contrast, name, &shape, &mut report)?;
             colliding::<2>(contrast, name, &shape, &mut report)?;
         }

@@ -8,6 +8,8 @@ mod contrast;
 mod crushed;
 mod deformations;
 mod double;
+mod durations;
+mod flight;
 mod impossible;
 mod places;
 mod points;
@@ -19,7 +21,7 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 
 /// What the study shows.
-pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places and overlaps at their extremes; what is impossible is refused";
+pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, time steps and overlaps at their extremes";
 
 /// What is written in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
@@ -35,6 +37,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.reports.push(contrast::run()?);
     outcome.reports.push(units::run()?);
     outcome.reports.push(places::run());
+    durations::run(effort, &mut outcome)?;
+    flight::run(effort, &mut outcome)?;
     sliding::run(effort, &mut outcome)?;
     Ok(outcome)
 }

@@ -39,7 +39,9 @@ pub(super) fn run() -> Result<Report, StudyError> {
     let two = Scaling { name: "2^30", large: 2.0_f64.powi(30) };
     let ten = Scaling { name: "1e9", large: 1e9 };
     for (name, precision) in [("double", Precision::Double), ("mixed", Precision::Mixed)] {
+        dimension::<1>(name, precision, [two, ten], &mut report)?;
         dimension::<2>(name, precision, [two, ten], &mut report)?;
+        dimension::<3>(name, precision, [two, ten], &mut report)?;
     }
     Ok(report)
 }

@@ -1,0 +1,150 @@
+//! Steps from 1e-12 to 1e6 times the time a wave needs for a cell; nothing that moves or loads; a body at rest.
+
+use super::bodies::{self, PLAIN, fill, simulation, sliding, stir, sum_of_momenta};
+use super::{Effort, Outcome, Report, StudyError, refused, rows, solvable, worse};
+use crate::report::Bound;
+use bfree::approximation::{Approximation, Gimp, Linear, Lme};
+use bfree::grid::Grid;
+use bfree::material::{Lame, LameError, Law};
+use bfree::particles::Particles;
+use bfree::scene;
+use bfree::simulation::Simulation;
+use bfree::tensor::{Deformation, Tensor, Vector};
+
+/// Roundings of sums over the particles of a few nodes.
+const ROUNDINGS: f64 = 64.0;
+
+/// Largest speed over that of sound.
+const MACH: f64 = 0.1;
+
+/// Steps of each duration.
+const STEPS: u32 = 5;
+
+fn families() -> [(&'static str, Approximation); 2] {
+    [("linear", Linear.into()), ("LME 3", Lme::new(3.0, 1e-6).into())]
+}
+
+pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
+    let mut report = rows("durations: errors over speeds, strains and stresses of the problem");
+    for (name, shape) in families() {
+        for exponent in [-12, -9, -6, -3, 0, 1, 2, 3, 6] {
+            vibrating::<2>(name, &shape, exponent, &mut report);
+        }
+        vibrating::<3>(name, &shape, -12, &mut report);
+        vibrating::<3>(name, &shape, 6, &mut report);
+        nothing::<1>(name, &shape, &mut report);
+        nothing::<2>(name, &shape, &mut report);
+        nothing::<3>(name, &shape, &mut report);
+    }
+    // With these two the particles integrate a uniform stress exactly: a discrete equilibrium.
+    for (name, shape) in [("linear", Linear.into()), ("gimp", Gimp::particles_per_axis(2).into())] {
+        pressed::<1>(name, &shape, 10_000, &mut report);
+        let [in_plane, in_space] = if *effort == Effort::Full { [10_000, 10_000] } else { [1000, 300] };
+        pressed::<2>(name, &shape, in_plane, &mut report);
+        pressed::<3>(name, &shape, in_space, &mut report);
+    }
+    no_stiffness(&mut report);
+    outcome.reports.push(report);
+    Ok(())
+}
+
+/// A free block that starts to deform without turning: for short steps it has barely changed; for long ones each step ends at rest.
+fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, report: &mut Report) {
+    let sound = PLAIN.p_wave_modulus().sqrt();
+    let ratio = 10.0_f64.powi(exponent);
+    let cells = if D == 3 { 2 } else { 4 };
+    let mut simulation = bodies::block::<D>(cells, shape.clone(), ratio / sound);
+    let a = Tensor::<f64, D>::from_fn(|i, k| if i == k { 1.0 - 1.6 * i as f64 } else { 0.3 }) * (MACH * sound / (2.0 * f64::from(cells)));
+    stir(&mut simulation, &a);
+    let start = simulation.particles.clone();
+    let scale = sum_of_momenta(&start);
+    let fastest = start.velocity.iter().map(Vector::norm).fold(0.0, worse);
+    let (mut momentum, mut strain): (f64, f64) = (0.0, 0.0);
+    let stepped = (0..STEPS).try_for_each(|_| {
+        simulation.step()?;
+        let particles = &simulation.particles;
+        momentum = worse(momentum, (particles.momentum() - start.momentum()).norm() / scale);
+        strain = particles.displacement_gradient.iter().map(|h| h.norm()).fold(strain, worse);
+        Ok::<_, StudyError>(())
+    });
+    let (what, case) = (format!("a free block vibrates, {name}, D = {D}"), format!("dt = 1e{exponent} h/c"));
+    let case_of_momentum = format!("{case}: linear momentum");
+    match stepped {
+        // Steps in which the body hardly gets to swing: what linear systems leave, times Δt, is shown.
+        Ok(()) if exponent > 0 => report.push(&[&what, &case_of_momentum, "shown"], momentum, Bound::Reported),
+        stepped => solvable(report, &what, &case_of_momentum, stepped.map(|()| momentum), bodies::MOMENTUM),
+    }
+    let particles = &simulation.particles;
+    let waves = f64::from(STEPS) * ratio;
+    let unit = |error: f64| Ok::<_, StudyError>(error);
+    if exponent <= -3 {
+        // Stresses grow to Λ |A| t at most; the change of speed is a few times c |A| t × t c/h.
+        let changed = particles.velocity.iter().zip(&start.velocity).map(|(v, v_0)| (v - v_0).norm()).fold(0.0, worse);
+        solvable(report, &what, &format!("{case}: change of velocity"), unit(changed / fastest), 10.0 * waves * waves + ROUNDINGS * f64::EPSILON);
+    } else if exponent >= 2 {
+        // α₁ M Δφ + K Δφ = α₂ M v: a velocity v leaves the strain 4 (v/c) h/(c Δt), some larger where the motion is longer.
+        let length = f64::from(2 * cells);
+        solvable(report, &what, &format!("{case}: strain"), unit(strain), 10.0 * length * MACH / ratio);
+    }
+}
+
+/// Neither velocity nor gravity: not a bit changes.
+fn nothing<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) {
+    let mut simulation = bodies::block::<D>(2, shape.clone(), 0.5);
+    simulation.loads.gravity = Some(bodies::gravity(Vector::zeros()));
+    let start = simulation.particles.clone();
+    let changed = (0..100).try_for_each(|_| simulation.step().map(|_| ())).map(|()| {
+        let particles = &simulation.particles;
+        f64::from(u8::from(particles.position != start.position) + u8::from(particles.velocity != start.velocity))
+            + particles.displacement_gradient.iter().map(Tensor::norm).fold(0.0, worse)
+    });
+    solvable(report, &format!("zero velocity, zero gravity, 100 steps, {name}, D = {D}"), "what has changed", changed, 0.0);
+}
+
+/// A block that fills its box under uniform stress: a discrete equilibrium, in which only round-off moves.
+fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report: &mut Report) {
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [if D == 3 { 2 } else { 3 }; D] };
+    let mut particles = Particles::default();
+    fill(&mut particles, &grid, ([0; D], [grid.cells[0]; D]), 2, (0, 1.0));
+    let strain = Tensor::<f64, D>::from_fn(|i, k| if i == k { -0.1 - 0.05 * i as f64 } else { 0.0 });
+    particles.displacement_gradient.fill(strain);
+    let mut simulation: Simulation<D> = simulation(grid, shape.clone(), particles, vec![bodies::body(PLAIN, 1.0)], 0.5);
+    simulation.loads.prescribed = sliding();
+    let start = simulation.particles.clone();
+    let rested = (0..steps).try_for_each(|_| simulation.step().map(|_| ()));
+    let (what, sound) = (format!("under stress at rest, {steps} steps, {name}, D = {D}"), PLAIN.p_wave_modulus().sqrt());
+    let particles = &simulation.particles;
+    let speed = particles.velocity.iter().map(Vector::norm).fold(0.0, worse) / sound;
+    let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);
+    let at = Deformation::new(strain);
+    let stress = bodies::body(PLAIN, 1.0).law.stress(&at).norm() / PLAIN.p_wave_modulus();
+    // Each step adds a rounding of the stresses, at random: a sum that grows with the root of their number, and its sum with another.
+    let bound = ROUNDINGS * f64::EPSILON * stress * f64::from(steps).sqrt();
+    solvable(report, &what, "speed over that of sound", rested.map(|()| speed), bound);
+    solvable(report, &what, "displacement over spacing", Ok::<_, StudyError>(moved), bound * f64::from(steps));
+}
+
+/// Bodies without stiffness are none of the laws'.
+fn no_stiffness(report: &mut Report) {
+    let answers = [Lame::new(0.0, 0.0), Lame::from_bulk_shear(1.0, 0.0)];
+    refused(report, "zero stiffness", "Lame::new", "Shear", answers, |error| matches!(error, LameError::Shear(_)));
+    let answers = [Lame::from_young_poisson(0.0, 0.3)];
+    refused(report, "zero stiffness", "Lame::from_young_poisson", "Young", answers, |error| matches!(error, LameError::Young(_)));
+    let answers = [0.5, 0.500_000_1, -1.0].map(|poisson| Lame::from_young_poisson(1.0, poisson));
+    refused(report, "incompressible", "nu = 0.5, 0.5000001, -1", "Poisson", answers, |error| matches!(error, LameError::Poisson(_)));
+    for (case, constants) in [
+        ("shear 0", r#""bulk": 1, "shear": 0"#),
+        ("Young 0", r#""young": 0, "poisson": 0.3"#),
+        ("nu 0.5", r#""young": 1, "poisson": 0.5"#),
+    ] {
+        let text = format!(
+            r#"{{"grid": {{"size": [4], "spacing": 1}}, "time": {{"step": 1, "end": 1}}, "bodies": [{{"name": "a",
+            "shape": {{"box": {{"min": [1], "max": [2]}}}}, "material": {{"neo_hookean": {{{constants}}}}}, "density": 1}}]}}"#
+        );
+        let answers = [scene::read(&text, &[])];
+        let key = "bodies[0].material";
+        refused(report, "zero stiffness in a scene", case, "Values", answers, |error| {
+            matches!(error, scene::SceneError::Values(_)) && error.to_string().contains(key)
+        });
+    }
+}
