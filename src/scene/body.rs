@@ -182,17 +182,23 @@ impl Constants {
                 problems.require(finite, path, "a solid with infinite moduli", "the moduli must be finite");
                 return;
             }
-            Err(LameError::Shear(_)) if let Some(young) = self.young => {
-                ("young", young, "the shear modulus young / (2 (1 + poisson)) must be finite and > 0".to_owned())
-            }
-            Err(LameError::Shear(shear)) => ("shear", shear, "must be finite and > 0".to_owned()),
-            Err(LameError::Bulk(_)) if let (Some(lambda), Some(shear)) = (self.lambda, self.shear) => {
-                ("lambda", lambda, format!("must be greater than -2/3 shear = {}", Number(-2.0 / 3.0 * shear)))
-            }
-            Err(LameError::Bulk(_)) if let Some(poisson) = self.poisson => {
-                ("poisson", poisson, "the bulk modulus young / (3 (1 - 2 poisson)) must be finite and > 0".to_owned())
-            }
-            Err(LameError::Bulk(bulk)) => ("bulk", bulk, "must be finite and > 0".to_owned()),
+            Err(LameError::Shear(shear)) => match self.young {
+                Some(young) => {
+                    ("young", young, "the shear modulus young / (2 (1 + poisson)) must be finite and > 0".to_owned())
+                }
+                None => ("shear", shear, "must be finite and > 0".to_owned()),
+            },
+            Err(LameError::Bulk(bulk)) => match (self.lambda, self.shear, self.poisson) {
+                (Some(lambda), Some(shear), _) => {
+                    ("lambda", lambda, format!("must be greater than -2/3 shear = {}", Number(-2.0 / 3.0 * shear)))
+                }
+                (_, _, Some(poisson)) => (
+                    "poisson",
+                    poisson,
+                    "the bulk modulus young / (3 (1 - 2 poisson)) must be finite and > 0".to_owned(),
+                ),
+                _ => ("bulk", bulk, "must be finite and > 0".to_owned()),
+            },
             Err(LameError::Young(young)) => ("young", young, "must be finite and > 0".to_owned()),
             Err(LameError::Poisson(poisson)) => ("poisson", poisson, "must be > -1 and < 0.5".to_owned()),
         };
