@@ -28,8 +28,8 @@ fn main() {
 fn block<const D: usize>(shape: &str, cells: u32) -> Simulation<D> {
     let approximation = match shape {
         "linear" => json!("linear"),
-        "gimp" => json!({"gimp": {}}),
-        "cubic" => json!({"bspline": "cubic"}),
+        "gimp" => json!("gimp"),
+        "cubic" => json!({"bspline": {"degree": 3}}),
         _ => json!({"lme": {"gamma": 3}}),
     };
     let scene = json!({

@@ -20,8 +20,8 @@
 //! assert!((norm(&[3e200, 4e200]) / 5e200 - 1.0).abs() < 1e-15);
 //! ```
 
+use crate::parallel;
 use crate::scalar::Real;
-use rayon::prelude::*;
 
 /// What vectors are made of: `f64` or `f32`. Reductions are added up in double precision in both.
 pub trait Entry: Real + Send + Sync {
@@ -51,8 +51,9 @@ pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
-        let partial: Vec<f64> = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).collect();
-        partial.iter().sum()
+        let length = x.len().min(y.len());
+        let chunk = |k: usize| k * CHUNK..((k + 1) * CHUNK).min(length);
+        parallel::map(length.div_ceil(CHUNK), |k| dot_chunk(&x[chunk(k)], &y[chunk(k)])).iter().sum()
     }
 }
 
@@ -114,7 +115,7 @@ fn update<S: Entry>(x: &[S], y: &mut [S], f: impl Fn(S, S) -> S + Sync) {
     if y.len() < PARALLEL {
         chunk((x, y));
     } else {
-        x.par_chunks(CHUNK).zip(y.par_chunks_mut(CHUNK)).for_each(chunk);
+        parallel::for_each(x.chunks(CHUNK).zip(y.chunks_mut(CHUNK)), chunk);
     }
 }
 

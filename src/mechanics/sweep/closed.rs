@@ -228,7 +228,7 @@ impl<const D: usize> Tiled<D> {
     ) {
         waves::run(self, Some(field), out, &|block: &Block, nodal: &[f32], buffer: &mut [f32]| {
             if let Some(groups) = &block.single {
-                of_block::product(groups, nodal, buffer, &frozen.0);
+                of_block::product_single(groups, nodal, buffer, &frozen.0);
             }
         });
     }
@@ -242,7 +242,7 @@ impl<const D: usize> Tiled<D> {
     pub(super) fn add_blocks_single(&self, frozen: &SingleTangents<D>, out: &mut [Tensor<f32, D>]) {
         self.blocks_by(out, &|block: &Block, buffer: &mut [f32]| {
             if let Some(groups) = &block.single {
-                of_block::diagonal(groups, buffer, &frozen.0);
+                of_block::diagonal_single(groups, buffer, &frozen.0);
             }
         });
     }

@@ -1,4 +1,5 @@
-//! The loop over particles: gather → point → scatter. The only place that knows threads and vector instructions.
+//! The loop over particles: gather → point → scatter. With the vectors of the solver the only user of threads, and the only one of vector
+//! instructions.
 //!
 //! Two ways with one answer: `plain` is the specification, and the way of shape functions that are no products;
 //! `tiled` is for products, N = Π_k N_k. Both cut the particles into blocks that do not depend on the number of threads.
@@ -26,12 +27,12 @@ use crate::grid::Grid;
 use crate::material::Law;
 use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
+use crate::parallel;
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use plain::Plain;
-use rayon::prelude::*;
 use std::ops::AddAssign;
 use tally::Tally;
 use tiled::Tiled;
@@ -677,12 +678,10 @@ impl<const D: usize> Supports<D> {
 
 /// `f(0), …, f(count − 1)`, on all cores; the error is that of the smallest index.
 fn ordered<R: Send, E: Send>(count: usize, f: impl Fn(usize) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
-    if count <= 1 || rayon::current_num_threads() == 1 {
+    if count <= 1 || !parallel::several() {
         return (0..count).map(f).collect();
     }
-    // Collect first: rayon's own short-circuit would return whichever error came first in time.
-    let results: Vec<Result<R, E>> = (0..count).into_par_iter().map(&f).collect();
-    results.into_iter().collect()
+    parallel::map(count, f).into_iter().collect()
 }
 
 fn infallible<R>(result: Result<R, std::convert::Infallible>) -> R {

@@ -1,17 +1,20 @@
 //! The kernels over one block of cells.
 //!
-//! These functions are generic over the number at most, so that the kernels are compiled once, here, for every dimension and
-//! instruction set, and not again for every point function: what a particle does comes in by reference.
+//! What other files call is not generic, so that the kernels are compiled once, here, for every number, dimension and instruction
+//! set, and not again by every crate and for every point function: what a particle does comes in by reference.
 
 use super::block::Groups;
 use super::closed::{Form, Numbers};
 use super::kernel::{Quadratic, Rows, Signed, Terms, gather, load, pair, scatter, scatter_blocks, store};
-use super::lanes::{LANES, Lanes, Number, WithLanes};
+use super::lanes::{LANES, Lanes, Number, SINGLE_LANES, WithLanes};
 use crate::material::ClosedTangent;
 use crate::scalar::Real;
 
 /// The groups of a block in double precision.
 type Double = Groups<f64, LANES>;
+
+/// The same in single precision.
+type Single = Groups<f32, SINGLE_LANES>;
 
 /// What is done at the particles of a group: puts q in the place of u and σ in that of L.
 pub(super) type Point<'a> = dyn Fn(&[u32], &mut Rows) + Sync + 'a;
@@ -60,23 +63,35 @@ pub(super) fn spread(groups: &Double, buffer: &mut [f64], point: &Point<'_>) {
 }
 
 /// The product with tangents in closed form.
-pub(super) fn product<X: Number<L>, const L: usize>(
+pub(super) fn product(groups: &Double, nodal: &[f64], buffer: &mut [f64], frozen: &Numbers<f64, LANES>) {
+    product_of(groups, nodal, buffer, frozen);
+}
+
+/// The same in single precision.
+pub(super) fn product_single(groups: &Single, nodal: &[f32], buffer: &mut [f32], frozen: &Numbers<f32, SINGLE_LANES>) {
+    product_of(groups, nodal, buffer, frozen);
+}
+
+fn product_of<X: Number<L>, const L: usize>(
     groups: &Groups<X, L>,
     nodal: &[X],
     buffer: &mut [X],
     frozen: &Numbers<X, L>,
 ) {
-    match (frozen.form.both, frozen.form.inertia) {
-        (false, false) => by_dimension!(X, L, groups, Product { groups, nodal, buffer, frozen }),
-        (false, true) => by_dimension!(X, L, groups, ProductInertia { groups, nodal, buffer, frozen }),
-        (true, false) => by_dimension!(X, L, groups, ProductBoth { groups, nodal, buffer, frozen }),
-        (true, true) => by_dimension!(X, L, groups, ProductBothInertia { groups, nodal, buffer, frozen }),
+    match frozen.form.inertia {
+        false => by_dimension!(X, L, groups, Product { groups, nodal, buffer, frozen }),
+        true => by_dimension!(X, L, groups, ProductInertia { groups, nodal, buffer, frozen }),
     }
 }
 
 /// The diagonal blocks of tangents in closed form.
-pub(super) fn diagonal<X: Number<L>, const L: usize>(groups: &Groups<X, L>, buffer: &mut [X], frozen: &Numbers<X, L>) {
-    by_dimension!(X, L, groups, Diagonal { groups, buffer, frozen });
+pub(super) fn diagonal(groups: &Double, buffer: &mut [f64], frozen: &Numbers<f64, LANES>) {
+    by_dimension!(f64, LANES, groups, Diagonal { groups, buffer, frozen });
+}
+
+/// The same in single precision.
+pub(super) fn diagonal_single(groups: &Single, buffer: &mut [f32], frozen: &Numbers<f32, SINGLE_LANES>) {
+    by_dimension!(f32, SINGLE_LANES, groups, Diagonal { groups, buffer, frozen });
 }
 
 /// The diagonal blocks of tangents that `quadratic` knows, group by group.
@@ -178,7 +193,7 @@ impl<const D: usize> WithLanes<f64, LANES> for Spread<'_, D> {
 }
 
 macro_rules! closed_product {
-    ($name:ident, $terms:ident, $both:expr, $inertia:expr) => {
+    ($name:ident, $terms:ident, $inertia:expr) => {
         struct $name<'a, const D: usize, X, const L: usize> {
             groups: &'a Groups<X, L>,
             nodal: &'a [X],
@@ -191,13 +206,13 @@ macro_rules! closed_product {
 
             #[inline(always)]
             fn run<S: Lanes<L, X = X>>(self, s: S) {
-                const FORM: Form = Form { both: $both, inertia: $inertia };
-                let count = FORM.rows(D);
+                let form = Form { both: self.frozen.form.both, inertia: $inertia };
+                let count = form.rows(D);
                 for group in 0..self.groups.len() {
                     let window = self.groups.window(group);
                     let mut at = gather::<S, D, L, { $inertia }>(s, &window, self.nodal);
                     let numbers = self.frozen.of_group(self.groups.first + group, count);
-                    let tangent: ClosedTangent<S::N, D> = FORM.read(s, numbers);
+                    let tangent: ClosedTangent<S::N, D> = form.read(s, numbers);
                     at.gradient = tangent.product(s, &at.gradient);
                     if $inertia {
                         let weight = s.load(&numbers[count - 1]);
@@ -212,10 +227,8 @@ macro_rules! closed_product {
     };
 }
 
-closed_product!(Product, OnlyGradient, false, false);
-closed_product!(ProductInertia, Signed, false, true);
-closed_product!(ProductBoth, OnlyGradient, true, false);
-closed_product!(ProductBothInertia, Signed, true, true);
+closed_product!(Product, OnlyGradient, false);
+closed_product!(ProductInertia, Signed, true);
 
 struct Diagonal<'a, const D: usize, X, const L: usize> {
     groups: &'a Groups<X, L>,

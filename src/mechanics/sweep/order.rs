@@ -1,8 +1,8 @@
 //! The order of particles in the tiled sweep: by block of cells, by cell, by number.
 
 use crate::grid::Grid;
+use crate::parallel;
 use crate::tensor::Vector;
-use rayon::prelude::*;
 
 /// Edge of a block in cells: in 3D its box of nodes, gathered and scattered, stays in the first-level cache.
 const fn edge(dimension: usize) -> u64 {
@@ -12,6 +12,9 @@ const fn edge(dimension: usize) -> u64 {
         _ => 4,
     }
 }
+
+/// Particles whose cells are found in one go.
+const RUN: usize = 4096;
 
 /// A particle and its place: (block · cells of a block + cell in the block, particle).
 pub(super) type Key = (u64, u32);
@@ -30,14 +33,14 @@ pub(super) fn sorted<const D: usize>(grid: &Grid<D>, positions: &[Vector<f64, D>
         }
         Some((block * cells::<D>() + local, p as u32))
     };
-    let mut keys: Vec<Key> = Vec::with_capacity(positions.len());
-    (0..positions.len())
-        .into_par_iter()
-        .with_min_len(4096)
-        .map(|p| key(p).unwrap_or((u64::MAX, p as u32)))
-        .collect_into_vec(&mut keys);
+    let mut keys: Vec<Key> = vec![(0, 0); positions.len()];
+    parallel::for_each(keys.chunks_mut(RUN).enumerate(), |(run, keys)| {
+        for (p, slot) in (run * RUN..).zip(keys) {
+            *slot = key(p).unwrap_or((u64::MAX, p as u32));
+        }
+    });
     if keys.windows(2).any(|pair| pair[0] > pair[1]) {
-        keys.par_sort_unstable();
+        parallel::sort(&mut keys);
     }
     // Particles in no cell come last, by number.
     let outside = keys.partition_point(|key| key.0 < u64::MAX);

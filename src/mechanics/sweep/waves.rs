@@ -9,9 +9,9 @@ use super::kernel::{Rows, of_lane};
 use super::lanes::{LANES, SINGLE_LANES};
 use super::of_block;
 use super::tiled::Tiled;
+use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
-use rayon::prelude::*;
 
 /// Blocks of a wave: their buffers stay in the second-level caches.
 const WAVE: usize = 64;
@@ -64,7 +64,7 @@ pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
     add: &Add<'_, X, O>,
 ) {
     let length = tiled.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + SINGLE_LANES;
-    let parallel = rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL;
+    let parallel = parallel::several() && tiled.groups() >= PARALLEL;
     let one = |scratch: &mut Vec<X>, buffer: &mut [X], block: &Block| {
         buffer[..block.box_nodes() * numbers + SINGLE_LANES].fill(X::zero());
         work(block, scratch, buffer);
@@ -79,13 +79,11 @@ pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
     }
     let mut buffers = vec![X::zero(); WAVE.min(tiled.blocks.len()) * length];
     for blocks in tiled.blocks.chunks(WAVE) {
-        buffers
-            .par_chunks_mut(length)
-            .zip(blocks)
-            .for_each_init(Vec::new, |scratch, (buffer, block)| one(scratch, buffer, block));
+        let parts = buffers.chunks_mut(length).zip(blocks);
+        parallel::for_each_with(parts, |scratch, (buffer, block)| one(scratch, buffer, block));
         let first = blocks.iter().filter_map(|block| block.nodes.first()).min().map_or(0, |&n| n as usize);
         let last = blocks.iter().filter_map(|block| block.nodes.last()).max().map_or(0, |&n| n as usize + 1);
-        out[first..last].par_chunks_mut(SLAB).enumerate().for_each(|(slab, out)| {
+        parallel::for_each(out[first..last].chunks_mut(SLAB).enumerate(), |(slab, out)| {
             for (block, buffer) in blocks.iter().zip(buffers.chunks(length)) {
                 add(block, buffer, first + slab * SLAB, out);
             }
@@ -109,7 +107,7 @@ pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
             take(p, point(p, value, gradient));
         });
     };
-    if rayon::current_num_threads() == 1 || tiled.groups() < PARALLEL {
+    if !parallel::several() || tiled.groups() < PARALLEL {
         let mut scratch = Default::default();
         for block in &tiled.blocks {
             gather(&mut scratch, block, &mut take);
@@ -117,12 +115,11 @@ pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
         return;
     }
     for blocks in tiled.blocks.chunks(WAVE) {
-        let part = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block| {
-            let mut part = Vec::with_capacity(block.groups.len() * LANES);
+        let mut parts: Vec<Vec<(usize, R)>> = blocks.iter().map(|_| Vec::new()).collect();
+        parallel::for_each_with(parts.iter_mut().zip(blocks), |scratch, (part, block)| {
+            part.reserve_exact(block.groups.len() * LANES);
             gather(scratch, block, &mut |p, result| part.push((p, result)));
-            part
-        };
-        let parts: Vec<Vec<(usize, R)>> = blocks.par_iter().map_init(Default::default, part).collect();
+        });
         for (p, result) in parts.into_iter().flatten() {
             take(p, result);
         }
@@ -155,8 +152,12 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
         gather_block(block, field, nodal, rows);
         visit(block, chunk, rows)
     };
-    if rayon::current_num_threads() > 1 && tiled.groups() >= PARALLEL {
-        tiled.blocks.par_iter().zip(chunks).map_init(Default::default, one).collect()
+    if parallel::several() && tiled.groups() >= PARALLEL {
+        let mut results: Vec<Option<R>> = tiled.blocks.iter().map(|_| None).collect();
+        let parts = results.iter_mut().zip(tiled.blocks.iter().zip(chunks));
+        parallel::for_each_with(parts, |scratch, (result, part)| *result = Some(one(scratch, part)));
+        // Every block has one.
+        results.into_iter().flatten().collect()
     } else {
         let mut scratch = Default::default();
         tiled.blocks.iter().zip(chunks).map(|both| one(&mut scratch, both)).collect()

@@ -1,0 +1,77 @@
+//! Work on all cores, in an order that does not depend on their number.
+//!
+//! What is handed to the threads is not generic here, so that their part is compiled once and not for every kind of work.
+
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// Whether there is more than one thread.
+pub(crate) fn several() -> bool {
+    rayon::current_num_threads() > 1
+}
+
+/// `task(0)`, …, `task(count − 1)`, each on whichever thread is free.
+fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().for_each(task);
+}
+
+/// What a mutex holds; a thread that panicked has not spoilt it.
+fn inside<T, R>(mutex: &Mutex<T>, f: impl FnOnce(&mut T) -> R) -> R {
+    f(&mut mutex.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// `f(part)` of every part.
+pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: impl Fn(P) + Sync) {
+    let parts: Vec<Mutex<Option<P>>> = parts.map(|part| Mutex::new(Some(part))).collect();
+    each(parts.len(), &|k| {
+        if let Some(part) = inside(&parts[k], Option::take) {
+            f(part);
+        }
+    });
+}
+
+/// As [`for_each`], with scratch space that a thread hands on from part to part.
+pub(crate) fn for_each_with<P: Send, S: Send + Default>(parts: impl Iterator<Item = P>, f: impl Fn(&mut S, P) + Sync) {
+    let spare = Mutex::new(Vec::new());
+    for_each(parts, |part| {
+        let mut scratch = inside(&spare, Vec::pop).unwrap_or_default();
+        f(&mut scratch, part);
+        inside(&spare, |spare| spare.push(scratch));
+    });
+}
+
+/// `[f(0), …, f(count − 1)]`
+pub(crate) fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
+    for_each(results.iter_mut().enumerate(), |(k, result)| *result = Some(f(k)));
+    // Every one is there.
+    results.into_iter().flatten().collect()
+}
+
+/// Sorts by the keys, all of which differ.
+pub(crate) fn sort(keys: &mut [(u64, u32)]) {
+    keys.par_sort_unstable();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_done_once_and_in_its_place() {
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                assert_eq!(several(), threads > 1);
+                assert_eq!(map(1000, |k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
+                let mut numbers = vec![0; 1000];
+                for_each_with(numbers.chunks_mut(7).enumerate(), |scratch: &mut Vec<usize>, (k, part)| {
+                    scratch.clear();
+                    scratch.extend((0..part.len()).map(|i| 7 * k + i));
+                    part.iter_mut().zip(scratch).for_each(|(number, &mut i)| *number += i);
+                });
+                assert!(numbers.iter().enumerate().all(|(i, &number)| i == number));
+            });
+        }
+    }
+}
