@@ -12,7 +12,11 @@ pub(crate) fn several() -> bool {
 
 /// `task(0)`, …, `task(count − 1)`, each on whichever thread is free.
 fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
-    (0..count).into_par_iter().for_each(task);
+    if count > 1 && several() {
+        (0..count).into_par_iter().for_each(task);
+    } else {
+        (0..count).for_each(task);
+    }
 }
 
 /// What a mutex holds; a thread that panicked has not spoilt it.
@@ -40,10 +44,18 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(parts: impl Iterator<Ite
     });
 }
 
-/// `[f(0), …, f(count − 1)]`
-pub(crate) fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
-    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
-    for_each(results.iter_mut().enumerate(), |(k, result)| *result = Some(f(k)));
+/// `f(part)` of every part, in their order.
+pub(crate) fn map<P: Send, R: Send>(parts: impl ExactSizeIterator<Item = P>, f: impl Fn(P) -> R + Sync) -> Vec<R> {
+    map_with(parts, |(), part| f(part))
+}
+
+/// As [`map`], with scratch space that a thread hands on.
+pub(crate) fn map_with<P: Send, R: Send, S: Send + Default>(
+    parts: impl ExactSizeIterator<Item = P>,
+    f: impl Fn(&mut S, P) -> R + Sync,
+) -> Vec<R> {
+    let mut results: Vec<Option<R>> = (0..parts.len()).map(|_| None).collect();
+    for_each_with(results.iter_mut().zip(parts), |scratch, (result, part)| *result = Some(f(scratch, part)));
     // Every one is there.
     results.into_iter().flatten().collect()
 }
@@ -63,7 +75,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 assert_eq!(several(), threads > 1);
-                assert_eq!(map(1000, |k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
+                assert_eq!(map(0..1000, |k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
                 let mut numbers = vec![0; 1000];
                 for_each_with(numbers.chunks_mut(7).enumerate(), |scratch: &mut Vec<usize>, (k, part)| {
                     scratch.clear();

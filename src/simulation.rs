@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
+use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, SpareTangents};
 use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
@@ -134,6 +134,22 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub clock: Clock,
     /// Work of gravity, tractions, pressure and moving walls since the start.
     pub external_work: f64,
+    /// What the next step uses again; nothing depends on it.
+    pub workspace: Workspace<D>,
+}
+
+/// The large arrays of the last step, in whose memory the next one works, and its order of particles, from which the next one starts to
+/// sort. It is no state: a clone is empty, and no checkpoint holds it.
+#[derive(Debug, Default)]
+pub struct Workspace<const D: usize> {
+    supports: Option<Supports<D>>,
+    tangents: SpareTangents<D>,
+}
+
+impl<const D: usize> Clone for Workspace<D> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 /// What a step did.
@@ -272,7 +288,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         let precision = self.settings.newton.precision;
         let positions = &self.particles.position;
-        let (supports, nodes) = Supports::with_precision(&self.approximation, &self.grid, positions, precision)?;
+        let Workspace { supports: spare, tangents } = std::mem::take(&mut self.workspace);
+        let (supports, nodes) = Supports::renewed(spare, &self.approximation, &self.grid, positions, precision)?;
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
@@ -280,7 +297,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
 
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt).in_memory_of(tangents);
         let mut dphi = self.initial_guess(&nodal, nodes.len(), dt);
         for dof in &prescribed {
             dphi[dof.node][dof.component] = dof.step.increment;
@@ -309,7 +326,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Update, supports.passes());
 
         let projection_iterations = projected.iterations;
+        let tangents = equilibrium.into_spare();
         moved.commit(&mut self.particles);
+        self.workspace = Workspace { supports: Some(supports), tangents };
         self.external_work += work;
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
         self.clock.advance_and_grow_if(error.is_none_or(small));
@@ -573,6 +592,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             settings: self.settings,
             clock: self.clock,
             external_work: self.external_work,
+            workspace: Workspace::default(),
         }
     }
 

@@ -1,6 +1,8 @@
 //! Uniform B-splines centred on the nodes.
 
-use super::{ApproximationError, AxisWeights, Separable, Validate, kernel::folded};
+use super::interior::Lane;
+use super::kernel::{Kernel, folded};
+use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
 
 /// The B-spline of the given degree.
@@ -18,27 +20,44 @@ impl Validate for Bspline {
     }
 }
 
-/// φ = ¾ − d²  (d < ½),  ½ (3/2 − d)²  (d < 3/2),   d = |D|
-#[inline]
-fn quadratic(distance: f64) -> (f64, f64) {
-    let d = distance.abs();
-    if d < 0.5 {
-        (0.75 - d * d, -2.0 * distance)
-    } else {
-        let rest = (1.5 - d).max(0.0);
-        (0.5 * rest * rest, -distance.signum() * rest)
+/// The kernel of [`Bspline::Quadratic`].
+pub(super) struct Quadratic;
+
+impl Kernel for Quadratic {
+    fn radius(&self) -> f64 {
+        1.5
+    }
+
+    /// φ = ¾ − d²  (d < ½),  ½ (3/2 − d)²  (d < 3/2),   d = |D|
+    #[inline(always)]
+    fn at<T: Lane>(&self, distance: T) -> (T, T) {
+        let c = |x: f64| distance.constant(x);
+        let d = distance.abs();
+        let rest = (c(1.5) - d).where_less(c(0.0), c(0.0), c(1.5) - d);
+        let near = (c(0.75) - d * d, c(-2.0) * distance);
+        let far = (c(0.5) * rest * rest, distance.where_less(c(0.0), rest, c(0.0) - rest));
+        (d.where_less(c(0.5), near.0, far.0), d.where_less(c(0.5), near.1, far.1))
     }
 }
 
-/// φ = 2/3 − d² + ½ d³  (d < 1),  (2 − d)³/6  (d < 2),   d = |D|
-#[inline]
-fn cubic(distance: f64) -> (f64, f64) {
-    let d = distance.abs();
-    if d < 1.0 {
-        (2.0 / 3.0 - d * d * (1.0 - 0.5 * d), distance * (1.5 * d - 2.0))
-    } else {
-        let rest = (2.0 - d).max(0.0);
-        (rest * rest * rest / 6.0, -distance.signum() * 0.5 * rest * rest)
+/// The kernel of [`Bspline::Cubic`].
+pub(super) struct Cubic;
+
+impl Kernel for Cubic {
+    fn radius(&self) -> f64 {
+        2.0
+    }
+
+    /// φ = 2/3 − d² + ½ d³  (d < 1),  (2 − d)³/6  (d < 2),   d = |D|
+    #[inline(always)]
+    fn at<T: Lane>(&self, distance: T) -> (T, T) {
+        let c = |x: f64| distance.constant(x);
+        let d = distance.abs();
+        let rest = (c(2.0) - d).where_less(c(0.0), c(0.0), c(2.0) - d);
+        let near = (c(2.0 / 3.0) - d * d * (c(1.0) - c(0.5) * d), distance * (c(1.5) * d - c(2.0)));
+        let slope = c(0.5) * rest * rest;
+        let far = (rest * rest * rest / c(6.0), distance.where_less(c(0.0), slope, c(0.0) - slope));
+        (d.where_less(c(1.0), near.0, far.0), d.where_less(c(1.0), near.1, far.1))
     }
 }
 
@@ -46,9 +65,13 @@ impl Separable for Bspline {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
         match self {
-            Self::Quadratic => folded(axis, x, 1.5, quadratic, out),
-            Self::Cubic => folded(axis, x, 2.0, cubic, out),
+            Self::Quadratic => folded(&Quadratic, axis, x, out),
+            Self::Cubic => folded(&Cubic, axis, x, out),
         }
+    }
+
+    fn shipped(&self) -> Option<Shipped<'_>> {
+        Some(Shipped::Bspline(*self))
     }
 
     fn width(&self) -> usize {

@@ -1,6 +1,8 @@
 //! Uniform generalized interpolation (uGIMP).
 
-use super::{ApproximationError, AxisWeights, Separable, Validate, kernel::folded};
+use super::interior::Lane;
+use super::kernel::{Kernel, folded};
+use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
 
 /// The hat averaged over a particle of constant width 2 l_p: Bardenhagen & Kober, CMES 5 (2004).
@@ -37,7 +39,11 @@ impl Validate for Gimp {
     }
 }
 
-impl Separable for Gimp {
+impl Kernel for Gimp {
+    fn radius(&self) -> f64 {
+        1.0 + self.half_width
+    }
+
     /// With d = |D| and l = l_p/h:
     ///
     /// ```text
@@ -45,22 +51,29 @@ impl Separable for Gimp {
     ///     1 − d                l ≤ d < 1 − l
     ///     (1 + l − d)²/(4l)    1 − l ≤ d < 1 + l
     /// ```
+    #[inline(always)]
+    fn at<T: Lane>(&self, distance: T) -> (T, T) {
+        let c = |x: f64| distance.constant(x);
+        let (d, l) = (distance.abs(), self.half_width);
+        let sign = distance.where_less(c(0.0), c(-1.0), c(1.0));
+        let rest = (c(1.0 + l) - d).where_less(c(0.0), c(0.0), c(1.0 + l) - d);
+        let far = (rest * rest / c(4.0 * l), c(0.0) - sign * rest / c(2.0 * l));
+        let middle = (c(1.0) - d, c(0.0) - sign);
+        let near = (c(1.0) - (d * d + c(l * l)) / c(2.0 * l), c(0.0) - distance / c(l));
+        let beyond = (d.where_less(c(1.0 - l), middle.0, far.0), d.where_less(c(1.0 - l), middle.1, far.1));
+        (d.where_less(c(l), near.0, beyond.0), d.where_less(c(l), near.1, beyond.1))
+    }
+}
+
+impl Separable for Gimp {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
         self.validate(1)?;
-        let l = self.half_width;
-        let kernel = |distance: f64| {
-            let (d, sign) = (distance.abs(), distance.signum());
-            if d < l {
-                (1.0 - (d * d + l * l) / (2.0 * l), -distance / l)
-            } else if d < 1.0 - l {
-                (1.0 - d, -sign)
-            } else {
-                let rest = (1.0 + l - d).max(0.0);
-                (rest * rest / (4.0 * l), -sign * rest / (2.0 * l))
-            }
-        };
-        folded(axis, x, 1.0 + l, kernel, out)
+        folded(self, axis, x, out)
+    }
+
+    fn shipped(&self) -> Option<Shipped<'_>> {
+        self.validate(1).is_ok().then_some(Shipped::Gimp(self))
     }
 
     fn width(&self) -> usize {

@@ -1,22 +1,31 @@
 //! Kernels centred on the nodes, with the ghosts beyond a wall folded back.
 
+use super::interior::Lane;
 use super::{ApproximationError, AxisWeights, product::Place};
 use crate::grid::Axis;
 
-/// N_k = φ((x − x_k)/h) for a `kernel` D ↦ (φ, φ') of half-width `radius` ≤ 2, both in units of h.
+/// D ↦ (φ, φ'), lengths in units of the spacing.
+pub(super) trait Kernel {
+    /// φ = 0 from this distance on; at most 2.
+    fn radius(&self) -> f64;
+
+    /// φ and φ'.
+    fn at<T: Lane>(&self, distance: T) -> (T, T);
+}
+
+/// N_k = φ((x − x_k)/h).
 ///
 /// A ghost beyond a wall continues the field linearly, u₋ₖ = 2u₀ − uₖ: N₀ += 2N₋ₖ, Nₖ −= N₋ₖ. That keeps partition of
 /// unity and linear consistency, and makes N₀ = 1 at the wall. The mirror node of a ghost always exists: a point of the
 /// box reaches one ghost at most, also on an axis of one cell.
 #[inline(always)]
 pub(super) fn folded(
+    kernel: &impl Kernel,
     axis: &Axis,
     x: f64,
-    radius: f64,
-    kernel: impl Fn(f64) -> (f64, f64),
     out: &mut AxisWeights,
 ) -> Result<(), ApproximationError> {
-    let place = Place::new(axis, x)?;
+    let (place, radius) = (Place::new(axis, x)?, kernel.radius());
     // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
     let lower = (radius - place.below).ceil() as i64 - 1;
     let upper = (radius - place.above).ceil() as i64;
@@ -34,7 +43,7 @@ pub(super) fn folded(
     for node in cell - lower..=cell + upper {
         let offset = node - cell;
         let distance = if offset <= 0 { place.below - offset as f64 } else { -(place.above + (offset - 1) as f64) };
-        let at = kernel(distance);
+        let at = kernel.at(distance);
         if node < 0 {
             add(0, 2.0, at);
             add(-node, -1.0, at);

@@ -1,6 +1,6 @@
 //! Linear functions (Q4 in the plane).
 
-use super::{ApproximationError, AxisWeights, Separable, Validate, product::Place};
+use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate, product::Place};
 use crate::grid::Axis;
 
 /// The product of hats. On a cell face the gradient is the one of the upper cell.
@@ -18,6 +18,10 @@ impl Separable for Linear {
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
         out.hats(&Place::new(axis, x)?, axis.spacing);
         Ok(())
+    }
+
+    fn shipped(&self) -> Option<Shipped<'_>> {
+        Some(Shipped::Linear)
     }
 
     fn width(&self) -> usize {

@@ -21,6 +21,7 @@
 mod bspline;
 mod error;
 mod gimp;
+mod interior;
 mod kernel;
 mod linear;
 mod lme;
@@ -29,9 +30,12 @@ mod product;
 pub use bspline::Bspline;
 pub use error::ApproximationError;
 pub use gimp::Gimp;
+pub use interior::Shipped;
+pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
 pub use lme::{Lme, LmeCircle, SMALLEST_TOLERANCE};
 pub use product::{AxisWeights, Separable};
+pub(crate) use product::{Place, check};
 
 use crate::grid::Grid;
 use crate::tensor::Vector;

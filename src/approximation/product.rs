@@ -1,6 +1,6 @@
 //! Functions of one coordinate and their tensor product: the one path of all separable families.
 
-use super::{ApproximationError, Support, Validate};
+use super::{ApproximationError, Shipped, Support, Validate};
 use crate::grid::{Axis, Grid};
 use crate::tensor::Vector;
 
@@ -77,11 +77,17 @@ pub trait Separable: Validate + Send + Sync {
 
     /// The most nodes an axis can list, were it long enough.
     fn width(&self) -> usize;
+
+    /// The functions as one of the shipped families, which the sweep evaluates in vector lanes where no wall is near; `None` for any
+    /// other.
+    fn shipped(&self) -> Option<Shipped<'_>> {
+        None
+    }
 }
 
 /// A coordinate in its cell, in units of the spacing; both distances are accurate at the walls.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// The cell, and its lower node. A point on the upper wall belongs to the last cell.
     pub cell: u32,
     /// Distance from the lower node, 0 … 1.
@@ -91,17 +97,32 @@ pub(super) struct Place {
 }
 
 impl Place {
+    /// # Errors
+    /// A point outside the axis, or an axis without cells.
     #[inline]
     pub fn new(axis: &Axis, x: f64) -> Result<Self, ApproximationError> {
-        if axis.cells == 0 || !(axis.spacing > 0.0 && axis.spacing.is_finite()) {
-            return Err(ApproximationError::Grid { spacing: axis.spacing, cells: axis.cells });
-        }
-        let Some(s) = axis.local(x) else { return Err(outside(&[*axis], &[x])) };
+        check(axis)?;
+        axis.local(x).map(|s| Self::at(axis, s)).ok_or_else(|| outside(&[*axis], &[x]))
+    }
+
+    /// The place `s` spacings behind the origin, 0 … cells.
+    #[inline(always)]
+    pub fn at(axis: &Axis, s: f64) -> Self {
         let cell = (s as u32).min(axis.cells - 1);
         // Exact: s and the cell agree in their leading digits.
         let below = s - f64::from(cell);
-        Ok(Self { cell, below, above: 1.0 - below })
+        Self { cell, below, above: 1.0 - below }
     }
+}
+
+/// # Errors
+/// An axis without cells.
+#[inline]
+pub(crate) fn check(axis: &Axis) -> Result<(), ApproximationError> {
+    if axis.cells == 0 || !(axis.spacing > 0.0 && axis.spacing.is_finite()) {
+        return Err(ApproximationError::Grid { spacing: axis.spacing, cells: axis.cells });
+    }
+    Ok(())
 }
 
 /// The error of a point outside the box spanned by `axes`.

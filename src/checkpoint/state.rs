@@ -9,8 +9,17 @@ use crc32fast::hash;
 /// The arrays a step inherits, by name. A field of the simulation that is added later does not compile here until somebody has
 /// decided on which side it belongs; a new array has its place in [`inherited`] and in [`restore`].
 pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, &[f64]); 5] {
-    let Simulation { grid: _, approximation: _, bodies: _, particles, loads: _, settings: _, clock: _, external_work } =
-        simulation;
+    let Simulation {
+        grid: _,
+        approximation: _,
+        bodies: _,
+        particles,
+        loads: _,
+        settings: _,
+        clock: _,
+        external_work,
+        workspace: _,
+    } = simulation;
     let Particles { position, velocity, acceleration, displacement_gradient, volume: _, mass: _, body: _ } = particles;
     [
         ("position", bytemuck::cast_slice(position)),

@@ -9,7 +9,7 @@ use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
@@ -64,10 +64,15 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
     /// The same for systems in single precision.
     pub(super) single_inverse_blocks: OnceLock<Vec<Tensor<f32, D>>>,
-    /// The tangents frozen last, whose arrays the next ones use: the largest of a step.
-    pub(super) spare: Mutex<Option<ClosedTangents<D>>>,
-    /// The same in single precision.
-    pub(super) single_spare: Mutex<Option<SingleTangents<D>>>,
+    /// Tangents no longer needed.
+    pub(super) spare: Mutex<SpareTangents<D>>,
+}
+
+/// The tangents frozen last, whose arrays the next ones use: the largest of a step.
+#[derive(Debug, Default)]
+pub(crate) struct SpareTangents<const D: usize> {
+    pub(super) double: Option<ClosedTangents<D>>,
+    pub(super) single: Option<SingleTangents<D>>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
@@ -107,8 +112,18 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             inverse_blocks: OnceLock::new(),
             single_inverse_blocks: OnceLock::new(),
             spare: Mutex::default(),
-            single_spare: Mutex::default(),
         }
+    }
+
+    /// The same, tangents being frozen in the arrays of others.
+    pub(crate) fn in_memory_of(mut self, spare: SpareTangents<D>) -> Self {
+        self.spare = Mutex::new(spare);
+        self
+    }
+
+    /// The tangents no longer needed.
+    pub(crate) fn into_spare(self) -> SpareTangents<D> {
+        self.spare.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The law of particle `p`.

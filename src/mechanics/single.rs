@@ -59,7 +59,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let scale = self.size(h);
         let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0) / scale;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-        let spare = held(&self.single_spare).take();
+        let spare = held(&self.spare).single.take();
         let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale, spare);
         let frozen = match frozen {
             Some(Ok(frozen)) => frozen,
@@ -85,7 +85,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 /// Leaves the largest array of a step to the next tangent.
 impl<const D: usize, L: Law> Drop for Single<'_, D, L> {
     fn drop(&mut self) {
-        *held(&self.equilibrium.single_spare) = Some(std::mem::take(&mut self.frozen));
+        held(&self.equilibrium.spare).single = Some(std::mem::take(&mut self.frozen));
     }
 }
 

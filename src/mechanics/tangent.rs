@@ -216,7 +216,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         if let Some(both) = closed_form::<D, L>(self.bodies) {
             let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
             let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-            let closed = self.supports.closed_tangents(&self.laws(), dphi, both, inertia, held(&self.spare).take());
+            let closed =
+                self.supports.closed_tangents(&self.laws(), dphi, both, inertia, held(&self.spare).double.take());
             match closed {
                 Some(Ok(closed)) => return Ok(Frozen::Closed(closed)),
                 Some(Err(Some(inadmissible))) => return Err(inadmissible),
@@ -380,7 +381,7 @@ pub struct Tangent<'a, const D: usize, L: Law> {
 impl<const D: usize, L: Law> Drop for Tangent<'_, D, L> {
     fn drop(&mut self) {
         if let Frozen::Closed(tangents) = std::mem::replace(&mut self.frozen, Frozen::Each(Vec::new())) {
-            *held(&self.equilibrium.spare) = Some(tangents);
+            held(&self.equilibrium.spare).double = Some(tangents);
         }
     }
 }

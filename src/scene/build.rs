@@ -243,6 +243,7 @@ impl Scene {
             settings: self.settings(),
             clock: Clock::new(self.time.step, self.time.max_halvings),
             external_work: 0.0,
+            workspace: Default::default(),
         };
         self.set_initial_velocity(&mut simulation)?;
         scale::check(self, &simulation)?;

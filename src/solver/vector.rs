@@ -51,9 +51,7 @@ pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
-        let length = x.len().min(y.len());
-        let chunk = |k: usize| k * CHUNK..((k + 1) * CHUNK).min(length);
-        parallel::map(length.div_ceil(CHUNK), |k| dot_chunk(&x[chunk(k)], &y[chunk(k)])).iter().sum()
+        parallel::map(x.chunks(CHUNK).zip(y.chunks(CHUNK)), |(x, y)| dot_chunk(x, y)).iter().sum()
     }
 }
 

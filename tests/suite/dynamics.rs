@@ -58,6 +58,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
         },
         clock: Clock::new(number(&reference["dt"]), 0),
         external_work: 0.0,
+        workspace: Default::default(),
     })
 }
 

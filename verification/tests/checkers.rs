@@ -144,6 +144,7 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
         settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(0.01, 0),
         external_work: 0.0,
+        workspace: Default::default(),
     }
 }
 

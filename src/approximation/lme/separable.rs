@@ -2,8 +2,9 @@
 
 use super::starts::Starts;
 use super::{radius, validate};
+use crate::approximation::interior::{Column, FURTHEST, Interior, Lane, NODES, SETTLED, distance};
 use crate::approximation::product::Place;
-use crate::approximation::{ApproximationError, AxisWeights, Separable, Validate};
+use crate::approximation::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
 use std::sync::Arc;
 
@@ -30,8 +31,8 @@ use std::sync::Arc;
 /// f increases with a slope of at least 1, so that |μ* − μ| ≤ |f(μ)|: one evaluation gives a bracket, and Newton kept in
 /// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: at most five evaluations of f.
 ///
-/// Away from walls μ is a function of a alone. There q is tabulated, and one step of Newton's method from the table, written
-/// in q, needs no exponential and no logarithm.
+/// Away from walls μ is a function of a alone. There q is taken from a table, and two steps of Newton's method from the table, written
+/// in q, need no exponential and no logarithm.
 ///
 /// ```
 /// use bfree::approximation::{AxisWeights, Lme, Separable};
@@ -71,10 +72,6 @@ pub(super) struct Reach {
 
 /// Iterations of the bracketed Newton method; bisection alone would need fewer than this.
 const ITERATIONS: usize = 200;
-/// A Newton step below this leaves an error of its square.
-const LAST_STEP: f64 = 1e-9;
-/// Below this step e^s − 1 = s + s²/2 and artanh t = t + t³/3 leave an error that the next step corrects.
-const SMALL_STEP: f64 = 1e-3;
 
 impl Lme {
     /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
@@ -86,7 +83,7 @@ impl Lme {
     }
 
     /// R_a/h
-    pub(super) fn radius(&self) -> f64 {
+    pub(in crate::approximation) fn radius(&self) -> f64 {
         self.radius
     }
 
@@ -138,6 +135,34 @@ impl Lme {
         }
     }
 
+    /// gⱼ qʲ for j = 0 … M, zero for nodes out of reach: |D| = d + j ≥ R.
+    #[inline(always)]
+    fn weights_within<T: Lane, const M: usize>(&self, distance: T, q: T) -> [T; FURTHEST + 1] {
+        let room = distance.constant(self.radius) - distance;
+        let mut weights = [distance.constant(0.0); FURTHEST + 1];
+        weights[0] = distance.constant(1.0);
+        let (mut weight, mut ratio) = (weights[0], q);
+        for j in 1..=M {
+            ratio = ratio * q.constant(self.decay);
+            weight = weight * ratio;
+            weights[j] = q.constant(j as f64).where_less(room, weight, q.constant(0.0));
+        }
+        weights
+    }
+
+    /// Σⱼ (d + j) gⱼ qʲ and Σⱼ j (d + j) gⱼ qʲ for the nodes within reach.
+    #[inline(always)]
+    fn moments_within<T: Lane, const M: usize>(&self, distance: T, q: T) -> (T, T) {
+        let weights = self.weights_within::<T, M>(distance, q);
+        let (mut sum, mut slope) = (distance, distance.constant(0.0));
+        for j in 1..=M {
+            let moment = (distance + q.constant(j as f64)) * weights[j];
+            sum = sum + moment;
+            slope = slope + q.constant(j as f64) * moment;
+        }
+        (sum, slope)
+    }
+
     /// f and f' at μ.
     #[inline]
     fn balance(&self, place: &Place, reach: Reach, mu: f64) -> (f64, f64) {
@@ -175,7 +200,7 @@ impl Lme {
             let next = if inside { newton } else { 0.5 * (low + high) };
             let step = (next - mu).abs();
             mu = next;
-            if step <= LAST_STEP && inside || step == 0.0 {
+            if step <= SETTLED && inside || step == 0.0 {
                 break;
             }
             (f, slope) = self.balance(place, reach, mu);
@@ -193,7 +218,7 @@ impl Lme {
     }
 
     /// q and dq/da away from walls: f depends on a directly and through μ, so dμ/da = −(∂f/∂a)/(∂f/∂μ).
-    pub(super) fn start(&self, place: &Place) -> [f64; 2] {
+    pub(super) fn table_entry(&self, place: &Place) -> [f64; 2] {
         let reach = self.free_reach(place);
         let mu = self.solve(place, reach);
         let q = mu.exp();
@@ -206,35 +231,6 @@ impl Lme {
         let (upper, upper_slope) = self.moments(place.above, reach.upper, q.recip());
         let direct = total(reach.lower, q) / lower + total(reach.upper, q.recip()) / upper;
         [q, -q * direct / (1.0 + lower_slope / lower + upper_slope / upper)]
-    }
-
-    /// q and 1/q at the root, from the table; `None` near walls, and where the table is too coarse.
-    ///
-    /// Newton's step in μ is −f/f' with f = −ln(U/(qL)) = −2 artanh t, t = (U − qL)/(U + qL), and multiplies q by its
-    /// exponential. As soon as a step is small both are polynomials to the last digit.
-    #[inline]
-    fn tabulated(&self, place: &Place, reach: Reach) -> Option<(f64, f64)> {
-        let starts = self.starts.as_ref()?;
-        if reach != self.free_reach(place) {
-            return None;
-        }
-        let mut q = starts.at(place);
-        for _ in 0..3 {
-            let p = q.recip();
-            let (lower, lower_slope) = self.moments(place.below, reach.lower, q);
-            let (upper, upper_slope) = self.moments(place.above, reach.upper, p);
-            let t = (upper - q * lower) / (upper + q * lower);
-            let step = 2.0 * t * (1.0 + t * t / 3.0) / (1.0 + lower_slope / lower + upper_slope / upper);
-            if step.is_nan() || step.abs() >= SMALL_STEP {
-                return None;
-            }
-            let growth = step * (1.0 + 0.5 * step);
-            q += q * growth;
-            if step.abs() <= LAST_STEP {
-                return Some((q, p - p * growth));
-            }
-        }
-        None
     }
 
     /// λ in units of 1/h; infinite on a wall.
@@ -250,8 +246,6 @@ impl Validate for Lme {
 }
 
 impl Separable for Lme {
-    /// ∇N = −N J⁻¹ D, J = Σ N D². D and J are taken about r = Σ N D, zero but for rounding, which makes Σ ∇N = 0 and
-    /// Σ x ∇N = 1 independent of the accuracy of λ.
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
         validate(self.gamma, self.tolerance)?;
@@ -265,10 +259,20 @@ impl Separable for Lme {
             return Ok(());
         }
 
-        let (q, p) = self.tabulated(&place, reach).unwrap_or_else(|| {
-            let mu = self.solve(&place, reach);
-            (mu.exp(), (-mu).exp())
-        });
+        if self.starts.is_some() && reach == self.free_reach(&place) {
+            let start = Interior::start(self, place.below);
+            let column = self.column::<f64, FURTHEST>(place.below, place.above, start, axis.spacing);
+            if column.correction <= SETTLED {
+                let nodes = FURTHEST - reach.lower as usize..FURTHEST + 2 + reach.upper as usize;
+                out.start(place.cell - reach.lower);
+                out.values.extend_from_slice(&column.values[nodes.clone()]);
+                out.derivatives.extend_from_slice(&column.derivatives[nodes]);
+                return Ok(());
+            }
+        }
+
+        let mu = self.solve(&place, reach);
+        let (q, p) = (mu.exp(), (-mu).exp());
         // The common factor that keeps the larger of the two weights in the cell at 1.
         let (lower, upper) = if q >= 1.0 { (1.0, p) } else { (q, 1.0) };
         out.start(place.cell - reach.lower);
@@ -279,28 +283,75 @@ impl Separable for Lme {
         out.push(upper, -place.above);
         self.weights(reach.upper, p, |j, weight| out.push(upper * weight, -(place.above + j)));
 
-        // Until the last loop `derivatives` holds D.
-        let z: f64 = out.values.iter().sum();
-        let mut r = 0.0;
-        for (value, distance) in out.values.iter_mut().zip(&out.derivatives) {
-            *value /= z;
-            r += *value * distance;
-        }
-        let mut j = 0.0;
-        for (value, distance) in out.values.iter().zip(&mut out.derivatives) {
-            *distance -= r;
-            j += value * *distance * *distance;
-        }
-        let scale = -1.0 / (j * axis.spacing);
-        for (value, distance) in out.values.iter().zip(&mut out.derivatives) {
-            *distance *= value * scale;
-        }
+        normalise(&mut out.values, &mut out.derivatives, axis.spacing);
         Ok(())
+    }
+
+    fn shipped(&self) -> Option<Shipped<'_>> {
+        (self.starts.is_some() && self.validate(1).is_ok()).then_some(Shipped::Lme(self))
     }
 
     fn width(&self) -> usize {
         // |D| < R holds for ceil(2R) nodes at most, and the two of the cell are always there.
         ((2.0 * self.radius).ceil() as usize).max(2)
+    }
+}
+
+/// Weights to N = weight/Z, and D to ∇N = −N J⁻¹ D, J = Σ N D². D and J are taken about r = Σ N D, zero but for rounding, which makes
+/// Σ ∇N = 0 and Σ x ∇N = 1 independent of the accuracy of λ.
+#[inline(always)]
+fn normalise<T: Lane>(values: &mut [T], derivatives: &mut [T], spacing: f64) {
+    let Some(&like) = values.first() else { return };
+    let c = |x: f64| like.constant(x);
+    let z = c(1.0) / values.iter().fold(c(0.0), |sum, &value| sum + value);
+    let mut r = c(0.0);
+    for (value, distance) in values.iter_mut().zip(&*derivatives) {
+        *value = *value * z;
+        r = r + *value * *distance;
+    }
+    let mut j = c(0.0);
+    for (value, distance) in values.iter().zip(&mut *derivatives) {
+        *distance = *distance - r;
+        j = j + *value * *distance * *distance;
+    }
+    let scale = c(-1.0) / (j * c(spacing));
+    for (value, distance) in values.iter().zip(derivatives) {
+        *distance = *distance * (*value * scale);
+    }
+}
+
+impl Interior for Lme {
+    #[inline(always)]
+    fn start(&self, below: f64) -> f64 {
+        self.starts.as_ref().map_or(f64::NAN, |starts| starts.at(below))
+    }
+
+    /// From q of the table two steps of Newton's method in μ: −f/f' with f = −ln(U/(qL)) = −2 artanh t, t = (U − qL)/(U + qL), which
+    /// multiplies q by its exponential. Steps are so small that both are polynomials to the last digit.
+    #[inline(always)]
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, start: T, spacing: f64) -> Column<T> {
+        let c = |x: f64| below.constant(x);
+        let (mut q, mut step) = (start, start);
+        for _ in 0..2 {
+            let (lower, lower_slope) = self.moments_within::<T, M>(below, q);
+            let (upper, upper_slope) = self.moments_within::<T, M>(above, c(1.0) / q);
+            let t = (upper - q * lower) / (upper + q * lower);
+            step = c(2.0) * t * (c(1.0) + t * t * c(1.0 / 3.0)) / (c(1.0) + lower_slope / lower + upper_slope / upper);
+            q = q + q * step * (c(1.0) + c(0.5) * step);
+        }
+        let p = c(1.0) / q;
+        // The common factor that keeps the larger of the two weights in the cell at 1.
+        let (lower, upper) = (q.where_less(c(1.0), q, c(1.0)), q.where_less(c(1.0), c(1.0), p));
+        let (on_lower, on_upper) = (self.weights_within::<T, M>(below, q), self.weights_within::<T, M>(above, p));
+        let (mut values, mut derivatives) = ([c(0.0); NODES], [c(0.0); NODES]);
+        for j in 0..=M {
+            values[M - j] = lower * on_lower[j];
+            values[M + 1 + j] = upper * on_upper[j];
+            derivatives[M - j] = distance::<T, M>(M - j, below, above);
+            derivatives[M + 1 + j] = distance::<T, M>(M + 1 + j, below, above);
+        }
+        normalise(&mut values[..2 * M + 2], &mut derivatives[..2 * M + 2], spacing);
+        Column { values, derivatives, correction: step.abs() }
     }
 }
 
@@ -311,25 +362,30 @@ mod tests {
     #[test]
     fn the_table_leads_to_the_root_that_is_found_without_it() {
         let axis = Axis { origin: 0.0, spacing: 1.0, cells: 40 };
-        for (gamma, tolerance) in [(0.3, 1e-6), (0.8, 1e-6), (1.8, 1e-10), (3.0, 1e-6), (4.0, 1e-2), (9.9, 1e-16)] {
-            let with = Lme::new(gamma, tolerance);
-            assert!(with.starts.is_some());
-            let without = Lme { starts: None, ..with.clone() };
-            let (mut fast, mut plain) = (AxisWeights::default(), AxisWeights::default());
-            let mut from_table = 0;
+        for (gamma, tolerance) in [(0.3, 1e-2), (0.8, 1e-6), (1.8, 1e-10), (3.0, 1e-6), (4.0, 1e-2), (9.9, 1e-16)] {
+            let lme = Lme::new(gamma, tolerance);
+            let without = Lme { starts: None, ..lme.clone() };
+            let mut plain = AxisWeights::default();
+            let mut found = 0;
             for i in 0..=1000 {
                 let x = 20.0 + f64::from(i) / 1000.0;
                 let place = Place::new(&axis, x).expect("inside");
-                from_table += usize::from(with.tabulated(&place, with.reach(&axis, &place)).is_some());
-                with.axis(&axis, x, &mut fast).expect("inside");
+                let reach = lme.reach(&axis, &place);
+                let start = lme.start(place.below);
+                let column = lme.column::<f64, FURTHEST>(place.below, place.above, start, axis.spacing);
+                let settled = column.correction <= SETTLED;
+                found += usize::from(settled);
                 without.axis(&axis, x, &mut plain).expect("inside");
-                assert_eq!((fast.first, fast.values.len()), (plain.first, plain.values.len()));
-                let both = [(&fast.values, &plain.values), (&fast.derivatives, &plain.derivatives)];
-                for (a, b) in both.into_iter().flat_map(|(a, b)| a.iter().zip(b)) {
+                let nodes = FURTHEST - reach.lower as usize..FURTHEST + 2 + reach.upper as usize;
+                assert_eq!((plain.first, plain.values.len()), (place.cell - reach.lower, nodes.len()));
+                let both = [(&column.values, &plain.values), (&column.derivatives, &plain.derivatives)];
+                for (a, b) in both.into_iter().flat_map(|(a, b)| a[nodes.clone()].iter().zip(b)).filter(|_| settled) {
                     assert!((a - b).abs() < 4e-15, "gamma {gamma}, x {x}: {a} {b}");
                 }
+                let outside = |x: &[f64]| x[..nodes.start].iter().chain(&x[nodes.end..]).all(|&x| x == 0.0);
+                assert!(outside(&column.values) && outside(&column.derivatives));
             }
-            assert!(from_table > 950, "gamma {gamma}, TOL {tolerance}: {from_table} of 1001");
+            assert!(found > 950, "gamma {gamma}, TOL {tolerance}: {found} of 1001");
         }
     }
 }

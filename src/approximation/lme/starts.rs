@@ -4,13 +4,14 @@
 //! step's λ would do, for all particles alike and without being remembered: a step is the same whatever went before it.
 
 use super::separable::Lme;
+use crate::approximation::interior::FURTHEST;
 use crate::approximation::product::Place;
 
 /// Beyond this locality the table would leave the first-level cache; functions are nearly linear there.
 const LARGEST_GAMMA: f64 = 10.0;
 
-/// Wider functions, in spacings, cost more to sum than to start.
-const LARGEST_RADIUS: f64 = 8.0;
+/// Wider functions, in spacings, have more nodes than vector lanes have room for, and cost more to sum than to start.
+const LARGEST_RADIUS: f64 = FURTHEST as f64 + 1.0;
 
 /// Intervals for each unit of γ̂. q varies like exp(γ̂(1 − 2a)): a cubic misses it by (2γ̂ δa)⁴/384, here 5e-10 at most, after
 /// which one step of Newton's method is exact to rounding.
@@ -30,16 +31,16 @@ impl Starts {
         let intervals = (INTERVALS * lme.gamma().max(1.0)).ceil();
         let at = |i: u32| {
             let below = f64::from(i) / intervals;
-            lme.start(&Place { cell: 0, below, above: 1.0 - below })
+            lme.table_entry(&Place { cell: 0, below, above: 1.0 - below })
         };
         Some(Self((0..=intervals as u32).map(at).collect()))
     }
 
-    /// q at `place`, by cubic Hermite interpolation.
-    #[inline]
-    pub(super) fn at(&self, place: &Place) -> f64 {
+    /// q at the distance `below` from the lower node, by cubic Hermite interpolation.
+    #[inline(always)]
+    pub(super) fn at(&self, below: f64) -> f64 {
         let intervals = self.0.len() - 1;
-        let (x, width) = (place.below * intervals as f64, (intervals as f64).recip());
+        let (x, width) = (below * intervals as f64, (intervals as f64).recip());
         let i = (x as usize).min(intervals - 1);
         let (t, [[q0, d0], [q1, d1]]) = (x - i as f64, [self.0[i], self.0[i + 1]]);
         let (d0, d1, rise) = (d0 * width, d1 * width, q1 - q0);

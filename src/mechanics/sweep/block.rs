@@ -6,7 +6,7 @@ use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 
 /// A cube of cells: its groups, its box of nodes, and which of them are active.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     /// The particles.
     pub(super) groups: Groups<f64, LANES>,
@@ -23,7 +23,7 @@ pub(super) struct Block {
 }
 
 /// Groups of up to `L` particles of a block, with a common window each.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Groups<X, const L: usize> {
     /// 1, 2 or 3.
     pub(super) dimension: usize,
@@ -52,9 +52,18 @@ pub(super) struct Group {
 }
 
 impl<X, const L: usize> Groups<X, L> {
-    pub(super) fn new(dimension: usize, size: [usize; 3]) -> Self {
-        let stride = [size[0], size[0] * size[1]];
-        Self { dimension, stride, first: 0, windows: Vec::new(), weights: Vec::new(), particles: Vec::new() }
+    /// No groups yet, in the arrays of others.
+    pub(super) fn renewed(self, dimension: usize, size: [usize; 3]) -> Self {
+        let Self { mut windows, mut weights, mut particles, .. } = self;
+        windows.clear();
+        weights.clear();
+        particles.clear();
+        Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, windows, weights, particles }
+    }
+
+    /// The particles, group by group.
+    pub(super) fn in_order(&self) -> impl Iterator<Item = u32> {
+        (0..self.len()).flat_map(|group| self.particles(group).iter().copied())
     }
 
     /// Number of groups.
@@ -92,22 +101,10 @@ impl<X, const L: usize> Groups<X, L> {
         }
     }
 
-    /// Group and lane of every particle, in their order.
-    pub(super) fn slots(&self) -> impl Iterator<Item = (usize, usize)> {
-        let lanes = self.windows.iter().map(|window| usize::from(window.lanes));
-        lanes.enumerate().flat_map(|(group, lanes)| (0..lanes).map(move |lane| (group, lane)))
-    }
-
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.windows.as_slice())
             + size_of_val(self.weights.as_slice())
             + size_of_val(self.particles.as_slice())
-    }
-
-    pub(super) fn shrink_to_fit(&mut self) {
-        self.windows.shrink_to_fit();
-        self.weights.shrink_to_fit();
-        self.particles.shrink_to_fit();
     }
 }
 

@@ -1,116 +1,229 @@
 //! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
 
 use super::block::{Block, Group, Groups};
+use super::columns::{Along, Columns, Family};
 use super::kernel::widest_window;
+use super::lanes::LANES;
 use super::order::{Key, follows};
-use crate::approximation::{ApproximationError, AxisWeights, Separable};
+use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::scalar::Real;
 use crate::tensor::Vector;
+use std::ops::Range;
 
-/// The weights of one particle along one axis: its nodes, and where N and dN/dx of each are.
-#[derive(Clone, Copy, Default)]
-struct Along {
-    first: u32,
-    width: u32,
-    start: usize,
+/// A particle whose functions do not exist.
+type Failure = (usize, ApproximationError);
+
+/// What one thread works in.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// The particles of a block on each axis.
+    along: [Along; 3],
+    /// The functions of a group along each axis, eight particles after eight.
+    columns: Vec<Columns>,
+    /// Groups and their windows.
+    groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
 
-impl Along {
-    fn end(&self) -> u32 {
-        self.first + self.width
-    }
-}
+/// Which nodes of a box are active: a bit for each node of a row along x.
+pub(super) type Active = Vec<u64>;
 
 /// The block of the particles `keys`, without its number of groups before it and its node numbers; and which nodes of its
-/// box are active. With `single` it has groups for single precision too.
+/// box are active. With `single` it has groups for single precision too. The arrays of `spare` are used again.
 ///
 /// # Errors
 /// The smallest particle whose functions do not exist.
 pub(super) fn block<const D: usize>(
-    product: &dyn Separable,
+    family: Family<'_>,
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
     keys: &[Key],
     single: bool,
-) -> Result<(Block, Vec<bool>), (usize, ApproximationError)> {
-    let mut scratch = AxisWeights::default();
-    let mut weights: Vec<[f64; 2]> = Vec::new();
-    let mut along: Vec<[Along; D]> = Vec::with_capacity(keys.len());
-    let mut failure = None;
-    for &(_, p) in keys {
-        let mut axes = [Along::default(); D];
-        for k in 0..D {
-            if let Err(error) = product.axis(&grid.axis(k), positions[p as usize][k], &mut scratch) {
-                super::tiled::keep_first(&mut failure, p as usize, error);
-                break;
-            }
-            axes[k] = Along { first: scratch.first, width: scratch.values.len() as u32, start: weights.len() };
-            weights.extend(scratch.values.iter().zip(&scratch.derivatives).map(|(&n, &dn)| [n, dn]));
+    spare: Block,
+    scratch: &mut Scratch,
+) -> Result<(Block, Active), Failure> {
+    built(family, grid, positions, keys, single, spare, scratch).map_err(|(i, error)| {
+        let mut first = None;
+        for &(_, p) in keys {
+            let errors = (0..D).filter_map(|k| family.error(&grid.axis(k), positions[p as usize][k]));
+            errors.for_each(|error| super::tiled::keep_first(&mut first, p as usize, error));
         }
-        along.push(axes);
-    }
-    if let Some(failure) = failure {
-        return Err(failure);
-    }
+        first.unwrap_or((keys[i].1 as usize, error))
+    })
+}
 
-    let mut low = [u32::MAX; D];
-    let mut high = [0; D];
-    for axes in &along {
-        for k in 0..D {
-            low[k] = low[k].min(axes[k].first);
-            high[k] = high[k].max(axes[k].end());
-        }
-    }
+/// As [`block`]; an error comes with the place of its particle among the keys, and there may be a smaller one.
+fn built<const D: usize>(
+    family: Family<'_>,
+    grid: &Grid<D>,
+    positions: &[Vector<f64, D>],
+    keys: &[Key],
+    single: bool,
+    spare: Block,
+    scratch: &mut Scratch,
+) -> Result<(Block, Active), Failure> {
     let (mut size, mut origin) = ([1; 3], [0; 3]);
-    for k in 0..D {
-        size[k] = (high[k] - low[k]) as usize;
-        origin[k] = low[k];
+    for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
+        along.x.clear();
+        along.x.extend(keys.iter().map(|&(_, p)| positions[p as usize][k]));
+        family.spans(&grid.axis(k), along)?;
+        let [low, high] = union(&along.spans);
+        size[k] = (high - low) as usize;
+        origin[k] = low;
     }
-    let block = Block {
-        groups: groups(keys, &along, &weights, origin, size, 1.0),
-        single: single.then(|| groups(keys, &along, &weights, origin, size, grid.spacing)),
-        origin,
-        size,
-        nodes: Vec::new(),
-        places: Vec::new(),
+    let mut active = vec![0; size[1] * size[2]];
+    let Block { groups, single: other, mut nodes, mut places, .. } = spare;
+    let building = Building { family, grid, keys, origin, size };
+    let groups = building.groups(groups, 1.0, scratch, &mut active)?;
+    let single = match single {
+        true => Some(building.groups(other.unwrap_or_default(), grid.spacing, scratch, &mut active)?),
+        false => None,
     };
-    let active = active(&block, &along, &weights);
+    nodes.clear();
+    places.clear();
+    let block = Block { groups, single, origin, size, nodes, places };
     Ok((block, active))
 }
 
-/// The particles by groups, dN/dx times `unit`.
-fn groups<X: Real, const L: usize, const D: usize>(
-    keys: &[Key],
-    along: &[[Along; D]],
-    weights: &[[f64; 2]],
+/// The smallest interval that holds all.
+#[inline(always)]
+fn union(spans: &[[u32; 2]]) -> [u32; 2] {
+    spans.iter().fold([u32::MAX, 0], |[low, high], span| [low.min(span[0]), high.max(span[1])])
+}
+
+/// A block under construction.
+struct Building<'a, const D: usize> {
+    family: Family<'a>,
+    grid: &'a Grid<D>,
+    keys: &'a [Key],
     origin: [u32; 3],
     size: [usize; 3],
-    unit: f64,
-) -> Groups<X, L> {
-    let mut built = Groups::new(D, size);
-    let mut start = 0;
-    while start < keys.len() {
-        let end = group_end::<L, D>(keys, along, start);
-        push(&mut built, &keys[start..end], &along[start..end], weights, origin, size, unit);
-        start = end;
+}
+
+impl<const D: usize> Building<'_, D> {
+    /// The particles by groups, dN/dx times `unit`, in the arrays of `spare`; marks the nodes of their functions.
+    fn groups<X: Real, const L: usize>(
+        &self,
+        spare: Groups<X, L>,
+        unit: f64,
+        scratch: &mut Scratch,
+        active: &mut Active,
+    ) -> Result<Groups<X, L>, Failure> {
+        let mut built = spare.renewed(D, self.size);
+        let mut groups = std::mem::take(&mut scratch.groups);
+        groups.clear();
+        let (mut start, mut rows) = (0, 0);
+        while start < self.keys.len() {
+            let end = group_end::<L, D>(self.keys, &scratch.along[0].spans, start);
+            let mut windows = [[0; 2]; 3];
+            for (window, along) in windows.iter_mut().zip(&scratch.along).take(D) {
+                *window = union(&along.spans[start..end]);
+                rows += 2 * (window[1] - window[0]) as usize;
+            }
+            groups.push((start..end, windows));
+            start = end;
+        }
+        built.windows.reserve_exact(groups.len());
+        built.particles.reserve_exact(groups.len());
+        built.weights.reserve_exact(rows);
+        built.weights.shrink_to(2 * rows);
+        for (particles, windows) in &groups {
+            self.push(&mut built, particles.clone(), windows, unit, scratch, active)?;
+        }
+        scratch.groups = groups;
+        Ok(built)
     }
-    built.shrink_to_fit();
-    built
+
+    /// Appends a group.
+    fn push<X: Real, const L: usize>(
+        &self,
+        groups: &mut Groups<X, L>,
+        particles: Range<usize>,
+        windows: &[[u32; 2]; 3],
+        unit: f64,
+        scratch: &mut Scratch,
+        active: &mut Active,
+    ) -> Result<(), Failure> {
+        let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
+        let eights = keys.len().div_ceil(LANES);
+        columns.resize_with(columns.len().max(D * eights), Columns::default);
+        for (part, keys) in keys.chunks(LANES).enumerate() {
+            let start = particles.start + part * LANES;
+            for k in 0..D {
+                let columns = &mut columns[part * D + k];
+                self.family.columns(&self.grid.axis(k), &mut along[k], start..start + keys.len(), columns)?;
+            }
+        }
+        let mut width = [1; 3];
+        let mut first = 0;
+        for k in (0..D).rev() {
+            width[k] = (windows[k][1] - windows[k][0]) as u8;
+            first = first * self.size[k] + (windows[k][0] - self.origin[k]) as usize;
+        }
+        let group = Group { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
+        for k in 0..D {
+            let (start, nodes) = (groups.weights.len(), usize::from(width[k]));
+            groups.weights.resize(start + 2 * nodes, [X::zero(); L]);
+            let (values, derivatives) = groups.weights[start..].split_at_mut(nodes);
+            for (part, keys) in keys.chunks(LANES).enumerate() {
+                columns[part * D + k].write(keys.len(), windows[k][0], unit, values, derivatives, part * LANES);
+            }
+        }
+        groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
+        groups.windows.push(group);
+        for (part, keys) in keys.chunks(LANES).enumerate() {
+            self.mark(&columns[part * D..(part + 1) * D], keys.len(), active);
+        }
+        Ok(())
+    }
+
+    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes.
+    fn mark(&self, columns: &[Columns], count: usize, active: &mut Active) {
+        for lane in 0..count {
+            let (mut begin, mut end) = ([0; 3], [1; 3]);
+            for k in 0..D {
+                [begin[k], end[k]] = columns[k].spans[lane].map(|node| (node - self.origin[k]) as usize);
+            }
+            // No N vanishes, nor underflows: the whole of the particle's window.
+            let whole = columns.iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
+            let row = ((1 << (end[0] - begin[0])) - 1) << begin[0];
+            for z in begin[2]..end[2] {
+                for y in begin[1]..end[1] {
+                    active[z * self.size[1] + y] |=
+                        if whole { row } else { self.visible(columns, lane, [begin[0], y, z], end[0]) };
+                }
+            }
+        }
+    }
+
+    /// The nodes of a row, from `at` to `end`, with N ≠ 0 or ∇N ≠ 0.
+    fn visible(&self, columns: &[Columns], lane: usize, at: [usize; 3], end: usize) -> u64 {
+        let mut bits = 0;
+        for x in at[0]..end {
+            let place = [x, at[1], at[2]];
+            let w: [[f64; 2]; D] = std::array::from_fn(|k| columns[k].at(lane, self.origin[k] + place[k] as u32));
+            let n: f64 = w.iter().map(|w| w[0]).product();
+            let slope = |k: usize| (0..D).map(|m| w[m][usize::from(m == k)]).product::<f64>();
+            if n != 0.0 || (0..D).any(|k| slope(k) != 0.0) {
+                bits |= 1 << x;
+            }
+        }
+        bits
+    }
 }
 
 /// Where the group that begins at `start` ends: as many particles of a cell as there are lanes, or whole neighbouring cells
 /// along x while all fit into the lanes and their window is not too wide.
-fn group_end<const L: usize, const D: usize>(keys: &[Key], along: &[[Along; D]], start: usize) -> usize {
-    let cell_end = |from: usize| from + keys[from..].partition_point(|key| key.0 == keys[from].0);
+fn group_end<const L: usize, const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
+    let cell_end = |from: usize| from + keys[from..].iter().take_while(|key| key.0 == keys[from].0).count();
     let mut end = cell_end(start);
     if end - start > L {
         return start + L;
     }
     while end < keys.len() && follows::<D>(&keys[end - 1], &keys[end]) {
         let next = cell_end(end);
-        let [low, high] = window(&along[start..next], 0);
+        let [low, high] = union(&along_x[start..next]);
         if next - start > L || (high - low) as usize > widest_window(L) {
             break;
         }
@@ -119,89 +232,37 @@ fn group_end<const L: usize, const D: usize>(keys: &[Key], along: &[[Along; D]],
     end
 }
 
-/// First node and end of the common window along axis `k`.
-fn window<const D: usize>(along: &[[Along; D]], k: usize) -> [u32; 2] {
-    along.iter().fold([u32::MAX, 0], |[low, high], axes| [low.min(axes[k].first), high.max(axes[k].end())])
-}
-
-/// Appends a group.
-fn push<X: Real, const L: usize, const D: usize>(
-    groups: &mut Groups<X, L>,
-    keys: &[Key],
-    along: &[[Along; D]],
-    weights: &[[f64; 2]],
-    origin: [u32; 3],
-    size: [usize; 3],
-    unit: f64,
-) {
-    let windows: [[u32; 2]; D] = std::array::from_fn(|k| window(along, k));
-    let mut width = [1; 3];
-    let mut first = 0;
-    for k in (0..D).rev() {
-        width[k] = (windows[k][1] - windows[k][0]) as u8;
-        first = first * size[k] + (windows[k][0] - origin[k]) as usize;
-    }
-    let group = Group { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
-    for k in 0..D {
-        let start = groups.weights.len();
-        let nodes = usize::from(width[k]);
-        groups.weights.resize(start + 2 * nodes, [X::zero(); L]);
-        for (lane, axes) in along.iter().enumerate() {
-            let at = start + (axes[k].first - windows[k][0]) as usize;
-            for (i, [n, dn]) in weights[axes[k].start..axes[k].start + axes[k].width as usize].iter().enumerate() {
-                groups.weights[at + i][lane] = X::lit(*n);
-                groups.weights[at + nodes + i][lane] = X::lit(dn * unit);
-            }
-        }
-    }
-    groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
-    groups.windows.push(group);
-}
-
-/// Which nodes of the box have N ≠ 0 or ∇N ≠ 0 for some particle.
-fn active<const D: usize>(block: &Block, along: &[[Along; D]], weights: &[[f64; 2]]) -> Vec<bool> {
-    let mut active = vec![false; block.box_nodes()];
-    let mut last = None;
-    for ((group, lane), axes) in block.groups.slots().zip(along) {
-        let list = |k: usize| &weights[axes[k].start..axes[k].start + axes[k].width as usize];
-        let smallest: f64 = (0..D).map(|k| list(k).iter().fold(f64::INFINITY, |low, w| low.min(w[0].abs()))).product();
-        if smallest > 0.0 {
-            // No N vanishes, nor underflows: the whole of the particle's window, often that of the particle before it.
-            let mut begin = [0; 3];
-            let mut width = [1; 3];
-            for k in 0..D {
-                begin[k] = (axes[k].first - block.origin[k]) as usize;
-                width[k] = axes[k].width as usize;
-            }
-            if last == Some((begin, width)) {
-                continue;
-            }
-            last = Some((begin, width));
-            for z in begin[2]..begin[2] + width[2] {
-                for y in begin[1]..begin[1] + width[1] {
-                    let row = (z * block.size[1] + y) * block.size[0] + begin[0];
-                    active[row..row + width[0]].fill(true);
-                }
-            }
-        } else {
-            block.entries::<D>(group, lane, |place, _, _| active[place] = true);
-        }
-    }
-    active
-}
-
 /// Numbers the active nodes in the order of the grid, and gives each block those of its box. `active` marks them in the
 /// boxes.
-pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], active: &[Vec<bool>]) -> Nodes {
+pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], active: &[Active]) -> Nodes {
     /// A row of a box along x, by the grid number of the row's node at x = 0.
     struct Row {
         start: u64,
         x: usize,
         block: usize,
-        /// Its first node in the box, and the end of the row.
+        /// Its first node in the box.
         place: usize,
-        end: usize,
+        /// Its nodes that are active.
+        active: u64,
     }
+
+    impl Row {
+        /// The active nodes, counted from the beginning of the row.
+        fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
+            let mut left = self.active;
+            std::iter::from_fn(move || {
+                let next = (left != 0).then(|| left.trailing_zeros() as usize);
+                left &= left.wrapping_sub(1);
+                next
+            })
+        }
+
+        /// The node behind the last active one.
+        fn end(&self) -> usize {
+            self.x + (u64::BITS - self.active.leading_zeros()) as usize
+        }
+    }
+
     /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
     fn apart(mut line: &[Row]) -> Vec<&[Row]> {
         let mut parts = Vec::new();
@@ -209,7 +270,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
             let mut reach = first.x;
             let gap = line.iter().position(|row| {
                 let beyond = row.x > reach;
-                reach = reach.max(row.x + row.end - row.place);
+                reach = reach.max(row.end());
                 beyond
             });
             let (part, rest) = line.split_at(gap.unwrap_or(line.len()));
@@ -227,7 +288,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
                 let x = index[0] as usize;
                 index[0] = 0;
                 let place = (z * ny + y) * nx;
-                rows.push(Row { start: grid.id(index), x, block: b, place, end: place + nx });
+                rows.push(Row { start: grid.id(index), x, block: b, place, active: active[b][z * ny + y] });
             }
         }
     }
@@ -238,11 +299,8 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
         let low = same[0].x;
         numbers.clear();
         for row in same {
-            let active = &active[row.block][row.place..row.end];
-            numbers.resize(numbers.len().max(row.x - low + active.len()), u32::MAX);
-            for (number, _) in numbers[row.x - low..].iter_mut().zip(active).filter(|(_, active)| **active) {
-                *number = 0;
-            }
+            numbers.resize(numbers.len().max(row.end() - low), u32::MAX);
+            row.nodes().for_each(|node| numbers[row.x - low + node] = 0);
         }
         for (x, number) in numbers.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
             *number = ids.len() as u32;
@@ -250,9 +308,9 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
         }
         for row in same {
             let block = &mut blocks[row.block];
-            for place in (row.place..row.end).filter(|&place| active[row.block][place]) {
-                block.nodes.push(numbers[row.x - low + place - row.place]);
-                block.places.push(place as u32);
+            for node in row.nodes() {
+                block.nodes.push(numbers[row.x - low + node]);
+                block.places.push((row.place + node) as u32);
             }
         }
     }

@@ -20,6 +20,10 @@ pub(super) trait Lanes<const L: usize>: Arithmetic {
     fn load(self, x: &[Self::X; L]) -> Self::N;
     fn store(self, v: Self::N, out: &mut [Self::X; L]);
     fn abs(self, a: Self::N) -> Self::N;
+    fn sub(self, a: Self::N, b: Self::N) -> Self::N;
+    fn div(self, a: Self::N, b: Self::N) -> Self::N;
+    /// `then` where a < b, and `otherwise` elsewhere.
+    fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N;
     /// Rows become columns.
     fn transpose(self, rows: [Self::N; L]) -> [Self::N; L];
 }
@@ -98,6 +102,18 @@ macro_rules! portable {
                 }
                 out
             }
+            #[inline(always)]
+            fn sub(self, a: Self::N, b: Self::N) -> Self::N {
+                std::array::from_fn(|i| a[i] - b[i])
+            }
+            #[inline(always)]
+            fn div(self, a: Self::N, b: Self::N) -> Self::N {
+                std::array::from_fn(|i| a[i] / b[i])
+            }
+            #[inline(always)]
+            fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N {
+                std::array::from_fn(|i| if a[i] < b[i] { then[i] } else { otherwise[i] })
+            }
         }
     };
 }
@@ -118,7 +134,7 @@ mod x86 {
     /// Vectors of one register.
     macro_rules! whole {
         ($s:ty, $this:ident => $simd:expr, $vector:ty, $number:ty, $lanes:expr,
-         $add:ident, $mul:ident, $mul_add:ident, $fnmadd:ident, $splat:ident, $abs:ident, $transpose:path) => {
+         $add:ident, $mul:ident, $mul_add:ident, $fnmadd:ident, $splat:ident, $abs:ident, $sub:ident, $div:ident, $less:ident, $select:ident, $transpose:path) => {
             impl Arithmetic for $s {
                 type N = $vector;
                 #[inline(always)]
@@ -162,6 +178,18 @@ mod x86 {
                     $simd.$abs(a)
                 }
                 #[inline(always)]
+                fn sub($this, a: $vector, b: $vector) -> $vector {
+                    $simd.$sub(a, b)
+                }
+                #[inline(always)]
+                fn div($this, a: $vector, b: $vector) -> $vector {
+                    $simd.$div(a, b)
+                }
+                #[inline(always)]
+                fn where_less($this, a: $vector, b: $vector, then: $vector, otherwise: $vector) -> $vector {
+                    $simd.$select($simd.$less(a, b), then, otherwise)
+                }
+                #[inline(always)]
                 fn transpose($this, rows: [$vector; $lanes]) -> [$vector; $lanes] {
                     $transpose($simd, rows)
                 }
@@ -170,9 +198,9 @@ mod x86 {
     }
 
     whole!(V4, self => self, f64x8, f64, LANES,
-        add_f64s, mul_f64s, mul_add_f64s, _mm512_fnmadd_pd, splat_f64s, abs_f64s, transpose_8);
+        add_f64s, mul_f64s, mul_add_f64s, _mm512_fnmadd_pd, splat_f64s, abs_f64s, sub_f64s, div_f64s, less_than_f64s, select_f64s, transpose_8);
     whole!(Single<V4>, self => self.0, f32x16, f32, SINGLE_LANES,
-        add_f32s, mul_f32s, mul_add_f32s, _mm512_fnmadd_ps, splat_f32s, abs_f32s, transpose_16);
+        add_f32s, mul_f32s, mul_add_f32s, _mm512_fnmadd_ps, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s, transpose_16);
 
     /// Quarters 0 and 2 of both.
     const EVEN: i32 = 0b10_00_10_00;
@@ -243,7 +271,7 @@ mod x86 {
     /// Vectors of two registers.
     macro_rules! halves {
         ($s:ty, $this:ident => $simd:expr, $half:ty, $number:ty, $lanes:expr,
-         $add:ident, $mul:ident, $mul_add:ident, $fnmadd:ident, $splat:ident, $abs:ident) => {
+         $add:ident, $mul:ident, $mul_add:ident, $fnmadd:ident, $splat:ident, $abs:ident, $sub:ident, $div:ident, $less:ident, $select:ident) => {
             impl Arithmetic for $s {
                 type N = [$half; 2];
                 #[inline(always)]
@@ -292,14 +320,27 @@ mod x86 {
                 fn abs($this, a: Self::N) -> Self::N {
                     [$simd.$abs(a[0]), $simd.$abs(a[1])]
                 }
+                #[inline(always)]
+                fn sub($this, a: Self::N, b: Self::N) -> Self::N {
+                    [$simd.$sub(a[0], b[0]), $simd.$sub(a[1], b[1])]
+                }
+                #[inline(always)]
+                fn div($this, a: Self::N, b: Self::N) -> Self::N {
+                    [$simd.$div(a[0], b[0]), $simd.$div(a[1], b[1])]
+                }
+                #[inline(always)]
+                fn where_less($this, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N {
+                    let half = |i: usize| $simd.$select($simd.$less(a[i], b[i]), then[i], otherwise[i]);
+                    [half(0), half(1)]
+                }
             }
         };
     }
 
     halves!(V3, self => self, f64x4, f64, LANES,
-        add_f64s, mul_f64s, mul_add_f64s, _mm256_fnmadd_pd, splat_f64s, abs_f64s);
+        add_f64s, mul_f64s, mul_add_f64s, _mm256_fnmadd_pd, splat_f64s, abs_f64s, sub_f64s, div_f64s, less_than_f64s, select_f64s);
     halves!(Single<V3>, self => self.0, f32x8, f32, SINGLE_LANES,
-        add_f32s, mul_f32s, mul_add_f32s, _mm256_fnmadd_ps, splat_f32s, abs_f32s);
+        add_f32s, mul_f32s, mul_add_f32s, _mm256_fnmadd_ps, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s);
 }
 
 macro_rules! number {
@@ -362,7 +403,16 @@ mod tests {
             }
             let columns = s.transpose(rows);
             let (a, b, c) = (rows[1], columns[2], s.splat(X::lit(0.3)));
-            let results = [s.add(a, b), s.mul(a, b), s.mul_add(a, b, c), s.mul_sub(a, b, c), s.abs(a)];
+            let results = [
+                s.add(a, b),
+                s.mul(a, b),
+                s.mul_add(a, b, c),
+                s.mul_sub(a, b, c),
+                s.abs(a),
+                s.sub(a, b),
+                s.div(a, b),
+                s.where_less(a, b, c, a),
+            ];
             let mut out = Vec::new();
             for v in columns.into_iter().chain(results) {
                 let mut numbers = [X::zero(); L];
@@ -382,9 +432,13 @@ mod tests {
             }
             for k in 0..L {
                 let (a, b, c) = (entry(1, k), entry(k, 2), 0.3);
-                let expected = [a + b, a * b, a * b + c, c - a * b, a.abs()];
+                let expected = [a + b, a * b, a * b + c, c - a * b, a.abs(), a - b, a / b, if a < b { c } else { a }];
                 for (result, expected) in results[L..].iter().zip(expected) {
-                    assert!((result[k].value() - expected).abs() <= epsilon, "{} for {expected}", result[k]);
+                    assert!(
+                        (result[k].value() - expected).abs() <= epsilon * expected.abs().max(1.0),
+                        "{} for {expected}",
+                        result[k]
+                    );
                 }
             }
         }

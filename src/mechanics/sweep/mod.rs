@@ -9,6 +9,7 @@
 mod block;
 mod builder;
 mod closed;
+mod columns;
 mod kernel;
 mod lanes;
 mod laws;
@@ -140,10 +141,48 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
+        Self::renewed(None, approximation, grid, positions, precision)
+    }
+
+    /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
+    /// particles. What comes out does not depend on them.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::solver::Precision;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (shape, grid) = (&simulation.approximation, &simulation.grid);
+    /// let before = &simulation.particles.position;
+    /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
+    /// let (last, _) = Supports::new(shape, grid, before)?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, Precision::Double)?;
+    /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
+    /// assert_eq!(nodes, same_nodes);
+    /// let field = direction(nodes.len(), 1);
+    /// assert_eq!(renewed.values(&field), anew.values(&field));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn renewed<A: ShapeFunction>(
+        spare: Option<Self>,
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+        precision: Precision,
+    ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
                 let single = precision == Precision::Mixed;
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, single)?;
+                let spare = spare.and_then(|spare| match spare.0 {
+                    Way::Plain(_) => None,
+                    Way::Tiled(tiled) => Some(tiled),
+                });
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, single, spare)?;
                 Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
             }
             _ => Self::plain(approximation, grid, positions),
@@ -678,10 +717,7 @@ impl<const D: usize> Supports<D> {
 
 /// `f(0), …, f(count − 1)`, on all cores; the error is that of the smallest index.
 fn ordered<R: Send, E: Send>(count: usize, f: impl Fn(usize) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
-    if count <= 1 || !parallel::several() {
-        return (0..count).map(f).collect();
-    }
-    parallel::map(count, f).into_iter().collect()
+    parallel::map(0..count, f).into_iter().collect()
 }
 
 fn infallible<R>(result: Result<R, std::convert::Infallible>) -> R {

@@ -19,34 +19,69 @@ const RUN: usize = 4096;
 /// A particle and its place: (block · cells of a block + cell in the block, particle).
 pub(super) type Key = (u64, u32);
 
-/// All particles by block, cell and number; the particle of the smallest number that lies in no cell, if there is one.
-pub(super) fn sorted<const D: usize>(grid: &Grid<D>, positions: &[Vector<f64, D>]) -> Result<Vec<Key>, usize> {
+/// All particles by block, cell and number; the particle of the smallest number that lies in no cell, if there is one. Particles
+/// come in the order `before`, if there is one for as many, such as that of the last step: the nearer it is, the sooner they are sorted.
+pub(super) fn sorted<const D: usize>(
+    grid: &Grid<D>,
+    positions: &[Vector<f64, D>],
+    before: Option<impl Iterator<Item = u32>>,
+) -> Result<Vec<Key>, usize> {
     let edge = edge(D);
     let blocks: [u64; D] = std::array::from_fn(|k| u64::from(grid.cells[k]).div_ceil(edge));
-    let key = |p: usize| {
-        let cell = grid.cell(&positions[p])?;
+    let key = |p: u32| {
+        let cell = grid.cell(&positions[p as usize])?;
         let (mut block, mut local) = (0, 0);
         for k in (0..D).rev() {
             let at = u64::from(cell[k]);
             block = block * blocks[k] + at / edge;
             local = local * edge + at % edge;
         }
-        Some((block * cells::<D>() + local, p as u32))
+        Some(block * cells::<D>() + local)
     };
-    let mut keys: Vec<Key> = vec![(0, 0); positions.len()];
-    parallel::for_each(keys.chunks_mut(RUN).enumerate(), |(run, keys)| {
-        for (p, slot) in (run * RUN..).zip(keys) {
-            *slot = key(p).unwrap_or((u64::MAX, p as u32));
+    let mut keys: Vec<Key> = match before {
+        Some(order) => order.map(|p| (0, p)).collect(),
+        None => (0..positions.len() as u32).map(|p| (0, p)).collect(),
+    };
+    parallel::for_each(keys.chunks_mut(RUN), |keys| {
+        for (cell, p) in keys {
+            *cell = key(*p).unwrap_or(u64::MAX);
         }
     });
-    if keys.windows(2).any(|pair| pair[0] > pair[1]) {
-        parallel::sort(&mut keys);
-    }
+    sort(&mut keys);
     // Particles in no cell come last, by number.
     let outside = keys.partition_point(|key| key.0 < u64::MAX);
     match keys.get(outside) {
         Some(&(_, p)) => Err(p as usize),
         None => Ok(keys),
+    }
+}
+
+/// Sorts keys most of which may be in order: those that are not are taken out, sorted, and merged into the rest ("drop-merge sort").
+fn sort(keys: &mut [Key]) {
+    let (mut kept, mut dropped) = (0, Vec::new());
+    for i in 0..keys.len() {
+        let key = keys[i];
+        if kept == 0 || keys[kept - 1] < key {
+            keys[kept] = key;
+            kept += 1;
+        } else if kept >= 2 && keys[kept - 2] < key {
+            // The odd one out is the one before.
+            dropped.push(std::mem::replace(&mut keys[kept - 1], key));
+        } else {
+            dropped.push(key);
+        }
+    }
+    parallel::sort(&mut dropped);
+    // From the back, so that what was kept is read before it is written over.
+    for to in (0..keys.len()).rev() {
+        let Some(&last) = dropped.last() else { break };
+        keys[to] = if kept > 0 && keys[kept - 1] > last {
+            kept -= 1;
+            keys[kept]
+        } else {
+            dropped.pop();
+            last
+        };
     }
 }
 
@@ -63,4 +98,31 @@ pub(super) fn block<const D: usize>(key: &Key) -> u64 {
 /// Whether `next` is the cell after `cell` along x in the same row of a block.
 pub(super) fn follows<const D: usize>(cell: &Key, next: &Key) -> bool {
     next.0 == cell.0 + 1 && !next.0.is_multiple_of(edge(D))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sorting_needs_no_order_and_uses_any() {
+        let number = |i: u64| (i * 0x9e37_79b9_7f4a_7c15) >> 40;
+        let orders: [&dyn Fn(u64) -> u64; 5] = [
+            &|i| i,
+            &|i| 1000 - i,
+            &number,
+            // One far too large at the beginning, and every tenth out of its place.
+            &|i| if i == 0 { 5000 } else { i },
+            &|i| if i % 10 == 3 { number(i) % 1000 } else { i },
+        ];
+        for order in orders {
+            for count in [0, 1, 2, 3, 1000] {
+                let mut keys: Vec<Key> = (0..count).map(|i| (order(i), i as u32)).collect();
+                let mut expected = keys.clone();
+                expected.sort_unstable();
+                sort(&mut keys);
+                assert_eq!(keys, expected);
+            }
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 use super::block::{Block, Groups};
 use super::builder::{block, number};
+use super::columns::Family;
 use super::kernel::{Quadratic, Rows, of_lane, pair, set_lane};
 use super::lanes::LANES;
 use super::laws::Laws;
@@ -17,6 +18,7 @@ use crate::grid::Grid;
 use crate::material::Law;
 use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
+use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
@@ -38,13 +40,14 @@ pub(super) struct Tiled<const D: usize> {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// As [`super::Supports::new`], for a shape function that is a product.
+    /// As [`super::Supports::new`], for a shape function that is a product. The arrays of `spare` are used again, and its order.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         product: &dyn Separable,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
         single: bool,
+        spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
         // The product names the axis that fails; the shape function names the whole position.
         let failure = |particle: usize, source: Option<ApproximationError>| {
@@ -53,12 +56,17 @@ impl<const D: usize> Tiled<D> {
             let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             SupportError { particle, source: whole.err().or(source).unwrap_or_else(outside) }
         };
-        let keys = order::sorted(grid, positions).map_err(|particle| failure(particle, None))?;
-        let mut runs: Vec<&[Key]> = Vec::new();
-        for run in keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)) {
-            runs.push(run);
-        }
-        let built = infallible(ordered(runs.len(), |b| Ok(block(product, grid, positions, runs[b], single))));
+        let spare = spare.filter(|spare| spare.particles() == positions.len());
+        let before = spare.as_ref().map(|spare| spare.blocks.iter().flat_map(|block| block.groups.in_order()));
+        let keys = order::sorted(grid, positions, before).map_err(|particle| failure(particle, None))?;
+        let (mut old, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
+        let runs: Vec<&[Key]> = keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)).collect();
+        old.resize_with(runs.len(), Block::default);
+        let family = Family::new(product);
+        let parts = runs.into_iter().zip(old);
+        let built = parallel::map_with(parts, |scratch, (keys, spare)| {
+            block(family, grid, positions, keys, single, spare, scratch)
+        });
         let mut first_failure: Option<(usize, ApproximationError)> = None;
         let (mut blocks, mut active) = (Vec::with_capacity(built.len()), Vec::with_capacity(built.len()));
         let (mut first, mut first_single) = (0, 0);
@@ -85,7 +93,7 @@ impl<const D: usize> Tiled<D> {
             return Err(failure(p, Some(source)));
         }
         let nodes = number(grid, &mut blocks, &active);
-        let mut slots = vec![0; positions.len()];
+        slots.resize(positions.len(), 0);
         for block in &blocks {
             block.groups.each(|group, lane, p| slots[p] = ((block.groups.first + group) * LANES + lane) as u32);
         }

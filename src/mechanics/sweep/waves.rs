@@ -115,10 +115,10 @@ pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
         return;
     }
     for blocks in tiled.blocks.chunks(WAVE) {
-        let mut parts: Vec<Vec<(usize, R)>> = blocks.iter().map(|_| Vec::new()).collect();
-        parallel::for_each_with(parts.iter_mut().zip(blocks), |scratch, (part, block)| {
-            part.reserve_exact(block.groups.len() * LANES);
+        let parts = parallel::map_with(blocks.iter(), |scratch, block: &Block| {
+            let mut part = Vec::with_capacity(block.groups.len() * LANES);
             gather(scratch, block, &mut |p, result| part.push((p, result)));
+            part
         });
         for (p, result) in parts.into_iter().flatten() {
             take(p, result);
@@ -153,11 +153,7 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
         visit(block, chunk, rows)
     };
     if parallel::several() && tiled.groups() >= PARALLEL {
-        let mut results: Vec<Option<R>> = tiled.blocks.iter().map(|_| None).collect();
-        let parts = results.iter_mut().zip(tiled.blocks.iter().zip(chunks));
-        parallel::for_each_with(parts, |scratch, (result, part)| *result = Some(one(scratch, part)));
-        // Every block has one.
-        results.into_iter().flatten().collect()
+        parallel::map_with(tiled.blocks.iter().zip(chunks), one)
     } else {
         let mut scratch = Default::default();
         tiled.blocks.iter().zip(chunks).map(|both| one(&mut scratch, both)).collect()

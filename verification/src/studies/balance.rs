@@ -99,6 +99,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
         },
         clock: Clock::new(STEP, 0),
         external_work: 0.0,
+        workspace: Default::default(),
     })
 }
 

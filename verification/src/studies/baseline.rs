@@ -299,5 +299,6 @@ fn strained_block<const D: usize>(approximation: Approximation, law: Material, c
         settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),
         external_work: 0.0,
+        workspace: Default::default(),
     }
 }

@@ -158,6 +158,7 @@ fn simulate<P: Problem>(
         },
         clock: Clock::new(1.0 / f64::from(steps), 0),
         external_work: 0.0,
+        workspace: Default::default(),
     };
     for _ in 0..steps {
         forced::step(&mut simulation, |p, t| body_force(problem, &law, density, &reference[p], t))?;

@@ -266,6 +266,7 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
         },
         clock: Clock::new(dt, 0),
         external_work: 0.0,
+        workspace: Default::default(),
     })
 }
 

@@ -175,5 +175,6 @@ pub(super) fn cloud<const D: usize, L: Law>(
         settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(dt, 0),
         external_work: 0.0,
+        workspace: Default::default(),
     })
 }

@@ -74,6 +74,7 @@ pub(super) fn simulation<const D: usize>(
         settings: settings(1.0),
         clock: Clock::new(dt, 0),
         external_work: 0.0,
+        workspace: Default::default(),
     }
 }
 

@@ -74,5 +74,6 @@ pub(super) fn block<const D: usize>(
         },
         clock: Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0),
         external_work: 0.0,
+        workspace: Default::default(),
     })
 }

@@ -1,0 +1,149 @@
+//! Functions away from walls: there they depend on the place in the cell alone, and are arithmetic without a branch, for one number or
+//! for the lanes of a vector.
+
+use super::kernel::Kernel;
+use super::{Bspline, Gimp, Lme, bspline};
+use std::ops::{Add, Div, Mul, Sub};
+
+/// The most nodes on a side, beyond those of the cell, that vector lanes have room for.
+pub(crate) const FURTHEST: usize = 4;
+
+/// Nodes of a [`Column`].
+pub(crate) const NODES: usize = 2 * FURTHEST + 2;
+
+/// A number, or the lanes of a vector; every operation is rounded, so that both have the same bits.
+pub(crate) trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The constant `x`, beside a number of the same kind.
+    fn constant(self, x: f64) -> Self;
+
+    /// `then` where `self` < `other`, and `otherwise` elsewhere.
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self;
+
+    /// |x|
+    fn abs(self) -> Self;
+}
+
+impl Lane for f64 {
+    #[inline(always)]
+    fn constant(self, x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+        if self < other { then } else { otherwise }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+}
+
+/// The functions of an axis at one coordinate: the nodes cell − M … cell + 1 + M, zero where a function does not reach.
+pub(crate) struct Column<T> {
+    /// N
+    pub values: [T; NODES],
+    /// dN/dx
+    pub derivatives: [T; NODES],
+    /// The last correction of an iteration, relative; if it is larger than [`SETTLED`],
+    /// [`Separable::axis`](super::Separable::axis) has to find the functions.
+    pub correction: T,
+}
+
+/// A correction below this leaves an error of its square.
+pub(crate) const SETTLED: f64 = 1e-9;
+
+/// A family of functions away from walls.
+pub(crate) trait Interior {
+    /// What is looked up before the arithmetic begins.
+    #[inline(always)]
+    fn start(&self, _below: f64) -> f64 {
+        0.0
+    }
+
+    /// The functions at the distances `below`·h and `above`·h from the nodes of the cell.
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, start: T, spacing: f64) -> Column<T>;
+}
+
+/// Something to be done with the functions of one family, which reach `M` nodes beyond those of the cell.
+pub(crate) trait InteriorVisitor {
+    /// Does it.
+    fn visit<const M: usize>(self, interior: &impl Interior);
+}
+
+/// A family that has vector lanes.
+#[derive(Clone, Copy, Debug)]
+pub enum Shipped<'a> {
+    /// See [`Linear`](super::Linear).
+    Linear,
+    /// See [`Gimp`].
+    Gimp(&'a Gimp),
+    /// See [`Bspline`].
+    Bspline(Bspline),
+    /// See [`Lme`].
+    Lme(&'a Lme),
+}
+
+impl Shipped<'_> {
+    /// Functions vanish from this distance on, in units of the spacing, but for those of the cell; at most [`FURTHEST`] + 1.
+    pub(crate) fn radius(&self) -> f64 {
+        match self {
+            Self::Linear => 1.0,
+            Self::Gimp(gimp) => gimp.radius(),
+            Self::Bspline(Bspline::Quadratic) => bspline::Quadratic.radius(),
+            Self::Bspline(Bspline::Cubic) => bspline::Cubic.radius(),
+            Self::Lme(lme) => lme.radius(),
+        }
+    }
+
+    /// Calls `visitor` with the functions, by a type that leaves no branch in a loop over particles.
+    pub(crate) fn with(&self, visitor: impl InteriorVisitor) {
+        match self {
+            Self::Linear => visitor.visit::<0>(&super::Linear),
+            Self::Gimp(gimp) => visitor.visit::<1>(*gimp),
+            Self::Bspline(Bspline::Quadratic) => visitor.visit::<1>(&bspline::Quadratic),
+            Self::Bspline(Bspline::Cubic) => visitor.visit::<1>(&bspline::Cubic),
+            Self::Lme(lme) if lme.radius() <= 2.0 => visitor.visit::<1>(*lme),
+            Self::Lme(lme) if lme.radius() <= 3.0 => visitor.visit::<2>(*lme),
+            Self::Lme(lme) if lme.radius() <= 4.0 => visitor.visit::<3>(*lme),
+            Self::Lme(lme) => visitor.visit::<FURTHEST>(*lme),
+        }
+    }
+}
+
+/// The distance of the `i`-th node of a column.
+#[inline(always)]
+pub(super) fn distance<T: Lane, const M: usize>(i: usize, below: T, above: T) -> T {
+    if i <= M {
+        below + below.constant((M - i) as f64)
+    } else {
+        above.constant(0.0) - (above + above.constant((i - M - 1) as f64))
+    }
+}
+
+impl Interior for super::Linear {
+    #[inline(always)]
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, _: T, spacing: f64) -> Column<T> {
+        let zero = below.constant(0.0);
+        let (mut values, mut derivatives) = ([zero; NODES], [zero; NODES]);
+        [values[M], values[M + 1]] = [above, below];
+        [derivatives[M], derivatives[M + 1]] = [below.constant(-1.0 / spacing), below.constant(1.0 / spacing)];
+        Column { values, derivatives, correction: zero }
+    }
+}
+
+impl<K: Kernel> Interior for K {
+    #[inline(always)]
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, _: T, spacing: f64) -> Column<T> {
+        let zero = below.constant(0.0);
+        let (mut values, mut derivatives) = ([zero; NODES], [zero; NODES]);
+        for i in 0..2 * M + 2 {
+            let (value, slope) = self.at(distance::<T, M>(i, below, above));
+            (values[i], derivatives[i]) = (value, slope / below.constant(spacing));
+        }
+        Column { values, derivatives, correction: zero }
+    }
+}

@@ -1,0 +1,306 @@
+//! The functions of an axis for the particles of a group, a lane each.
+//!
+//! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, each
+//! particle asks for its list.
+
+use super::WIDEST;
+use super::lanes::{LANES, Lanes, Number, WithLanes};
+use crate::approximation::{
+    self, ApproximationError, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED, Separable,
+    Shipped,
+};
+use crate::grid::Axis;
+use crate::scalar::Real;
+use std::ops::{Add, Div, Mul, Range, Sub};
+
+/// A product of functions, and how far they reach if they have vector lanes.
+#[derive(Clone, Copy)]
+pub(super) struct Family<'a> {
+    product: &'a dyn Separable,
+    shipped: Option<(Shipped<'a>, f64)>,
+}
+
+/// Particles on an axis.
+#[derive(Default)]
+pub(super) struct Along {
+    /// Their coordinates.
+    pub(super) x: Vec<f64>,
+    /// First node and end of each list.
+    pub(super) spans: Vec<[u32; 2]>,
+    cells: Vec<u32>,
+    below: Vec<f64>,
+    above: Vec<f64>,
+    /// Whether a wall cuts the list.
+    cut: Vec<bool>,
+    list: AxisWeights,
+}
+
+impl<'a> Family<'a> {
+    pub(super) fn new(product: &'a dyn Separable) -> Self {
+        Self { product, shipped: product.shipped().map(|shipped| (shipped, shipped.radius())) }
+    }
+
+    /// The error of the functions at `x`, if they have one.
+    pub(super) fn error(&self, axis: &Axis, x: f64) -> Option<ApproximationError> {
+        self.product.axis(axis, x, &mut AxisWeights::default()).err()
+    }
+
+    /// Finds the lists of the particles at `along.x`, which lie on the axis.
+    ///
+    /// # Errors
+    /// That of the first particle that has none, with its place.
+    pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), (usize, ApproximationError)> {
+        approximation::check(axis).map_err(|error| (0, error))?;
+        if let Some((_, radius)) = self.shipped {
+            f64::widest(Places { axis, radius, along });
+            return Ok(());
+        }
+        along.spans.clear();
+        for (i, &x) in along.x.iter().enumerate() {
+            self.product.axis(axis, x, &mut along.list).map_err(|error| (i, error))?;
+            along.spans.push(span(&along.list));
+        }
+        Ok(())
+    }
+
+    /// The functions of the particles `range`, at most eight.
+    ///
+    /// # Errors
+    /// That of the first particle that has none, with its place.
+    pub(super) fn columns(
+        &self,
+        axis: &Axis,
+        along: &mut Along,
+        range: Range<usize>,
+        out: &mut Columns,
+    ) -> Result<(), (usize, ApproximationError)> {
+        let mut listed = [true; LANES];
+        if let Some((shipped, radius)) = self.shipped {
+            let (mut below, mut above) = ([0.5; LANES], [0.5; LANES]);
+            for (lane, i) in range.clone().enumerate().take(LANES) {
+                (below[lane], above[lane]) = (along.below[i], along.above[i]);
+            }
+            let mut corrections = [0.0; LANES];
+            shipped.with(InLanes { below, above, spacing: axis.spacing, radius, corrections: &mut corrections, out });
+            for (lane, i) in range.clone().enumerate().take(LANES) {
+                out.first[lane] += i64::from(along.cells[i]);
+                listed[lane] = along.cut[i] || corrections[lane].is_nan() || corrections[lane] > SETTLED;
+            }
+        }
+        for (lane, i) in range.clone().enumerate() {
+            out.spans[lane] = along.spans[i];
+            if listed[lane] {
+                self.product.axis(axis, along.x[i], &mut along.list).map_err(|error| (i, error))?;
+                out.take_list(lane, &along.list);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// First node and end of a list.
+fn span(list: &AxisWeights) -> [u32; 2] {
+    [list.first, list.first + list.values.len() as u32]
+}
+
+/// Finds cells, places in them, and first nodes and ends.
+struct Places<'a> {
+    axis: &'a Axis,
+    radius: f64,
+    along: &'a mut Along,
+}
+
+impl WithLanes<f64, LANES> for Places<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<LANES, X = f64>>(self, _: S) {
+        let Self { axis, radius, along } = self;
+        let count = along.x.len();
+        along.cells.resize(count, 0);
+        along.below.resize(count, 0.0);
+        along.above.resize(count, 0.0);
+        along.spans.resize(count, [0; 2]);
+        along.cut.resize(count, false);
+        let last = f64::from(axis.cells);
+        let places = along.cells.iter_mut().zip(&mut along.below).zip(&mut along.above);
+        for (&x, ((cell, below), above)) in along.x.iter().zip(places) {
+            let place = Place::at(axis, ((x - axis.origin) / axis.spacing).min(last));
+            (*cell, *below, *above) = (place.cell, place.below, place.above);
+        }
+        // j ≥ 1 with j < R − d
+        let reach = |distance: f64| (1..=FURTHEST).map(|j| u32::from((j as f64) < radius - distance)).sum::<u32>();
+        let lists = along.spans.iter_mut().zip(&mut along.cut);
+        for (((&cell, &below), &above), (span, cut)) in
+            along.cells.iter().zip(&along.below).zip(&along.above).zip(lists)
+        {
+            let (lower, upper) = (reach(below), reach(above));
+            *cut = (cell < lower) | (cell + 1 + upper > axis.cells);
+            *span = [cell - lower.min(cell), (cell + 2 + upper).min(axis.cells + 1)];
+        }
+    }
+}
+
+/// The functions of an axis at up to eight coordinates.
+#[derive(Default)]
+pub(super) struct Columns {
+    /// N by rows: the i-th is that of the node `first + i` of each lane.
+    values: [[f64; LANES]; WIDEST],
+    /// dN/dx
+    derivatives: [[f64; LANES]; WIDEST],
+    first: [i64; LANES],
+    /// First node and end of each list.
+    pub(super) spans: [[u32; 2]; LANES],
+    /// The smallest |N| of each list.
+    pub(super) smallest: [f64; LANES],
+}
+
+impl Columns {
+    /// Puts a list into a lane.
+    fn take_list(&mut self, lane: usize, list: &AxisWeights) {
+        self.first[lane] = i64::from(list.first);
+        self.spans[lane] = span(list);
+        self.smallest[lane] = list.values.iter().fold(f64::INFINITY, |low, n| low.min(n.abs()));
+        let nodes =
+            list.values.iter().zip(&list.derivatives).map(|(&n, &dn)| (n, dn)).chain(std::iter::repeat((0.0, 0.0)));
+        for ((n, dn), (values, derivatives)) in nodes.zip(self.values.iter_mut().zip(&mut self.derivatives)) {
+            (values[lane], derivatives[lane]) = (n, dn);
+        }
+    }
+
+    /// N and dN/dx of a node in a list.
+    pub(super) fn at(&self, lane: usize, node: u32) -> [f64; 2] {
+        let row = (i64::from(node) - self.first[lane]) as usize;
+        [self.values[row][lane], self.derivatives[row][lane]]
+    }
+
+    /// Writes N and dN/dx times `unit` of the first `count` lanes to the rows of the nodes `low ..`, in the lanes from `at` on. What is
+    /// zero is not written.
+    #[inline(always)]
+    pub(super) fn write<X: Real, const L: usize>(
+        &self,
+        count: usize,
+        low: u32,
+        unit: f64,
+        values: &mut [[X; L]],
+        derivatives: &mut [[X; L]],
+        at: usize,
+    ) {
+        if count == LANES && self.first.iter().all(|&first| first == self.first[0] && first <= i64::from(low)) {
+            // All in one cell: whole rows.
+            for (i, (values, derivatives)) in values.iter_mut().zip(derivatives).enumerate() {
+                let row = (i64::from(low) - self.first[0]) as usize + i;
+                for lane in 0..LANES {
+                    values[at + lane] = X::lit(self.values[row][lane]);
+                    derivatives[at + lane] = X::lit(self.derivatives[row][lane] * unit);
+                }
+            }
+            return;
+        }
+        for lane in 0..count {
+            let [first, end] = self.spans[lane];
+            let rows = (i64::from(first) - self.first[lane]) as usize;
+            for (i, node) in (first..end).enumerate() {
+                let to = (node - low) as usize;
+                values[to][at + lane] = X::lit(self.values[rows + i][lane]);
+                derivatives[to][at + lane] = X::lit(self.derivatives[rows + i][lane] * unit);
+            }
+        }
+    }
+}
+
+/// Finds the columns of one family.
+struct InLanes<'a> {
+    below: [f64; LANES],
+    above: [f64; LANES],
+    spacing: f64,
+    radius: f64,
+    corrections: &'a mut [f64; LANES],
+    /// `first` is relative to the cell.
+    out: &'a mut Columns,
+}
+
+impl InteriorVisitor for InLanes<'_> {
+    fn visit<const M: usize>(self, interior: &impl Interior) {
+        self.out.first = [-(M as i64); LANES];
+        let starts = self.below.map(|below| interior.start(below));
+        f64::widest(Evaluate::<_, M> { interior, starts, lanes: self });
+    }
+}
+
+struct Evaluate<'a, 'b, I, const M: usize> {
+    interior: &'a I,
+    starts: [f64; LANES],
+    lanes: InLanes<'b>,
+}
+
+impl<I: Interior, const M: usize> WithLanes<f64, LANES> for Evaluate<'_, '_, I, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
+        let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;
+        let wide = |x: &[f64; LANES]| Wide(s, s.load(x));
+        let (below, above) = (wide(&below), wide(&above));
+        let column = self.interior.column::<_, M>(below, above, wide(&self.starts), spacing);
+        let mut smallest = below.constant(f64::INFINITY);
+        for i in 0..2 * M + 2 {
+            let (n, dn) = (column.values[i], column.derivatives[i]);
+            s.store(n.1, &mut out.values[i]);
+            s.store(dn.1, &mut out.derivatives[i]);
+            let (distance, j) = if i <= M { (below, M - i) } else { (above, i - M - 1) };
+            let room = below.constant(radius) - distance;
+            let size = if j == 0 { n.abs() } else { room.constant(j as f64).where_less(room, n.abs(), smallest) };
+            smallest = size.where_less(smallest, size, smallest);
+        }
+        s.store(smallest.1, &mut out.smallest);
+        s.store(column.correction.1, corrections);
+    }
+}
+
+/// The lanes of a vector, with operators.
+struct Wide<S: Lanes<LANES, X = f64>>(S, S::N);
+
+impl<S: Lanes<LANES, X = f64>> Clone for Wide<S> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S: Lanes<LANES, X = f64>> Copy for Wide<S> {}
+
+macro_rules! operator {
+    ($operator:ident, $method:ident) => {
+        impl<S: Lanes<LANES, X = f64>> $operator for Wide<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0, self.0.$method(self.1, other.1))
+            }
+        }
+    };
+}
+
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<S: Lanes<LANES, X = f64>> Lane for Wide<S> {
+    #[inline(always)]
+    fn constant(self, x: f64) -> Self {
+        Self(self.0, self.0.splat(x))
+    }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+        Self(self.0, self.0.where_less(self.1, other.1, then.1, otherwise.1))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0, self.0.abs(self.1))
+    }
+}
