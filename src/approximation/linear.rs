@@ -1,5 +1,6 @@
 //! Linear functions (Q4 in the plane).
 
+use super::interior::{Column, Interior};
 use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate, product::Place};
 use crate::grid::Axis;
 
@@ -16,7 +17,10 @@ impl Validate for Linear {
 impl Separable for Linear {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
-        out.hats(&Place::new(axis, x)?, axis.spacing);
+        let place = Place::new(axis, x)?;
+        let Column { values, derivatives, .. } = self.column::<f64, 0>(place.below, place.above, 0.0, axis.spacing);
+        out.start(place.cell);
+        (0..2).for_each(|node| out.push(values[node], derivatives[node]));
         Ok(())
     }
 

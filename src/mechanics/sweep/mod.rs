@@ -10,6 +10,7 @@ mod block;
 mod builder;
 mod closed;
 mod columns;
+mod diagonal;
 mod kernel;
 mod lanes;
 mod laws;
@@ -32,6 +33,7 @@ use crate::parallel;
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
+use kernel::{Rows, of_lane};
 use num_traits::Zero;
 use plain::Plain;
 use std::ops::AddAssign;
@@ -294,7 +296,14 @@ impl<const D: usize> Supports<D> {
     /// Σ u_I N_I at every particle.
     pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut values = vec![Vector::zeros(); self.particles()];
-        self.each_particle(field, |_, value, _| value, |p, value| values[p] = value);
+        match &self.0 {
+            Way::Plain(_) => self.each_particle(field, |_, value, _| value, |p, value| values[p] = value),
+            Way::Tiled(tiled) => {
+                self.1.pass();
+                let point = |_: usize, rows: &Rows, lane: usize| Vector::from_fn(|i, _| rows[i][lane]);
+                waves::each_particle(tiled, field, of_block::gather_values, point, |p, value| values[p] = value);
+            }
+        }
         values
     }
 
@@ -327,7 +336,13 @@ impl<const D: usize> Supports<D> {
                 let results = infallible(plain.interpolate(field, |p, value, gradient| Ok(point(p, value, gradient))));
                 results.into_iter().enumerate().for_each(|(p, result)| take(p, result));
             }
-            Way::Tiled(tiled) => waves::each_particle(tiled, field, point, take),
+            Way::Tiled(tiled) => {
+                let point = |p: usize, rows: &Rows, lane: usize| {
+                    let (value, gradient) = of_lane(rows, lane);
+                    point(p, value, gradient)
+                };
+                waves::each_particle(tiled, field, of_block::gather_all, point, take);
+            }
         }
     }
 

@@ -5,7 +5,8 @@
 
 use super::block::Groups;
 use super::closed::{Form, Numbers};
-use super::kernel::{Quadratic, Rows, Signed, Terms, gather, load, pair, scatter, scatter_blocks, store};
+use super::diagonal::{Quadratic, pair, scatter_blocks};
+use super::kernel::{Gathered, Rows, Signed, Terms, gather, load, scatter, store};
 use super::lanes::{LANES, Lanes, Number, SINGLE_LANES, WithLanes};
 use crate::material::ClosedTangent;
 use crate::scalar::Real;
@@ -40,6 +41,11 @@ macro_rules! by_dimension {
 /// u and L of every group.
 pub(super) fn gather_all(groups: &Double, nodal: &[f64], rows: &mut [Rows]) {
     by_dimension!(f64, groups, GatherAll { groups, nodal, rows });
+}
+
+/// u of every group, in the first rows of each.
+pub(super) fn gather_values(groups: &Double, nodal: &[f64], rows: &mut [Rows]) {
+    by_dimension!(f64, groups, GatherValues { groups, nodal, rows });
 }
 
 /// Gathers, asks `point`, and scatters.
@@ -112,6 +118,27 @@ impl<const D: usize> WithLanes<f64, LANES> for GatherAll<'_, D> {
     fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
         for (group, rows) in self.rows.iter_mut().enumerate() {
             store(s, &gather::<S, D, LANES, true>(s, &self.groups.window(group), self.nodal), rows);
+        }
+    }
+}
+
+struct GatherValues<'a, const D: usize> {
+    groups: &'a Double,
+    nodal: &'a [f64],
+    rows: &'a mut [Rows],
+}
+
+impl<const D: usize> WithLanes<f64, LANES> for GatherValues<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
+        for (group, rows) in self.rows.iter_mut().enumerate() {
+            // L is not stored, and so not computed.
+            let Gathered { value, .. } = gather::<S, D, LANES, true>(s, &self.groups.window(group), self.nodal);
+            for (value, row) in value.into_iter().zip(rows) {
+                s.store(value, row);
+            }
         }
     }
 }

@@ -6,7 +6,8 @@
 use super::block::{Block, Groups};
 use super::builder::{block, number};
 use super::columns::Family;
-use super::kernel::{Quadratic, Rows, of_lane, pair, set_lane};
+use super::diagonal::{Quadratic, pair};
+use super::kernel::{Rows, of_lane, set_lane};
 use super::lanes::LANES;
 use super::laws::Laws;
 use super::of_block;

@@ -4,14 +4,14 @@
 //! are added to the nodes in the order of the blocks, every slab of nodes by one thread. Neither the waves nor the order
 //! depend on the number of threads.
 
-use super::block::Block;
-use super::kernel::{Rows, of_lane};
+use super::block::{Block, Groups};
+use super::kernel::Rows;
 use super::lanes::{LANES, SINGLE_LANES};
 use super::of_block;
 use super::tiled::Tiled;
 use crate::parallel;
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
 
 /// Blocks of a wave: their buffers stay in the second-level caches.
 const WAVE: usize = 64;
@@ -91,21 +91,22 @@ pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
     }
 }
 
-/// `take(p, point(p, u_p, ∇u_p))` of every particle, in the order of the blocks; no more results wait to be taken than those of a
+/// What is gathered of each group.
+pub(super) type GatherKernel = fn(&Groups<f64, LANES>, &[f64], &mut [Rows]);
+
+/// `take(p, point(p, rows, lane))` of every particle with what `kernel` gathered in the rows of its group, in the order of the blocks; no more results wait to be taken than those of a
 /// wave.
 pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
     tiled: &Tiled<D>,
     field: &[Vector<T, D>],
-    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
+    kernel: GatherKernel,
+    point: impl Fn(usize, &Rows, usize) -> R + Sync,
     mut take: impl FnMut(usize, R),
 ) {
     let gather = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block, take: &mut dyn FnMut(usize, R)| {
         let (nodal, rows) = scratch;
-        gather_block(block, field, nodal, rows);
-        block.groups.each(|group, lane, p| {
-            let (value, gradient) = of_lane(&rows[group], lane);
-            take(p, point(p, value, gradient));
-        });
+        gather_block(block, field, kernel, nodal, rows);
+        block.groups.each(|group, lane, p| take(p, point(p, &rows[group], lane)));
     };
     if !parallel::several() || tiled.groups() < PARALLEL {
         let mut scratch = Default::default();
@@ -126,10 +127,11 @@ pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
     }
 }
 
-/// u and L of each group of a block.
+/// What `kernel` gathers of each group of a block.
 fn gather_block<T: Real, const D: usize>(
     block: &Block,
     field: &[Vector<T, D>],
+    kernel: GatherKernel,
     nodal: &mut Vec<f64>,
     rows: &mut Vec<Rows>,
 ) {
@@ -137,7 +139,7 @@ fn gather_block<T: Real, const D: usize>(
     block.fill(field, nodal);
     // What is left of another block is written over.
     rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
-    of_block::gather_all(&block.groups, nodal, rows);
+    kernel(&block.groups, nodal, rows);
 }
 
 /// `visit(block, chunk, u and L of each group)` of every block; `chunks` hands out a part of the result to each.
@@ -149,7 +151,7 @@ pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
 ) -> Vec<R> {
     let one = |scratch: &mut (Vec<f64>, Vec<Rows>), (block, chunk): (&Block, C)| {
         let (nodal, rows) = scratch;
-        gather_block(block, field, nodal, rows);
+        gather_block(block, field, of_block::gather_all, nodal, rows);
         visit(block, chunk, rows)
     };
     if parallel::several() && tiled.groups() >= PARALLEL {
