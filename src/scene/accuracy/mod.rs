@@ -82,8 +82,9 @@ impl Display for Chosen {
     }
 }
 
-/// Keys that speak of inertia, and that a scene without inertia refuses.
-const OF_INERTIA: [&str; 2] = ["time.", "transfer"];
+/// What a scene without inertia keeps its own of: keys that speak of inertia, which it refuses, and shape functions, for nodes of LME beside
+/// free faces would be held by next to nothing.
+const OF_INERTIA: [&str; 3] = ["time.", "transfer", "approximation"];
 
 /// Lays what the key `accuracy` sets under a scene. A scene that is not of the types of a scene is left as it is: whoever reads it
 /// says why.
