@@ -240,6 +240,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
             &of_motion("only with a transfer other than flip".into()),
         ),
         term("internal force", true, &format!("F S of every particle, {D}×{D}")),
+        term("choice of laws", simulation.bodies.len() > 1, &choice_of_laws(simulation, supports)),
         term("third axis", D == 3, &format!("grid.size has {D} components: so has every vector")),
         term(
             "gravity",
@@ -269,6 +270,18 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
             },
         ),
     ]
+}
+
+/// How often the sweep asks which law it evaluates.
+fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> String {
+    let often = match supports.closed_bytes(false, false, Precision::Double) {
+        Some(_) => "once in a pass over the particles",
+        None => "for every particle: the shape functions are no products, or too wide",
+    };
+    match simulation.bodies.len() {
+        1 => format!("only with several bodies; the law of the only one is looked up {often}"),
+        count => format!("the law of each of {count} bodies is looked up {often}"),
+    }
 }
 
 /// What the linear systems are solved in.

@@ -148,8 +148,10 @@ pub trait Law: Send + Sync {
 
 /// Something to be done with a law of whatever type.
 pub(crate) trait LawVisitor {
+    /// What comes out.
+    type Output;
     /// Does it.
-    fn visit<L: Law>(self, law: &L);
+    fn visit<L: Law + 'static>(self, law: L) -> Self::Output;
 }
 
 /// The tangent of one particle, frozen: everything its product needs and nothing more.
@@ -346,7 +348,7 @@ macro_rules! materials {
 
         impl Material {
             /// Calls `visitor` with the law, by a type that leaves no branch in a loop over particles.
-            pub(crate) fn with(&self, visitor: impl LawVisitor) {
+            pub(crate) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
                 match self { $(Self::$law(law) => law.with(visitor)),* }
             }
         }

@@ -55,10 +55,10 @@ impl NeoHookean {
     }
 
     /// Calls `visitor` with a type for each volumetric response.
-    pub(super) fn with(&self, visitor: impl LawVisitor) {
+    pub(super) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
         match self.volumetric {
-            Volumetric::Ciarlet => visitor.visit(&Of::<false>(self.lame)),
-            Volumetric::Logarithmic => visitor.visit(&Of::<true>(self.lame)),
+            Volumetric::Ciarlet => visitor.visit(Of::<false>(self.lame)),
+            Volumetric::Logarithmic => visitor.visit(Of::<true>(self.lame)),
         }
     }
 

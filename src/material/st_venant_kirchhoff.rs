@@ -14,8 +14,8 @@ pub struct StVenantKirchhoff {
 
 impl StVenantKirchhoff {
     /// Calls `visitor`.
-    pub(super) fn with(&self, visitor: impl LawVisitor) {
-        visitor.visit(self);
+    pub(super) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
+        visitor.visit(*self)
     }
 }
 

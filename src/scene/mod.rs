@@ -54,7 +54,7 @@ pub struct Scene {
     /// What the accuracy has set.
     #[serde(skip)]
     pub chosen: Vec<accuracy::Chosen>,
-    /// The shape functions. Default: `{"lme": {}}`.
+    /// The shape functions. Default: `{"bspline": {"degree": 3}}`; all shipped scenes name theirs.
     #[serde(default)]
     pub approximation: approximation::Approximation,
     /// Time stepping.

@@ -3,13 +3,15 @@
 
 use crate::support::{Failure, scene};
 use bfree::field::Field;
-use bfree::material::{ClosedTangent, Lame, Law, NeoHookean};
+use bfree::material::{ClosedTangent, FrozenMaterial, Lame, Law, Material, NeoHookean};
 use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::particles::Body;
 use bfree::phases::Phase;
 use bfree::plan::Plan;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor};
+use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -139,6 +141,72 @@ impl Law for Counting {
     fn freeze<T: Real, const D: usize>(&self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, v: T) -> ClosedTangent<T, D> {
         self.law.freeze(f_n, at, v)
     }
+}
+
+/// A law of the list, counting how often the sweep asks which one it is.
+#[derive(Clone, Debug)]
+struct Asked {
+    law: Material,
+    times: Arc<AtomicU64>,
+}
+
+impl Law for Asked {
+    type Frozen<T: Real, const D: usize> = FrozenMaterial<T, D>;
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.law.energy(at)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.law.stress(at)
+    }
+
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        self.law.elasticity(at, x)
+    }
+
+    fn freeze<T: Real, const D: usize>(&self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, v: T) -> Self::Frozen<T, D> {
+        self.law.freeze(f_n, at, v)
+    }
+
+    fn shipped(&self) -> Option<&Material> {
+        self.times.fetch_add(1, Ordering::Relaxed);
+        Some(&self.law)
+    }
+}
+
+/// What the first step of the falling block asks for the law, and its passes over the particles; the block in two halves, or whole.
+fn asked(bodies: &str, spacing: f64) -> Result<(u64, u64, u64), Failure> {
+    let overrides = [format!("bodies={bodies}"), format!("grid.spacing={spacing}"), "output={}".to_owned()];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let times = Arc::new(AtomicU64::new(0));
+    let asked = |body: &Body<Material>| Asked { law: body.law.clone(), times: Arc::clone(&times) };
+    let mut simulation = scene::<2>("compaction_confined.json", &overrides)?.with_laws(asked);
+    times.store(0, Ordering::Relaxed);
+    let report = simulation.advance()?;
+    let passes = report.seconds.passes().iter().sum();
+    Ok((times.load(Ordering::Relaxed), passes, simulation.particles.len() as u64))
+}
+
+#[test]
+fn a_law_is_chosen_once_a_pass_and_not_for_every_particle() -> Result<(), Failure> {
+    let body = |name: &str, x: [f64; 2]| {
+        json!({
+            "name": name, "shape": { "box": { "min": [x[0], 0], "max": [x[1], 1] } }, "density": 2700,
+            "material": { "neo_hookean": { "lambda": 5e4, "shear": 3e4 } },
+        })
+    };
+    let whole = json!([body("block", [0.0, 1.0])]).to_string();
+    let halves = json!([body("left", [0.0, 0.5]), body("right", [0.5, 1.0])]).to_string();
+    for spacing in [0.1, 0.025] {
+        let (one_law, passes, particles) = asked(&whole, spacing)?;
+        // Eight particles at a time are more than all passes: as little as a question for each such group would show.
+        assert!(spacing > 0.05 || particles / 8 > passes, "{particles} particles, {passes} passes");
+        assert!(one_law > 0 && one_law < passes, "{one_law} in {passes} passes");
+        let (two_laws, same_passes, _) = asked(&halves, spacing)?;
+        assert_eq!((two_laws, same_passes), (2 * one_law, passes));
+    }
+    Ok(())
 }
 
 #[test]

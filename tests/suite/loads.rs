@@ -22,6 +22,7 @@ fn carried(table: &serde_json::Value, velocity: f64, step: f64) -> serde_json::V
     json!({
         "grid": {"size": [2, 2], "spacing": 0.5},
         "time": {"step": step, "end": 1},
+        "approximation": {"lme": {}},
         "bodies": [{
             "name": "load", "shape": {"box": {"min": [0, 0], "max": [2, 2]}}, "density": 1, "velocity": [velocity, 0],
             "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}, "particles_per_cell": 2
@@ -131,7 +132,7 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
 fn struck(step: f64) -> Result<[f64; 4], Failure> {
     let moving = json!({"velocity": [[0, [1]]]});
     let mut simulation: Simulation<1> = build(&json!({
-        "grid": {"size": [2], "spacing": 0.1}, "time": {"step": step, "end": 0.1},
+        "grid": {"size": [2], "spacing": 0.1}, "time": {"step": step, "end": 0.1}, "approximation": {"lme": {}},
         "bodies": [{"name": "bar", "shape": {"box": {"min": [0.1], "max": [1.9]}}, "density": 1,
                     "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}, "particles_per_cell": 2}],
         "boundary": {"left": moving, "right": moving}

@@ -128,7 +128,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
         "bodies": [{"name": "a", "shape": {"half_space": {"point": [0.5], "normal": [1]}},
                     "material": {"neo_hookean": {"bulk": 1, "shear": 1}}, "density": 1}]}"#;
     let scene = scene::read(least, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let all = least.replacen('{', r#"{"approximation": {"lme": {"gamma": 3, "tolerance": 1e-6, "support": "separable"}},
+    let all = least.replacen('{', r#"{"approximation": {"bspline": {"degree": 3}},
         "transfer": "flip", "boundary": {}, "prescribed": [], "tractions": [], "pressures": [],
         "solver": {"newton": {"tolerance": 1e-9, "max_iterations": 30},
                    "krylov": {"method": {"gmres": {"restart": 30}}, "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
@@ -136,6 +136,13 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
         .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "wall_update": "literal", "max_halvings": 10"#)
         .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "particles""#);
     assert_eq!(scene, scene::read(&all, &[]).unwrap_or_else(|error| panic!("{error}")));
+    for (short, long) in [
+        ("bspline={}", r#"bspline={"degree": 3}"#),
+        ("lme={}", r#"lme={"gamma": 3, "tolerance": 1e-6, "support": "separable"}"#),
+    ] {
+        let with = |family: &str| scene::read(least, &[format!("approximation.{family}").parse().unwrap()]);
+        assert_eq!(with(short).unwrap(), with(long).unwrap());
+    }
     // what is written back is the same scene
     let written = serde_json::to_string(&scene).unwrap();
     assert_eq!(scene, scene::read(&written, &[]).unwrap_or_else(|error| panic!("{error}")));

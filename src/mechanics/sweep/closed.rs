@@ -173,6 +173,7 @@ impl<const D: usize> Tiled<D> {
             chunks.push(chunk);
             rest = behind;
         }
+        let evaluate = laws.tangents(form.both, factor);
         let results = waves::gathered(self, field, chunks, |block, chunk, gathered| {
             let Some(groups) = groups(block) else { return Ok(()) };
             let mut failure = None;
@@ -181,7 +182,7 @@ impl<const D: usize> Tiled<D> {
             let (mut to, mut at) = (0, 0);
             for group in 0..block.groups.len() {
                 let particles = block.groups.particles(group);
-                match laws.tangents(particles, &gathered[group], form.both, factor, &mut tangents) {
+                match evaluate(particles, &gathered[group], &mut tangents) {
                     Ok(()) => {}
                     Err(Some(error)) => keep_first(&mut failure, error.particle, Some(error)),
                     // What has no closed form anywhere is no error of a particle.

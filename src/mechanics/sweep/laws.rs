@@ -2,6 +2,7 @@
 //!
 //! The formulas are those of one particle, called in a loop over the lanes. The shipped laws are arithmetic alone, and the compiler
 //! turns the loop into vector instructions, with the same bits; their loops are compiled here, once. Any other law keeps a plain loop.
+//! Which loop a body takes is chosen once a pass over the particles.
 
 use super::kernel::Rows;
 use super::lanes::{LANES, Lanes, Number, WithLanes};
@@ -20,8 +21,6 @@ pub struct Laws<'a, const D: usize, L> {
 
 /// The particles of a group, a lane each; zero in the lanes behind them.
 struct States<'a> {
-    /// D
-    dimension: usize,
     /// u, and ∇u by rows.
     rows: &'a Rows,
     /// H_n by rows.
@@ -32,7 +31,7 @@ struct States<'a> {
 
 impl<'a> States<'a> {
     fn of<const D: usize>(particles: &Particles<D>, group: &[u32], rows: &'a Rows) -> Self {
-        let mut states = Self { dimension: D, rows, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES] };
+        let mut states = Self { rows, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES] };
         for (lane, &p) in group.iter().enumerate().take(LANES) {
             let h_n = &particles.displacement_gradient[p as usize];
             for i in 0..D {
@@ -74,66 +73,78 @@ const SIMPLE: f64 = 1.0;
 /// A closed form with b and c.
 const BOTH: f64 = 2.0;
 
-impl<const D: usize, L: Law> Laws<'_, D, L> {
-    /// Puts σ = V₀ F S F_nᵀ in the place of ∇u.
-    ///
-    /// # Errors
-    /// The smallest particle of the group with det F ≤ 0.
-    pub(super) fn stresses(&self, group: &[u32], rows: &mut Rows) -> Result<(), Inadmissible> {
-        let states = &States::of(self.particles, group, rows);
-        let mut stresses = [[0.0; LANES]; 10];
-        self.by_law(group, &mut stresses, |law, stresses| match law.shipped() {
-            Some(material) => shipped_stresses(material, StressesOf { states, stresses }),
-            None => *stresses = stresses_of::<L, D>(law, states),
-        });
-        judge(group, &stresses[DET_F])?;
-        rows[D..D + D * D].copy_from_slice(&stresses[..D * D]);
-        Ok(())
-    }
+/// The loop over the lanes of one law, which fills `ROWS` rows.
+type Evaluate<'l, const ROWS: usize> = dyn Fn(&States<'_>, &mut [[f64; LANES]; ROWS]) + Sync + 'l;
 
-    /// The tangents at ∇u times `factor` in closed form; with `both` their b and c are there, zero where a law has none.
-    ///
-    /// # Errors
-    /// The smallest particle of the group with det F ≤ 0, or `None` in its place where a tangent has not that form.
-    pub(super) fn tangents(
-        &self,
-        group: &[u32],
-        rows: &Rows,
-        both: bool,
-        factor: f64,
-        tangents: &mut Tangents,
-    ) -> Result<(), Option<Inadmissible>> {
-        let states = &States::of(self.particles, group, rows);
-        self.by_law(group, tangents, |law, tangents| match law.shipped() {
-            Some(material) => shipped_tangents(material, TangentsOf { states, factor, tangents }),
-            None => *tangents = tangents_of::<L, D>(law, states, factor),
-        });
-        judge(group, &tangents[TANGENT_DET_F]).map_err(Some)?;
-        let fits = |&form: &f64| form == SIMPLE || (both && form == BOTH);
-        if tangents[FORM][..group.len()].iter().all(fits) { Ok(()) } else { Err(None) }
-    }
+/// For each body the loop of its law.
+struct Chosen<'a, const ROWS: usize> {
+    body: &'a [u32],
+    loops: Vec<Box<Evaluate<'a, ROWS>>>,
+}
 
-    /// Calls `evaluate(law, out)` for each law in the group, and keeps the lanes of its particles.
-    fn by_law<const ROWS: usize>(
-        &self,
-        group: &[u32],
-        out: &mut [[f64; LANES]; ROWS],
-        evaluate: impl Fn(&L, &mut [[f64; LANES]; ROWS]),
-    ) {
-        let body = |lane: usize| self.particles.body[group[lane] as usize];
-        evaluate(&self.bodies[body(0) as usize].law, out);
+impl<const ROWS: usize> Chosen<'_, ROWS> {
+    /// Evaluates the laws that are in the group, and keeps the lanes of their particles.
+    fn evaluate(&self, group: &[u32], states: &States<'_>, out: &mut [[f64; LANES]; ROWS]) {
+        if let [only] = self.loops.as_slice() {
+            return only(states, out);
+        }
+        let body = |lane: usize| self.body[group[lane] as usize];
+        self.loops[body(0) as usize](states, out);
         for lane in 1..group.len() {
             if (0..lane).any(|before| body(before) == body(lane)) {
                 continue;
             }
             let mut other = [[0.0; LANES]; ROWS];
-            evaluate(&self.bodies[body(lane) as usize].law, &mut other);
+            self.loops[body(lane) as usize](states, &mut other);
             for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
                 for (out, other) in out.iter_mut().zip(&other) {
                     out[same] = other[same];
                 }
             }
         }
+    }
+}
+
+impl<const D: usize, L: Law> Laws<'_, D, L> {
+    /// What puts σ = V₀ F S F_nᵀ in the place of ∇u, a group at a time, for one pass; its error is the smallest particle of the group
+    /// with det F ≤ 0.
+    pub(super) fn stresses(&self) -> impl Fn(&[u32], &mut Rows) -> Result<(), Inadmissible> + Sync {
+        let chosen = self.chosen(|law| match law.shipped() {
+            Some(material) => shipped_stresses(material, D),
+            None => Box::new(|states, out| *out = stresses_of::<L, D>(law, states)),
+        });
+        move |group, rows| {
+            let mut stresses: Stresses = [[0.0; LANES]; 10];
+            chosen.evaluate(group, &States::of(self.particles, group, rows), &mut stresses);
+            judge(group, &stresses[DET_F])?;
+            rows[D..D + D * D].copy_from_slice(&stresses[..D * D]);
+            Ok(())
+        }
+    }
+
+    /// What computes the tangents at ∇u times `factor` in closed form, a group at a time, for one pass; with `both` their b and c are
+    /// there, zero where a law has none. Its error is the smallest particle of the group with det F ≤ 0, or `None` in its place where a
+    /// tangent has not that form.
+    pub(super) fn tangents(
+        &self,
+        both: bool,
+        factor: f64,
+    ) -> impl Fn(&[u32], &Rows, &mut Tangents) -> Result<(), Option<Inadmissible>> + Sync {
+        let chosen = self.chosen(|law| match law.shipped() {
+            Some(material) => shipped_tangents(material, D, factor),
+            None => Box::new(move |states, out| *out = tangents_of::<L, D>(law, states, factor)),
+        });
+        move |group, rows, tangents| {
+            chosen.evaluate(group, &States::of(self.particles, group, rows), tangents);
+            judge(group, &tangents[TANGENT_DET_F]).map_err(Some)?;
+            let fits = |&form: &f64| form == SIMPLE || (both && form == BOTH);
+            if tangents[FORM][..group.len()].iter().all(fits) { Ok(()) } else { Err(None) }
+        }
+    }
+
+    /// `choose` of the law of every body.
+    fn chosen<'s, const ROWS: usize>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluate<'s, ROWS>>) -> Chosen<'s, ROWS> {
+        Chosen { body: &self.particles.body, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
     }
 }
 
@@ -220,36 +231,61 @@ struct InLanes<'l, L, W, const D: usize>(&'l L, W);
 
 /// Not generic, so that it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped_stresses(law: &Material, work: StressesOf<'_>) {
-    law.with(work);
+fn shipped_stresses(law: &Material, dimension: usize) -> Box<Evaluate<'static, 10>> {
+    law.with(ChooseStresses { dimension })
 }
 
 /// As [`shipped_stresses`].
 #[inline(never)]
-fn shipped_tangents(law: &Material, work: TangentsOf<'_>) {
-    law.with(work);
+fn shipped_tangents(law: &Material, dimension: usize, factor: f64) -> Box<Evaluate<'static, 32>> {
+    law.with(ChooseTangents { dimension, factor })
 }
 
-macro_rules! visit_in_lanes {
-    ($visitor:ident) => {
-        impl LawVisitor for $visitor<'_> {
-            fn visit<L: Law>(self, law: &L) {
-                match self.states.dimension {
-                    1 => f64::widest(InLanes::<_, _, 1>(law, self)),
-                    2 => f64::widest(InLanes::<_, _, 2>(law, self)),
-                    _ => f64::widest(InLanes::<_, _, 3>(law, self)),
-                }
-            }
+struct ChooseStresses {
+    dimension: usize,
+}
+
+impl LawVisitor for ChooseStresses {
+    type Output = Box<Evaluate<'static, 10>>;
+
+    fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
+        fn in_dimension<L: Law + 'static, const D: usize>(law: L) -> Box<Evaluate<'static, 10>> {
+            Box::new(move |states, stresses| f64::widest(InLanes::<_, _, D>(&law, StressesOf { states, stresses })))
         }
-    };
+        match self.dimension {
+            1 => in_dimension::<L, 1>(law),
+            2 => in_dimension::<L, 2>(law),
+            _ => in_dimension::<L, 3>(law),
+        }
+    }
+}
+
+struct ChooseTangents {
+    dimension: usize,
+    factor: f64,
+}
+
+impl LawVisitor for ChooseTangents {
+    type Output = Box<Evaluate<'static, 32>>;
+
+    fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
+        fn in_dimension<L: Law + 'static, const D: usize>(law: L, factor: f64) -> Box<Evaluate<'static, 32>> {
+            Box::new(move |states, tangents| {
+                f64::widest(InLanes::<_, _, D>(&law, TangentsOf { states, factor, tangents }))
+            })
+        }
+        match self.dimension {
+            1 => in_dimension::<L, 1>(law, self.factor),
+            2 => in_dimension::<L, 2>(law, self.factor),
+            _ => in_dimension::<L, 3>(law, self.factor),
+        }
+    }
 }
 
 struct StressesOf<'a> {
     states: &'a States<'a>,
     stresses: &'a mut Stresses,
 }
-
-visit_in_lanes!(StressesOf);
 
 impl<L: Law, const D: usize> WithLanes<f64, LANES> for InLanes<'_, L, StressesOf<'_>, D> {
     type Output = ();
@@ -265,8 +301,6 @@ struct TangentsOf<'a> {
     factor: f64,
     tangents: &'a mut Tangents,
 }
-
-visit_in_lanes!(TangentsOf);
 
 impl<L: Law, const D: usize> WithLanes<f64, LANES> for InLanes<'_, L, TangentsOf<'_>, D> {
     type Output = ();

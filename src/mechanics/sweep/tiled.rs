@@ -221,9 +221,9 @@ impl<const D: usize> Tiled<D> {
         out: &mut [Vector<T, D>],
     ) -> Option<Result<(), Inadmissible>> {
         is_f64::<T>().then(|| {
-            let stresses = |particles: &[u32], rows: &mut Rows| {
-                laws.stresses(particles, rows).map_err(|error| (error.particle, error))
-            };
+            let evaluate = laws.stresses();
+            let stresses =
+                |particles: &[u32], rows: &mut Rows| evaluate(particles, rows).map_err(|error| (error.particle, error));
             let Some(inertia) = inertia else {
                 return self.by_group(field, out, of_block::stresses, stresses);
             };
@@ -247,8 +247,9 @@ impl<const D: usize> Tiled<D> {
         out: &mut [Vector<T, D>],
     ) -> Option<Result<(), Inadmissible>> {
         is_f64::<T>().then(|| {
+            let evaluate = laws.stresses();
             self.by_group(field, out, of_block::magnitudes, |particles, rows| {
-                laws.stresses(particles, rows).map_err(|error| (error.particle, error))?;
+                evaluate(particles, rows).map_err(|error| (error.particle, error))?;
                 rows[..D].fill([0.0; LANES]);
                 rows[D..D + D * D].as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
                 Ok(())

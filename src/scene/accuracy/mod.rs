@@ -82,8 +82,9 @@ impl Display for Chosen {
     }
 }
 
-/// Keys that speak of inertia, and that a scene without inertia refuses.
-const OF_INERTIA: [&str; 2] = ["time.", "transfer"];
+/// Keys that are left alone in a scene without inertia: those that speak of it, which the scene refuses, and the shape functions, for nodes
+/// of LME beside free faces are held by next to nothing but inertia.
+const NEED_INERTIA: [&str; 3] = ["time.", "transfer", "approximation"];
 
 /// Lays what the key `accuracy` sets under a scene. A scene that is not of the types of a scene is left as it is: whoever reads it
 /// says why.
@@ -96,7 +97,7 @@ pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     let Some(bodies) = part::<Vec<Body>>(&scene["bodies"]) else { return Ok(Vec::new()) };
     let mut under = Under { scene, chosen: Vec::new() };
     for (key, value) in level.keys() {
-        let refused = under.scene["time"]["inertia"] == "none" && OF_INERTIA.iter().any(|word| key.starts_with(word));
+        let refused = under.scene["time"]["inertia"] == "none" && NEED_INERTIA.iter().any(|word| key.starts_with(word));
         if !refused {
             under.set(key, value);
         }

@@ -80,12 +80,22 @@ pub(super) struct Cost {
     pub tally: Tally,
     /// CPU seconds of its one thread, without the making of forces and the measuring of errors.
     pub seconds: f64,
-    /// What was evaluated, each times what it takes at the start, in seconds: untouched by what else the machine does.
-    pub counted: f64,
-    /// Seconds of one product with the tangent, a particle.
-    pub product: f64,
+    /// What each evaluation takes.
+    pub units: Units,
     /// The most bytes at one time, by the plan.
     pub bytes: u64,
+}
+
+impl Cost {
+    /// What was evaluated, each times what it takes, in seconds: untouched by what else the machine does.
+    pub fn counted(&self) -> f64 {
+        let Self { tally, units, .. } = self;
+        units.shapes * tally.steps as f64
+            + units.projection * tally.projections as f64
+            + units.residual * tally.residuals as f64
+            + units.linearization * tally.linearizations as f64
+            + units.product * tally.products as f64
+    }
 }
 
 /// The force of a manufactured solution per unit mass, on a particle at a time.
@@ -99,7 +109,7 @@ pub(super) fn drive<const D: usize>(
     force: Option<Force<'_, D>>,
     mut watch: impl FnMut(&Simulation<D>) -> Result<(), StudyError>,
 ) -> Result<Cost, StudyError> {
-    let units = Units::of(simulation, setting.assembled)?;
+    let (units, bytes) = Units::of(simulation, setting.assembled)?;
     let mut tally = Tally::default();
     let mut seconds = 0.0;
     while simulation.clock.nominal_steps() < steps {
@@ -131,27 +141,37 @@ pub(super) fn drive<const D: usize>(
         }
         watch(simulation)?;
     }
-    let counted = units.shapes * tally.steps as f64
-        + units.projection * tally.projections as f64
-        + units.residual * tally.residuals as f64
-        + units.linearization * tally.linearizations as f64
-        + units.product * tally.products as f64;
-    let product = units.product / simulation.particles.len() as f64;
-    Ok(Cost { tally, seconds, counted, product, bytes: units.bytes })
+    Ok(Cost { tally, seconds, units, bytes })
 }
 
-/// Seconds of one evaluation of each kind, at the start.
-struct Units {
+/// Seconds of one evaluation of each kind, at the start of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Units {
     shapes: f64,
     projection: f64,
     residual: f64,
     linearization: f64,
+    /// One product with the tangent.
     product: f64,
-    bytes: u64,
+    /// That for one particle.
+    pub product_of_one: f64,
 }
 
 impl Units {
-    fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<Self, StudyError> {
+    /// The shorter times of both.
+    pub fn least(&self, other: &Self) -> Self {
+        Self {
+            shapes: self.shapes.min(other.shapes),
+            projection: self.projection.min(other.projection),
+            residual: self.residual.min(other.residual),
+            linearization: self.linearization.min(other.linearization),
+            product: self.product.min(other.product),
+            product_of_one: self.product_of_one.min(other.product_of_one),
+        }
+    }
+
+    /// Measures them, and asks the plan for the most bytes at one time.
+    pub fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<(Self, u64), StudyError> {
         let prepared = Prepared::new(simulation)?;
         let equilibrium = prepared.equilibrium(simulation);
         let (count, lumping) = (prepared.nodes.len(), simulation.settings.lumping);
@@ -192,7 +212,8 @@ impl Units {
             }
         };
         let projection = projection / prepared.nodal.iterations.max(1) as f64;
-        Ok(Self { shapes, projection, residual, linearization, product, bytes })
+        let product_of_one = product / simulation.particles.len() as f64;
+        Ok((Self { shapes, projection, residual, linearization, product, product_of_one }, bytes))
     }
 }
 

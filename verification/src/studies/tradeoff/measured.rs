@@ -2,9 +2,12 @@
 
 use super::cost::Cost;
 use super::problem::Problem;
-use super::setting::{Origin, Setting};
+use super::setting::{Origin, Setting, origin};
 use crate::report::chain;
 use crate::studies::StudyError;
+
+/// How often it is measured again what evaluations take.
+const ROUNDS: usize = 4;
 
 /// A run that succeeded.
 #[derive(Clone, Debug)]
@@ -37,26 +40,34 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// Runs the base and the settings, the first of which is the base.
+    /// Runs the base and the settings, the first of which is the base; and measures what evaluations take again and again, so that a
+    /// time in which the machine is slow falls on no setting alone.
     pub fn of(problem: &dyn Problem, settings: &[Setting]) -> Result<Self, StudyError> {
         let (error, cost) = problem.run(&Setting::base())?;
-        let unit = cost.product;
-        let point = |setting: &Setting, error: f64, cost: Cost| Point {
-            setting: setting.clone(),
-            error,
-            cost,
-            work: cost.counted / unit,
-        };
-        let base = point(&Setting::base(), error, cost);
-        let (mut points, mut failures) = (vec![base.clone()], Vec::new());
+        let (mut runs, mut failures) = (vec![(Setting::base(), error, cost)], Vec::new());
         for setting in settings.iter().filter(|setting| setting.origin != Origin::Default) {
             match problem.run(setting) {
-                Ok((error, cost)) if error.is_finite() => points.push(point(setting, error, cost)),
+                Ok((error, cost)) if error.is_finite() => runs.push((setting.clone(), error, cost)),
                 Ok((error, _)) => failures.push((setting.clone(), format!("the error is {error}"))),
                 Err(why) => failures.push((setting.clone(), chain(&*why))),
             }
         }
-        Ok(Self { problem: problem.name(), smooth: problem.smooth(), base, points, failures })
+        for _ in 0..ROUNDS {
+            for (setting, _, cost) in &mut runs {
+                cost.units = cost.units.least(&problem.units(setting)?);
+            }
+        }
+        let unit = runs[0].2.units.product_of_one;
+        let point = |(setting, error, cost): (Setting, f64, Cost)| Point { setting, error, work: cost.counted() / unit, cost };
+        let points: Vec<Point> = runs.into_iter().map(point).collect();
+        Ok(Self { problem: problem.name(), smooth: problem.smooth(), base: points[0].clone(), points, failures })
+    }
+
+    /// What the values of a knob are compared with: the base, or the defaults of the shape functions that have it; `None` where these
+    /// have failed.
+    pub fn base_of(&self, knob: &str) -> Option<&Point> {
+        let origin = origin(knob);
+        self.points.iter().find(|point| point.setting.origin == origin)
     }
 
     /// The points that nothing beats, from the cheapest to the most accurate.
@@ -85,14 +96,14 @@ fn front(mut points: Vec<&Point>, price: impl Fn(&Point) -> f64) -> Vec<&Point> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::tradeoff::cost::Tally;
+    use crate::studies::tradeoff::cost::{Tally, Units};
 
     #[test]
     fn the_front_is_what_nothing_beats() {
         let point = |work: f64, error: f64| Point {
             setting: Setting::base(),
             error,
-            cost: Cost { tally: Tally::default(), seconds: work, counted: work, product: 1.0, bytes: 0 },
+            cost: Cost { tally: Tally::default(), seconds: work, units: Units::default(), bytes: 0 },
             work,
         };
         let points = [point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.5), point(2.0, 0.2), point(4.0, 0.1), point(5.0, 0.3)];

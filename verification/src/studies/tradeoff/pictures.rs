@@ -61,10 +61,10 @@ fn diagram(measured: &Measured, price: &str, front: Vec<&Point>, of: impl Fn(&Po
 /// Each knob by itself: error against work, both as ratios to the defaults'.
 fn turned(all: &[Measured], knobs: &[(&'static str, String)]) -> Sheet {
     let curve = |k: usize, measured: &Measured, knob: &str| {
-        let base = &measured.base;
-        let turned = measured.points.iter().filter(|point| point.setting.of_knob(knob).is_some());
-        let mut points: Vec<_> = turned.map(|point| (point.work / base.work, point.error / base.error)).collect();
-        points.push((1.0, 1.0));
+        let base = measured.base_of(knob);
+        let turned = measured.points.iter().filter(|point| point.setting.of_knob(knob).is_some()).chain(base);
+        let ratios = |point: &Point| base.map(|base| (point.work / base.work, point.error / base.error));
+        let mut points: Vec<_> = turned.filter_map(ratios).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         Curve::new(measured.problem, k + 1, Mark::Joined, points)
     };

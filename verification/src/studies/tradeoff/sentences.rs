@@ -1,7 +1,7 @@
 //! What each knob costs, what it buys, where it stops paying: a sentence from the measured numbers.
 
 use super::measured::{Measured, Point};
-use super::setting::{Origin, Setting};
+use super::setting::Setting;
 use crate::table::Table;
 
 /// A smaller fall of the error does not pay.
@@ -66,13 +66,10 @@ fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
     let of = |name: &str| {
         let (mut ratios, mut quadratic, mut failed) = ([const { Vec::new() }; 4], true, Vec::new());
         for measured in all {
-            let matches = |setting: &Setting| match &setting.origin {
-                Origin::Default => name == default,
-                _ => setting.of_knob(knob) == Some(name),
-            };
-            let found = measured.points.iter().find(|point| matches(&point.setting));
-            if let Some(Point { error, work, cost, .. }) = found {
-                let base = &measured.base;
+            let matches = |setting: &Setting| setting.of_knob(knob) == Some(name);
+            let base = measured.base_of(knob);
+            let found = if name == default { base } else { measured.points.iter().find(|point| matches(&point.setting)) };
+            if let (Some(Point { error, work, cost, .. }), Some(base)) = (found, base) {
                 let pairs = [
                     (*error, base.error),
                     (*work, base.work),

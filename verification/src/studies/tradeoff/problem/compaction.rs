@@ -3,7 +3,7 @@
 use super::{LEVELS, Problem, steps, whole_steps};
 use crate::elements::Elements;
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, drive};
+use crate::studies::tradeoff::cost::{Cost, Units, drive};
 use crate::studies::tradeoff::setting::Setting;
 use bfree::clock::Clock;
 use bfree::material::{Lame, Material};
@@ -100,6 +100,10 @@ impl Problem for Compaction {
 
     fn scene(&self) -> Value {
         scene()
+    }
+
+    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
+        Ok(Units::of(&scene.build::<2>(Path::new("."))?, setting.assembled)?.0)
     }
 
     fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {

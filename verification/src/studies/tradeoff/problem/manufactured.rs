@@ -3,7 +3,7 @@
 use super::{LEVELS, Problem, steps};
 use crate::manufactured::{AxisAligned, body_force, state};
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, drive};
+use crate::studies::tradeoff::cost::{Cost, Units, drive};
 use crate::studies::tradeoff::setting::Setting;
 use bfree::material::Lame;
 use bfree::scene::Scene;
@@ -24,6 +24,19 @@ pub(in crate::studies::tradeoff) struct Manufactured<const D: usize> {
 
 /// Faces of a box, along each axis.
 const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+
+impl<const D: usize> Manufactured<D> {
+    fn start(&self, scene: &Scene) -> Result<Simulation<D>, StudyError> {
+        let mut simulation: Simulation<D> = scene.build(Path::new("."))?;
+        let particles = &mut simulation.particles;
+        for (p, x) in particles.position.iter().enumerate() {
+            let start = state(&AxisAligned::default(), x, 0.0);
+            particles.velocity[p] = start.velocity;
+            particles.acceleration[p] = start.acceleration;
+        }
+        Ok(simulation)
+    }
+}
 
 impl<const D: usize> Problem for Manufactured<D> {
     fn name(&self) -> &'static str {
@@ -60,16 +73,15 @@ impl<const D: usize> Problem for Manufactured<D> {
         })
     }
 
+    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
+        Ok(Units::of(&self.start(scene)?, setting.assembled)?.0)
+    }
+
     fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
         let motion = AxisAligned::default();
-        let mut simulation: Simulation<D> = scene.build(Path::new("."))?;
+        let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
         let law = simulation.bodies.first().ok_or("a scene without a body")?.law.clone();
-        for (p, x) in reference.iter().enumerate() {
-            let start = state(&motion, x, 0.0);
-            simulation.particles.velocity[p] = start.velocity;
-            simulation.particles.acceleration[p] = start.acceleration;
-        }
         let force = |p: usize, t: f64| -> Vector<f64, D> { body_force(&motion, &law, 1.0, &reference[p], t) };
         let cost = drive(&mut simulation, setting, steps(scene), Some(&force), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);

@@ -8,7 +8,7 @@ pub(super) use compaction::Compaction;
 pub(super) use manufactured::Manufactured;
 pub(super) use riemann::Bar;
 
-use super::cost::Cost;
+use super::cost::{Cost, Units};
 use super::setting::Setting;
 use crate::report::chain;
 use crate::studies::StudyError;
@@ -48,6 +48,14 @@ pub(super) trait Problem: Sync {
     /// Runs it from a scene that is ready: the relative error, and the cost.
     fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError>;
 
+    /// What evaluations take at the start of a run.
+    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError>;
+
+    /// The same of a setting.
+    fn units(&self, setting: &Setting) -> Result<Units, StudyError> {
+        self.units_of(&self.set(setting)?, setting)
+    }
+
     /// h of a level.
     fn spacing(&self, level: usize) -> f64 {
         self.cells()[level].recip()
@@ -75,9 +83,9 @@ pub(super) trait Problem: Sync {
         Ok(scene)
     }
 
-    /// The value that a key has if a scene does not give it.
-    fn default_of(&self, key: &str) -> Option<Value> {
-        let scene = self.set(&Setting::base()).map_err(|error| chain(&*error)).ok()?;
+    /// The value that a key has in the scene of a setting.
+    fn value(&self, setting: &Setting, key: &str) -> Option<Value> {
+        let scene = self.set(setting).map_err(|error| chain(&*error)).ok()?;
         let scene = serde_json::to_value(scene).ok()?;
         let place = key.split('.').try_fold(&scene, |at, step| match step.parse::<usize>() {
             Ok(index) => at.get(index),

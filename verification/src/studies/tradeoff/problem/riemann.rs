@@ -4,7 +4,7 @@ use super::{LEVELS, Problem, steps};
 use crate::riemann::{PSystem, State};
 use crate::start::velocity_by_masses;
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, drive};
+use crate::studies::tradeoff::cost::{Cost, Units, drive};
 use crate::studies::tradeoff::setting::Setting;
 use bfree::material::Lame;
 use bfree::scene::Scene;
@@ -30,6 +30,14 @@ pub(in crate::studies::tradeoff) struct Bar {
 
 fn lame() -> Result<Lame, StudyError> {
     Ok(Lame::from_young_poisson(YOUNG, POISSON)?)
+}
+
+impl Bar {
+    fn start(&self, scene: &Scene) -> Result<Simulation<1>, StudyError> {
+        let mut simulation: Simulation<1> = scene.build(Path::new("."))?;
+        velocity_by_masses(&mut simulation, |x| x.map(|x| if x <= MIDDLE { JUMP } else { 0.0 }))?;
+        Ok(simulation)
+    }
 }
 
 impl Problem for Bar {
@@ -74,13 +82,16 @@ impl Problem for Bar {
         Some(common / (common * cells / between_fronts).ceil())
     }
 
+    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
+        Ok(Units::of(&self.start(scene)?, setting.assembled)?.0)
+    }
+
     fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
         let lame = lame()?;
         let system = PSystem { modulus: 0.5 * lame.lambda + lame.shear, density: DENSITY };
         let side = |velocity| State { stretch: 1.0, velocity };
         let exact = system.solve(side(JUMP), side(0.0))?;
-        let mut simulation: Simulation<1> = scene.build(Path::new("."))?;
-        velocity_by_masses(&mut simulation, |x| x.map(|x| if x <= MIDDLE { JUMP } else { 0.0 }))?;
+        let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
         let cost = drive(&mut simulation, setting, steps(scene), None, |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
