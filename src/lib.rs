@@ -106,8 +106,8 @@
 //! **5. To the particles** ([`mechanics::transfer::Moved`]) (45), (50)–(52):
 //!
 //! ```text
-//! a_p += Σ_I N_I (α₁ Δφ − α₂ vₙ − (α₃+1) aₙ)_I        x_p += Σ_I N_I Δφ_I
-//! v_p += Σ_I N_I (α₄ Δφ + (α₅−1) vₙ + α₆ aₙ)_I        F_p  = ΔF Fₙ
+//! a_p += Σ_I N_I (α₁ (Δφ − Δt vₙ) − (α₃+1) aₙ)_I      x_p += Σ_I N_I Δφ_I
+//! v_p += Σ_I N_I (α₄ (Δφ − Δt vₙ) + α₆ aₙ)_I          F_p  = ΔF Fₙ
 //! ```
 //!
 //! Up to here nothing has touched the particles: a step that fails leaves them as they were, and

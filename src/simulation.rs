@@ -65,10 +65,10 @@ impl Settings {
     /// use bfree::mechanics::time::Inertia;
     /// use bfree::simulation::Settings;
     ///
-    /// // v = α₄ Δφ + α₅ vₙ + α₆ aₙ: twice the mean velocity less the last, by the trapezoidal rule; nothing without inertia.
+    /// // v = α₄ Δφ + (1 − α₄ Δt) vₙ + α₆ aₙ: twice the mean velocity less the last, by the trapezoidal rule; nothing without inertia.
     /// let settings = Settings::default();
     /// let alphas = settings.alphas(0.5);
-    /// assert_eq!((alphas.a4, alphas.a5, alphas.a6), (2.0 / 0.5, -1.0, 0.0));
+    /// assert_eq!((alphas.a4, 1.0 - alphas.a4 * alphas.dt, alphas.a6), (2.0 / 0.5, -1.0, 0.0));
     /// let alphas = Settings { inertia: Inertia::None, ..settings }.alphas(0.5);
     /// assert_eq!((alphas.a1, alphas.a4), (0.0, 0.0));
     /// ```

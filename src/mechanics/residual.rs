@@ -15,7 +15,7 @@ pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
-/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ Δφ − α₂ v_n − α₃ a_n
+/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
 ///
 /// ```
 /// use bfree::mechanics::{residual::{Carry, Equilibrium}, sweep::Supports, transfer::Nodal};
@@ -58,8 +58,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub pressures: Vec<PressurePoint<D>>,
     /// Prescribed degrees of freedom.
     pub prescribed: &'a [PrescribedDof],
-    /// Σ_J N_J (α₂ v_n + α₃ a_n)_J at the particles; empty when ε = 1.
-    history: Vec<Vector<f64, D>>,
+    /// Σ_J N_J Δφ̂_J at the particles; empty when ε = 1.
+    predicted: Vec<Vector<f64, D>>,
     /// The preconditioner of the step's linear systems: inverse diagonal blocks of the first tangent that is frozen.
     pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
     /// The same for systems in single precision.
@@ -91,10 +91,9 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     ) -> Self {
         // Without inertia nothing is weighed, and nothing is consistent.
         let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, lumping) };
-        let history = if lumping < 1.0 {
-            let nodal_history: Vec<_> =
-                (nodal.velocity.iter().zip(&nodal.acceleration)).map(|(v, a)| v * alphas.a2 + a * alphas.a3).collect();
-            supports.values(&nodal_history)
+        let predicted = if lumping < 1.0 {
+            let state = nodal.velocity.iter().zip(&nodal.acceleration);
+            supports.values(&state.map(|(v, a)| alphas.predicted(v, a)).collect::<Vec<_>>())
         } else {
             Vec::new()
         };
@@ -108,7 +107,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             dead_load,
             pressures,
             prescribed,
-            history,
+            predicted,
             inverse_blocks: OnceLock::new(),
             single_inverse_blocks: OnceLock::new(),
             spare: Mutex::default(),
@@ -138,13 +137,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
     }
 
-    /// ε m_I and a_I = α₁ Δφ − α₂ v_n − α₃ a_n; `None` without inertia.
+    /// ε m_I and a_I = α₁ (Δφ − Δφ̂); `None` without inertia.
     #[inline(always)]
     fn motion<T: Real>(&self, node: usize, dphi: &Vector<T, D>) -> Option<(T, Vector<T, D>)> {
         let (v, a) = (self.nodal.velocity.get(node)?, self.nodal.acceleration.get(node)?);
-        let a = Vector::from_fn(|i, _| {
-            T::lit(self.alphas.a1) * dphi[i] - T::lit(self.alphas.a2 * v[i] + self.alphas.a3 * a[i])
-        });
+        let predicted = self.alphas.predicted(v, a);
+        let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (dphi[i] - T::lit(predicted[i])));
         Some((T::lit(self.lumping * self.nodal.mass[node]), a))
     }
 
@@ -158,7 +156,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     #[inline(always)]
     fn consistent_inertia<T: Real>(&self, p: usize, dphi: &Vector<T, D>) -> Vector<T, D> {
         self.consistent_mass(p).map_or_else(Vector::zeros, |m| {
-            Vector::from_fn(|i, _| T::lit(m) * (T::lit(self.alphas.a1) * dphi[i] - T::lit(self.history[p][i])))
+            Vector::from_fn(|i, _| T::lit(self.alphas.a1 * m) * (dphi[i] - T::lit(self.predicted[p][i])))
         })
     }
 

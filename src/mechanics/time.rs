@@ -1,5 +1,7 @@
 //! What a step in time is: incremental Newmark-β (the paper's Table 1), or a load step without inertia.
 
+use crate::tensor::Vector;
+
 /// Whether bodies have inertia.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Inertia {
@@ -27,23 +29,61 @@ impl Default for Newmark {
     }
 }
 
-/// a = α₁ Δφ − α₂ v_n − α₃ a_n,  v = α₄ Δφ + α₅ v_n + α₆ a_n   (eq. 19)
+/// a = α₁ Δφ − α₂ v_n − α₃ a_n,  v = α₄ Δφ + α₅ v_n + α₆ a_n   (eq. 19), evaluated as
+///
+/// ```text
+/// a       = α₁ (Δφ − Δφ̂),  Δφ̂ = Δt v_n + α₃/α₁ a_n
+/// v − v_n = α₄ (Δφ − Δt v_n) + α₆ a_n
+/// a − a_n = α₁ (Δφ − Δt v_n) − (α₃ + 1) a_n
+/// ```
+///
+/// which is the same, because α₂ = α₁ Δt and α₅ = 1 − α₄ Δt. As printed, large terms leave a small difference, and in steady flight
+/// they are rounded the same way in every step: the momentum drifts. Here Δφ = Δt v_n without acceleration changes not a bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)] // named in the formula above
+#[allow(missing_docs)] // named in the formulas above
 pub struct Alphas {
+    pub dt: f64,
     pub a1: f64,
     pub a2: f64,
     pub a3: f64,
     pub a4: f64,
-    pub a5: f64,
     pub a6: f64,
 }
 
 impl Alphas {
     /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
-    pub const START: Self = Self { a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a5: 1.0, a6: 0.0 };
-    /// a = 0 and v = 0 for every Δφ: nothing has inertia.
-    pub const NONE: Self = Self { a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a5: 0.0, a6: 0.0 };
+    pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0 };
+    /// Nothing has inertia, a velocity or an acceleration.
+    pub const NONE: Self = Self { dt: 0.0, a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a6: 0.0 };
+
+    /// Δφ̂, the increment that ends without acceleration, from v_n and a_n. There is none without inertia.
+    ///
+    /// ```
+    /// use bfree::mechanics::time::Newmark;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // Without acceleration at the start either, it is that of uniform motion.
+    /// let (v, rest) = (Vector::from([3.0, -1.0]), Vector::from([0.0, 0.0]));
+    /// assert_eq!(Newmark::default().alphas(0.5).predicted(&v, &rest), v * 0.5);
+    /// ```
+    #[inline(always)]
+    pub fn predicted<const D: usize>(&self, v: &Vector<f64, D>, a: &Vector<f64, D>) -> Vector<f64, D> {
+        v * self.dt + a * (self.a3 / self.a1)
+    }
+
+    /// v − v_n and a − a_n, from Δφ, v_n and a_n.
+    ///
+    /// Example: [`Newmark::alphas`].
+    #[inline(always)]
+    pub fn increments<const D: usize>(
+        &self,
+        dphi: &Vector<f64, D>,
+        v: &Vector<f64, D>,
+        a: &Vector<f64, D>,
+    ) -> (Vector<f64, D>, Vector<f64, D>) {
+        let bent = dphi - v * self.dt;
+        (bent * self.a4 + a * self.a6, bent * self.a1 - a * (self.a3 + 1.0))
+    }
 }
 
 impl Newmark {
@@ -51,22 +91,23 @@ impl Newmark {
     ///
     /// ```
     /// use bfree::mechanics::time::Newmark;
+    /// use bfree::tensor::Vector;
     ///
     /// // Uniformly accelerated motion, Δφ = v Δt + ½ a Δt², is exact for every β and γ.
-    /// let (v, a, dt) = (3.0, -2.0, 0.25);
+    /// let (v, a, dt) = (Vector::from([3.0]), Vector::from([-2.0]), 0.25);
     /// let alphas = Newmark { beta: 0.3025, gamma: 0.6 }.alphas(dt);
-    /// let dphi = v * dt + 0.5 * a * dt * dt;
-    /// assert!((alphas.a1 * dphi - alphas.a2 * v - alphas.a3 * a - a).abs() < 1e-12);
-    /// assert!((alphas.a4 * dphi + alphas.a5 * v + alphas.a6 * a - (v + a * dt)).abs() < 1e-12);
+    /// let dphi = v * dt + a * (0.5 * dt * dt);
+    /// let (delta_v, delta_a) = alphas.increments(&dphi, &v, &a);
+    /// assert!((delta_v - a * dt).norm() < 1e-14 && delta_a.norm() < 1e-13);
     /// ```
     pub fn alphas(&self, dt: f64) -> Alphas {
         let Self { beta, gamma } = *self;
         Alphas {
+            dt,
             a1: 1.0 / (beta * dt * dt),
             a2: 1.0 / (beta * dt),
             a3: (1.0 - 2.0 * beta) / (2.0 * beta),
             a4: gamma / (beta * dt),
-            a5: 1.0 - gamma / beta,
             a6: (1.0 - gamma / (2.0 * beta)) * dt,
         }
     }
@@ -76,23 +117,54 @@ impl Newmark {
 mod tests {
     use super::*;
 
+    const RULES: [(f64, f64); 4] = [(0.25, 0.5), (0.3025, 0.6), (0.5, 0.9), (1.0, 1.5)];
+
     #[test]
     fn uniformly_accelerated_motion_is_exact_for_every_beta_and_gamma() {
-        let (v, a) = (1.7, -3.0);
-        for (beta, gamma) in [(0.25, 0.5), (0.3025, 0.6), (0.5, 0.9), (1.0, 1.5)] {
+        let (v, a) = (Vector::from([1.7]), Vector::from([-3.0]));
+        for (beta, gamma) in RULES {
             for dt in [1e-3, 0.5, 40.0] {
                 let alphas = Newmark { beta, gamma }.alphas(dt);
-                let dphi = v * dt + 0.5 * a * dt * dt;
-                let acceleration = alphas.a1 * dphi - alphas.a2 * v - alphas.a3 * a;
-                let velocity = alphas.a4 * dphi + alphas.a5 * v + alphas.a6 * a;
-                assert!(
-                    (acceleration - a).abs() < 1e-15 * alphas.a2 * 64.0 * (1.0 + dt),
-                    "β = {beta}: a = {acceleration}"
-                );
-                assert!(
-                    (velocity - (v + a * dt)).abs() < 1e-13 * (1.0 + dt),
-                    "β = {beta}, γ = {gamma}: v = {velocity}"
-                );
+                let dphi = v * dt + a * (0.5 * dt * dt);
+                let (delta_v, delta_a) = alphas.increments(&dphi, &v, &a);
+                let acceleration = (dphi - alphas.predicted(&v, &a)) * alphas.a1;
+                // What a rounding of Δφ makes of it.
+                let round_off = f64::EPSILON * dphi.norm() * alphas.a1;
+                assert!((acceleration - a).norm() < 8.0 * round_off, "β = {beta}: a = {acceleration}");
+                assert!(delta_a.norm() < 8.0 * round_off, "β = {beta}: Δa = {delta_a}");
+                let round_off = f64::EPSILON * dphi.norm() * alphas.a4;
+                assert!((delta_v - a * dt).norm() < 8.0 * round_off, "β = {beta}, γ = {gamma}: Δv = {delta_v}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_differences_are_those_of_the_printed_formulas() {
+        let (dphi, v, a) = (Vector::from([0.3, -1.1]), Vector::from([1.7, 0.2]), Vector::from([-3.0, 0.9]));
+        for (beta, gamma) in RULES {
+            for dt in [0.05, 0.5, 4.0] {
+                let alphas = Newmark { beta, gamma }.alphas(dt);
+                let Alphas { a1, a2, a3, a4, a6, .. } = alphas;
+                let a5 = 1.0 - gamma / beta;
+                let velocity = dphi * a4 + v * a5 + a * a6;
+                let acceleration = dphi * a1 - v * a2 - a * a3;
+                let (delta_v, delta_a) = alphas.increments(&dphi, &v, &a);
+                let of_residual = (dphi - alphas.predicted(&v, &a)) * a1;
+                let close = |x: Vector<f64, 2>, y: Vector<f64, 2>| (x - y).norm() < 1e-14 * (a1 + a2 + a4 + 10.0);
+                assert!(close(v + delta_v, velocity) && close(a + delta_a, acceleration), "β = {beta}, Δt = {dt}");
+                assert!(close(of_residual, acceleration), "β = {beta}, Δt = {dt}: {of_residual}");
+            }
+        }
+    }
+
+    #[test]
+    fn steady_flight_changes_not_a_bit() {
+        let (v, rest) = (Vector::from([0.1, -1.0 / 3.0, 7e5]), Vector::zeros());
+        for (beta, gamma) in RULES {
+            for dt in [1.0 / 3.0, 1e-9, 7e8] {
+                let alphas = Newmark { beta, gamma }.alphas(dt);
+                assert_eq!(alphas.increments(&(v * dt), &v, &rest), (rest, rest));
+                assert_eq!(v * dt - alphas.predicted(&v, &rest), rest);
             }
         }
     }

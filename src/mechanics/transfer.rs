@@ -276,8 +276,8 @@ pub struct Moved<const D: usize> {
 impl<const D: usize> Moved<D> {
     /// The particle updates, with `projected` the nodal state before, `nodal` after the prescribed values were put in.
     ///
-    /// a_p += Σ N Δa,  Δa = α₁Δφ − α₂v_n − (α₃+1)a_n        (50)
-    /// v_p += Σ N Δv,  Δv = α₄Δφ + (α₅−1)v_n + α₆a_n         (51)
+    /// a_p += Σ N Δa,  Δa = α₁(Δφ − Δt v_n) − (α₃+1)a_n      (50)
+    /// v_p += Σ N Δv,  Δv = α₄(Δφ − Δt v_n) + α₆a_n           (51), both as in [`Alphas`]
     /// x_p += Σ N Δφ                                           (52)
     /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
     #[allow(clippy::too_many_arguments)] // the ingredients of four formulas
@@ -304,11 +304,9 @@ impl<const D: usize> Moved<D> {
         if nodal.is_static() {
             return moved;
         }
-        let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration).map(|((d, v), a)| (d, v, a));
-        let mut delta_a: Vec<_> =
-            state().map(|(d, v, a)| d * alphas.a1 - v * alphas.a2 - a * (alphas.a3 + 1.0)).collect();
-        let mut delta_v: Vec<_> =
-            state().map(|(d, v, a)| d * alphas.a4 + v * (alphas.a5 - 1.0) + a * alphas.a6).collect();
+        let state = dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
+        let (mut delta_v, mut delta_a): (Vec<_>, Vec<_>) =
+            state.map(|((dphi, v), a)| alphas.increments(dphi, v, a)).unzip();
         let mut impulses = Vec::with_capacity(prescribed.len());
         for dof in prescribed {
             let (node, i) = (dof.node, dof.component);

@@ -178,8 +178,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
     pub fn step(&mut self) -> Result<NewtonReport, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
         let alphas = self.newmark.alphas(dt);
-        let carried =
-            self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u * (alphas.a1 / alphas.a2)).collect();
+        let carried = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
         let nodal = Nodal {
             mass: self.mass.clone(),
             velocity: carried,
@@ -206,8 +205,9 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let report = newton(&equilibrium, bytemuck::cast_slice_mut(&mut u), &self.newton)?;
         for (node, new) in u.iter().enumerate() {
             let (by, v, a) = (new - self.displacement[node], self.velocity[node], self.acceleration[node]);
-            self.acceleration[node] = by * alphas.a1 - v * alphas.a2 - a * alphas.a3;
-            self.velocity[node] = by * alphas.a4 + v * alphas.a5 + a * alphas.a6;
+            let (delta_v, delta_a) = alphas.increments(&by, &v, &a);
+            self.velocity[node] += delta_v;
+            self.acceleration[node] += delta_a;
         }
         self.displacement = u;
         self.clock.advance();

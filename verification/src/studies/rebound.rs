@@ -96,7 +96,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let mut change = vec![Vector::zeros(); dphi.len()];
     for node in 0..dphi.len() {
         let (v, a) = (nodal.velocity[node], nodal.acceleration[node]);
-        let mut new = dphi[node] * alphas.a4 + v * alphas.a5 + a * alphas.a6;
+        let mut new = v + alphas.increments(&dphi[node], &v, &a).0;
         for dof in prepared.prescribed.iter().filter(|dof| dof.node == node) {
             new[dof.component] = 0.0;
         }

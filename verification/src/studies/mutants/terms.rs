@@ -237,7 +237,7 @@ fn residual<const D: usize, L: Law>(
         Fault::ResidualWithoutInertia => {
             for (node, r) in r.iter_mut().enumerate() {
                 let (v, a) = (eq.nodal.velocity[node], eq.nodal.acceleration[node]);
-                let acceleration = dphi[node] * eq.alphas.a1 - v * eq.alphas.a2 - a * eq.alphas.a3;
+                let acceleration = (dphi[node] - eq.alphas.predicted(&v, &a)) * eq.alphas.a1;
                 *r -= acceleration * (eq.lumping * eq.nodal.mass[node]);
             }
         }
