@@ -27,6 +27,10 @@ fn width(line: usize, lines: usize) -> u32 {
 /// Height of a line of the legend, and room for its letters.
 const LEGEND: (i32, i32) = (22, 8);
 
+/// Ticks of an axis, at most, and what a label of a decade, as 1e-12, takes of its length.
+const TICKS: f64 = 8.0;
+const DECADE: f64 = 56.0;
+
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -62,11 +66,13 @@ impl Axis {
         }
     }
 
-    /// Where the axis has ticks: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5.
-    pub(crate) fn ticks(&self, range: &Range<f64>) -> Vec<f64> {
+    /// Where the axis has ticks: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5. Along `length`
+    /// units of the picture their labels have room side by side.
+    pub(crate) fn ticks(&self, range: &Range<f64>, length: f64) -> Vec<f64> {
         let span = range.end - range.start;
         if self.logarithmic {
-            let every = (span / 8.0).ceil().max(1.0) as usize;
+            let most = (length / DECADE).clamp(1.0, TICKS);
+            let every = (span / most).ceil().max(1.0) as usize;
             let digits: &[f64] = if span < 3.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
             let decades = (range.start.floor() as i64..=range.end.ceil() as i64).filter(|d| d % every as i64 == 0);
             decades
@@ -74,7 +80,7 @@ impl Axis {
                 .filter(|t| range.contains(t))
                 .collect()
         } else {
-            let rough = span / 8.0;
+            let rough = span / TICKS;
             let decade = 10.0_f64.powf(rough.log10().floor());
             let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|&s| s >= rough).unwrap_or(rough);
             let (first, last) = ((range.start / step).ceil() as i64, (range.end / step).floor() as i64);
@@ -178,7 +184,8 @@ impl Figure {
         // The legend stands beside the chart, where it hides nothing.
         let (area, legend) = root.split_horizontally(1000 - (LEGEND.1 * longest + 60).min(400));
         let (x, y) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
-        let (x_ticks, y_ticks) = (self.x.ticks(&x), self.y.ticks(&y));
+        // Labels of the upright axis stand above each other.
+        let (x_ticks, y_ticks) = (self.x.ticks(&x, 500.0), self.y.ticks(&y, f64::INFINITY));
         let mut chart = ChartBuilder::on(&area)
             .caption(&self.title, ("sans-serif", 18))
             .margin(12)
@@ -217,10 +224,12 @@ mod tests {
     fn ticks_are_round_numbers_inside_the_range() {
         let axis = Axis::logarithmic("h");
         let labels = |axis: &Axis, range: Range<f64>| -> Vec<String> {
-            axis.ticks(&range).into_iter().map(|place| axis.tick(place)).collect()
+            axis.ticks(&range, 500.0).into_iter().map(|place| axis.tick(place)).collect()
         };
         assert_eq!(labels(&axis, 0.9..1.6), ["10", "20"]);
-        assert_eq!(axis.ticks(&(-16.5..0.5)), [-15.0, -12.0, -9.0, -6.0, -3.0, 0.0]);
+        assert_eq!(axis.ticks(&(-16.5..0.5), 500.0), [-15.0, -12.0, -9.0, -6.0, -3.0, 0.0]);
+        assert_eq!(labels(&axis, -13.0..0.1).len(), 7);
+        assert_eq!(axis.ticks(&(-12.5..0.1), 268.0), [-12.0, -8.0, -4.0, 0.0]);
         assert_eq!(labels(&Axis::linear("t"), -0.1..0.52), ["-0.1", "0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
     }
 }

@@ -9,6 +9,13 @@ use std::ops::Range;
 /// Plotters rounds places to whole units: drawn this much larger, and shown smaller, lines are smooth.
 const FINE: u32 = 4;
 
+/// A dash of a broken line, and the gap after it.
+const DASH: (u32, u32) = (6 * FINE, 4 * FINE);
+
+/// Room beside a chart, and for the numbers at its upright axis.
+const MARGINS: (u32, u32) = (8, 18);
+const NUMBERS: u32 = 66;
+
 const LABEL: (&str, u32) = ("sans-serif", 14 * FINE);
 
 /// How the points of a curve are shown.
@@ -202,13 +209,15 @@ impl Panel {
         });
         let (x, y) = window
             .unwrap_or_else(|| (crate::figure::range(all().map(|p| p.0)), crate::figure::range(all().map(|p| p.1))));
-        let (ticks_x, ticks_y) = (self.x.ticks(&x), self.y.ticks(&y));
+        let length = (area.dim_in_pixel().0 / FINE).saturating_sub(MARGINS.0 + MARGINS.1 + NUMBERS);
+        // Labels of the upright axis stand above each other.
+        let (ticks_x, ticks_y) = (self.x.ticks(&x, f64::from(length)), self.y.ticks(&y, f64::INFINITY));
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, ("sans-serif", 16 * FINE))
-            .margin(8 * FINE)
-            .margin_right(18 * FINE)
+            .margin(MARGINS.0 * FINE)
+            .margin_right(MARGINS.1 * FINE)
             .x_label_area_size(44 * FINE)
-            .y_label_area_size(66 * FINE)
+            .y_label_area_size(NUMBERS * FINE)
             .build_cartesian_2d(
                 Scale { range: x.clone(), ticks: ticks_x },
                 Scale { range: y.clone(), ticks: ticks_y },
@@ -238,8 +247,8 @@ impl Panel {
                 }
                 Mark::Dashed => chart.draw_series(DashedLineSeries::new(
                     inside.clone(),
-                    6 * FINE,
-                    4 * FINE,
+                    DASH.0,
+                    DASH.1,
                     color.stroke_width(3 * FINE / 2),
                 ))?,
                 Mark::Dots => {
@@ -252,9 +261,13 @@ impl Panel {
                 let (start, width) = if curve.mark == Mark::Dots { (length / 2, 5 * FINE) } else { (0, 2 * FINE) };
                 let end = if curve.mark == Mark::Dots { start + width as i32 } else { length };
                 // The library measures text too short: without the blanks it would leave the box.
-                series
-                    .label(format!("{}    ", curve.name))
-                    .legend(move |(x, y)| PathElement::new([(x + start, y), (x + end, y)], color.stroke_width(width)));
+                let series = series.label(format!("{}    ", curve.name));
+                let line = move |(x, y)| [(x + start, y), (x + end, y)];
+                let style = color.stroke_width(width);
+                match curve.mark {
+                    Mark::Dashed => series.legend(move |at| DashedPathElement::new(line(at), DASH.0, DASH.1, style)),
+                    _ => series.legend(move |at| PathElement::new(line(at), style)),
+                };
             }
             if curve.mark == Mark::Joined {
                 chart.draw_series(dots())?;
