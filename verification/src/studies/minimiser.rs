@@ -17,8 +17,16 @@ use bfree::tensor::Vector;
 /// What the study shows.
 pub(super) const ABOUT: &str = "argmin minimises the potential and lands on the increment that Newton found";
 
-/// Π is a sum of some thousand contributions, rounded to a few eps of the sum of their magnitudes.
-const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// Round-off of the difference of two values of Π, relative to the sum of the magnitudes of its n contributions.
+///
+/// Each value is a plain sum: n additions, each wrong by at most eps/2 of a partial sum, which the sum of the magnitudes bounds. As
+/// independent errors, spread evenly, those of both values have a standard deviation of √(2n/3) eps/2 at most: √n eps is more than two
+/// of them, and if the contributions have one sign, so that the partial sums grow from nothing, more than four. A contribution itself,
+/// V W, is wrong by about 4 eps of its own, and by 4 more through H: W is of second order in H, which is composed of two gradients
+/// and so rounded to 2 eps.
+fn round_off(contributions: usize) -> f64 {
+    ((contributions as f64).sqrt() + 8.0) * f64::EPSILON
+}
 
 /// Pairs of vectors L-BFGS remembers.
 const MEMORY: usize = 20;
@@ -79,7 +87,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         case(&mut report, &mut table, &label, speed, time, lumping)?;
     }
     let remarks = vec![
-        "A minimiser sees x only through Pi, whose round-off is d = 16 eps times the sum of the magnitudes of its contributions: with Pi = Pi_min + \
+        "A minimiser sees x only through Pi, whose round-off is d = (sqrt(n) + 8) eps times the sum of the magnitudes of its n contributions: with Pi = Pi_min + \
          e.Ke/2 that is an error of sqrt(2 d) in the energy norm sqrt(e.Ke), whatever the condition of K. That is the bound."
             .into(),
     ];
@@ -143,14 +151,15 @@ fn case(
     bfree::solver::LinearOperator::apply(&equilibrium.linearize(by_newton)?, &difference, &mut k_e);
     let energy_norm = bfree::solver::vector::dot(&difference, &k_e).max(0.0).sqrt();
     let (least, magnitude) = potential(&equilibrium, by_newton)?;
-    let bound = (2.0 * ROUND_OFF * magnitude).sqrt();
+    let round_off = round_off(simulation.particles.len() + prepared.nodes.len());
+    let bound = (2.0 * round_off * magnitude).sqrt();
     report.push(&["energy norm of the difference", label], energy_norm, Bound::AtMost(bound));
     let norm = bfree::solver::vector::norm;
     let relative = norm(&difference) / norm(by_newton);
     report.push(&["|difference| / |dphi|", label], relative, Bound::Reported);
     // Newton's point is a minimum: the other one does not lie lower.
     let lower = (least - potential(&equilibrium, &found)?.0) / magnitude;
-    report.push(&["(Pi Newton - Pi L-BFGS) / magnitude", label], lower, Bound::AtMost(ROUND_OFF));
+    report.push(&["(Pi Newton - Pi L-BFGS) / magnitude", label], lower, Bound::AtMost(round_off));
     table.push([
         label.into(),
         newton.history.iterations.len().to_string(),
