@@ -6,12 +6,25 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{Settings, Simulation};
+use bfree::simulation::{Settings, Simulation, StepReport};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::{Tensor, Vector};
 
 /// Linear momentum over whole steps, relative to Σ m |v|.
 pub(super) const MOMENTUM: f64 = 1e-13;
+
+/// Newton ends where ‖R‖ is below 16 floors of 4 eps of the sum of the magnitudes of the contributions to R, if not before.
+const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+
+/// A bound of Σ_I |R_I| where Newton's method ends: over n nodes √n ‖R‖ at most. Momentum changes by Δt Σ_I R_I, whatever the
+/// stresses are.
+pub(super) fn left_by_newton<const D: usize>(settings: &Settings, step: &StepReport<D>) -> f64 {
+    let history = &step.newton.history;
+    let number = |measured: Option<f64>| measured.unwrap_or(f64::NAN);
+    let asked = settings.newton.relative_tolerance * number(history.first_residual);
+    let residual = super::worse(asked, ROUND_OFF * number(history.magnitude));
+    (step.active_nodes as f64).sqrt() * residual
+}
 
 /// A body of Ciarlet's law.
 pub(super) fn body(lame: Lame, density: f64) -> Body<Material> {
@@ -44,11 +57,14 @@ pub(super) fn fill<const D: usize>(
 }
 
 /// Newton to the last digit: what a study then finds is no matter of tolerances.
+pub(super) const TOLERANCE: f64 = 1e-14;
+
+/// With that tolerance.
 pub(super) fn settings(lumping: f64) -> Settings {
     Settings {
         lumping,
         newton: NewtonSettings {
-            relative_tolerance: 1e-14,
+            relative_tolerance: TOLERANCE,
             forcing: Forcing::Fixed(1e-8),
             max_krylov_iterations: 5000,
             ..NewtonSettings::default()

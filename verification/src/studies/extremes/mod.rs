@@ -14,6 +14,7 @@ mod impossible;
 mod places;
 mod points;
 mod sliding;
+mod small;
 mod strains;
 mod units;
 
@@ -21,7 +22,7 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 
 /// What the study shows.
-pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, time steps and overlaps at their extremes";
+pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, lone particles, time steps and overlaps at their extremes";
 
 /// What is written in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
@@ -37,6 +38,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.reports.push(contrast::run()?);
     outcome.reports.push(units::run()?);
     outcome.reports.push(places::run());
+    small::run(&mut outcome);
     durations::run(effort, &mut outcome)?;
     flight::run(effort, &mut outcome)?;
     sliding::run(effort, &mut outcome)?;
