@@ -3,6 +3,7 @@
 use crate::figure::{Axis, COLORS, FigureError};
 use bfree::output::plot::{PlotError, png};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use std::ops::Range;
 

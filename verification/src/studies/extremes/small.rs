@@ -137,10 +137,11 @@ fn outside<const D: usize>(report: &mut Report) {
 
 /// One particle in the middle of each cell of a block that vibrates.
 fn sparse<const D: usize>(name: &str, shape: &Approximation, lumping: f64, report: &mut Report) {
-    let mut simulation: Simulation<D> = bodies::block(3, shape.clone(), STEP);
+    let cells = if D == 3 { 2 } else { 3 };
+    let mut simulation: Simulation<D> = bodies::block(cells, shape.clone(), STEP);
     let grid = simulation.grid;
     simulation.particles = Particles::default();
-    fill(&mut simulation.particles, &grid, ([3; D], [6; D]), 1, (0, 1.0));
+    fill(&mut simulation.particles, &grid, ([cells; D], [2 * cells; D]), 1, (0, 1.0));
     simulation.settings = settings(lumping);
     let a = Tensor::<f64, D>::from_fn(|i, k| if i == k { 0.05 - 0.04 * i as f64 } else { 0.01 });
     stir(&mut simulation, &a);
