@@ -77,7 +77,7 @@ impl Axis {
             let decades = (range.start.floor() as i64..=range.end.ceil() as i64).filter(|d| d % every as i64 == 0);
             decades
                 .flat_map(|d| digits.iter().map(move |m| d as f64 + m.log10()))
-                .filter(|t| range.contains(t))
+                .filter(|t| (range.start..=range.end).contains(t))
                 .collect()
         } else {
             let rough = span / TICKS;
@@ -229,7 +229,7 @@ mod tests {
         assert_eq!(labels(&axis, 0.9..1.6), ["10", "20"]);
         assert_eq!(axis.ticks(&(-16.5..0.5), 500.0), [-15.0, -12.0, -9.0, -6.0, -3.0, 0.0]);
         assert_eq!(labels(&axis, -13.0..0.1).len(), 7);
-        assert_eq!(axis.ticks(&(-12.5..0.1), 268.0), [-12.0, -8.0, -4.0, 0.0]);
+        assert_eq!(axis.ticks(&(-12.5..0.1), 268.0), [-12.0, -9.0, -6.0, -3.0, 0.0]);
         assert_eq!(labels(&Axis::linear("t"), -0.1..0.52), ["-0.1", "0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
     }
 }
