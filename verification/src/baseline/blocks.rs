@@ -2,7 +2,6 @@
 
 use bfree::mechanics::sweep::Supports;
 use bfree::tensor::{Tensor, Vector};
-use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Which nodes share a particle: the sparsity of the tangent.
@@ -77,46 +76,6 @@ impl Pattern {
     }
 }
 
-/// Rows that one thread takes at a time.
-const ROWS: usize = 64;
-
-/// Sums that do not wait for each other: with one of them the product is bound by the latency of an addition, not by memory.
-const SUMS: usize = 4;
-
-/// Some rows of a product, with the widest vectors of the processor.
-struct Rows<'a, const D: usize> {
-    matrix: &'a BlockMatrix<'a, D>,
-    first: usize,
-    u: &'a [Vector<f64, D>],
-    out: &'a mut [Vector<f64, D>],
-}
-
-impl<const D: usize> WithSimd for Rows<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Pattern { starts, columns } = self.matrix.pattern;
-        for (row, out) in (self.first..).zip(self.out) {
-            let range = starts[row]..starts[row + 1];
-            // Σ_J K_IJ ∘ (1 ⊗ u_J): the blocks entry by entry, as they lie in memory, and the sum along their rows at the end.
-            let mut sums = [[[0.0; D]; D]; SUMS];
-            let (columns, blocks) = (columns[range.clone()].chunks(SUMS), self.matrix.blocks[range].chunks(SUMS));
-            for (columns, blocks) in columns.zip(blocks) {
-                for ((sum, block), &column) in sums.iter_mut().zip(blocks).zip(columns) {
-                    let u = &self.u[column as usize];
-                    for k in 0..D {
-                        for i in 0..D {
-                            sum[k][i] += block[(i, k)] * u[k];
-                        }
-                    }
-                }
-            }
-            *out = sums.iter().flatten().map(|column| Vector::from(*column)).sum();
-        }
-    }
-}
-
 /// A sparse matrix of D×D blocks.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix<'a, const D: usize> {
@@ -148,8 +107,13 @@ impl<'a, const D: usize> BlockMatrix<'a, D> {
 
     /// out = K u
     pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        out.par_chunks_mut(ROWS).enumerate().for_each(|(chunk, out)| {
-            Arch::new().dispatch(Rows { matrix: self, first: chunk * ROWS, u, out });
+        out.par_iter_mut().enumerate().with_min_len(64).for_each(|(row, out)| {
+            let blocks = &self.blocks[self.pattern.starts[row]..self.pattern.starts[row + 1]];
+            let mut sum = Vector::zeros();
+            for (&column, block) in self.pattern.row(row).iter().zip(blocks) {
+                sum += block * u[column as usize];
+            }
+            *out = sum;
         });
     }
 
