@@ -317,7 +317,7 @@ fn arrays<const D: usize, L: Law, A>(
     [
         only(true, array("particles: x, H, volume, mass, body", Lifetime::Step, particles * Particles::<D>::BYTES)),
         only(moves, array("particles: v, a", Lifetime::Step, particles * 2 * vector)),
-        only(consistent, array("particles: history of the consistent inertia", Lifetime::Step, particles * vector)),
+        only(consistent, array("particles: prediction for the consistent inertia", Lifetime::Step, particles * vector)),
         only(true, array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes())),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
         only(true, array("nodal fields: loads, Δφ, residuals", Lifetime::Step, nodes * 8 * vector)),
@@ -325,7 +325,7 @@ fn arrays<const D: usize, L: Law, A>(
         // As projected, and with prescribed values in place.
         only(moves, array("nodal fields: v, a", Lifetime::Step, nodes * 4 * vector)),
         only(faces > 0, array("loaded surfaces", Lifetime::Step, faces * size_of::<SurfacePoint<D>>())),
-        only(true, array("frozen tangent", Lifetime::Solve, frozen)),
+        only(true, array("frozen tangent", Lifetime::Step, frozen)),
         only(true, array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor / share)),
         only(true, array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors)),
         only(true, array("particles: x and H after the step", Lifetime::Update, particles * (vector + tensor))),

@@ -139,7 +139,7 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 }
 
 /// The large arrays of the last step, in whose memory the next one works, and its order of particles, from which the next one starts to
-/// sort. It is no state: a clone is empty, and no checkpoint holds it.
+/// sort. It is no state: a clone is empty, no checkpoint holds it, and a step that fails leaves none.
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
@@ -326,7 +326,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Update, supports.passes());
 
         let projection_iterations = projected.iterations;
-        let tangents = equilibrium.into_spare();
+        let tangents = equilibrium.into_spare(precision);
         moved.commit(&mut self.particles);
         self.workspace = Workspace { supports: Some(supports), tangents };
         self.external_work += work;

@@ -75,7 +75,7 @@ pub trait Separable: Validate + Send + Sync {
     /// `x` outside the axis or not a number; an axis without cells.
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError>;
 
-    /// The most nodes an axis can list, were it long enough.
+    /// The most nodes an axis can list, were it long enough. The list holds the nodes of the cell, and is not longer than this.
     fn width(&self) -> usize;
 
     /// The functions as one of the shipped families, which the sweep evaluates in vector lanes where no wall is near; `None` for any

@@ -8,6 +8,7 @@ use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
+use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector, cofactor, identity};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -120,9 +121,13 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self
     }
 
-    /// The tangents no longer needed.
-    pub(crate) fn into_spare(self) -> SpareTangents<D> {
-        self.spare.into_inner().unwrap_or_else(PoisonError::into_inner)
+    /// The tangents no longer needed; of two precisions that which the next step begins with.
+    pub(crate) fn into_spare(self, precision: Precision) -> SpareTangents<D> {
+        let SpareTangents { double, single } = self.spare.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match precision {
+            Precision::Mixed if single.is_some() => SpareTangents { double: None, single },
+            _ => SpareTangents { double, single: None },
+        }
     }
 
     /// The law of particle `p`.

@@ -194,7 +194,7 @@ impl<'a, const D: usize> EffectiveMass<'a, D> {
         let mut diagonal: Vec<f64> = mass.iter().map(|m| lumping * m).collect();
         supports.scatter(&mut diagonal, |p, n, _| (1.0 - lumping) * particles.mass[p] * n * n);
         // Of the least numbers above 0 there is no inverse.
-        let inverse = |d: f64| if d.recip().is_finite() { d.recip() } else { 0.0 };
+        let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
         let inverse_diagonal = diagonal.into_iter().map(inverse).collect();
         Self { particles, supports, mass, lumping, inverse_diagonal }
     }

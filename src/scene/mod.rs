@@ -49,7 +49,7 @@ pub struct Scene {
     pub grid: grid::GridBox,
     /// How accurate the results should be: sets, from a measured table, what the scene leaves open of `grid.spacing`, `time.step`,
     /// `approximation`, `time.lumping`, `bodies[].particles_per_cell` and `solver.newton.tolerance`. What the scene gives
-    /// stays. Default: nothing is set.
+    /// stays, and without inertia so do `time` and `approximation`. Default: nothing is set.
     pub accuracy: Option<accuracy::Accuracy>,
     /// What the accuracy has set.
     #[serde(skip)]

@@ -183,6 +183,42 @@ fn any_number_of_threads_sums_the_same_bits() {
     }
 }
 
+/// What is left of other supports, with other blocks, widths and precision, is not seen.
+fn renewal<const D: usize>() {
+    let (grid, after) = case::<D>();
+    let mut random = Irregular(7);
+    let before: Vec<Vector<f64, D>> =
+        after.iter().map(|_| grid.origin + random.vector::<D>().map(|x| (0.5 + 0.4 * x) * 0.7)).collect();
+    for shape in shapes() {
+        let anew = Supports::with_precision(&shape, &grid, &after, Precision::Mixed).unwrap();
+        for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
+            let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
+            let renewed = Supports::renewed(Some(spare), &shape, &grid, &after, Precision::Mixed).unwrap();
+            assert_eq!(renewed.1, anew.1);
+            assert_eq!(renewed.0.windows(), anew.0.windows());
+            for p in 0..after.len() {
+                assert!(renewed.0.of(p).eq(anew.0.of(p)), "{shape:?} after {other:?}: particle {p}");
+            }
+            // Every lane is summed here, also those that belong to no particle.
+            let u = field::<D>(&anew.1);
+            assert_eq!(sums(&renewed.0, &u), sums(&anew.0, &u));
+        }
+    }
+}
+
+fn sums<const D: usize>(supports: &Supports<D>, u: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+    let mut out = vec![Vector::zeros(); u.len()];
+    supports.assemble(u, &mut out, |_, u, l| Ok::<_, Infallible>((u, l))).unwrap();
+    out
+}
+
+#[test]
+fn supports_do_not_depend_on_those_whose_memory_they_use() {
+    renewal::<1>();
+    renewal::<2>();
+    renewal::<3>();
+}
+
 #[test]
 fn the_first_particle_that_fails_is_named() {
     let (grid, mut positions) = case::<2>();

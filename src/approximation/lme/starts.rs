@@ -13,8 +13,8 @@ const LARGEST_GAMMA: f64 = 10.0;
 /// Wider functions, in spacings, have more nodes than vector lanes have room for, and cost more to sum than to start.
 const LARGEST_RADIUS: f64 = FURTHEST as f64 + 1.0;
 
-/// Intervals for each unit of γ̂. q varies like exp(γ̂(1 − 2a)): a cubic misses it by (2γ̂ δa)⁴/384, here 5e-10 at most, after
-/// which one step of Newton's method is exact to rounding.
+/// Intervals for each unit of γ̂. q varies like exp(γ̂(1 − 2a)): a cubic misses it by (2γ̂ δa)⁴/384, here 5e-10 at most. One
+/// step of Newton's method from there is exact to rounding, and a second shows it, also where nodes come into reach within an interval.
 const INTERVALS: f64 = 96.0;
 
 /// q and dq/da at equally spaced a in 0 … 1.

@@ -75,11 +75,9 @@ fn built<const D: usize>(
     let mut active = vec![0; size[1] * size[2]];
     let Block { groups, single: other, mut nodes, mut places, .. } = spare;
     let building = Building { family, grid, keys, origin, size };
-    let groups = building.groups(groups, 1.0, scratch, &mut active)?;
-    let single = match single {
-        true => Some(building.groups(other.unwrap_or_default(), grid.spacing, scratch, &mut active)?),
-        false => None,
-    };
+    let groups = building.groups(groups, 1.0, scratch, Some(&mut active))?;
+    let in_single = || building.groups(other.unwrap_or_default(), grid.spacing, scratch, None);
+    let single = single.then(in_single).transpose()?;
     nodes.clear();
     places.clear();
     let block = Block { groups, single, origin, size, nodes, places };
@@ -102,13 +100,13 @@ struct Building<'a, const D: usize> {
 }
 
 impl<const D: usize> Building<'_, D> {
-    /// The particles by groups, dN/dx times `unit`, in the arrays of `spare`; marks the nodes of their functions.
+    /// The particles by groups, dN/dx times `unit`, in the arrays of `spare`; marks the nodes of their functions in `active`.
     fn groups<X: Real, const L: usize>(
         &self,
         spare: Groups<X, L>,
         unit: f64,
         scratch: &mut Scratch,
-        active: &mut Active,
+        mut active: Option<&mut Active>,
     ) -> Result<Groups<X, L>, Failure> {
         let mut built = spare.renewed(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
@@ -127,9 +125,12 @@ impl<const D: usize> Building<'_, D> {
         built.windows.reserve_exact(groups.len());
         built.particles.reserve_exact(groups.len());
         built.weights.reserve_exact(rows);
+        // A block may have been much denser before.
+        built.windows.shrink_to(2 * groups.len());
+        built.particles.shrink_to(2 * groups.len());
         built.weights.shrink_to(2 * rows);
         for (particles, windows) in &groups {
-            self.push(&mut built, particles.clone(), windows, unit, scratch, active)?;
+            self.push(&mut built, particles.clone(), windows, unit, scratch, active.as_deref_mut())?;
         }
         scratch.groups = groups;
         Ok(built)
@@ -143,7 +144,7 @@ impl<const D: usize> Building<'_, D> {
         windows: &[[u32; 2]; 3],
         unit: f64,
         scratch: &mut Scratch,
-        active: &mut Active,
+        active: Option<&mut Active>,
     ) -> Result<(), Failure> {
         let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
         let eights = keys.len().div_ceil(LANES);
@@ -172,8 +173,10 @@ impl<const D: usize> Building<'_, D> {
         }
         groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
         groups.windows.push(group);
-        for (part, keys) in keys.chunks(LANES).enumerate() {
-            self.mark(&columns[part * D..(part + 1) * D], keys.len(), active);
+        if let Some(active) = active {
+            for (part, keys) in keys.chunks(LANES).enumerate() {
+                self.mark(&columns[part * D..(part + 1) * D], keys.len(), active);
+            }
         }
         Ok(())
     }
@@ -216,15 +219,19 @@ impl<const D: usize> Building<'_, D> {
 /// Where the group that begins at `start` ends: as many particles of a cell as there are lanes, or whole neighbouring cells
 /// along x while all fit into the lanes and their window is not too wide.
 fn group_end<const L: usize, const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
-    let cell_end = |from: usize| from + keys[from..].iter().take_while(|key| key.0 == keys[from].0).count();
+    // No further than a group reaches: a cell may hold very many.
+    let cell_end = |from: usize| from + keys[from..].iter().take(L + 1).take_while(|key| key.0 == keys[from].0).count();
     let mut end = cell_end(start);
     if end - start > L {
         return start + L;
     }
     while end < keys.len() && follows::<D>(&keys[end - 1], &keys[end]) {
         let next = cell_end(end);
+        if next - start > L {
+            break;
+        }
         let [low, high] = union(&along_x[start..next]);
-        if next - start > L || (high - low) as usize > widest_window(L) {
+        if (high - low) as usize > widest_window(L) {
             break;
         }
         end = next;

@@ -165,6 +165,11 @@ impl<const D: usize> Tiled<D> {
     ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
+        // What they hold is written over.
+        if numbers.capacity() < count * rows {
+            numbers = Vec::with_capacity(count * rows);
+        }
+        numbers.shrink_to(2 * count * rows);
         numbers.resize(count * rows, [X::zero(); N]);
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = numbers.as_mut_slice();

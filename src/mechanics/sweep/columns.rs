@@ -37,7 +37,8 @@ pub(super) struct Along {
 
 impl<'a> Family<'a> {
     pub(super) fn new(product: &'a dyn Separable) -> Self {
-        Self { product, shipped: product.shipped().map(|shipped| (shipped, shipped.radius())) }
+        let shipped = product.shipped().map(|shipped| (shipped, shipped.radius()));
+        Self { product, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
     }
 
     /// The error of the functions at `x`, if they have one.
@@ -135,8 +136,8 @@ impl WithLanes<f64, LANES> for Places<'_> {
             along.cells.iter().zip(&along.below).zip(&along.above).zip(lists)
         {
             let (lower, upper) = (reach(below), reach(above));
-            *cut = (cell < lower) | (cell + 1 + upper > axis.cells);
-            *span = [cell - lower.min(cell), (cell + 2 + upper).min(axis.cells + 1)];
+            *cut = (cell < lower) | (upper + 1 > axis.cells - cell);
+            *span = [cell - lower.min(cell), cell + 1 + (upper + 1).min(axis.cells - cell)];
         }
     }
 }
@@ -174,8 +175,8 @@ impl Columns {
         [self.values[row][lane], self.derivatives[row][lane]]
     }
 
-    /// Writes N and dN/dx times `unit` of the first `count` lanes to the rows of the nodes `low ..`, in the lanes from `at` on. What is
-    /// zero is not written.
+    /// Writes N and dN/dx times `unit` of the first `count` lanes to the rows of the nodes `low ..`, in the lanes from `at` on, which
+    /// hold zeros.
     #[inline(always)]
     pub(super) fn write<X: Real, const L: usize>(
         &self,
@@ -186,8 +187,10 @@ impl Columns {
         derivatives: &mut [[X; L]],
         at: usize,
     ) {
-        if count == LANES && self.first.iter().all(|&first| first == self.first[0] && first <= i64::from(low)) {
-            // All in one cell: whole rows.
+        // The same nodes in all lanes, as in one cell: whole rows.
+        let skipped = usize::try_from(i64::from(low) - self.first[0]);
+        let fits = skipped.is_ok_and(|skipped| skipped + values.len() <= WIDEST);
+        if fits && count == LANES && self.first.iter().all(|&first| first == self.first[0]) {
             for (i, (values, derivatives)) in values.iter_mut().zip(derivatives).enumerate() {
                 let row = (i64::from(low) - self.first[0]) as usize + i;
                 for lane in 0..LANES {

@@ -56,19 +56,34 @@ pub(super) fn sorted<const D: usize>(
     }
 }
 
+/// Keys dropped one after the other that tell that not they are out of order, but some that were kept.
+const RECENT: usize = 8;
+
 /// Sorts keys most of which may be in order: those that are not are taken out, sorted, and merged into the rest ("drop-merge sort").
 fn sort(keys: &mut [Key]) {
-    let (mut kept, mut dropped) = (0, Vec::new());
-    for i in 0..keys.len() {
+    let (mut kept, mut dropped, mut in_row) = (0, Vec::new(), 0);
+    let mut i = 0;
+    while i < keys.len() {
         let key = keys[i];
+        i += 1;
         if kept == 0 || keys[kept - 1] < key {
             keys[kept] = key;
             kept += 1;
-        } else if kept >= 2 && keys[kept - 2] < key {
-            // The odd one out is the one before.
-            dropped.push(std::mem::replace(&mut keys[kept - 1], key));
-        } else {
-            dropped.push(key);
+            in_row = 0;
+            continue;
+        }
+        dropped.push(key);
+        in_row += 1;
+        if in_row == RECENT {
+            // Take them back, and drop what is larger than all of them.
+            let last = dropped.split_off(dropped.len() - RECENT);
+            let largest = last.into_iter().fold(key, Key::max);
+            while kept > 0 && keys[kept - 1] > largest {
+                kept -= 1;
+                dropped.push(keys[kept]);
+            }
+            i -= RECENT;
+            in_row = 0;
         }
     }
     parallel::sort(&mut dropped);
@@ -107,13 +122,15 @@ mod tests {
     #[test]
     fn sorting_needs_no_order_and_uses_any() {
         let number = |i: u64| (i * 0x9e37_79b9_7f4a_7c15) >> 40;
-        let orders: [&dyn Fn(u64) -> u64; 5] = [
+        let orders: [&dyn Fn(u64) -> u64; 7] = [
             &|i| i,
             &|i| 1000 - i,
             &number,
             // One far too large at the beginning, and every tenth out of its place.
             &|i| if i == 0 { 5000 } else { i },
             &|i| if i % 10 == 3 { number(i) % 1000 } else { i },
+            &|i| if i == 2 || i == 3 { 2000 + i } else { i },
+            &|i| (i * 7) % 1001,
         ];
         for order in orders {
             for count in [0, 1, 2, 3, 1000] {

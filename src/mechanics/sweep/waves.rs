@@ -94,8 +94,8 @@ pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
 /// What is gathered of each group.
 pub(super) type GatherKernel = fn(&Groups<f64, LANES>, &[f64], &mut [Rows]);
 
-/// `take(p, point(p, rows, lane))` of every particle with what `kernel` gathered in the rows of its group, in the order of the blocks; no more results wait to be taken than those of a
-/// wave.
+/// `take(p, point(p, rows, lane))` of every particle with what `kernel` gathered in the rows of its group, in
+/// the order of the blocks; no more results wait to be taken than those of a wave.
 pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
     tiled: &Tiled<D>,
     field: &[Vector<T, D>],

@@ -174,7 +174,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "m < light",
         "false",
         Killed(&[BALANCE], &[DYNAMICS])),
-    patch("a5 for a5 - 1 in (51)", NEWMARK,
+    patch("v for v - v_n in (51)", NEWMARK,
         "bent * self.a4 + a * self.a6",
         "bent * self.a4 + v + a * self.a6",
         Killed(&[DYNAMICS, BALANCE, PATCH], &[TANGENT])),
