@@ -8,6 +8,7 @@ use bfree::grid::Grid;
 use bfree::mechanics::loads::Motion;
 use bfree::particles::Particles;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
+use bfree::solver::NewtonSettings;
 use bfree::tensor::{Deformation, Tensor, Vector};
 
 const STEPS: u32 = 5;
@@ -35,6 +36,8 @@ struct Place {
     others: f64,
 }
 
+const HARDLY_OFF: f64 = 1e-13;
+
 /// 1e-300 and 1e-13 off the hull nodes have so much of the particle's mass: less and more than what counts as light.
 const PLACES: [Place; 7] = [
     Place { name: "in a cell", at: 2.3, axes: 1, others: 3.6 },
@@ -43,7 +46,7 @@ const PLACES: [Place; 7] = [
     Place { name: "on the hull", at: 0.0, axes: 1, others: 3.6 },
     Place { name: "on two faces of the hull", at: 0.0, axes: 2, others: 3.6 },
     Place { name: "1e-300 off the hull", at: 1e-300, axes: 1, others: 3.0 },
-    Place { name: "1e-13 off the hull", at: 1e-13, axes: 1, others: 3.0 },
+    Place { name: "1e-13 off the hull", at: HARDLY_OFF, axes: 1, others: 3.0 },
 ];
 
 pub(super) fn run(outcome: &mut Outcome) {
@@ -89,6 +92,11 @@ fn lone<const D: usize>(place: &Place, shape: &Approximation, lumping: f64) -> (
     simulation.settings.initial_guess = InitialGuess::Velocity;
     // On the hull round-off alone would take it out of the box.
     simulation.loads.prescribed = (0..D).filter(|&k| held(k)).map(|k| normal(k, false, Motion::Rest)).collect();
+    // Nodes with 1e-13 of the mass make a condition of 1e13: GMRES ends at some 1e-11 of the first residual, so that Newton's method is
+    // asked for what a scene asks by itself.
+    if place.at == HARDLY_OFF {
+        simulation.settings.newton.relative_tolerance = NewtonSettings::default().relative_tolerance;
+    }
     let g = Vector::from_fn(|k, _| if held(k) { 0.0 } else { -0.2 });
     simulation.loads.gravity = Some(gravity(g));
     simulation.particles.acceleration.fill(g);
