@@ -12,9 +12,6 @@ use crate::scalar::Real;
 use crate::tensor::Vector;
 use std::ops::Range;
 
-/// A particle whose functions do not exist.
-type Failure = (usize, ApproximationError);
-
 /// What one thread works in.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -33,7 +30,7 @@ pub(super) type Active = Vec<u64>;
 /// box are active. With `single` it has groups for single precision too. The arrays of `spare` are used again.
 ///
 /// # Errors
-/// The smallest particle whose functions do not exist.
+/// Those of the functions of one of the particles.
 pub(super) fn block<const D: usize>(
     family: Family<'_>,
     grid: &Grid<D>,
@@ -42,27 +39,7 @@ pub(super) fn block<const D: usize>(
     single: bool,
     spare: Block,
     scratch: &mut Scratch,
-) -> Result<(Block, Active), Failure> {
-    built(family, grid, positions, keys, single, spare, scratch).map_err(|(i, error)| {
-        let mut first = None;
-        for &(_, p) in keys {
-            let errors = (0..D).filter_map(|k| family.error(&grid.axis(k), positions[p as usize][k]));
-            errors.for_each(|error| super::tiled::keep_first(&mut first, p as usize, error));
-        }
-        first.unwrap_or((keys[i].1 as usize, error))
-    })
-}
-
-/// As [`block`]; an error comes with the place of its particle among the keys, and there may be a smaller one.
-fn built<const D: usize>(
-    family: Family<'_>,
-    grid: &Grid<D>,
-    positions: &[Vector<f64, D>],
-    keys: &[Key],
-    single: bool,
-    spare: Block,
-    scratch: &mut Scratch,
-) -> Result<(Block, Active), Failure> {
+) -> Result<(Block, Active), ApproximationError> {
     let (mut size, mut origin) = ([1; 3], [0; 3]);
     for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
         along.x.clear();
@@ -107,7 +84,7 @@ impl<const D: usize> Building<'_, D> {
         unit: f64,
         scratch: &mut Scratch,
         mut active: Option<&mut Active>,
-    ) -> Result<Groups<X, L>, Failure> {
+    ) -> Result<Groups<X, L>, ApproximationError> {
         let mut built = spare.renewed(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
         groups.clear();
@@ -145,7 +122,7 @@ impl<const D: usize> Building<'_, D> {
         unit: f64,
         scratch: &mut Scratch,
         active: Option<&mut Active>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), ApproximationError> {
         let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
         let eights = keys.len().div_ceil(LANES);
         columns.resize_with(columns.len().max(D * eights), Columns::default);

@@ -41,24 +41,19 @@ impl<'a> Family<'a> {
         Self { product, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
     }
 
-    /// The error of the functions at `x`, if they have one.
-    pub(super) fn error(&self, axis: &Axis, x: f64) -> Option<ApproximationError> {
-        self.product.axis(axis, x, &mut AxisWeights::default()).err()
-    }
-
     /// Finds the lists of the particles at `along.x`, which lie on the axis.
     ///
     /// # Errors
-    /// That of the first particle that has none, with its place.
-    pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), (usize, ApproximationError)> {
-        approximation::check(axis).map_err(|error| (0, error))?;
+    /// That of the first particle that has none.
+    pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), ApproximationError> {
+        approximation::check(axis)?;
         if let Some((_, radius)) = self.shipped {
             f64::widest(Places { axis, radius, along });
             return Ok(());
         }
         along.spans.clear();
-        for (i, &x) in along.x.iter().enumerate() {
-            self.product.axis(axis, x, &mut along.list).map_err(|error| (i, error))?;
+        for &x in &along.x {
+            self.product.axis(axis, x, &mut along.list)?;
             along.spans.push(span(&along.list));
         }
         Ok(())
@@ -67,14 +62,14 @@ impl<'a> Family<'a> {
     /// The functions of the particles `range`, at most eight.
     ///
     /// # Errors
-    /// That of the first particle that has none, with its place.
+    /// That of the first particle that has none.
     pub(super) fn columns(
         &self,
         axis: &Axis,
         along: &mut Along,
         range: Range<usize>,
         out: &mut Columns,
-    ) -> Result<(), (usize, ApproximationError)> {
+    ) -> Result<(), ApproximationError> {
         let mut listed = [true; LANES];
         if let Some((shipped, radius)) = self.shipped {
             let (mut below, mut above) = ([0.5; LANES], [0.5; LANES]);
@@ -91,7 +86,7 @@ impl<'a> Family<'a> {
         for (lane, i) in range.clone().enumerate() {
             out.spans[lane] = along.spans[i];
             if listed[lane] {
-                self.product.axis(axis, along.x[i], &mut along.list).map_err(|error| (i, error))?;
+                self.product.axis(axis, along.x[i], &mut along.list)?;
                 out.take_list(lane, &along.list);
             }
         }

@@ -50,48 +50,40 @@ impl<const D: usize> Tiled<D> {
         single: bool,
         spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
-        // The product names the axis that fails; the shape function names the whole position.
-        let failure = |particle: usize, source: Option<ApproximationError>| {
-            let whole =
-                approximation.evaluate(grid, &positions[particle], &mut Scratch::default(), &mut Support::default());
-            let outside = || ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
-            SupportError { particle, source: whole.err().or(source).unwrap_or_else(outside) }
+        // Whichever came first in time: the first particle without functions, and what they say of its whole position.
+        let failure = |particle: usize, source: ApproximationError| {
+            let (mut scratch, mut support) = (Scratch::default(), Support::default());
+            let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
+            let first = positions.iter().enumerate().find_map(|(p, x)| Some((p, error(x)?)));
+            let (particle, source) = first.unwrap_or((particle, source));
+            SupportError { particle, source }
         };
         let spare = spare.filter(|spare| spare.particles() == positions.len());
         let before = spare.as_ref().map(|spare| spare.blocks.iter().flat_map(|block| block.groups.in_order()));
-        let keys = order::sorted(grid, positions, before).map_err(|particle| failure(particle, None))?;
+        let keys = order::sorted(grid, positions, before).map_err(|particle| {
+            let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
+            failure(particle, outside)
+        })?;
         let (mut old, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
         let runs: Vec<&[Key]> = keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)).collect();
         old.resize_with(runs.len(), Block::default);
         let family = Family::new(product);
-        let parts = runs.into_iter().zip(old);
-        let built = parallel::map_with(parts, |scratch, (keys, spare)| {
-            block(family, grid, positions, keys, single, spare, scratch)
+        let built = parallel::map_with(runs.into_iter().zip(old), |scratch, (keys, spare)| {
+            let particle = keys[0].1 as usize;
+            block(family, grid, positions, keys, single, spare, scratch).map_err(|error| (particle, error))
         });
-        let mut first_failure: Option<(usize, ApproximationError)> = None;
         let (mut blocks, mut active) = (Vec::with_capacity(built.len()), Vec::with_capacity(built.len()));
         let (mut first, mut first_single) = (0, 0);
         for result in built {
-            match result {
-                Ok((mut block, mask)) => {
-                    block.groups.first = first;
-                    first += block.groups.len();
-                    if let Some(groups) = &mut block.single {
-                        groups.first = first_single;
-                        first_single += groups.len();
-                    }
-                    blocks.push(block);
-                    active.push(mask);
-                }
-                Err((p, source)) => {
-                    if first_failure.as_ref().is_none_or(|(first, _)| p < *first) {
-                        first_failure = Some((p, source));
-                    }
-                }
+            let (mut block, mask) = result.map_err(|(particle, error)| failure(particle, error))?;
+            block.groups.first = first;
+            first += block.groups.len();
+            if let Some(groups) = &mut block.single {
+                groups.first = first_single;
+                first_single += groups.len();
             }
-        }
-        if let Some((p, source)) = first_failure {
-            return Err(failure(p, Some(source)));
+            blocks.push(block);
+            active.push(mask);
         }
         let nodes = number(grid, &mut blocks, &active);
         slots.resize(positions.len(), 0);
