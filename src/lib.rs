@@ -103,7 +103,7 @@
 //! ℂmat{v,b} = Λ J² (C⁻¹v ⊗ C⁻¹b) − q (C⁻¹b·v) C⁻¹ − q (C⁻¹b ⊗ C⁻¹v),      q = Λ/2 (J² − 1) − G
 //! ```
 //!
-//! **5. To the particles** ([`mechanics::transfer::Moved`]) (45), (50)–(52):
+//! **5. To the particles** ([`mechanics::transfer::Update`]) (45), (50)–(52):
 //!
 //! ```text
 //! a_p += Σ_I N_I (α₁ (Δφ − Δt vₙ) − (α₃+1) aₙ)_I      x_p += Σ_I N_I Δφ_I
@@ -150,6 +150,7 @@ mod parallel;
 pub mod particles;
 pub mod phases;
 pub mod plan;
+pub mod pooled;
 pub mod scalar;
 pub mod scene;
 pub mod shape;

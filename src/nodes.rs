@@ -1,6 +1,7 @@
 //! Active nodes: those some particle lists with N ≠ 0 or ∇N ≠ 0, numbered in the order of the grid.
 
 use crate::grid::Grid;
+use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
 /// The active nodes of one step. Memory goes with the body, not with the box.
@@ -23,7 +24,7 @@ use crate::tensor::Vector;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Nodes {
     /// Grid numbers of the active nodes, ascending.
-    ids: Vec<u64>,
+    ids: Pooled<u64>,
 }
 
 impl Nodes {
@@ -35,11 +36,11 @@ impl Nodes {
         }
         ids.sort_unstable();
         ids.dedup();
-        Self { ids }
+        Self { ids: ids.into() }
     }
 
     /// From grid numbers that ascend already.
-    pub(crate) fn ascending(ids: Vec<u64>) -> Self {
+    pub(crate) fn ascending(ids: Pooled<u64>) -> Self {
         Self { ids }
     }
 

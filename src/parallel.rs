@@ -3,7 +3,7 @@
 //! What is handed to the threads is not generic here, so that their part is compiled once and not for every kind of work.
 
 use rayon::prelude::*;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Whether there is more than one thread.
 pub(crate) fn several() -> bool {
@@ -19,16 +19,17 @@ fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
     }
 }
 
-/// What a mutex holds; a thread that panicked has not spoilt it.
-fn inside<T, R>(mutex: &Mutex<T>, f: impl FnOnce(&mut T) -> R) -> R {
-    f(&mut mutex.lock().unwrap_or_else(PoisonError::into_inner))
+/// What a mutex guards; a thread that panicked has not spoilt it.
+pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// `f(part)` of every part.
 pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: impl Fn(P) + Sync) {
     let parts: Vec<Mutex<Option<P>>> = parts.map(|part| Mutex::new(Some(part))).collect();
     each(parts.len(), &|k| {
-        if let Some(part) = inside(&parts[k], Option::take) {
+        let part = held(&parts[k]).take();
+        if let Some(part) = part {
             f(part);
         }
     });
@@ -38,9 +39,10 @@ pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: impl Fn(P) + 
 pub(crate) fn for_each_with<P: Send, S: Send + Default>(parts: impl Iterator<Item = P>, f: impl Fn(&mut S, P) + Sync) {
     let spare = Mutex::new(Vec::new());
     for_each(parts, |part| {
-        let mut scratch = inside(&spare, Vec::pop).unwrap_or_default();
+        let scratch = held(&spare).pop();
+        let mut scratch = scratch.unwrap_or_default();
         f(&mut scratch, part);
-        inside(&spare, |spare| spare.push(scratch));
+        held(&spare).push(scratch);
     });
 }
 
@@ -61,7 +63,7 @@ pub(crate) fn map_with<P: Send, R: Send, S: Send + Default>(
 }
 
 /// Sorts by the keys, all of which differ.
-pub(crate) fn sort(keys: &mut [(u64, u32)]) {
+pub(crate) fn sort<K: Ord + Send>(keys: &mut [K]) {
     keys.par_sort_unstable();
 }
 

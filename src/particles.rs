@@ -16,6 +16,9 @@ pub struct Body<L> {
 /// State of all particles at the last converged step; one entry per particle in each array. Without inertia those of velocity and
 /// acceleration are empty.
 ///
+/// In memory particles lie near the order in which the sweep over cells takes them: a step may put them in another one. Who a particle
+/// is, its `id` says; results, probes and messages go by that.
+///
 /// ```
 /// use bfree::particles::Particles;
 /// use bfree::tensor::Vector;
@@ -46,6 +49,8 @@ pub struct Particles<const D: usize> {
     pub mass: Vec<f64>,
     /// Index of the body in the simulation's list.
     pub body: Vec<u32>,
+    /// Number of the particle in the order of their making, from 0.
+    pub id: Vec<u32>,
 }
 
 impl<const D: usize> Default for Particles<D> {
@@ -58,6 +63,7 @@ impl<const D: usize> Default for Particles<D> {
             volume: Vec::new(),
             mass: Vec::new(),
             body: Vec::new(),
+            id: Vec::new(),
         }
     }
 }
@@ -65,7 +71,7 @@ impl<const D: usize> Default for Particles<D> {
 impl<const D: usize> Particles<D> {
     /// Bytes of one particle in all arrays but those of velocity and acceleration.
     pub const BYTES: usize =
-        size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + size_of::<u32>();
+        size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + 2 * size_of::<u32>();
 
     /// Number of particles.
     pub fn len(&self) -> usize {
@@ -82,11 +88,11 @@ impl<const D: usize> Particles<D> {
     ///
     /// Example: [`Self::push_without_inertia`].
     pub fn reserve(&mut self, more: usize) {
-        let Self { position, velocity: _, acceleration: _, displacement_gradient, volume, mass, body } = self;
+        let Self { position, velocity: _, acceleration: _, displacement_gradient, volume, mass, body, id } = self;
         position.reserve_exact(more);
         displacement_gradient.reserve_exact(more);
         [volume, mass].into_iter().for_each(|array| array.reserve_exact(more));
-        body.reserve_exact(more);
+        [body, id].into_iter().for_each(|array| array.reserve_exact(more));
     }
 
     /// Adds an undeformed particle at rest acceleration.
@@ -112,11 +118,67 @@ impl<const D: usize> Particles<D> {
     /// assert!(particles.velocity.is_empty() && particles.kinetic_energy() == 0.0);
     /// ```
     pub fn push_without_inertia(&mut self, position: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
+        self.id.push(self.len() as u32);
         self.position.push(position);
         self.displacement_gradient.push(Tensor::zeros());
         self.volume.push(volume);
         self.mass.push(mass);
         self.body.push(body);
+    }
+
+    /// Where the particles lie in memory, by id.
+    ///
+    /// Example: [`Self::rearrange`].
+    pub fn places(&self) -> Vec<u32> {
+        let mut places = vec![0; self.len()];
+        for (place, &id) in self.id.iter().enumerate() {
+            places[id as usize] = place as u32;
+        }
+        places
+    }
+
+    /// Where the particle `id` lies in memory.
+    ///
+    /// Example: [`Self::rearrange`].
+    pub fn place(&self, id: usize) -> Option<usize> {
+        self.id.iter().position(|&one| one as usize == id)
+    }
+
+    /// The same particles in the order of their ids.
+    ///
+    /// Example: [`Self::rearrange`].
+    pub fn by_id(&self) -> Self {
+        let mut sorted = self.clone();
+        sorted.rearrange(&self.places());
+        sorted
+    }
+
+    /// Puts what lies at `order[i]` to the place `i`, one array after the other.
+    ///
+    /// ```
+    /// use bfree::particles::Particles;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let mut particles = Particles::<1>::default();
+    /// for i in 0..3 {
+    ///     particles.push(Vector::from([f64::from(i)]), Vector::zeros(), 1.0, 1.0, 0);
+    /// }
+    /// particles.rearrange(&[2, 0, 1]);
+    /// assert_eq!((particles.position[0][0], particles.place(2)), (2.0, Some(0)));
+    /// assert_eq!(particles.places(), [1, 2, 0]);
+    /// assert_eq!(particles.by_id().position.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
+    /// ```
+    pub fn rearrange(&mut self, order: &[u32]) {
+        fn array<T: Copy>(array: &mut Vec<T>, order: &[u32]) {
+            if !array.is_empty() {
+                *array = order.iter().map(|&from| array[from as usize]).collect();
+            }
+        }
+        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id } = self;
+        [position, velocity, acceleration].into_iter().for_each(|vectors| array(vectors, order));
+        array(displacement_gradient, order);
+        [volume, mass].into_iter().for_each(|numbers| array(numbers, order));
+        [body, id].into_iter().for_each(|numbers| array(numbers, order));
     }
 
     /// Σ m v

@@ -27,24 +27,11 @@ pub struct TermUse {
     pub why: String,
 }
 
-/// When in a step an array lives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lifetime {
-    /// All the time.
-    Step,
-    /// While Newton's method runs.
-    Solve,
-    /// While the particles are updated.
-    Update,
-}
-
 /// An array and its bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrayUse {
     /// What it holds.
     pub name: &'static str,
-    /// When it lives.
-    pub lifetime: Lifetime,
     /// Bytes.
     pub bytes: u64,
 }
@@ -124,17 +111,15 @@ pub struct TooLarge {
 /// What a run of a simulation requires, at its present state.
 ///
 /// ```
-/// use bfree::plan::{Lifetime, Plan};
+/// use bfree::plan::Plan;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let plan = Plan::of(&scene.build::<2>("scenes".as_ref())?)?;
 /// assert_eq!((plan.particles, plan.grid_nodes), (112, 31 * 11));
 /// // Two unknowns for each active node, but for those on walls.
 /// assert!(plan.active_nodes < 341 && plan.unknowns <= 2 * plan.active_nodes);
-/// // Not all arrays live at the same time.
-/// let all: u64 = plan.arrays.iter().map(|array| array.bytes).sum();
-/// let step: u64 = plan.arrays.iter().filter(|one| one.lifetime == Lifetime::Step).map(|array| array.bytes).sum();
-/// assert!(step < plan.bytes() && plan.bytes() < all);
+/// // A step leaves its arrays to the next one.
+/// assert_eq!(plan.bytes(), plan.arrays.iter().map(|array| array.bytes).sum::<u64>());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -181,12 +166,9 @@ impl Plan {
         })
     }
 
-    /// The most bytes that arrays hold at one time.
+    /// Bytes of all arrays: a step leaves them to the next one.
     pub fn bytes(&self) -> u64 {
-        let of = |lifetime: Lifetime| -> u64 {
-            self.arrays.iter().filter(|array| array.lifetime == lifetime).map(|array| array.bytes).sum()
-        };
-        of(Lifetime::Step) + of(Lifetime::Solve).max(of(Lifetime::Update))
+        self.arrays.iter().map(|array| array.bytes).sum()
     }
 
     /// Whether the arrays fit into `memory` bytes.
@@ -303,11 +285,13 @@ fn arrays<const D: usize, L: Law, A>(
     let weighs = moves || simulation.loads.gravity.is_some();
     let lumping = if moves { simulation.settings.lumping } else { 1.0 };
     let consistent = moves && lumping < 1.0;
+    let smooths = moves && simulation.settings.smoothing.is_some();
+    let tiled = supports.closed_bytes(false, false, Precision::Double).is_some();
     let krylov_vectors = match simulation.settings.newton.krylov {
         Krylov::Gmres { restart } => restart + 1,
         Krylov::ConjugateGradient => 4,
     };
-    let array = |name, lifetime, bytes: usize| ArrayUse { name, lifetime, bytes: bytes as u64 };
+    let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
     let precision = precision_used(simulation, supports);
     let frozen = frozen_bytes(&simulation.bodies, supports, lumping, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
@@ -315,21 +299,22 @@ fn arrays<const D: usize, L: Law, A>(
     // What is not there does not appear.
     let only = |used: bool, array: ArrayUse| used.then_some(array);
     [
-        only(true, array("particles: x, H, volume, mass, body", Lifetime::Step, particles * Particles::<D>::BYTES)),
-        only(moves, array("particles: v, a", Lifetime::Step, particles * 2 * vector)),
-        only(consistent, array("particles: prediction for the consistent inertia", Lifetime::Step, particles * vector)),
-        only(true, array("shape functions: N, dN/dx by axis", Lifetime::Step, supports.bytes())),
+        only(true, array("particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES)),
+        only(moves, array("particles: v, a", particles * 2 * vector)),
+        // The field without what nodes can carry, what it changes by, and the change of the other field.
+        only(smooths, array("particles: smoothing", particles * 3 * vector)),
+        only(consistent, array("particles: prediction for the consistent inertia", particles * vector)),
+        only(true, array("shape functions: N, dN/dx by axis", supports.bytes())),
+        only(tiled, array("particles: the order of the sweep", particles * 2 * size_of::<u64>())),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
-        only(true, array("nodal fields: loads, Δφ, residuals", Lifetime::Step, nodes * 8 * vector)),
-        only(weighs, array("nodal mass", Lifetime::Step, nodes * 8)),
+        only(true, array("nodal fields: loads, Δφ, residuals", nodes * 8 * vector)),
         // As projected, and with prescribed values in place.
-        only(moves, array("nodal fields: v, a", Lifetime::Step, nodes * 4 * vector)),
-        only(faces > 0, array("loaded surfaces", Lifetime::Step, faces * size_of::<SurfacePoint<D>>())),
-        only(true, array("frozen tangent", Lifetime::Step, frozen)),
-        only(true, array("preconditioner: diagonal blocks", Lifetime::Solve, nodes * tensor / share)),
-        only(true, array("Krylov vectors", Lifetime::Solve, nodes * vector / share * krylov_vectors)),
-        only(true, array("particles: x and H after the step", Lifetime::Update, particles * (vector + tensor))),
-        only(moves, array("particles: increments of v and a", Lifetime::Update, particles * 2 * vector)),
+        only(weighs, array("nodal mass", nodes * 2 * size_of::<f64>())),
+        only(moves, array("nodal fields: v, a", nodes * 4 * vector)),
+        only(faces > 0, array("loaded surfaces", faces * size_of::<SurfacePoint<D>>())),
+        only(true, array("frozen tangent", frozen)),
+        only(true, array("preconditioner: diagonal blocks", nodes * tensor / share)),
+        only(true, array("Krylov vectors", nodes * vector / share * krylov_vectors)),
     ]
     .into_iter()
     .flatten()
@@ -352,12 +337,7 @@ impl Display for Plan {
         }
         write!(f, "memory        {} at most at one time", BinaryBytes(self.bytes()))?;
         for array in &self.arrays {
-            let when = match array.lifetime {
-                Lifetime::Step => "",
-                Lifetime::Solve => " (while solving)",
-                Lifetime::Update => " (while updating)",
-            };
-            write!(f, "\n  {:>10}  {}{when}", BinaryBytes(array.bytes).to_string(), array.name)?;
+            write!(f, "\n  {:>10}  {}", BinaryBytes(array.bytes).to_string(), array.name)?;
         }
         Ok(())
     }

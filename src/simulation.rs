@@ -7,15 +7,16 @@ use crate::grid::Grid;
 use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, SpareTangents};
+use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
 use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::time::{Alphas, Inertia, Newmark};
-use crate::mechanics::transfer::{Moved, Nodal, WallUpdate};
+use crate::mechanics::transfer::{Nodal, Update, WallUpdate};
 use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
+use crate::pooled::Pooled;
 use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, newton};
 use crate::tensor::{Deformation, Vector};
 use std::num::NonZeroU64;
@@ -51,7 +52,7 @@ pub struct Settings {
     pub smoothing: Option<Smoothing>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
-    /// The most a step may err, see [`Moved::local_error`], in units of the grid spacing: a longer one is taken back and halved, as
+    /// The most a step may err, see [`Update::local_error`], in units of the grid spacing: a longer one is taken back and halved, as
     /// often as the clock allows, and it grows back only when its error is small. `None` for steps as given, and without inertia.
     pub error_tolerance: Option<f64>,
     /// Compare the tangent with dual numbers at the end of every so many steps.
@@ -143,7 +144,6 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
-    tangents: SpareTangents<D>,
 }
 
 impl<const D: usize> Clone for Workspace<D> {
@@ -242,7 +242,7 @@ pub enum StepError {
         "particle {particle} leaves the grid at {position:?}; enlarge the grid or hold the body with a boundary condition"
     )]
     LeftGrid {
-        /// Number of the particle.
+        /// Id of the particle.
         particle: usize,
         /// Where it would be.
         position: Vec<f64>,
@@ -262,6 +262,36 @@ pub struct AdvanceError {
     pub cause: Box<StepError>,
     /// All attempts, the last one included.
     pub failed: Vec<FailedAttempt>,
+}
+
+impl<const D: usize, L, A> Simulation<D, L, A> {
+    /// Puts the particle that lies at `order[i]` in memory to the place `i`, wherever places are known. [`Self::step`] does it where it
+    /// saves time; results do not depend on it.
+    ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let loaded = |of: &bfree::simulation::Simulation<2>| {
+    ///     let points = of.loads.surface[0].points.iter();
+    ///     points.map(|point| of.particles.id[point.particle]).collect::<Vec<_>>()
+    /// };
+    /// // Last first; the load is on the same particles.
+    /// let before = loaded(&simulation);
+    /// let order: Vec<u32> = (0..simulation.particles.len() as u32).rev().collect();
+    /// simulation.rearrange(&order);
+    /// assert_eq!(loaded(&simulation), before);
+    /// assert_eq!(simulation.particles.id.last(), Some(&0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn rearrange(&mut self, order: &[u32]) {
+        self.workspace = Workspace::default();
+        self.particles.rearrange(order);
+        let mut places = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(to, &from)| places[from as usize] = to);
+        for point in self.loads.surface.iter_mut().flat_map(|load| &mut load.points) {
+            point.particle = places[point.particle];
+        }
+    }
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -287,9 +317,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut watch = Stopwatch::start();
 
         let precision = self.settings.newton.precision;
-        let positions = &self.particles.position;
-        let Workspace { supports: spare, tangents } = std::mem::take(&mut self.workspace);
-        let (supports, nodes) = Supports::renewed(spare, &self.approximation, &self.grid, positions, precision)?;
+        let Particles { position, id, .. } = &self.particles;
+        let spare = self.workspace.supports.take();
+        let (supports, nodes) =
+            Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision)?;
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
@@ -297,7 +328,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
 
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt).in_memory_of(tangents);
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
         let mut dphi = self.initial_guess(&nodal, nodes.len(), dt);
         for dof in &prescribed {
             dphi[dof.node][dof.component] = dof.step.increment;
@@ -307,28 +338,25 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &dphi)?;
 
-        let mut moved = Moved::new(
-            &self.particles,
-            &supports,
-            &alphas,
-            &projected,
-            &nodal,
-            &prescribed,
-            self.settings.wall_update,
-            &dphi,
-        );
-        let error = self.local_error(&moved, dt, &newton)?;
+        let walls = self.settings.wall_update;
+        let mut update = Update::new(&alphas, &projected, &nodal, &prescribed, walls, &dphi);
+        let error = self.local_error(&update, &supports, dt, &newton)?;
         if let Some(smoothing) = &self.settings.smoothing {
-            moved.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
+            update.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
         }
-        self.check_inside(moved.positions())?;
-        let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, moved.impulses())?;
+        if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
+            return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
+        }
+        let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
+        update.commit(&mut self.particles, &supports);
         watch.lap(Phase::Update, supports.passes());
 
         let projection_iterations = projected.iterations;
-        let tangents = equilibrium.into_spare(precision);
-        moved.commit(&mut self.particles);
-        self.workspace = Workspace { supports: Some(supports), tangents };
+        match supports.leaping() {
+            // The workspace knows the particles by their places of before.
+            Some(order) => self.rearrange(&order),
+            None => self.workspace.supports = Some(supports),
+        }
         self.external_work += work;
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
         self.clock.advance_and_grow_if(error.is_none_or(small));
@@ -467,8 +495,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    fn initial_guess(&self, nodal: &Nodal<D>, count: usize, dt: f64) -> Vec<Vector<f64, D>> {
-        let mut dphi = vec![Vector::zeros(); count];
+    fn initial_guess(&self, nodal: &Nodal<D>, count: usize, dt: f64) -> Pooled<Vector<f64, D>> {
+        let mut dphi = Pooled::filled(count, Vector::zeros());
         if self.settings.initial_guess == InitialGuess::Velocity {
             dphi.iter_mut().zip(&nodal.velocity).for_each(|(dphi, v)| *dphi = v * dt);
         }
@@ -489,10 +517,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// The error of a step that ends in `moved`, where somebody asks for it.
-    fn local_error(&self, moved: &Moved<D>, dt: f64, newton: &NewtonReport) -> Result<Option<f64>, StepError> {
+    /// The error of a step that ends in `update`, where somebody asks for it.
+    fn local_error(
+        &self,
+        update: &Update<'_, D>,
+        supports: &Supports<D>,
+        dt: f64,
+        newton: &NewtonReport,
+    ) -> Result<Option<f64>, StepError> {
         let Some(tolerance) = self.settings.error_tolerance else { return Ok(None) };
-        let error = moved.local_error(self.settings.newmark.beta, dt, &self.particles.mass) / self.grid.spacing;
+        let error = update.local_error(&self.particles, supports, self.settings.newmark.beta, dt) / self.grid.spacing;
         // Not a number is no small error.
         if (error.is_nan() || error > tolerance) && self.clock.can_halve() {
             return Err(StepError::Inaccurate { error, tolerance, newton: Box::new(newton.history.clone()) });
@@ -513,7 +547,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let residual = end.residual::<f64>(dphi, Carry::ALL)?;
+            let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
+            end.residual_into::<f64>(dphi, Carry::ALL, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(impulses) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 reactions[dof.owner][dof.component] += reaction + blow;
@@ -521,7 +556,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }
         }
         // At t_n: a = a_n and Δφ = 0.
-        let at_rest = vec![Vector::zeros(); dphi.len()];
+        let at_rest = Pooled::filled(dphi.len(), Vector::zeros());
         let start = self.equilibrium(end.supports, end.nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
             let residual = start.residual::<f64>(&at_rest, Carry::ALL)?;
@@ -529,8 +564,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }
         }
-        let forces = end.external_force(dphi).into_iter().zip(start.external_force(&at_rest));
-        for ((f_end, f_start), dphi) in forces.zip(dphi) {
+        for ((f_end, f_start), dphi) in end.external_force(dphi).iter().zip(&start.external_force(&at_rest)).zip(dphi) {
             work += 0.5 * (f_end + f_start).dot(dphi);
         }
         Ok((reactions, work))
@@ -543,15 +577,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Ok(equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?)
             }
             _ => Ok(()),
-        }
-    }
-
-    fn check_inside(&self, positions: &[Vector<f64, D>]) -> Result<(), StepError> {
-        match positions.iter().position(|x| !self.grid.contains(x)) {
-            Some(particle) => {
-                Err(StepError::LeftGrid { particle, position: positions[particle].iter().copied().collect() })
-            }
-            None => Ok(()),
         }
     }
 

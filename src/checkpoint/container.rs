@@ -14,6 +14,7 @@
 use crc32fast::Hasher;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::io::{self, Read, Write};
 
 const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
@@ -85,9 +86,13 @@ pub(super) struct Array {
 }
 
 /// Writes a file.
-pub(super) fn write(out: &mut impl Write, content: &impl Serialize, arrays: &[(&str, &[f64])]) -> io::Result<()> {
-    let shape = |&(name, values): &(&str, &[f64])| Shape {
-        name: name.to_owned(),
+pub(super) fn write(
+    out: &mut impl Write,
+    content: &impl Serialize,
+    arrays: &[(&str, Cow<'_, [f64]>)],
+) -> io::Result<()> {
+    let shape = |(name, values): &(&str, Cow<'_, [f64]>)| Shape {
+        name: (*name).to_owned(),
         r#type: Type::F64,
         length: values.len() as u64,
     };
@@ -190,7 +195,7 @@ mod tests {
         let values: Vec<Vec<f64>> =
             lengths.iter().map(|&n| (0..n).map(|k| WILD[k % 6] * (1 + k / 6) as f64).collect()).collect();
         let names = ["position", "velocity", "λ"];
-        let arrays: Vec<(&str, &[f64])> = names.iter().copied().zip(values.iter().map(Vec::as_slice)).collect();
+        let arrays: Vec<(&str, Cow<'_, [f64]>)> = names.into_iter().zip(values.into_iter().map(Cow::from)).collect();
         let mut bytes = Vec::new();
         write(&mut bytes, &json!({"title": "two blocks"}), &arrays).unwrap();
         bytes

@@ -5,10 +5,11 @@ use crate::clock::Reached;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crc32fast::hash;
+use std::borrow::Cow;
 
 /// The arrays a step inherits, by name. A field of the simulation that is added later does not compile here until somebody has
 /// decided on which side it belongs; a new array has its place in [`inherited`] and in [`restore`].
-pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, &[f64]); 5] {
+pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, Cow<'_, [f64]>); 6] {
     let Simulation {
         grid: _,
         approximation: _,
@@ -20,14 +21,27 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         external_work,
         workspace: _,
     } = simulation;
-    let Particles { position, velocity, acceleration, displacement_gradient, volume: _, mass: _, body: _ } = particles;
+    let Particles { position, velocity, acceleration, displacement_gradient, volume: _, mass: _, body: _, id } =
+        particles;
+    let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
     [
-        ("position", bytemuck::cast_slice(position)),
-        ("velocity", bytemuck::cast_slice(velocity)),
-        ("acceleration", bytemuck::cast_slice(acceleration)),
-        ("displacement_gradient", bytemuck::cast_slice(displacement_gradient)),
-        ("external_work", std::slice::from_ref(external_work)),
+        ("id", id.into()),
+        ("position", bytemuck::cast_slice(position).into()),
+        ("velocity", bytemuck::cast_slice(velocity).into()),
+        ("acceleration", bytemuck::cast_slice(acceleration).into()),
+        ("displacement_gradient", bytemuck::cast_slice(displacement_gradient).into()),
+        ("external_work", std::slice::from_ref(external_work).into()),
     ]
+}
+
+/// The order in which particles lie in `ids`, by their present places; `None` if they are not the same particles.
+fn order(present: &[u32], ids: &[f64]) -> Option<Vec<u32>> {
+    let mut places = vec![None; present.len()];
+    for (place, &id) in present.iter().enumerate() {
+        *places.get_mut(id as usize)? = Some(place as u32);
+    }
+    // Each one once.
+    ids.iter().map(|&id| places.get_mut(id as usize)?.take()).collect()
 }
 
 /// Puts a simulation into the state of `arrays` and `reached`, all or nothing.
@@ -40,12 +54,17 @@ pub(super) fn restore<const D: usize, L, A>(
     arrays: &[Array],
 ) -> Result<(), String> {
     for (name, values) in inherited(simulation) {
-        let found = arrays.iter().find(|array| array.name == name).ok_or(format!("no array {name}"))?;
+        let found = arrays.iter().find(|array| array.name == name).ok_or_else(|| format!("no array {name}"))?;
         if found.values.len() != values.len() {
             return Err(format!("{} numbers of {name} instead of {}", found.values.len(), values.len()));
         }
     }
+    let ids =
+        arrays.iter().filter(|array| array.name == "id").flat_map(|array| &array.values).copied().collect::<Vec<_>>();
+    let order = order(&simulation.particles.id, &ids).ok_or("ids that are not those of the particles")?;
     simulation.clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
+    // What no array holds goes where it was, too.
+    simulation.rearrange(&order);
     let particles = &mut simulation.particles;
     for Array { name, values } in arrays {
         let into: &mut [f64] = match name.as_str() {
@@ -63,7 +82,8 @@ pub(super) fn restore<const D: usize, L, A>(
 
 /// Checksums of the particles at the start of a run: they may come from files that have changed since.
 pub(super) fn fingerprint<const D: usize>(particles: &Particles<D>) -> Vec<(String, u32)> {
-    let Particles { position, velocity, acceleration: _, displacement_gradient: _, volume, mass, body } = particles;
+    let Particles { position, velocity, acceleration: _, displacement_gradient: _, volume, mass, body, id: _ } =
+        particles;
     [
         ("position", hash(bytemuck::cast_slice(position))),
         ("velocity", hash(bytemuck::cast_slice(velocity))),

@@ -3,6 +3,7 @@
 use crate::grid::Grid;
 use crate::mechanics::sweep::Supports;
 use crate::nodes::Nodes;
+use crate::pooled::Pooled;
 use crate::shape::Shape;
 use crate::tensor::Vector;
 
@@ -228,7 +229,7 @@ pub struct Gravity<const D: usize> {
 /// A particle that stands for a piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint<const D: usize> {
-    /// The particle.
+    /// The place of the particle in memory.
     pub particle: usize,
     /// Outward unit normal N in the reference configuration.
     pub normal: Vector<f64, D>,
@@ -272,7 +273,7 @@ pub struct Loads<const D: usize> {
 /// p A N of a particle under follower pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressurePoint<const D: usize> {
-    /// The particle.
+    /// The place of the particle in memory.
     pub particle: usize,
     /// p A N
     pub force: Vector<f64, D>,
@@ -298,8 +299,8 @@ impl<const D: usize> Loads<D> {
     /// assert!((carried(1.0) / weight - 0.5).abs() < 1e-13);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Vec<Vector<f64, D>> {
-        let mut force = vec![Vector::zeros(); supports.nodes()];
+    pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Pooled<Vector<f64, D>> {
+        let mut force = Pooled::filled(supports.nodes(), Vector::zeros());
         if let Some(gravity) = &self.gravity {
             // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
             let b = gravity.acceleration * gravity.curve.value(t);

@@ -11,7 +11,7 @@ use crate::tensor::{Tensor, identity, scaled};
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("particle {particle} cannot be deformed so")]
 pub struct Inadmissible {
-    /// Number of the particle.
+    /// Id of the particle.
     pub particle: usize,
     /// The determinant found.
     pub source: NonPositiveJacobian,

@@ -3,14 +3,14 @@
 use crate::material::{Law, NonPositiveJacobian, admissible};
 use crate::mechanics::loads::{PrescribedDof, PressurePoint};
 use crate::mechanics::point::{self, carried};
-use crate::mechanics::sweep::{ClosedTangents, Inertia, Laws, SingleTangents, Supports};
+use crate::mechanics::sweep::{Inertia, Laws, Supports};
 use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
+use crate::pooled::Pooled;
 use crate::scalar::Real;
-use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector, cofactor, identity};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::OnceLock;
 
 pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
@@ -54,26 +54,17 @@ pub struct Equilibrium<'a, const D: usize, L> {
     /// Lumped mass, v_n and a_n at the nodes, prescribed values in place; without v_n and a_n there is no inertia.
     pub nodal: &'a Nodal<D>,
     /// Nodal dead loads at t_{n+1}.
-    pub dead_load: Vec<Vector<f64, D>>,
+    pub dead_load: Pooled<Vector<f64, D>>,
     /// Follower pressure at t_{n+1}.
     pub pressures: Vec<PressurePoint<D>>,
     /// Prescribed degrees of freedom.
     pub prescribed: &'a [PrescribedDof],
     /// Σ_J N_J Δφ̂_J at the particles; empty when ε = 1.
-    predicted: Vec<Vector<f64, D>>,
+    predicted: Pooled<Vector<f64, D>>,
     /// The preconditioner of the step's linear systems: inverse diagonal blocks of the first tangent that is frozen.
-    pub(super) inverse_blocks: OnceLock<Vec<Tensor<f64, D>>>,
+    pub(super) inverse_blocks: OnceLock<Pooled<Tensor<f64, D>>>,
     /// The same for systems in single precision.
-    pub(super) single_inverse_blocks: OnceLock<Vec<Tensor<f32, D>>>,
-    /// Tangents no longer needed.
-    pub(super) spare: Mutex<SpareTangents<D>>,
-}
-
-/// The tangents frozen last, whose arrays the next ones use: the largest of a step.
-#[derive(Debug, Default)]
-pub(crate) struct SpareTangents<const D: usize> {
-    pub(super) double: Option<ClosedTangents<D>>,
-    pub(super) single: Option<SingleTangents<D>>,
+    pub(super) single_inverse_blocks: OnceLock<Pooled<Tensor<f32, D>>>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
@@ -86,7 +77,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         alphas: Alphas,
         lumping: f64,
         nodal: &'a Nodal<D>,
-        dead_load: Vec<Vector<f64, D>>,
+        dead_load: impl Into<Pooled<Vector<f64, D>>>,
         pressures: Vec<PressurePoint<D>>,
         prescribed: &'a [PrescribedDof],
     ) -> Self {
@@ -94,9 +85,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, lumping) };
         let predicted = if lumping < 1.0 {
             let state = nodal.velocity.iter().zip(&nodal.acceleration);
-            supports.values(&state.map(|(v, a)| alphas.predicted(v, a)).collect::<Vec<_>>())
+            let of_nodes: Pooled<_> = state.map(|(v, a)| alphas.predicted(v, a)).collect();
+            let mut predicted = Pooled::filled(particles.len(), Vector::zeros());
+            supports.each_value(&of_nodes, |p, value| predicted[p] = value);
+            predicted
         } else {
-            Vec::new()
+            Pooled::default()
         };
         Self {
             particles,
@@ -105,28 +99,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             alphas,
             lumping,
             nodal,
-            dead_load,
+            dead_load: dead_load.into(),
             pressures,
             prescribed,
             predicted,
             inverse_blocks: OnceLock::new(),
             single_inverse_blocks: OnceLock::new(),
-            spare: Mutex::default(),
-        }
-    }
-
-    /// The same, tangents being frozen in the arrays of others.
-    pub(crate) fn in_memory_of(mut self, spare: SpareTangents<D>) -> Self {
-        self.spare = Mutex::new(spare);
-        self
-    }
-
-    /// The tangents no longer needed; of two precisions that which the next step begins with.
-    pub(crate) fn into_spare(self, precision: Precision) -> SpareTangents<D> {
-        let SpareTangents { double, single } = self.spare.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match precision {
-            Precision::Mixed if single.is_some() => SpareTangents { double: None, single },
-            _ => SpareTangents { double, single: None },
         }
     }
 
@@ -134,6 +112,12 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     #[inline(always)]
     pub fn law(&self, p: usize) -> &L {
         &self.bodies[self.particles.body[p] as usize].law
+    }
+
+    /// What to say of a particle at `p` in memory that cannot be deformed so.
+    pub(crate) fn inadmissible(&self, p: usize) -> impl Fn(NonPositiveJacobian) -> Inadmissible {
+        let particle = self.particles.id[p] as usize;
+        move |source| Inadmissible { particle, source }
     }
 
     /// Weight of the consistent inertia at particle `p`, (1−ε) m; `None` when the mass is lumped.
@@ -175,7 +159,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     ) -> Result<Tensor<T, D>, Inadmissible> {
         let (h_n, volume) = (&self.particles.displacement_gradient[p], self.particles.volume[p]);
         let (stress, det_f) = point::internal(self.law(p), g, h_n, volume, carry);
-        NonPositiveJacobian::check(det_f).map_err(|source| Inadmissible { particle: p, source })?;
+        NonPositiveJacobian::check(det_f).map_err(self.inadmissible(p))?;
         Ok(stress)
     }
 
@@ -204,24 +188,32 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// The first particle with det F ≤ 0.
     pub fn residual<T: Real>(&self, dphi: &[Vector<T, D>], carry: Carry) -> Result<Vec<Vector<T, D>>, Inadmissible> {
-        let mut out: Vec<Vector<T, D>> = dphi
-            .iter()
-            .enumerate()
-            .map(|(node, dphi)| {
-                let motion = self.motion(node, &dphi.map(|x| carried(x, carry.inertia)));
-                motion.map_or_else(Vector::zeros, |(m, a)| a * m) - self.dead_load[node].map(T::lit)
-            })
-            .collect();
+        let mut out = vec![Vector::zeros(); dphi.len()];
+        self.residual_into(dphi, carry, &mut out)?;
+        Ok(out)
+    }
+
+    /// As [`Self::residual`], in `out`.
+    pub(crate) fn residual_into<T: Real>(
+        &self,
+        dphi: &[Vector<T, D>],
+        carry: Carry,
+        out: &mut [Vector<T, D>],
+    ) -> Result<(), Inadmissible> {
+        for (node, (out, dphi)) in out.iter_mut().zip(dphi).enumerate() {
+            let motion = self.motion(node, &dphi.map(|x| carried(x, carry.inertia)));
+            *out = motion.map_or_else(Vector::zeros, |(m, a)| a * m) - self.dead_load[node].map(T::lit);
+        }
         let inertia = |p: usize, u: &Vector<f64, D>| self.consistent_inertia(p, u);
         let inertia: Option<Inertia<'_, D>> = if self.lumping < 1.0 { Some(&inertia) } else { None };
-        match self.supports.forces(&self.laws(), dphi, inertia, &mut out) {
+        match self.supports.forces(&self.laws(), dphi, inertia, out) {
             Some(done) => done?,
-            None => self.supports.assemble(dphi, &mut out, |p, u, g| {
+            None => self.supports.assemble(dphi, out, |p, u, g| {
                 Ok((self.consistent_inertia(p, &u.map(|x| carried(x, carry.inertia))), self.internal(p, &g, carry)?))
             })?,
         }
-        self.add_pressure(dphi, carry, &mut out);
-        Ok(out)
+        self.add_pressure(dphi, carry, out);
+        Ok(())
     }
 
     /// f_ext: gravity, tractions and follower pressure at Δφ.
@@ -241,10 +233,11 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// assert!((force.iter().map(|f| f[1]).sum::<f64>() / weight - 1.0).abs() < 1e-13);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        let mut pressure = vec![Vector::zeros(); dphi.len()];
-        self.add_pressure(dphi, Carry::ALL, &mut pressure);
-        self.dead_load.iter().zip(pressure).map(|(dead, pressure)| dead - pressure).collect()
+    pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
+        let mut force = Pooled::filled(dphi.len(), Vector::zeros());
+        self.add_pressure(dphi, Carry::ALL, &mut force);
+        force.iter_mut().zip(&self.dead_load).for_each(|(force, dead)| *force = dead - *force);
+        force
     }
 
     /// The norm, over the free degrees of freedom, of the sum of the magnitudes of all contributions to R: what
@@ -265,7 +258,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         let mut out = self.magnitudes(dphi)?;
         self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {
             let h_n = &self.particles.displacement_gradient[p];
-            let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: p, source })?;
+            let at = admissible(compose(&g, h_n)).map_err(self.inadmissible(p))?;
             let f_n = (identity::<f64, D>() + h_n).norm();
             let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
             // ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖, the response to a change of volume standing for all, and δF of size ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖
@@ -277,15 +270,15 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     /// The norm over the free degrees of freedom.
-    fn free_norm(&self, mut field: Vec<Vector<f64, D>>) -> f64 {
+    fn free_norm(&self, mut field: Pooled<Vector<f64, D>>) -> f64 {
         self.clear_prescribed(&mut field);
         field.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
     }
 
     /// The magnitudes of all contributions to R, summed at each node.
-    fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Vector<f64, D>>, Inadmissible> {
+    fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let Alphas { a1, a2, a3, .. } = self.alphas;
-        let mut out: Vec<Vector<f64, D>> = dphi
+        let mut out: Pooled<Vector<f64, D>> = dphi
             .iter()
             .enumerate()
             .map(|(node, dphi)| {
@@ -341,8 +334,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self.pressures.is_empty().then(|| {
             let half_over_a1 = T::lit(0.5 / self.alphas.a1);
             let per_particle = self.supports.interpolate(dphi, |p, u, g| {
-                let at = admissible(compose(&g, &self.particles.displacement_gradient[p]))
-                    .map_err(|source| Inadmissible { particle: p, source })?;
+                let at =
+                    admissible(compose(&g, &self.particles.displacement_gradient[p])).map_err(self.inadmissible(p))?;
                 let strain = T::lit(self.particles.volume[p]) * self.law(p).energy(&at);
                 let inertia = self.consistent_mass(p).map_or_else(T::zero, |m| {
                     let momentum = self.consistent_inertia(p, &u);

@@ -6,7 +6,8 @@
 use crate::material::{ClosedTangent, FrozenTangent, Law};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::SingleTangents;
-use crate::mechanics::tangent::{FrozenPressure, closed_form, held, invert_block};
+use crate::mechanics::tangent::{FrozenPressure, closed_form, invert_block};
+use crate::pooled::Pooled;
 use crate::solver::{LinearOperator, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
@@ -43,7 +44,7 @@ pub struct Single<'a, const D: usize, L: Law> {
     frozen: SingleTangents<D>,
     pressures: Vec<FrozenPressure<D>>,
     /// α₁ ε m_I / s; empty without inertia.
-    lumped: Vec<f32>,
+    lumped: Pooled<f32>,
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
@@ -59,8 +60,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let scale = self.size(h);
         let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0) / scale;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-        let spare = held(&self.spare).single.take();
-        let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale, spare);
+        let frozen = self.supports.single_tangents(&self.laws(), dphi, both, inertia, scale);
         let frozen = match frozen {
             Some(Ok(frozen)) => frozen,
             Some(Err(Some(inadmissible))) => return Err(inadmissible),
@@ -82,23 +82,16 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 }
 
-/// Leaves the largest array of a step to the next tangent.
-impl<const D: usize, L: Law> Drop for Single<'_, D, L> {
-    fn drop(&mut self) {
-        held(&self.equilibrium.spare).single = Some(std::mem::take(&mut self.frozen));
-    }
-}
-
 impl<const D: usize, L: Law> Single<'_, D, L> {
     /// K_II/s of every active node; a prescribed degree of freedom has the identity's row and column.
-    fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
+    fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut single = vec![Tensor::zeros(); eq.dead_load.len()];
+        let mut single = Pooled::filled(eq.dead_load.len(), Tensor::zeros());
         for (block, &m) in single.iter_mut().zip(&self.lumped) {
             *block = scaled(&identity::<f32, D>(), m);
         }
         eq.supports.add_single_blocks(&self.frozen, &mut single);
-        let mut blocks: Vec<Tensor<f64, D>> = single.iter().map(|block| block.map(f64::from)).collect();
+        let mut blocks: Pooled<Tensor<f64, D>> = single.iter().map(|block| block.map(f64::from)).collect();
         let mut pressure = vec![Tensor::zeros(); if self.pressures.is_empty() { 0 } else { blocks.len() }];
         for point in &self.pressures {
             point.add_blocks(eq.supports, &mut pressure);
@@ -135,7 +128,7 @@ impl<const D: usize, L: Law> Preconditioner<f32> for Single<'_, D, L> {
     fn precondition(&self, r: &[f32], z: &mut [f32]) {
         let (r, z): (&[Vector<f32, D>], &mut [Vector<f32, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
         let invert = || self.diagonal_blocks().iter().map(|block| invert_block(block).map(|x| x as f32)).collect();
-        let inverse_blocks: &Vec<_> = self.equilibrium.single_inverse_blocks.get_or_init(invert);
+        let inverse_blocks: &Pooled<_> = self.equilibrium.single_inverse_blocks.get_or_init(invert);
         for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
             *z = inverse * r;
         }

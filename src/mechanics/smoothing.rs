@@ -11,6 +11,7 @@
 
 use crate::mechanics::sweep::Supports;
 use crate::particles::Particles;
+use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
 /// κ₁ of [`Smoothing::limited`], in κ.
@@ -111,17 +112,18 @@ impl Smoothing {
         supports: &Supports<D>,
         mass: &[f64],
         dt: f64,
-    ) -> Option<Vec<f64>> {
+    ) -> Option<Pooled<f64>> {
         if self.at_kinks == 0.0 {
             return None;
         }
         // Seen from the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
-        let velocity: Vec<_> = particles.velocity.iter().map(|v| v - frame).collect();
+        let velocity: Pooled<_> = particles.velocity.iter().map(|v| v - frame).collect();
         let mean = nodal_mean(particles, supports, mass, &velocity);
-        let mean_of_mean = nodal_mean(particles, supports, mass, &supports.values(&mean));
-        let squares: Vec<_> = velocity.iter().map(|v| scalar(v.norm_squared())).collect();
-        let mean_square = nodal_mean(particles, supports, mass, &squares);
+        let mut at_particles: Pooled<_> = velocity.iter().map(|v| scalar(v.norm_squared())).collect();
+        let mean_square = nodal_mean(particles, supports, mass, &at_particles);
+        supports.each_value(&mean, |p, mean| at_particles[p] = mean);
+        let mean_of_mean = nodal_mean(particles, supports, mass, &at_particles);
         let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, D>)| {
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
@@ -144,25 +146,22 @@ impl Smoothing {
         at_kinks: Option<&[f64]>,
         field: &[Vector<f64, D>],
         dt: f64,
-    ) -> Vec<Vector<f64, D>> {
+    ) -> Pooled<Vector<f64, D>> {
         let theta = self.share(dt);
         // r_j = (I − N M_L⁻¹ Nᵀm)^j u at the particles, and Σ N w = u − r_k.
-        let mut rest = field.to_vec();
+        let mut change: Pooled<_> = field.iter().copied().collect();
         for _ in 0..self.order {
-            let smooth = supports.values(&nodal_mean(particles, supports, mass, &rest));
-            for (r, s) in rest.iter_mut().zip(smooth) {
-                *r -= s;
-            }
+            let smooth = nodal_mean(particles, supports, mass, &change);
+            supports.each_value(&smooth, |p, smooth| change[p] -= smooth);
         }
-        let mut change: Vec<_> = rest.iter().map(|r| r * -theta).collect();
+        change.iter_mut().for_each(|r| *r *= -theta);
         if let Some(shares) = at_kinks {
-            let mean = nodal_mean(particles, supports, mass, field);
-            let drawn: Vec<_> = mean.iter().zip(shares).map(|(u, &share)| u * share).collect();
-            let share: Vec<_> = shares.iter().map(|&share| scalar(share)).collect();
-            let at_particles = supports.values(&drawn).into_iter().zip(supports.values(&share));
-            for ((change, u), (drawn, share)) in change.iter_mut().zip(field).zip(at_particles) {
-                *change += drawn - u * share[0];
-            }
+            let mut drawn = nodal_mean(particles, supports, mass, field);
+            drawn.iter_mut().zip(shares).for_each(|(u, &share)| *u *= share);
+            let share: Pooled<_> = shares.iter().map(|&share| scalar(share)).collect();
+            let mut own = Pooled::filled(field.len(), Vector::zeros());
+            supports.each_value(&share, |p, share| own[p] = field[p] * share[0]);
+            supports.each_value(&drawn, |p, drawn| change[p] += drawn - own[p]);
         }
         change
     }
@@ -174,8 +173,8 @@ fn nodal_mean<const D: usize>(
     supports: &Supports<D>,
     mass: &[f64],
     field: &[Vector<f64, D>],
-) -> Vec<Vector<f64, D>> {
-    let mut out = vec![Vector::zeros(); mass.len()];
+) -> Pooled<Vector<f64, D>> {
+    let mut out = Pooled::filled(mass.len(), Vector::zeros());
     supports.spread(&mut out, |p| field[p] * particles.mass[p]);
     for (w, &m) in out.iter_mut().zip(mass) {
         // A node without mass weighs nothing in what follows either.

@@ -5,11 +5,11 @@ use crate::mechanics::point;
 use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
 use crate::mechanics::sweep::{ClosedTangents, Supports};
 use crate::particles::Body;
+use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::solver::{LinearOperator, NonlinearProblem, Precision, Preconditioner, SingleTangent};
 use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
 use num_dual::Dual64;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The terms of the tangent, one for each way Δφ enters the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -150,8 +150,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     pub(crate) fn states(&self, dphi: &[Vector<f64, D>]) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
         let state = |p| {
             let g = self.supports.gradient_at(p, dphi);
-            admissible(compose(&g, &self.particles.displacement_gradient[p]))
-                .map_err(|source| Inadmissible { particle: p, source })
+            admissible(compose(&g, &self.particles.displacement_gradient[p])).map_err(self.inadmissible(p))
         };
         (0..self.supports.particles()).map(state).collect()
     }
@@ -208,7 +207,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     fn freeze_at(&self, p: usize, g: &Tensor<f64, D>) -> Result<L::Frozen<f64, D>, Inadmissible> {
         let (h_n, volume) = (&self.particles.displacement_gradient[p], self.particles.volume[p]);
         let (frozen, det_f) = point::freeze(self.law(p), g, h_n, volume);
-        NonPositiveJacobian::check(det_f).map_err(|source| Inadmissible { particle: p, source })?;
+        NonPositiveJacobian::check(det_f).map_err(self.inadmissible(p))?;
         Ok(frozen)
     }
 
@@ -216,8 +215,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         if let Some(both) = closed_form::<D, L>(self.bodies) {
             let weight = |p: usize| self.alphas.a1 * self.consistent_mass(p).unwrap_or(0.0);
             let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = (self.lumping < 1.0).then_some(&weight);
-            let closed =
-                self.supports.closed_tangents(&self.laws(), dphi, both, inertia, held(&self.spare).double.take());
+            let closed = self.supports.closed_tangents(&self.laws(), dphi, both, inertia);
             match closed {
                 Some(Ok(closed)) => return Ok(Frozen::Closed(closed)),
                 Some(Err(Some(inadmissible))) => return Err(inadmissible),
@@ -227,11 +225,6 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         }
         Ok(Frozen::Each(self.supports.interpolate(dphi, |p, _, g| self.freeze_at(p, &g))?))
     }
-}
-
-/// What a lock holds, also where a thread has panicked.
-pub(super) fn held<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
-    lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The point tangents of all particles.
@@ -377,15 +370,6 @@ pub struct Tangent<'a, const D: usize, L: Law> {
     pressures: Vec<FrozenPressure<D>>,
 }
 
-/// Leaves the largest array of a step to the next tangent.
-impl<const D: usize, L: Law> Drop for Tangent<'_, D, L> {
-    fn drop(&mut self) {
-        if let Frozen::Closed(tangents) = std::mem::replace(&mut self.frozen, Frozen::Each(Vec::new())) {
-            held(&self.equilibrium.spare).double = Some(tangents);
-        }
-    }
-}
-
 impl<const D: usize, L: Law> Tangent<'_, D, L> {
     /// K u on the free degrees of freedom (u is taken as zero on the prescribed ones).
     pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
@@ -412,9 +396,9 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
     }
 
     /// K_II of every active node; a prescribed degree of freedom has the identity's row and column.
-    pub fn diagonal_blocks(&self) -> Vec<Tensor<f64, D>> {
+    pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut blocks = vec![Tensor::zeros(); eq.dead_load.len()];
+        let mut blocks = Pooled::filled(eq.dead_load.len(), Tensor::zeros());
         for (block, weight) in blocks.iter_mut().zip(eq.lumped_weights()) {
             *block = scaled(&identity(), weight);
         }
@@ -461,8 +445,12 @@ impl<const D: usize, L: Law> LinearOperator for Tangent<'_, D, L> {
 impl<const D: usize, L: Law> Preconditioner for Tangent<'_, D, L> {
     fn precondition(&self, r: &[f64], z: &mut [f64]) {
         let (r, z): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        let invert = || self.diagonal_blocks().iter().map(invert_block).collect();
-        let inverse_blocks: &Vec<_> = self.equilibrium.inverse_blocks.get_or_init(invert);
+        let invert = || {
+            let mut blocks = self.diagonal_blocks();
+            blocks.iter_mut().for_each(|block| *block = invert_block(block));
+            blocks
+        };
+        let inverse_blocks: &Pooled<_> = self.equilibrium.inverse_blocks.get_or_init(invert);
         for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
             *z = inverse * r;
         }
@@ -477,9 +465,9 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self: 'a;
 
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
-        let mut residual = Self::residual::<f64>(self, bytemuck::cast_slice(x), Carry::ALL)?;
-        self.clear_prescribed(&mut residual);
-        r.copy_from_slice(bytemuck::cast_slice(&residual));
+        let residual = bytemuck::cast_slice_mut(r);
+        self.residual_into::<f64>(bytemuck::cast_slice(x), Carry::ALL, residual)?;
+        self.clear_prescribed(residual);
         Ok(())
     }
 

@@ -1,13 +1,15 @@
 //! Particles → nodes (eqs. 40–42) and nodes → particles (eqs. 45, 50–52).
 
+use crate::grid::Grid;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::compose;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
 use crate::particles::Particles;
+use crate::pooled::Pooled;
 use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::Vector;
 
 /// A node lighter than this fraction of the heaviest particle gets no projected velocity: its Δφ comes from the stiffness.
 const LIGHT: f64 = 1e-14;
@@ -41,11 +43,11 @@ const PROJECTION_TOLERANCE: f64 = 1e-12;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nodal<const D: usize> {
     /// Σ_p m N_I; empty without inertia and gravity.
-    pub mass: Vec<f64>,
+    pub mass: Pooled<f64>,
     /// v_n; empty without inertia.
-    pub velocity: Vec<Vector<f64, D>>,
+    pub velocity: Pooled<Vector<f64, D>>,
     /// a_n; empty without inertia.
-    pub acceleration: Vec<Vector<f64, D>>,
+    pub acceleration: Pooled<Vector<f64, D>>,
     /// Iterations the projection took (0 for a lumped mass).
     pub iterations: usize,
 }
@@ -62,9 +64,9 @@ impl<const D: usize> Nodal<D> {
         count: usize,
         lumping: f64,
     ) -> Result<Self, LinearError> {
-        let Self { mass, .. } = Self::at_rest(particles, supports, count);
+        let Self { mass, .. } = Self::mass_alone(particles, supports, count);
         let right = |field: &[Vector<f64, D>]| {
-            let mut out = vec![Vector::zeros(); count];
+            let mut out = Pooled::filled(count, Vector::zeros());
             supports.spread(&mut out, |p| field[p] * particles.mass[p]);
             out
         };
@@ -91,7 +93,7 @@ impl<const D: usize> Nodal<D> {
 
     /// The lumped mass, and no motion.
     pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let still = vec![Vector::zeros(); count];
+        let still = Pooled::filled(count, Vector::zeros());
         Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports, count) }
     }
 
@@ -111,7 +113,7 @@ impl<const D: usize> Nodal<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let mut mass = vec![Vector::<f64, D>::zeros(); count];
+        let mut mass = Pooled::filled(count, Vector::<f64, D>::zeros());
         supports.spread(&mut mass, |p| Vector::from_fn(|i, _| if i == 0 { particles.mass[p] } else { 0.0 }));
         Self { mass: mass.iter().map(|m| m[0]).collect(), ..Self::default() }
     }
@@ -186,22 +188,22 @@ struct EffectiveMass<'a, const D: usize> {
     supports: &'a Supports<D>,
     mass: &'a [f64],
     lumping: f64,
-    inverse_diagonal: Vec<f64>,
+    inverse_diagonal: Pooled<f64>,
 }
 
 impl<'a, const D: usize> EffectiveMass<'a, D> {
     fn new(particles: &'a Particles<D>, supports: &'a Supports<D>, mass: &'a [f64], lumping: f64) -> Self {
-        let mut diagonal: Vec<f64> = mass.iter().map(|m| lumping * m).collect();
+        let mut diagonal: Pooled<f64> = mass.iter().map(|m| lumping * m).collect();
         supports.scatter(&mut diagonal, |p, n, _| (1.0 - lumping) * particles.mass[p] * n * n);
         // Of the least numbers above 0 there is no inverse.
         let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
-        let inverse_diagonal = diagonal.into_iter().map(inverse).collect();
-        Self { particles, supports, mass, lumping, inverse_diagonal }
+        diagonal.iter_mut().for_each(|d| *d = inverse(*d));
+        Self { particles, supports, mass, lumping, inverse_diagonal: diagonal }
     }
 
     /// Overwrites the right-hand side by the solution; from zero, so that a singular M gives the answer of least norm.
     fn solve(&self, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
-        let right = field.to_vec();
+        let right: Pooled<_> = field.iter().copied().collect();
         field.fill(Vector::zeros());
         let settings = ConjugateGradientSettings {
             relative_tolerance: PROJECTION_TOLERANCE,
@@ -241,10 +243,10 @@ pub enum WallUpdate {
     Consistent,
 }
 
-/// Where the particles are after the step: computed first, checked, and only then committed.
+/// What the nodes give to the particles at the end of a step. Until it is committed nothing has touched them.
 ///
 /// ```
-/// use bfree::mechanics::{smoothing::Smoothing, sweep::Supports, transfer::{Moved, Nodal, WallUpdate}};
+/// use bfree::mechanics::{smoothing::Smoothing, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
@@ -254,67 +256,57 @@ pub enum WallUpdate {
 /// // The cylinder flies with v = ½ and meets nothing: Δφ = v Δt at every node.
 /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
 /// let alphas = simulation.settings.newmark.alphas(dt);
-/// let mut moved = Moved::new(&particles, &supports, &alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-/// moved.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
-/// assert!((moved.positions()[7] - particles.position[7] - particles.velocity[7] * dt).norm() < 1e-14);
-/// assert!(moved.impulses().is_empty()); // no walls
-/// moved.commit(&mut particles);
+/// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+/// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
+/// assert!(update.impulses().is_empty()); // no walls
+/// assert_eq!(update.leaving(&particles, &supports, &simulation.grid), None);
+/// update.commit(&mut particles, &supports);
+/// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
+/// assert!(flown.norm() < 1e-14);
 /// assert!((particles.kinetic_energy() / simulation.particles.kinetic_energy() - 1.0).abs() < 1e-12);
 /// assert!(particles.displacement_gradient.iter().all(|h| h.norm() < 1e-13));
 /// // That is what the whole step finds.
 /// simulation.step()?;
-/// let apart = simulation.particles.position.iter().zip(&particles.position).map(|(a, b)| (a - b).norm());
-/// assert!(apart.fold(0.0, f64::max) < 1e-12);
+/// let whole = simulation.particles.by_id();
+/// assert!(whole.position.iter().zip(&particles.position).all(|(a, b)| (a - b).norm() < 1e-12));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Moved<const D: usize> {
-    position: Vec<Vector<f64, D>>,
-    delta_velocity: Vec<Vector<f64, D>>,
-    delta_acceleration: Vec<Vector<f64, D>>,
-    displacement_gradient: Vec<Tensor<f64, D>>,
+pub struct Update<'a, const D: usize> {
+    dphi: &'a [Vector<f64, D>],
+    /// Δv and Δa of the nodes; empty without inertia.
+    delta_velocity: Pooled<Vector<f64, D>>,
+    delta_acceleration: Pooled<Vector<f64, D>>,
     impulses: Vec<f64>,
+    /// What smoothing adds to v and a of the particles.
+    smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
 }
 
-impl<const D: usize> Moved<D> {
-    /// The particle updates, with `projected` the nodal state before, `nodal` after the prescribed values were put in.
+impl<'a, const D: usize> Update<'a, D> {
+    /// The increments of the nodes, with `projected` their state before, `nodal` after the prescribed values were put in.
     ///
     /// a_p += Σ N Δa,  Δa = α₁(Δφ − Δt v_n) − (α₃+1)a_n      (50)
     /// v_p += Σ N Δv,  Δv = α₄(Δφ − Δt v_n) + α₆a_n           (51), both as in [`Alphas`]
     /// x_p += Σ N Δφ                                           (52)
     /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
-    #[allow(clippy::too_many_arguments)] // the ingredients of four formulas
     pub fn new(
-        particles: &Particles<D>,
-        supports: &Supports<D>,
         alphas: &Alphas,
         projected: &Nodal<D>,
         nodal: &Nodal<D>,
         prescribed: &[PrescribedDof],
         walls: WallUpdate,
-        dphi: &[Vector<f64, D>],
+        dphi: &'a [Vector<f64, D>],
     ) -> Self {
-        let mut position = particles.position.clone();
-        let mut displacement_gradient = particles.displacement_gradient.clone();
-        let moved = |p: usize, delta_x, g| (delta_x, compose(&g, &particles.displacement_gradient[p]));
-        supports.each_particle(dphi, moved, |p, (delta_x, h)| {
-            position[p] += delta_x;
-            displacement_gradient[p] = h;
-        });
-        let (delta_velocity, delta_acceleration) = (Vec::new(), Vec::new());
-        let impulses = vec![0.0; prescribed.len()];
-        let moved = Self { position, delta_velocity, delta_acceleration, displacement_gradient, impulses };
-        if nodal.is_static() {
-            return moved;
-        }
-        let state = dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
-        let (mut delta_v, mut delta_a): (Vec<_>, Vec<_>) =
-            state.map(|((dphi, v), a)| alphas.increments(dphi, v, a)).unzip();
-        let mut impulses = Vec::with_capacity(prescribed.len());
-        for dof in prescribed {
+        let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
+        let increments = || state().map(|((dphi, v), a)| alphas.increments(dphi, v, a));
+        let mut delta_velocity: Pooled<_> = increments().map(|both| both.0).collect();
+        let mut delta_acceleration: Pooled<_> = increments().map(|both| both.1).collect();
+        let mut impulses = vec![0.0; prescribed.len()];
+        for (dof, impulse) in prescribed.iter().zip(&mut impulses).filter(|_| !nodal.is_static()) {
             let (node, i) = (dof.node, dof.component);
+            let (delta_v, delta_a) = (&mut delta_velocity[node][i], &mut delta_acceleration[node][i]);
+            let by_forces = *delta_v;
             let literal = !dof.moving && walls == WallUpdate::Literal;
-            let by_forces = delta_v[node][i];
-            (delta_v[node][i], delta_a[node][i]) = if literal {
+            (*delta_v, *delta_a) = if literal {
                 (0.0, 0.0)
             } else {
                 (
@@ -322,18 +314,17 @@ impl<const D: usize> Moved<D> {
                     dof.step.acceleration_end - projected.acceleration[node][i],
                 )
             };
-            impulses.push(nodal.mass[node] * (delta_v[node][i] - by_forces));
+            *impulse = nodal.mass[node] * (*delta_v - by_forces);
         }
-        let (delta_velocity, delta_acceleration) = (supports.values(&delta_v), supports.values(&delta_a));
-        Self { delta_velocity, delta_acceleration, impulses, ..moved }
+        Self { dphi, delta_velocity, delta_acceleration, impulses, smoothed: None }
     }
 
     /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it: what Newmark's step differs from Taylor's series
     /// with a third derivative ȧ = Δa/Δt, e = (β − 1/6) Δt² Δa. The root of its mean square over the mass; exact to leading order in
-    /// Δt. Where a resting wall leaves the particles' acceleration alone, it counts as none. To be asked before smoothing.
+    /// Δt. Where a resting wall leaves the particles' acceleration alone, it counts as none; nor does smoothing count.
     ///
     /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::{Moved, Nodal, WallUpdate}};
+    /// use bfree::mechanics::{sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
     /// use bfree::tensor::Vector;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -344,18 +335,21 @@ impl<const D: usize> Moved<D> {
     /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
     /// let (a, beta) = (Vector::from([3.0, 4.0]), simulation.settings.newmark.beta);
     /// let dphi = vec![a * (beta * dt * dt); nodes.len()];
-    /// let moved = Moved::new(particles, &supports, &alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-    /// let error = moved.local_error(beta, dt, &particles.mass);
+    /// let update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+    /// let error = update.local_error(particles, &supports, beta, dt);
     /// assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn local_error(&self, beta: f64, dt: f64, mass: &[f64]) -> f64 {
-        let squares = self.delta_acceleration.iter().zip(mass).map(|(a, m)| m * a.norm_squared());
-        let mean = squares.fold(0.0, |sum, one| sum + one) / mass.iter().sum::<f64>();
-        (beta - 1.0 / 6.0).abs() * dt * dt * mean.sqrt()
+    pub fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, beta: f64, dt: f64) -> f64 {
+        let mass = &particles.mass;
+        let mut squares = 0.0;
+        if !self.delta_acceleration.is_empty() {
+            supports.each_value(&self.delta_acceleration, |p, a| squares += mass[p] * a.norm_squared());
+        }
+        (beta - 1.0 / 6.0).abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
     }
 
-    /// Adds to both increments what `smoothing` makes of the fields they start from; `mass` is the lumped one of the nodes.
+    /// Adds to v and a of the particles what `smoothing` makes of them as they are; `mass` is the lumped one of the nodes.
     pub fn smooth(
         &mut self,
         smoothing: &Smoothing,
@@ -368,14 +362,8 @@ impl<const D: usize> Moved<D> {
             return;
         }
         let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
-        let fields =
-            [(&mut self.delta_velocity, &particles.velocity), (&mut self.delta_acceleration, &particles.acceleration)];
-        for (delta, field) in fields {
-            let changes = smoothing.change(particles, supports, mass, at_kinks.as_deref(), field, dt);
-            for (delta, change) in delta.iter_mut().zip(changes) {
-                *delta += change;
-            }
-        }
+        let change = |field| smoothing.change(particles, supports, mass, at_kinks.as_deref(), field, dt);
+        self.smoothed = Some([&particles.velocity, &particles.acceleration].map(|field| change(field)));
     }
 
     /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom: the momentum a wall gives beyond the reactions, where
@@ -384,20 +372,44 @@ impl<const D: usize> Moved<D> {
         &self.impulses
     }
 
-    /// The new positions.
-    pub fn positions(&self) -> &[Vector<f64, D>] {
-        &self.position
+    /// The particle with the smallest id that would leave the grid, by its id, and where it would be.
+    pub fn leaving(
+        &self,
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        grid: &Grid<D>,
+    ) -> Option<(usize, Vector<f64, D>)> {
+        let mut first: Option<(usize, Vector<f64, D>)> = None;
+        supports.each_value(self.dphi, |p, delta_x| {
+            let (id, x) = (particles.id[p] as usize, particles.position[p] + delta_x);
+            if !grid.contains(&x) && first.is_none_or(|(one, _)| id < one) {
+                first = Some((id, x));
+            }
+        });
+        first
     }
 
-    /// Writes to the particles: the only place that does, once per step.
-    pub fn commit(self, particles: &mut Particles<D>) {
-        for (v, delta) in particles.velocity.iter_mut().zip(&self.delta_velocity) {
-            *v += delta;
+    /// Writes to the particles, in place: the only place that does, once per step.
+    pub fn commit(self, particles: &mut Particles<D>, supports: &Supports<D>) {
+        let Particles { position, velocity, acceleration, displacement_gradient, .. } = particles;
+        supports.each_particle(
+            self.dphi,
+            |_, delta_x, g| (delta_x, g),
+            |p, (delta_x, g)| {
+                position[p] += delta_x;
+                displacement_gradient[p] = compose(&g, &displacement_gradient[p]);
+            },
+        );
+        if self.delta_velocity.is_empty() {
+            return;
         }
-        for (a, delta) in particles.acceleration.iter_mut().zip(&self.delta_acceleration) {
-            *a += delta;
+        let [changed_v, changed_a] = self.smoothed.unwrap_or_default();
+        for (field, delta, changed) in
+            [(velocity, &self.delta_velocity, changed_v), (acceleration, &self.delta_acceleration, changed_a)]
+        {
+            supports.each_value(delta, |p, delta| {
+                field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
+            });
         }
-        particles.position = self.position;
-        particles.displacement_gradient = self.displacement_gradient;
     }
 }

@@ -28,7 +28,7 @@ pub enum OutputError {
     /// A particle has no stress.
     #[error("particle {particle} has no stress: {source}")]
     Inadmissible {
-        /// Number of the particle.
+        /// Id of the particle.
         particle: usize,
         /// The determinant found.
         source: NonPositiveJacobian,
@@ -41,7 +41,7 @@ pub enum OutputError {
     ProbeParticle {
         /// Name of the probe.
         name: String,
-        /// The particle asked for.
+        /// The id asked for.
         particle: usize,
         /// Number of particles.
         particles: usize,

@@ -10,7 +10,8 @@ use crate::tensor::{Deformation, Tensor, Vector};
 const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 impl Field {
-    /// Appends the components at one particle (which must exist in the simulation and the reference) to `out`.
+    /// Appends the components at the particle that lies at the place `particle` in memory (which must exist in the simulation and the
+    /// reference) to `out`.
     ///
     /// ```
     /// use bfree::{field::Field, output::Reference, tensor::Tensor};
@@ -37,13 +38,14 @@ impl Field {
         out: &mut Vec<f64>,
     ) -> Result<(), OutputError> {
         let particles = &simulation.particles;
+        let id = particles.id[particle] as usize;
         let h = || particles.displacement_gradient[particle];
         let law = || &simulation.bodies[particles.body[particle] as usize].law;
-        let stress = || cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle, source });
+        let stress = || cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle: id, source });
         match self {
             Self::Position => out.extend(padded(&particles.position[particle])),
             Self::Displacement => {
-                out.extend(padded(&(particles.position[particle] - reference.position[particle])));
+                out.extend(padded(&(particles.position[particle] - reference.position[id])));
             }
             Self::Velocity => out.extend(padded(particles.velocity.get(particle).ok_or(OutputError::Inertia(self))?)),
             Self::Acceleration => {
@@ -72,7 +74,7 @@ impl Field {
         Ok(())
     }
 
-    /// The components at all particles, particle after particle.
+    /// The components at all particles, by their ids.
     ///
     /// ```
     /// use bfree::{field::Field, output::Reference};
@@ -96,10 +98,10 @@ impl Field {
         reference: &Reference<D>,
     ) -> Result<Vec<f64>, OutputError> {
         reference.check(simulation)?;
-        let count = simulation.particles.len();
-        let mut out = Vec::with_capacity(count * self.kind().components().len());
-        for particle in 0..count {
-            self.append(simulation, reference, particle, &mut out)?;
+        let particles = simulation.particles.places();
+        let mut out = Vec::with_capacity(particles.len() * self.kind().components().len());
+        for particle in particles {
+            self.append(simulation, reference, particle as usize, &mut out)?;
         }
         Ok(out)
     }

@@ -37,14 +37,14 @@ pub struct Probe<const D: usize> {
 }
 
 impl<const D: usize> Probe<D> {
-    /// The particle looked at now; `None` if none is near enough.
+    /// Where the particle looked at now lies in memory; `None` if none is near enough.
     fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
         let name = || self.name.clone();
         match self.place {
-            Place::Particle(particle) if particle < particles.len() => Ok(Some(particle)),
-            Place::Particle(particle) => {
-                Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
-            }
+            Place::Particle(particle) => match particles.place(particle) {
+                Some(place) => Ok(Some(place)),
+                None => Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() }),
+            },
             Place::Nearest { point, body, within } => match nearest(particles, &point, body) {
                 Some((particle, distance)) => Ok((distance <= within).then_some(particle)),
                 None => Err(OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() }),
@@ -53,7 +53,8 @@ impl<const D: usize> Probe<D> {
     }
 }
 
-/// The particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near ones, the first.
+/// The place in memory of the particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near
+/// ones, that with the smallest id.
 ///
 /// ```
 /// use bfree::output::nearest;
@@ -78,7 +79,7 @@ pub fn nearest<const D: usize>(
         .filter(|(_, (_, of))| body.is_none_or(|body| body == **of))
         .map(|(particle, (x, _))| (particle, (x - point).norm_squared()))
         .filter(|(_, distance)| distance.is_finite())
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .min_by(|a, b| a.1.total_cmp(&b.1).then(particles.id[a.0].cmp(&particles.id[b.0])))
         .map(|(particle, square)| (particle, square.sqrt()))
 }
 

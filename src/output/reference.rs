@@ -9,7 +9,7 @@ use crate::tensor::Vector;
 /// Positions, energy and momentum at the start of the run. A restarted run keeps that of the first one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference<const D: usize> {
-    /// Position of every particle; displacements are measured from here.
+    /// Position of every particle by its id; displacements are measured from here.
     pub position: Vec<Vector<f64, D>>,
     /// Kinetic and strain energy, less the external work done so far.
     pub energy: f64,
@@ -32,7 +32,7 @@ impl<const D: usize> Reference<D> {
     pub fn of<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Self {
         let particles = &simulation.particles;
         Self {
-            position: particles.position.clone(),
+            position: particles.places().iter().map(|&p| particles.position[p as usize]).collect(),
             energy: particles.kinetic_energy() + simulation.strain_energy() - simulation.external_work,
             momentum: particles.momentum(),
         }

@@ -119,16 +119,17 @@ pub(crate) fn multiples(clock: &Clock, every: f64) -> f64 {
     ((clock.time() + 1e-6 * clock.nominal()) / every).floor()
 }
 
-/// The particles with the fields asked for; no others are computed.
+/// The particles, by their ids, with the fields asked for; no others are computed.
 pub(crate) fn snapshot<const D: usize, L: Law, A>(
     simulation: &Simulation<D, L, A>,
     reference: &Reference<D>,
     fields: &[Field],
 ) -> Result<Snapshot, OutputError> {
-    let grid = &simulation.grid;
+    let (grid, particles) = (&simulation.grid, &simulation.particles);
+    let places = particles.places();
     let arrays = fields.iter().map(|field| {
         let values = match field.kind() {
-            Kind::Index => Values::Index(simulation.particles.body.clone()),
+            Kind::Index => Values::Index(places.iter().map(|&p| particles.body[p as usize]).collect()),
             _ => Values::Float(field.values(simulation, reference)?),
         };
         let components = field.kind().components().iter().map(|&name| name.to_owned()).collect();
@@ -142,7 +143,7 @@ pub(crate) fn snapshot<const D: usize, L: Law, A>(
             spacing: grid.spacing,
             cells: std::array::from_fn(|k| grid.cells.get(k).copied().unwrap_or(0)),
         },
-        points: simulation.particles.position.iter().map(padded).collect(),
+        points: places.iter().map(|&p| padded(&particles.position[p as usize])).collect(),
         arrays: arrays.collect::<Result<_, OutputError>>()?,
     })
 }

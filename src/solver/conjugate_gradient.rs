@@ -5,6 +5,7 @@ use super::{
     InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
     true_residual,
 };
+use crate::pooled::Pooled;
 
 /// A curvature below this part of the largest one seen, in units of round-off: neither its size nor its sign means anything.
 const UNRESOLVED: f64 = 16.0;
@@ -79,7 +80,7 @@ pub fn conjugate_gradient<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditi
         return Ok(report);
     }
     let target = settings.relative_tolerance * b_norm;
-    let mut r = rhs.to_vec();
+    let mut r: Pooled<S> = rhs.iter().copied().collect();
     let mut r_norm = b_norm;
     loop {
         let allowed = settings.max_iterations - report.iterations.min(settings.max_iterations);
@@ -124,8 +125,8 @@ fn descend<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Size
     allowed: usize,
 ) -> Result<Run, LinearError> {
     let n = r.len();
-    let mut x = solution.to_vec();
-    let (mut z, mut q) = (vec![S::zero(); n], vec![S::zero(); n]);
+    let mut x: Pooled<S> = solution.iter().copied().collect();
+    let (mut z, mut q) = (Pooled::filled(n, S::zero()), Pooled::filled(n, S::zero()));
     preconditioner.precondition(r, &mut z);
     let mut p = z.clone();
     let mut rz = dot(r, &z);

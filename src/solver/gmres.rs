@@ -5,6 +5,7 @@ use super::{
     InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
     true_residual,
 };
+use crate::pooled::Pooled;
 
 /// A second orthogonalisation is made when the first one leaves less than this part of the vector: 1/√2 (Daniel, Gragg,
 /// Kaufman, Stewart 1976).
@@ -92,10 +93,10 @@ pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Si
     let target = settings.relative_tolerance * b_norm;
     // More than n directions are never independent.
     let mut restart = settings.restart.min(rhs.len());
-    let mut r = rhs.to_vec();
+    let mut r: Pooled<S> = rhs.iter().copied().collect();
     let mut r_norm = b_norm;
-    let mut trial = vec![S::zero(); rhs.len()];
-    let mut correction = vec![S::zero(); rhs.len()];
+    let mut trial = Pooled::filled(rhs.len(), S::zero());
+    let mut correction = Pooled::filled(rhs.len(), S::zero());
     loop {
         report.relative_residual = r_norm / b_norm;
         if report.iterations >= settings.max_iterations {
@@ -142,10 +143,10 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
     length: usize,
     correction: &mut [S],
 ) -> Result<(usize, f64), LinearError> {
-    let mut v = vec![S::zero(); r.len()];
+    let mut v = Pooled::filled(r.len(), S::zero());
     scaled(1.0 / r_norm, r, &mut v);
     // Grows by one vector an iteration: what is not needed is not allocated.
-    let mut basis: Vec<Vec<S>> = Vec::new();
+    let mut basis: Vec<Pooled<S>> = Vec::new();
     let exhausted_below = EXHAUSTED * S::EPSILON;
     let mut triangle = Triangle {
         columns: Vec::new(),
@@ -155,7 +156,7 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
         negligible: exhausted_below,
     };
     for iteration in 0..length {
-        let mut w = vec![S::zero(); r.len()];
+        let mut w = Pooled::filled(r.len(), S::zero());
         // `correction` holds M⁻¹ v meanwhile.
         preconditioner.precondition(&v, correction);
         operator.apply(correction, &mut w);
@@ -167,10 +168,10 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
         if exhausted || triangle.residual() <= target {
             break;
         }
-        v = vec![S::zero(); r.len()];
+        v = Pooled::filled(r.len(), S::zero());
         scaled(1.0 / left, &w, &mut v);
     }
-    let mut sum = vec![S::zero(); r.len()];
+    let mut sum = Pooled::filled(r.len(), S::zero());
     for (y, v) in triangle.solve().iter().zip(&basis) {
         axpy(*y, v, &mut sum);
     }
@@ -179,7 +180,7 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
 }
 
 /// Takes out of `w` its parts along the orthonormal `basis`. Returns these parts and the norm of what is left.
-fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Vec<S>]) -> (Vec<f64>, f64) {
+fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Pooled<S>]) -> (Vec<f64>, f64) {
     let mut column = vec![0.0; basis.len()];
     let mut before = w_norm;
     for _ in 0..2 {

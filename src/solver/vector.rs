@@ -21,10 +21,11 @@
 //! ```
 
 use crate::parallel;
+use crate::pooled::Element;
 use crate::scalar::Real;
 
 /// What vectors are made of: `f64` or `f32`. Reductions are added up in double precision in both.
-pub trait Entry: Real + Send + Sync {
+pub trait Entry: Real + Element + Sync {
     /// The unit of round-off.
     const EPSILON: f64;
 }

@@ -95,7 +95,7 @@ fn five_steps_agree_with_an_independent_program() -> Result<(), Failure> {
                 assert_eq!(report.active_nodes as f64, number(&run["active_last"]), "{shape}: active nodes");
             }
         }
-        let particles = &simulation.particles;
+        let particles = simulation.particles.by_id();
         for (name, ours, theirs, scale) in [
             ("x", &particles.position, vectors(&run["x"]), 1.0),
             ("v", &particles.velocity, vectors(&run["v"]), 1.0),

@@ -93,12 +93,9 @@ fn results<const D: usize, L: Law>(
     let weight = |p: usize| 2.0 + 0.1 * p as f64;
     let (mut forces, mut product) = (zeros.clone(), zeros.clone());
     supports.forces(laws, dphi, Some(&inertia), &mut forces).unwrap().unwrap();
-    // In the array of other tangents, of another form.
-    let spare = supports.closed_tangents(laws, &zeros, both, None, None).unwrap().ok();
-    let tangents = supports.closed_tangents(laws, dphi, both, Some(&weight), spare).unwrap().unwrap();
+    let tangents = supports.closed_tangents(laws, dphi, both, Some(&weight)).unwrap().unwrap();
     supports.product(&tangents, u, &mut product);
-    let spare = supports.single_tangents(laws, &zeros, both, None, 1.0, None).unwrap().ok();
-    let single = supports.single_tangents(laws, dphi, both, Some(&weight), 4.0, spare).unwrap().unwrap();
+    let single = supports.single_tangents(laws, dphi, both, Some(&weight), 4.0).unwrap().unwrap();
     let u_single: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
     let mut product_single = vec![Vector::zeros(); u.len()];
     supports.single_product(&single, &u_single, &mut product_single);
@@ -189,13 +186,13 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let forces = pool.install(|| supports.forces(&laws, &zero, None, &mut zero.clone()));
             assert_eq!(forces, Some(Err(expected)));
-            let tangents = pool.install(|| supports.closed_tangents(&laws, &zero, true, None, None));
+            let tangents = pool.install(|| supports.closed_tangents(&laws, &zero, true, None));
             assert_eq!(tangents.map(|tangents| tangents.map(|_| ())), Some(Err(Some(expected))));
         }
         // A tangent that has terms for which there is no room is not cut short.
         particles.displacement_gradient.fill(Tensor::zeros());
         let laws = Laws { particles: &particles, bodies: &bodies };
-        let simple = supports.closed_tangents(&laws, &zero, false, None, None).map(|tangents| tangents.map(|_| ()));
+        let simple = supports.closed_tangents(&laws, &zero, false, None).map(|tangents| tangents.map(|_| ()));
         let has_room = !matches!(bodies[0].law, Material::StVenantKirchhoff(_));
         assert_eq!(simple, Some(if has_room { Ok(()) } else { Err(None) }));
     }

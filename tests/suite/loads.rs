@@ -39,7 +39,7 @@ fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<()
     for _ in 0..50 {
         simulation.advance()?;
     }
-    for (x, x0) in simulation.particles.position.iter().zip(&start) {
+    for (x, x0) in simulation.particles.by_id().position.iter().zip(&start) {
         assert!((x - x0 - Vector::from([v, 0.0])).amax() < 1e-12);
     }
     for velocity in &simulation.particles.velocity {
@@ -94,7 +94,7 @@ fn a_load_present_at_the_start_acts_from_the_start() -> Result<(), Failure> {
         }
         // The trapezoidal rule is exact for a constant acceleration.
         let t = simulation.clock.time();
-        for (x, x0) in simulation.particles.position.iter().zip(&start) {
+        for (x, x0) in simulation.particles.by_id().position.iter().zip(&start) {
             let fallen = x - x0 - Vector::from([0.5 * t, -0.5 * 9.81 * t * t]);
             assert!(fallen.amax() < 1e-9, "step {step}, lumping {lumping}: off by {fallen}");
         }
@@ -117,7 +117,7 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
         simulation.advance()?;
         let t = simulation.clock.time();
         // The walls have moved by the integral of their velocity, whatever the step.
-        for (x, x0) in simulation.particles.position.iter().zip(&start) {
+        for (x, x0) in simulation.particles.by_id().position.iter().zip(&start) {
             assert!((x - x0 - Vector::from([1.5, 0.5]) * t * t).amax() < 1e-13, "x = {x} at t = {t}");
         }
         for (v, a) in simulation.particles.velocity.iter().zip(&simulation.particles.acceleration) {
@@ -196,7 +196,7 @@ fn inflation(spacing: f64) -> Result<f64, Failure> {
     let exact = |r: f64| pressure * a * a / (2.0 * shear * (b * b - a * a)) * ((1.0 - 2.0 * poisson) * r + b * b / r);
     let center = Vector::from([2.0, 2.0]);
     let (mut sum, mut count) = (0.0, 0.0);
-    for (x, x0) in simulation.particles.position.iter().zip(&start) {
+    for (x, x0) in simulation.particles.by_id().position.iter().zip(&start) {
         let r = (x0 - center).norm();
         if (1.2..1.3).contains(&r) {
             sum += ((x - center).norm() - r) / exact(r);
@@ -259,8 +259,8 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &[Vector::from([0.5, 0.5])])?;
     for (t, factor) in [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (9.0, 2.0)] {
         // A particle of mass 3 in the middle of four nodes: a quarter of m b, and of T A, to each.
-        for force in loads.dead(t, &[0.75; 4], &supports) {
-            assert_eq!(force, Vector::from([0.25 * 16.0 * 0.25, 0.75 * -8.0]) * factor, "t = {t}");
+        for force in &loads.dead(t, &[0.75; 4], &supports) {
+            assert_eq!(*force, Vector::from([0.25 * 16.0 * 0.25, 0.75 * -8.0]) * factor, "t = {t}");
         }
         let pressures = loads.pressures(t);
         assert_eq!((pressures.len(), pressures[0].particle), (1, 0));

@@ -20,6 +20,7 @@ mod runs;
 mod scenes;
 mod smoothing;
 mod statics;
+mod storage;
 mod support;
 mod sweep;
 mod transfer;

@@ -113,7 +113,7 @@ fn a_scene_too_large_for_the_memory_is_refused() {
     assert!(scene.build_within::<2>(&folder("scenes"), least).is_ok());
     let refused = scene.build_within::<2>(&folder("scenes"), least - 1).err().map(|error| error.to_string());
     let refused = refused.unwrap_or_default();
-    assert!(refused.starts_with("bodies[0].shape: 400 particles so far need at least 79.69 KiB"), "{refused}");
+    assert!(refused.starts_with("bodies[0].shape: 400 particles so far need at least 84.38 KiB"), "{refused}");
     assert!(plan.check_fits(plan.bytes()).is_ok());
     let refused = plan.check_fits(plan.bytes() - 1).err().map(|error| error.to_string()).unwrap_or_default();
     assert!(refused.contains("solver.krylov.method"), "{refused}");

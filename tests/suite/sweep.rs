@@ -193,7 +193,7 @@ fn renewal<const D: usize>() {
         let anew = Supports::with_precision(&shape, &grid, &after, Precision::Mixed).unwrap();
         for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
             let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
-            let renewed = Supports::renewed(Some(spare), &shape, &grid, &after, Precision::Mixed).unwrap();
+            let renewed = Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed).unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {
@@ -315,8 +315,8 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
         let weight = |_: usize| 1.0;
         let inertia: Option<&(dyn Fn(usize) -> f64 + Sync)> = if lumping < 1.0 { Some(&weight) } else { None };
         let laws = Laws { particles: &particles, bodies: &bodies };
-        let frozen = tiled.closed_tangents(&laws, &field, both, inertia, None).ok_or("no vector lanes")?;
-        let single = tiled.single_tangents(&laws, &field, both, inertia, 1.0, None).ok_or("no vector lanes")?;
+        let frozen = tiled.closed_tangents(&laws, &field, both, inertia).ok_or("no vector lanes")?;
+        let single = tiled.single_tangents(&laws, &field, both, inertia, 1.0).ok_or("no vector lanes")?;
         let (frozen, single) = (frozen.map_err(|_| "no closed form")?, single.map_err(|_| "no closed form")?);
         assert!(frozen.bytes() > 0 && single.bytes() > 0);
         for (precision, bytes) in [(Precision::Double, frozen.bytes()), (Precision::Mixed, single.bytes())] {

@@ -180,9 +180,9 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let alphas = self.newmark.alphas(dt);
         let carried = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
         let nodal = Nodal {
-            mass: self.mass.clone(),
+            mass: self.mass.clone().into(),
             velocity: carried,
-            acceleration: self.acceleration.clone(),
+            acceleration: self.acceleration.clone().into(),
             iterations: 0,
         };
         // Walls at rest alone: u = 0 there, whatever was carried.

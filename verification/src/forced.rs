@@ -6,7 +6,7 @@ use bfree::material::Law;
 use bfree::mechanics::loads::prescribed_dofs;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::transfer::{Moved, Nodal};
+use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::solver::{NewtonError, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
@@ -83,11 +83,11 @@ pub fn step_by<const D: usize, L: Law, A: ShapeFunction>(
     let newton = solve(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
 
     let walls = settings.wall_update;
-    let mut moved = Moved::new(particles, &supports, &alphas, &projected, &nodal, &prescribed, walls, &dphi);
+    let mut update = Update::new(&alphas, &projected, &nodal, &prescribed, walls, &dphi);
     if let Some(smoothing) = &settings.smoothing {
-        moved.smooth(smoothing, particles, &supports, &nodal.mass, dt);
+        update.smooth(smoothing, particles, &supports, &nodal.mass, dt);
     }
-    moved.commit(&mut simulation.particles);
+    update.commit(&mut simulation.particles, &supports);
     simulation.clock.advance();
     Ok(Forced { newton, projection_iterations: projected.iterations })
 }

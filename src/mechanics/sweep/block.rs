@@ -20,6 +20,8 @@ pub(super) struct Block {
     pub(super) nodes: Vec<u32>,
     /// Their places in the box.
     pub(super) places: Vec<u32>,
+    /// Which nodes of the box they are: a bit for each node of a row along x.
+    pub(super) active: Vec<u64>,
 }
 
 /// Groups of up to `L` particles of a block, with a common window each.
@@ -120,6 +122,7 @@ impl Block {
             + self.single.as_ref().map_or(0, Groups::bytes)
             + size_of_val(self.nodes.as_slice())
             + size_of_val(self.places.as_slice())
+            + size_of_val(self.active.as_slice())
     }
 
     /// Fills the box from a field on the active nodes; zero at the others.

@@ -8,6 +8,7 @@ use super::order::{Key, follows};
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
+use crate::pooled::{Element, Pooled, kept_as_it_is};
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use std::ops::Range;
@@ -23,11 +24,7 @@ pub(super) struct Scratch {
     groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
 
-/// Which nodes of a box are active: a bit for each node of a row along x.
-pub(super) type Active = Vec<u64>;
-
-/// The block of the particles `keys`, without its number of groups before it and its node numbers; and which nodes of its
-/// box are active. With `single` it has groups for single precision too. The arrays of `spare` are used again.
+/// The block of the particles `keys`, without its number of groups before it and its node numbers. With `single` it has groups for single precision too. The arrays of `spare` are used again.
 ///
 /// # Errors
 /// Those of the functions of one of the particles.
@@ -39,26 +36,26 @@ pub(super) fn block<const D: usize>(
     single: bool,
     spare: Block,
     scratch: &mut Scratch,
-) -> Result<(Block, Active), ApproximationError> {
+) -> Result<Block, ApproximationError> {
     let (mut size, mut origin) = ([1; 3], [0; 3]);
     for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
         along.x.clear();
-        along.x.extend(keys.iter().map(|&(_, p)| positions[p as usize][k]));
+        along.x.extend(keys.iter().map(|key| positions[key.particle as usize][k]));
         family.spans(&grid.axis(k), along)?;
         let [low, high] = union(&along.spans);
         size[k] = (high - low) as usize;
         origin[k] = low;
     }
-    let mut active = vec![0; size[1] * size[2]];
-    let Block { groups, single: other, mut nodes, mut places, .. } = spare;
+    let Block { groups, single: other, mut nodes, mut places, mut active, .. } = spare;
+    active.clear();
+    active.resize(size[1] * size[2], 0);
     let building = Building { family, grid, keys, origin, size };
     let groups = building.groups(groups, 1.0, scratch, Some(&mut active))?;
     let in_single = || building.groups(other.unwrap_or_default(), grid.spacing, scratch, None);
     let single = single.then(in_single).transpose()?;
     nodes.clear();
     places.clear();
-    let block = Block { groups, single, origin, size, nodes, places };
-    Ok((block, active))
+    Ok(Block { groups, single, origin, size, nodes, places, active })
 }
 
 /// The smallest interval that holds all.
@@ -83,7 +80,7 @@ impl<const D: usize> Building<'_, D> {
         spare: Groups<X, L>,
         unit: f64,
         scratch: &mut Scratch,
-        mut active: Option<&mut Active>,
+        mut active: Option<&mut Vec<u64>>,
     ) -> Result<Groups<X, L>, ApproximationError> {
         let mut built = spare.renewed(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
@@ -121,7 +118,7 @@ impl<const D: usize> Building<'_, D> {
         windows: &[[u32; 2]; 3],
         unit: f64,
         scratch: &mut Scratch,
-        active: Option<&mut Active>,
+        active: Option<&mut Vec<u64>>,
     ) -> Result<(), ApproximationError> {
         let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
         let eights = keys.len().div_ceil(LANES);
@@ -148,7 +145,7 @@ impl<const D: usize> Building<'_, D> {
                 columns[part * D + k].write(keys.len(), windows[k][0], unit, values, derivatives, part * LANES);
             }
         }
-        groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.1)));
+        groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
         groups.windows.push(group);
         if let Some(active) = active {
             for (part, keys) in keys.chunks(LANES).enumerate() {
@@ -159,7 +156,7 @@ impl<const D: usize> Building<'_, D> {
     }
 
     /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes.
-    fn mark(&self, columns: &[Columns], count: usize, active: &mut Active) {
+    fn mark(&self, columns: &[Columns], count: usize, active: &mut [u64]) {
         for lane in 0..count {
             let (mut begin, mut end) = ([0; 3], [1; 3]);
             for k in 0..D {
@@ -197,7 +194,8 @@ impl<const D: usize> Building<'_, D> {
 /// along x while all fit into the lanes and their window is not too wide.
 fn group_end<const L: usize, const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
     // No further than a group reaches: a cell may hold very many.
-    let cell_end = |from: usize| from + keys[from..].iter().take(L + 1).take_while(|key| key.0 == keys[from].0).count();
+    let cell_end =
+        |from: usize| from + keys[from..].iter().take(L + 1).take_while(|key| key.cell == keys[from].cell).count();
     let mut end = cell_end(start);
     if end - start > L {
         return start + L;
@@ -216,37 +214,38 @@ fn group_end<const L: usize, const D: usize>(keys: &[Key], along_x: &[[u32; 2]],
     end
 }
 
-/// Numbers the active nodes in the order of the grid, and gives each block those of its box. `active` marks them in the
-/// boxes.
-pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], active: &[Active]) -> Nodes {
-    /// A row of a box along x, by the grid number of the row's node at x = 0.
-    struct Row {
-        start: u64,
-        x: usize,
-        block: usize,
-        /// Its first node in the box.
-        place: usize,
-        /// Its nodes that are active.
-        active: u64,
+/// A row of a box along x, by the grid number of the row's node at x = 0.
+struct Row {
+    start: u64,
+    x: usize,
+    block: usize,
+    /// Its first node in the box.
+    place: usize,
+    /// Its nodes that are active.
+    active: u64,
+}
+
+kept_as_it_is!(Row);
+
+impl Row {
+    /// The active nodes, counted from the beginning of the row.
+    fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
+        let mut left = self.active;
+        std::iter::from_fn(move || {
+            let next = (left != 0).then(|| left.trailing_zeros() as usize);
+            left &= left.wrapping_sub(1);
+            next
+        })
     }
 
-    impl Row {
-        /// The active nodes, counted from the beginning of the row.
-        fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
-            let mut left = self.active;
-            std::iter::from_fn(move || {
-                let next = (left != 0).then(|| left.trailing_zeros() as usize);
-                left &= left.wrapping_sub(1);
-                next
-            })
-        }
-
-        /// The node behind the last active one.
-        fn end(&self) -> usize {
-            self.x + (u64::BITS - self.active.leading_zeros()) as usize
-        }
+    /// The node behind the last active one.
+    fn end(&self) -> usize {
+        self.x + (u64::BITS - self.active.leading_zeros()) as usize
     }
+}
 
+/// Numbers the active nodes in the order of the grid, and gives each block those of its box.
+pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> Nodes {
     /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
     fn apart(mut line: &[Row]) -> Vec<&[Row]> {
         let mut parts = Vec::new();
@@ -263,7 +262,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
         }
         parts
     }
-    let mut rows = Vec::new();
+    let mut rows: Pooled<Row> = Pooled::with_room(blocks.iter().map(|block| block.active.len()).sum());
     for (b, block) in blocks.iter().enumerate() {
         let [nx, ny, nz] = block.size;
         for z in 0..nz {
@@ -272,12 +271,13 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block], activ
                 let x = index[0] as usize;
                 index[0] = 0;
                 let place = (z * ny + y) * nx;
-                rows.push(Row { start: grid.id(index), x, block: b, place, active: active[b][z * ny + y] });
+                rows.push(Row { start: grid.id(index), x, block: b, place, active: block.active[z * ny + y] });
             }
         }
     }
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
-    let mut ids = Vec::new();
+    // About as many as boxes have inside, where they do not overlap.
+    let mut ids = Pooled::with_room(blocks.iter().map(|block| block.groups.len()).sum());
     let mut numbers: Vec<u32> = Vec::new();
     for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {
         let low = same[0].x;

@@ -8,6 +8,7 @@ use super::tiled::{Tiled, first_error, keep_first};
 use super::waves;
 use crate::material::{ClosedTangent, Law};
 use crate::mechanics::point::Inadmissible;
+use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use std::ops::Range;
@@ -88,6 +89,19 @@ fn symmetric<S: Lanes<L>, const D: usize, const L: usize>(s: S, rows: &[[S::X; L
     b
 }
 
+/// The largest arrays of a step leave their memory to the next tangents.
+impl<const D: usize> Drop for ClosedTangents<D> {
+    fn drop(&mut self) {
+        drop(Pooled::from(std::mem::take(&mut self.0.numbers)));
+    }
+}
+
+impl<const D: usize> Drop for SingleTangents<D> {
+    fn drop(&mut self) {
+        drop(Pooled::from(std::mem::take(&mut self.0.numbers)));
+    }
+}
+
 impl<const D: usize> ClosedTangents<D> {
     /// Bytes of all arrays.
     ///
@@ -119,17 +133,16 @@ fn copy<X: Real>(from: &[f64; LANES], lanes: Range<usize>, to: &mut [X]) {
 }
 
 impl<const D: usize> Tiled<D> {
-    /// The tangents of all particles at ∇u, and their consistent inertia if there is one; in the array of `spare`.
+    /// The tangents of all particles at ∇u, and their consistent inertia if there is one.
     pub(super) fn closed<L: Law>(
         &self,
         laws: &Laws<'_, D, L>,
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Weight<'_>,
-        spare: Option<ClosedTangents<D>>,
     ) -> Result<ClosedTangents<D>, Option<Inadmissible>> {
         let form = Form { both, inertia: inertia.is_some() };
-        let array = spare.map_or_else(Vec::new, |spare| spare.0.numbers);
+        let array = |rows| Pooled::unspecified(rows, [0.0; LANES]).into_vec();
         Ok(ClosedTangents(self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, array)?))
     }
 
@@ -141,12 +154,11 @@ impl<const D: usize> Tiled<D> {
         both: bool,
         inertia: Weight<'_>,
         scale: f64,
-        spare: Option<SingleTangents<D>>,
     ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         let h = self.unit?;
         let form = Form { both, inertia: inertia.is_some() };
         let factor = 1.0 / (scale * h * h);
-        let array = spare.map_or_else(Vec::new, |spare| spare.0.numbers);
+        let array = |rows| Pooled::unspecified(rows, [0.0; SINGLE_LANES]).into_vec();
         let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, array);
         Some(numbers.map(SingleTangents))
     }
@@ -161,16 +173,12 @@ impl<const D: usize> Tiled<D> {
         form: Form,
         inertia: Weight<'_>,
         factor: f64,
-        mut numbers: Vec<[X; N]>,
+        array: impl FnOnce(usize) -> Vec<[X; N]>,
     ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
         // What they hold is written over.
-        if numbers.capacity() < count * rows {
-            numbers = Vec::with_capacity(count * rows);
-        }
-        numbers.shrink_to(2 * count * rows);
-        numbers.resize(count * rows, [X::zero(); N]);
+        let mut numbers = array(count * rows);
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = numbers.as_mut_slice();
         for block in &self.blocks {

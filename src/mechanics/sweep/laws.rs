@@ -116,7 +116,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         move |group, rows| {
             let mut stresses: Stresses = [[0.0; LANES]; 10];
             chosen.evaluate(group, &States::of(self.particles, group, rows), &mut stresses);
-            judge(group, &stresses[DET_F])?;
+            judge(&self.particles.id, group, &stresses[DET_F])?;
             rows[D..D + D * D].copy_from_slice(&stresses[..D * D]);
             Ok(())
         }
@@ -136,7 +136,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         });
         move |group, rows, tangents| {
             chosen.evaluate(group, &States::of(self.particles, group, rows), tangents);
-            judge(group, &tangents[TANGENT_DET_F]).map_err(Some)?;
+            judge(&self.particles.id, group, &tangents[TANGENT_DET_F]).map_err(Some)?;
             let fits = |&form: &f64| form == SIMPLE || (both && form == BOTH);
             if tangents[FORM][..group.len()].iter().all(fits) { Ok(()) } else { Err(None) }
         }
@@ -148,11 +148,11 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     }
 }
 
-/// The smallest particle of a group whose det F is none of a body.
-fn judge(group: &[u32], det_f: &[f64; LANES]) -> Result<(), Inadmissible> {
+/// The particle of a group with the smallest id whose det F is none of a body.
+fn judge(ids: &[u32], group: &[u32], det_f: &[f64; LANES]) -> Result<(), Inadmissible> {
     let check = |(&p, &det_f): (&u32, &f64)| {
         let error = NonPositiveJacobian::check(det_f).err();
-        error.map(|source| Inadmissible { particle: p as usize, source })
+        error.map(|source| Inadmissible { particle: ids[p as usize] as usize, source })
     };
     match group.iter().zip(det_f).filter_map(check).min_by_key(|error| error.particle) {
         Some(first) => Err(first),

@@ -43,6 +43,9 @@ use tiled::Tiled;
 /// Particles per block of the plain sweep: large enough to pay for a task, small enough to keep a block's nodes in cache.
 const BLOCK: usize = 256;
 
+/// Particles lie well in memory if fewer than one in so many lies elsewhere than behind the one before it in the sweep.
+const LEAPS: usize = 8;
+
 /// Products with more nodes than this along an axis take the plain sweep: the box of a block would leave the cache.
 const WIDEST: usize = 16;
 
@@ -143,11 +146,12 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, positions, precision)
+        Self::renewed(None, approximation, grid, positions, None, precision)
     }
 
     /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
-    /// particles. What comes out does not depend on them.
+    /// particles. What comes out does not depend on them. Nor does it on the places of particles in memory, if `ids` tells them apart:
+    /// sums are taken in the order of cells and ids.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
@@ -160,7 +164,7 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, Precision::Double)?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double)?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction(nodes.len(), 1);
@@ -175,6 +179,7 @@ impl<const D: usize> Supports<D> {
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
+        ids: Option<&[u32]>,
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
@@ -184,7 +189,7 @@ impl<const D: usize> Supports<D> {
                     Way::Plain(_) => None,
                     Way::Tiled(tiled) => Some(tiled),
                 });
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, single, spare)?;
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
                 Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
             }
             _ => Self::plain(approximation, grid, positions),
@@ -225,6 +230,29 @@ impl<const D: usize> Supports<D> {
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
         Ok((Self(Way::Plain(plain), Tally::of(nodes.len())), nodes))
+    }
+
+    /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
+    /// [`LEAPS`].
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// // The disc is filled row by row: two particles of a cell, then those of the next.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &mut simulation.particles;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// particles.rearrange(&supports.leaping().ok_or("by rows")?);
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// assert_eq!(supports.leaping(), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn leaping(&self) -> Option<Vec<u32>> {
+        let Way::Tiled(tiled) = &self.0 else { return None };
+        let mut next = 0;
+        let leaps = tiled.order().filter(|&p| std::mem::replace(&mut next, p + 1) != p).count();
+        (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
     }
 
     /// Number of particles.
@@ -296,15 +324,36 @@ impl<const D: usize> Supports<D> {
     /// Σ u_I N_I at every particle.
     pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut values = vec![Vector::zeros(); self.particles()];
+        self.each_value(field, |p, value| values[p] = value);
+        values
+    }
+
+    /// `take(p, Σ u_I N_I)` of every particle, in an order that does not depend on the number of threads.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// let field = direction(nodes.len(), 1);
+    /// let (values, mut visited) = (supports.values(&field), 0);
+    /// supports.each_value(&field, |p, value| {
+    ///     assert_eq!(value, values[p]);
+    ///     visited += 1;
+    /// });
+    /// assert_eq!(visited, values.len());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn each_value(&self, field: &[Vector<f64, D>], mut take: impl FnMut(usize, Vector<f64, D>)) {
         match &self.0 {
-            Way::Plain(_) => self.each_particle(field, |_, value, _| value, |p, value| values[p] = value),
+            Way::Plain(_) => self.each_particle(field, |_, value, _| value, take),
             Way::Tiled(tiled) => {
                 self.1.pass();
                 let point = |_: usize, rows: &Rows, lane: usize| Vector::from_fn(|i, _| rows[i][lane]);
-                waves::each_particle(tiled, field, of_block::gather_values, point, |p, value| values[p] = value);
+                waves::each_particle(tiled, field, of_block::gather_values, point, &mut take);
             }
         }
-        values
     }
 
     /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
@@ -545,8 +594,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The closed tangents of all particles at ∇u_p, `both` telling whether they have the term b L c, with the weights of
-    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes. The array of `spare`, tangents no longer
-    /// needed, is used again.
+    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes.
     ///
     /// ```
     /// use bfree::material::{FrozenTangent, Law, NonPositiveJacobian, admissible};
@@ -563,7 +611,7 @@ impl<const D: usize> Supports<D> {
     ///     Ok::<_, NonPositiveJacobian>(law.freeze(&identity(), &admissible(g)?, particles.volume[p]))
     /// };
     /// let laws = Laws { particles, bodies: &simulation.bodies };
-    /// let tangents = supports.closed_tangents(&laws, &dphi, false, None, None).ok_or("LME has vector lanes")?;
+    /// let tangents = supports.closed_tangents(&laws, &dphi, false, None).ok_or("LME has vector lanes")?;
     /// let tangents = tangents.map_err(|_| "deformed too far")?;
     /// assert_eq!(Some(tangents.bytes()), supports.closed_bytes(false, false, Precision::Double));
     /// // In vector lanes as particle by particle: K u = Σ_p (V₀ δP F_nᵀ) ∇N, and its diagonal blocks.
@@ -587,13 +635,12 @@ impl<const D: usize> Supports<D> {
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
-        spare: Option<ClosedTangents<D>>,
     ) -> Option<Result<ClosedTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                Some(tiled.closed(laws, field, both, inertia, spare))
+                Some(tiled.closed(laws, field, both, inertia))
             }
         }
     }
@@ -646,8 +693,8 @@ impl<const D: usize> Supports<D> {
     /// assert_eq!(h, grid.spacing);
     /// // Gradients are in units of 1/h, and K comes divided by a number, h² to leave it as it is.
     /// let (laws, rest) = (Laws { particles, bodies: &simulation.bodies }, vec![Vector::zeros(); nodes.len()]);
-    /// let tangents = supports.closed_tangents(&laws, &rest, false, None, None).ok_or("LME has vector lanes")?;
-    /// let single = supports.single_tangents(&laws, &rest, false, None, 1.0, None).ok_or("and in single precision")?;
+    /// let tangents = supports.closed_tangents(&laws, &rest, false, None).ok_or("LME has vector lanes")?;
+    /// let single = supports.single_tangents(&laws, &rest, false, None, 1.0).ok_or("and in single precision")?;
     /// let (tangents, single) = (tangents.map_err(|_| "at rest")?, single.map_err(|_| "at rest")?);
     /// assert!(single.bytes() < tangents.bytes());
     /// let u = direction::<2>(nodes.len(), 2);
@@ -673,13 +720,12 @@ impl<const D: usize> Supports<D> {
         both: bool,
         inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
         scale: f64,
-        spare: Option<SingleTangents<D>>,
     ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         match &self.0 {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                tiled.closed_single(laws, field, both, inertia, scale, spare)
+                tiled.closed_single(laws, field, both, inertia, scale)
             }
         }
     }

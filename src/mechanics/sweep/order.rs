@@ -1,7 +1,8 @@
-//! The order of particles in the tiled sweep: by block of cells, by cell, by number.
+//! The order of particles in the tiled sweep: by block of cells, by cell, by id.
 
 use crate::grid::Grid;
 use crate::parallel;
+use crate::pooled::{Element, Pooled, kept_as_it_is};
 use crate::tensor::Vector;
 
 /// Edge of a block in cells: in 3D its box of nodes, gathered and scattered, stays in the first-level cache.
@@ -16,19 +17,31 @@ const fn edge(dimension: usize) -> u64 {
 /// Particles whose cells are found in one go.
 const RUN: usize = 4096;
 
-/// A particle and its place: (block · cells of a block + cell in the block, particle).
-pub(super) type Key = (u64, u32);
+/// A particle and its cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    /// block · cells of a block + cell in the block
+    pub(super) cell: u64,
+    /// Its id.
+    id: u32,
+    /// Where it lies in memory.
+    pub(super) particle: u32,
+}
 
-/// All particles by block, cell and number; the particle of the smallest number that lies in no cell, if there is one. Particles
-/// come in the order `before`, if there is one for as many, such as that of the last step: the nearer it is, the sooner they are sorted.
+kept_as_it_is!(Key);
+
+/// All particles by block, cell and id, which without `ids` is their place in memory; or the particle of the smallest id that lies in
+/// no cell. Particles come in the order `before`, if there is one for as many, such as that of the last step: the nearer it is, the
+/// sooner they are sorted.
 pub(super) fn sorted<const D: usize>(
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
+    ids: Option<&[u32]>,
     before: Option<impl Iterator<Item = u32>>,
-) -> Result<Vec<Key>, usize> {
+) -> Result<Pooled<Key>, usize> {
     let edge = edge(D);
     let blocks: [u64; D] = std::array::from_fn(|k| u64::from(grid.cells[k]).div_ceil(edge));
-    let key = |p: u32| {
+    let place = |p: u32| {
         let cell = grid.cell(&positions[p as usize])?;
         let (mut block, mut local) = (0, 0);
         for k in (0..D).rev() {
@@ -38,20 +51,22 @@ pub(super) fn sorted<const D: usize>(
         }
         Some(block * cells::<D>() + local)
     };
-    let mut keys: Vec<Key> = match before {
-        Some(order) => order.map(|p| (0, p)).collect(),
-        None => (0..positions.len() as u32).map(|p| (0, p)).collect(),
-    };
+    let key_of = |particle: u32| Key { cell: 0, id: ids.map_or(particle, |ids| ids[particle as usize]), particle };
+    let mut keys = Pooled::filled(positions.len(), key_of(0));
+    match before {
+        Some(order) => keys.iter_mut().zip(order).for_each(|(to, p)| *to = key_of(p)),
+        None => keys.iter_mut().zip(0..).for_each(|(to, p)| *to = key_of(p)),
+    }
     parallel::for_each(keys.chunks_mut(RUN), |keys| {
-        for (cell, p) in keys {
-            *cell = key(*p).unwrap_or(u64::MAX);
+        for key in keys {
+            key.cell = place(key.particle).unwrap_or(u64::MAX);
         }
     });
     sort(&mut keys);
-    // Particles in no cell come last, by number.
-    let outside = keys.partition_point(|key| key.0 < u64::MAX);
+    // Particles in no cell come last, by id.
+    let outside = keys.partition_point(|key| key.cell < u64::MAX);
     match keys.get(outside) {
-        Some(&(_, p)) => Err(p as usize),
+        Some(key) => Err(key.particle as usize),
         None => Ok(keys),
     }
 }
@@ -107,12 +122,12 @@ const fn cells<const D: usize>() -> u64 {
 
 /// The block of a key.
 pub(super) fn block<const D: usize>(key: &Key) -> u64 {
-    key.0 / cells::<D>()
+    key.cell / cells::<D>()
 }
 
 /// Whether `next` is the cell after `cell` along x in the same row of a block.
 pub(super) fn follows<const D: usize>(cell: &Key, next: &Key) -> bool {
-    next.0 == cell.0 + 1 && !next.0.is_multiple_of(edge(D))
+    next.cell == cell.cell + 1 && !next.cell.is_multiple_of(edge(D))
 }
 
 #[cfg(test)]
@@ -134,7 +149,8 @@ mod tests {
         ];
         for order in orders {
             for count in [0, 1, 2, 3, 1000] {
-                let mut keys: Vec<Key> = (0..count).map(|i| (order(i), i as u32)).collect();
+                let key = |i: u64| Key { cell: order(i), id: i as u32, particle: 0 };
+                let mut keys: Vec<Key> = (0..count).map(key).collect();
                 let mut expected = keys.clone();
                 expected.sort_unstable();
                 sort(&mut keys);

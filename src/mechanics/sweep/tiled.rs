@@ -1,6 +1,6 @@
 //! The sweep for products N = Π_k N_k: weights of each axis only, particles of a cell side by side in vector lanes.
 //!
-//! Particles are taken in the order (cell, number). A *group* is up to eight of them, of one cell or of a few neighbours
+//! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
 use super::block::{Block, Groups};
@@ -11,7 +11,7 @@ use super::kernel::{Rows, of_lane, set_lane};
 use super::lanes::LANES;
 use super::laws::Laws;
 use super::of_block;
-use super::order::{self, Key};
+use super::order;
 use super::waves;
 use super::{Inertia, Magnitude, SupportError, infallible, ordered};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
@@ -19,7 +19,7 @@ use crate::grid::Grid;
 use crate::material::Law;
 use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
-use crate::parallel;
+use crate::parallel::{self, held};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
@@ -47,6 +47,7 @@ impl<const D: usize> Tiled<D> {
         product: &dyn Separable,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
+        ids: Option<&[u32]>,
         single: bool,
         spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
@@ -59,33 +60,34 @@ impl<const D: usize> Tiled<D> {
             SupportError { particle, source }
         };
         let spare = spare.filter(|spare| spare.particles() == positions.len());
-        let before = spare.as_ref().map(|spare| spare.blocks.iter().flat_map(|block| block.groups.in_order()));
-        let keys = order::sorted(grid, positions, before).map_err(|particle| {
+        let before = spare.as_ref().map(Self::order);
+        let keys = order::sorted(grid, positions, ids, before).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
         })?;
-        let (mut old, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
-        let runs: Vec<&[Key]> = keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b)).collect();
-        old.resize_with(runs.len(), Block::default);
-        let family = Family::new(product);
-        let built = parallel::map_with(runs.into_iter().zip(old), |scratch, (keys, spare)| {
-            let particle = keys[0].1 as usize;
-            block(family, grid, positions, keys, single, spare, scratch).map_err(|error| (particle, error))
+        let (mut blocks, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
+        let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
+        blocks.resize_with(runs().count(), Block::default);
+        let (family, failed) = (Family::new(product), Mutex::new(None));
+        parallel::for_each_with(blocks.iter_mut().zip(runs()), |scratch, (place, keys)| {
+            match block(family, grid, positions, keys, single, std::mem::take(place), scratch) {
+                Ok(built) => *place = built,
+                Err(error) => keep_first(&mut held(&failed), keys[0].particle as usize, error),
+            }
         });
-        let (mut blocks, mut active) = (Vec::with_capacity(built.len()), Vec::with_capacity(built.len()));
+        if let Some((particle, error)) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            return Err(failure(particle, error));
+        }
         let (mut first, mut first_single) = (0, 0);
-        for result in built {
-            let (mut block, mask) = result.map_err(|(particle, error)| failure(particle, error))?;
+        for block in &mut blocks {
             block.groups.first = first;
             first += block.groups.len();
             if let Some(groups) = &mut block.single {
                 groups.first = first_single;
                 first_single += groups.len();
             }
-            blocks.push(block);
-            active.push(mask);
         }
-        let nodes = number(grid, &mut blocks, &active);
+        let nodes = number(grid, &mut blocks);
         slots.resize(positions.len(), 0);
         for block in &blocks {
             block.groups.each(|group, lane, p| slots[p] = ((block.groups.first + group) * LANES + lane) as u32);
@@ -95,6 +97,11 @@ impl<const D: usize> Tiled<D> {
 
     pub(super) fn particles(&self) -> usize {
         self.slots.len()
+    }
+
+    /// The particles, block by block and group by group.
+    pub(super) fn order(&self) -> impl Iterator<Item = u32> {
+        self.blocks.iter().flat_map(|block| block.groups.in_order())
     }
 
     /// Number of groups.
@@ -196,7 +203,7 @@ impl<const D: usize> Tiled<D> {
         let failure = Mutex::new(None);
         let point = |particles: &[u32], rows: &mut Rows| {
             if let Err((p, error)) = point(particles, rows) {
-                keep_first(&mut failure.lock().unwrap_or_else(PoisonError::into_inner), p, error);
+                keep_first(&mut held(&failure), p, error);
             }
         };
         waves::run(self, Some(field), out, &|block, nodal, buffer| kernel(&block.groups, nodal, buffer, &point));

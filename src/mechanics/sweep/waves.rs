@@ -115,13 +115,12 @@ pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
         }
         return;
     }
+    let mut parts: Vec<Vec<(usize, R)>> = tiled.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
     for blocks in tiled.blocks.chunks(WAVE) {
-        let parts = parallel::map_with(blocks.iter(), |scratch, block: &Block| {
-            let mut part = Vec::with_capacity(block.groups.len() * LANES);
+        parallel::for_each_with(blocks.iter().zip(&mut parts), |scratch, (block, part)| {
             gather(scratch, block, &mut |p, result| part.push((p, result)));
-            part
         });
-        for (p, result) in parts.into_iter().flatten() {
+        for (p, result) in parts.iter_mut().flat_map(|part| part.drain(..)) {
             take(p, result);
         }
     }

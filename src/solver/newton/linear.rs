@@ -3,6 +3,7 @@
 use super::failure::LinearSolverFailure;
 use super::report::NewtonCounts;
 use super::settings::{FALLBACK_RESTART, Krylov, NewtonSettings};
+use crate::pooled::Pooled;
 use crate::solver::conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
 use crate::solver::forcing::LOOSEST;
 use crate::solver::gmres::{GmresSettings, gmres};
@@ -24,7 +25,7 @@ pub(super) fn solve<T: LinearOperator + Preconditioner>(
     settings: &NewtonSettings,
     counts: &mut NewtonCounts,
 ) -> Solved {
-    let mut rhs = vec![0.0; r.len()];
+    let mut rhs = Pooled::filled(r.len(), 0.0);
     scaled(-1.0, r, &mut rhs);
     solve_in(tangent, &rhs, d, relative_tolerance, settings, counts)
 }
@@ -39,12 +40,12 @@ pub(super) fn solve_single(
     counts: &mut NewtonCounts,
 ) -> Solved {
     let size = norm(r).log2().round().exp2();
-    let rhs: Vec<f32> = r.iter().map(|r| (-r / size) as f32).collect();
-    let mut single = vec![0.0; r.len()];
+    let rhs: Pooled<f32> = r.iter().map(|r| (-r / size) as f32).collect();
+    let mut single = Pooled::filled(r.len(), 0.0);
     let solved = solve_in(tangent, &rhs, &mut single, relative_tolerance, settings, counts)?;
     let unit = size / tangent.scale();
-    for (d, single) in d.iter_mut().zip(single) {
-        *d = unit * f64::from(single);
+    for (d, single) in d.iter_mut().zip(&single) {
+        *d = unit * f64::from(*single);
     }
     Ok(solved)
 }

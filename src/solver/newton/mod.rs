@@ -15,6 +15,7 @@ pub use settings::{Krylov, NewtonSettings, Precision};
 use super::NonlinearProblem;
 use super::forcing::Progress;
 use super::vector::{dot, norm};
+use crate::pooled::Pooled;
 use linear::{SINGLE_TOLERANCE, solve, solve_single};
 use search::{Search, Step, search};
 
@@ -71,8 +72,7 @@ fn iterate<P: NonlinearProblem>(
 ) -> Result<Convergence, NewtonFailure<P::Inadmissible>> {
     settings.check()?;
     let n = x.len();
-    let (mut r, mut d) = (vec![0.0; n], vec![0.0; n]);
-    let (mut trial, mut r_trial) = (vec![0.0; n], vec![0.0; n]);
+    let [mut r, mut d, mut trial, mut r_trial] = std::array::from_fn(|_| Pooled::filled(n, 0.0));
 
     history.counts.residuals += 1;
     problem.residual(x, &mut r).map_err(|source| NewtonFailure::Inadmissible { iteration: 0, source })?;

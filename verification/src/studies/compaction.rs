@@ -60,7 +60,8 @@ fn particles(scene: &str, overrides: &[&str]) -> Result<History, StudyError> {
     let mut history = vec![(0.0, 0.0)];
     for _ in 0..STEPS {
         simulation.advance()?;
-        let u = simulation.particles.position[watched][1] - start[watched][1];
+        let now = simulation.particles.place(watched).ok_or("the particle is lost")?;
+        let u = simulation.particles.position[now][1] - start[watched][1];
         history.push((simulation.clock.time(), u));
     }
     Ok(history)

@@ -12,7 +12,7 @@ use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::time::{Alphas, Newmark};
-use bfree::mechanics::transfer::{Moved, Nodal, WallUpdate};
+use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
@@ -140,10 +140,9 @@ fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut
     let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
     let dt = 0.1;
     let alphas: Alphas = Newmark::default().alphas(dt);
-    let moved =
-        Moved::new(&particles, &supports, &alphas, &nodal, &nodal, &[], WallUpdate::Consistent, &dphi);
+    let update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Consistent, &dphi);
     let mut after = particles.clone();
-    moved.commit(&mut after);
+    update.commit(&mut after, &supports);
     let (mut position, mut strain): (f64, f64) = (0.0, 0.0);
     for p in 0..particles.len() {
         let x = &particles.position[p];

@@ -9,7 +9,7 @@ use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Carry;
 use bfree::mechanics::time::Alphas;
-use bfree::mechanics::transfer::{Moved, Nodal};
+use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{Simulation, StepReport};
 use bfree::solver::newton;
 use bfree::tensor::Vector;
@@ -106,18 +106,9 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     }
     let at_particles = prepared.supports.values(&change);
     lumping += at_particles.iter().zip(&particles.mass).map(|(dv, m)| 0.5 * m * dv.norm_squared()).sum::<f64>();
-    let moved = Moved::new(
-        particles,
-        &prepared.supports,
-        &alphas,
-        &projected,
-        nodal,
-        &prepared.prescribed,
-        settings.wall_update,
-        &dphi,
-    );
+    let update = Update::new(&alphas, &projected, nodal, &prepared.prescribed, settings.wall_update, &dphi);
     let (kinetic, strain) = (particles.kinetic_energy(), simulation.strain_energy());
-    moved.commit(&mut simulation.particles);
+    update.commit(&mut simulation.particles, &prepared.supports);
     simulation.clock.advance();
     let transfer = simulation.particles.kinetic_energy() - kinetic - of_nodes;
     let rule = of_nodes + simulation.strain_energy() - strain - supports;

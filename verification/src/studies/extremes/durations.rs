@@ -100,7 +100,7 @@ fn nothing<const D: usize>(name: &str, shape: &Approximation, report: &mut Repor
     simulation.loads.gravity = Some(bodies::gravity(Vector::zeros()));
     let start = simulation.particles.clone();
     let changed = (0..100).try_for_each(|_| simulation.step().map(|_| ())).map(|()| {
-        let particles = &simulation.particles;
+        let particles = simulation.particles.by_id();
         f64::from(u8::from(particles.position != start.position) + u8::from(particles.velocity != start.velocity))
             + particles.displacement_gradient.iter().map(Tensor::norm).fold(0.0, worse)
     });
@@ -119,7 +119,7 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     let start = simulation.particles.clone();
     let rested = (0..steps).try_for_each(|_| simulation.step().map(|_| ()));
     let (what, sound) = (format!("under stress at rest, {steps} steps, {name}, D = {D}"), PLAIN.p_wave_modulus().sqrt());
-    let particles = &simulation.particles;
+    let particles = simulation.particles.by_id();
     let speed = particles.velocity.iter().map(Vector::norm).fold(0.0, worse) / sound;
     let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);
     let at = Deformation::new(strain);

@@ -84,7 +84,7 @@ fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64
     for _ in 0..STEPS {
         simulation.step()?;
     }
-    let particles = &simulation.particles;
+    let particles = simulation.particles.by_id();
     // Sizes of the problem in plain units: the box, the speed and the acceleration that the loads make, a strain of 1.
     let vectors = |list: &[Vector<f64, D>], unit: f64, size: f64| {
         list.iter().flat_map(|x| x.iter().map(|x| (x / unit, size)).collect::<Vec<_>>()).collect::<Vec<_>>()

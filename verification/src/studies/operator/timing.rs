@@ -107,7 +107,7 @@ fn product<const D: usize>(
     let mut turns = [before, &after].into_iter().cycle();
     let shape_functions = best(6, || {
         let positions = turns.next().unwrap_or(before);
-        spare = Supports::renewed(spare.take(), shape, grid, positions, Precision::Double).ok().map(|(supports, _)| supports);
+        spare = Supports::renewed(spare.take(), shape, grid, positions, None, Precision::Double).ok().map(|(supports, _)| supports);
     });
     let times = |s: f64| format!("{:.1}", s / seconds);
     let floor = (work.useful / peak).max(work.bytes / copy);

@@ -209,7 +209,8 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     let seconds = start.elapsed().as_secs_f64();
 
     // At the nodes: the projected velocity, at the projected X.
-    let mut carrier = simulation.particles.clone();
+    let particles = simulation.particles.by_id();
+    let mut carrier = particles.clone();
     carrier.acceleration = reference.iter().map(|&x| Vector::from([x])).collect();
     let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &carrier.position)?;
     let lumped = Nodal::project(&carrier, &supports, nodes.len(), 1.0)?;
@@ -218,7 +219,6 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     let inside = |x: f64| (x - MIDDLE).abs() < inner - ENDS;
     let nodal = distance(&exact, at_nodes.filter(|node| inside(node.0)));
 
-    let particles = &simulation.particles;
     let profile: Vec<(f64, f64)> =
         reference.iter().zip(&particles.velocity).filter(|at| inside(*at.0)).map(|(&x, v)| (x, v[0])).collect();
     let volume = particles.volume.first().copied().unwrap_or(0.0);

@@ -123,7 +123,7 @@ impl Problem for Compaction {
             let Some(sample) = samples.get((done / every - 1) as usize) else { return Ok(()) };
             block.displacement.clone_from(sample);
             let (error, size) = &mut *sums.borrow_mut();
-            for (x, found) in start.iter().zip(&now.particles.position) {
+            for (x, found) in start.iter().zip(&now.particles.by_id().position) {
                 let exact = block.displacement_at(x)?;
                 *error += (found - x - exact).norm_squared();
                 *size += exact.norm_squared();

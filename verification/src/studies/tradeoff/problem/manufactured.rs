@@ -85,7 +85,7 @@ impl<const D: usize> Problem for Manufactured<D> {
         let force = |p: usize, t: f64| -> Vector<f64, D> { body_force(&motion, &law, 1.0, &reference[p], t) };
         let cost = drive(&mut simulation, setting, steps(scene), Some(&force), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
-        for (x, found) in reference.iter().zip(&simulation.particles.position) {
+        for (x, found) in reference.iter().zip(&simulation.particles.by_id().position) {
             let exact = state(&motion, x, simulation.clock.time()).position;
             error += (found - exact).norm_squared();
             size += (exact - x).norm_squared();

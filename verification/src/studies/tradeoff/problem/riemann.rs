@@ -95,7 +95,7 @@ impl Problem for Bar {
         let reference = simulation.particles.position.clone();
         let cost = drive(&mut simulation, setting, steps(scene), None, |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
-        for (x, v) in reference.iter().zip(&simulation.particles.velocity) {
+        for (x, v) in reference.iter().zip(&simulation.particles.by_id().velocity) {
             let place = x[0] - MIDDLE;
             if place.abs() < HALF - ENDS {
                 let expected = exact.at(place / simulation.clock.time()).velocity;

@@ -1,0 +1,119 @@
+//! Where particles lie in memory: near the order of the sweep, and without any influence on the results.
+
+use crate::support::{Failure, Random, scene};
+use bfree::checkpoint::{Checkpoints, Identity, restore};
+use bfree::mechanics::sweep::Supports;
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::simulation::Simulation;
+
+/// A dead load and a follower pressure on some particles each, of two bodies with two laws.
+const LOADED: [&str; 2] = [
+    r#"tractions=[{"body":"soft","region":{"box":{"min":[0,0],"max":[2.4,10]}},"traction":[0.1,0]}]"#,
+    r#"pressures=[{"body":"stiff","region":{"box":{"min":[7.6,0],"max":[10,10]}},"pressure":0.1}]"#,
+];
+
+fn shuffled<const D: usize>(simulation: &Simulation<D>) -> Simulation<D> {
+    let (mut random, mut other) = (Random(5), simulation.clone());
+    let mut order: Vec<u32> = (0..other.particles.len() as u32).collect();
+    for last in (1..order.len()).rev() {
+        order.swap(last, random.below(last as u64 + 1) as usize);
+    }
+    other.rearrange(&order);
+    assert_ne!(other.particles.id, simulation.particles.id);
+    other
+}
+
+fn same_bits<const D: usize>(mut one: Simulation<D>) -> Result<(), Failure> {
+    let mut other = shuffled(&one);
+    for _ in 0..3 {
+        let (here, there) = (one.advance()?, other.advance()?);
+        assert_eq!(here.newton.history, there.newton.history);
+        assert_eq!(here.reactions, there.reactions);
+    }
+    assert_eq!(one.particles.by_id(), other.particles.by_id());
+    Ok(())
+}
+
+#[test]
+fn no_bit_depends_on_where_particles_lie() -> Result<(), Failure> {
+    same_bits(scene::<2>("collision.json", &LOADED)?)?;
+    same_bits(scene::<2>("collision.json", &["time.lumping=0.5", LOADED[0], LOADED[1]])?)?;
+    same_bits(scene::<2>("cantilever.json", &[])?)?;
+    same_bits(scene::<3>("ball_drop.json", &[])?)
+}
+
+#[test]
+fn a_step_puts_the_particles_where_the_sweep_looks_for_them() -> Result<(), Failure> {
+    let mut simulation = shuffled(&scene::<2>("collision.json", &[])?);
+    let leaps = |of: &Simulation<2>| -> Result<bool, Failure> {
+        let (supports, _) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+        Ok(supports.leaping().is_some())
+    };
+    assert!(leaps(&simulation)?);
+    for _ in 0..3 {
+        simulation.advance()?;
+        assert!(!leaps(&simulation)?);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
+    let (folder, start) = (tempfile::tempdir()?, scene::<2>("collision.json", &LOADED)?);
+    let identity = Identity::new(serde_json::Value::Null, &start.particles);
+    let settings = OutputSettings {
+        directory: folder.path().to_owned(),
+        fields: vec![],
+        snapshot_every: None,
+        probes: vec![],
+        end_time: 1.0,
+        audience: Audience::Nobody,
+    };
+    let mut simulation = shuffled(&start);
+    let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+    simulation.advance()?;
+    let mut checkpoints =
+        Checkpoints::new(folder.path().to_owned(), identity.clone(), serde_json::Value::Null, 1.0, None);
+    checkpoints.write(&simulation, &mut recorder)?;
+    let mut continued = start.clone();
+    restore(folder.path(), &identity, &mut continued)?;
+    assert_eq!((&continued.particles, &continued.loads), (&simulation.particles, &simulation.loads));
+    simulation.advance()?;
+    continued.advance()?;
+    assert_eq!((&continued.particles, &continued.loads), (&simulation.particles, &simulation.loads));
+    Ok(())
+}
+
+/// (particles, bytes allocated in a step by the thread that takes it) of a block of `cells`³ cells under its weight; the least of some
+/// steps, as other tests may have taken the memory left for this one.
+fn allocated(cells: u32, method: &str) -> Result<(f64, f64), Failure> {
+    let side = f64::from(cells) * 0.1;
+    let overrides = [
+        format!("grid.size=[{0},{0},{0}]", side + 0.4),
+        "grid.spacing=0.1".to_owned(),
+        format!(r#"bodies.0.shape={{"box":{{"min":[0.2,0,0.2],"max":[{0},{side},{0}]}}}}"#, side + 0.2),
+        "bodies.0.velocity=[0,0,0]".to_owned(),
+        "output={}".to_owned(),
+        format!("solver.krylov={method}"),
+    ];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let mut simulation = scene::<3>("ball_drop.json", &overrides)?;
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut step = || alone.install(|| allocation_counter::measure(|| assert!(simulation.step().is_ok())).bytes_total);
+    // The first steps make room, and put the particles in order.
+    step();
+    step();
+    let least = (0..4).map(|_| step()).min().ok_or("no steps")?;
+    Ok((simulation.particles.len() as f64, least as f64))
+}
+
+#[test]
+fn a_step_that_writes_nothing_allocates_nothing_that_grows_with_the_scene() -> Result<(), Failure> {
+    for method in [r#"{"method":{"gmres":{}}}"#, r#"{"method":"conjugate_gradient","precision":"mixed"}"#] {
+        let ((few, before), (many, after)) = (allocated(10, method)?, allocated(18, method)?);
+        let each = (after - before) / (many - few);
+        // Handing blocks to threads, and the nodes on walls; the arrays of a step take several hundred bytes a particle.
+        assert!(each < 2.0, "{method}: {each} bytes for each particle, {before} and {after} in all");
+    }
+    Ok(())
+}
