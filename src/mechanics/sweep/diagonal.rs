@@ -1,6 +1,6 @@
 //! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
 
-use super::kernel::{Pairs, Signed, Window, by_tile, tile};
+use super::kernel::{Pairs, Window, by_tile, tile};
 use super::lanes::{LANES, Lanes};
 use crate::scalar::Real;
 
@@ -40,7 +40,7 @@ pub(super) fn scatter_blocks<S: Lanes<L>, const D: usize, const L: usize>(
 ) {
     let rows = window.width[1] * window.width[2];
     for chunk in 0..rows.div_ceil(L) {
-        let pairs = Pairs::<S, D, L>::new::<Signed>(s, window, chunk * L);
+        let pairs = Pairs::<S, D, L>::new(s, window, chunk * L);
         let mut start = 0;
         while start < window.width[0] {
             let tile = tile::<L>(window.width[0] - start);
@@ -58,11 +58,13 @@ fn blocks_tile<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
     pairs: &Pairs<S, D, L>,
     from: &Quadratic<S::X, L>,
     out: &mut [S::X],
+    width: usize,
 ) {
     let zero = s.zero();
     let (n, dn) = window.axis(0);
-    let (n, dn) = (&n[start..start + W], &dn[start..start + W]);
+    let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
     let mut sums = [[[zero; D]; D]; W];
+    let sums = &mut sums[..width.min(W)];
     for i in 0..D {
         let mut row = [[zero; D]; W];
         for p in 0..window.lanes.min(L) {
@@ -80,7 +82,7 @@ fn blocks_tile<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
             }
             let square = s.mul(pairs.products[0][p], pairs.products[0][p]);
             powers[2][i] = s.mul_add(s.splat(from.mass[p]), square, powers[2][i]);
-            for x in 0..W {
+            for x in 0..sums.len() {
                 let (nx, dx) = (n[x][p], dn[x][p]);
                 let (two, one, none) = (s.splat(dx * dx), s.splat(nx * dx), s.splat(nx * nx));
                 for j in 0..D {
@@ -92,7 +94,7 @@ fn blocks_tile<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
                 }
             }
         }
-        for x in 0..W {
+        for x in 0..sums.len() {
             sums[x][i] = row[x];
         }
     }

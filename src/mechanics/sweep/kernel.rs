@@ -51,15 +51,17 @@ pub(super) fn tile<const L: usize>(left: usize) -> usize {
     if left <= widest { left } else { left.div_ceil(2).min(widest - 1) }
 }
 
+/// Calls a function of the width of a tile: compiled for every width, or once for all where the lanes are rare.
 macro_rules! by_tile {
-    ($tile:expr, $function:ident::<$($generic:tt),*>($($argument:expr),*)) => {
+    ($tile:expr, $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
         match $tile {
-            1 => $function::<$($generic,)* 1>($($argument),*),
-            2 => $function::<$($generic,)* 2>($($argument),*),
-            3 => $function::<$($generic,)* 3>($($argument),*),
-            4 => $function::<$($generic,)* 4>($($argument),*),
-            5 => $function::<$($generic,)* 5>($($argument),*),
-            _ => $function::<$($generic,)* 6>($($argument),*),
+            tile if $lanes::RARE => $function::<$lanes, $($generic,)* 6>($($argument,)* tile),
+            1 => $function::<$lanes, $($generic,)* 1>($($argument,)* 1),
+            2 => $function::<$lanes, $($generic,)* 2>($($argument,)* 2),
+            3 => $function::<$lanes, $($generic,)* 3>($($argument,)* 3),
+            4 => $function::<$lanes, $($generic,)* 4>($($argument,)* 4),
+            5 => $function::<$lanes, $($generic,)* 5>($($argument,)* 5),
+            _ => $function::<$lanes, $($generic,)* 6>($($argument,)* 6),
         }
     };
 }
@@ -156,10 +158,11 @@ fn row<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
     weights: &[[S::N; W]; 2],
     nodal: &[S::X],
     first: usize,
+    width: usize,
 ) -> Sums<S::N, D, 2> {
-    let row = &nodal[first * D..(first + W) * D];
+    let row = &nodal[first * D..(first + width) * D];
     let mut sums = [[s.zero(); D]; 2];
-    for x in 0..W {
+    for x in 0..width.min(W) {
         for c in 0..D {
             let u = s.splat(row[x * D + c]);
             sums[0][c] = s.mul_add(u, weights[0][x], sums[0][c]);
@@ -177,11 +180,12 @@ fn plane<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
     weights: &[[S::N; W]; 2],
     nodal: &[S::X],
     first: usize,
+    width: usize,
 ) -> Sums<S::N, D, 3> {
     let (ny, dy) = window.axis(1);
     let mut sums = [[s.zero(); D]; 3];
     for y in 0..ny.len() {
-        let [value, slope] = row::<S, D, L, W>(s, weights, nodal, first + y * window.stride[0]);
+        let [value, slope] = row::<S, D, L, W>(s, weights, nodal, first + y * window.stride[0], width);
         let (ny, dy) = (s.load(&ny[y]), s.load(&dy[y]));
         for c in 0..D {
             sums[0][c] = s.mul_add(value[c], ny, sums[0][c]);
@@ -199,20 +203,21 @@ fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, c
     start: usize,
     nodal: &[S::X],
     out: &mut Gathered<S::N, D>,
+    width: usize,
 ) {
     let (n, dn) = window.axis(0);
-    let (n, dn) = (&n[start..start + W], &dn[start..start + W]);
+    let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
     let mut weights = [[s.zero(); W]; 2];
-    for x in 0..W {
+    for x in 0..width.min(W) {
         (weights[0][x], weights[1][x]) = (s.load(&n[x]), s.load(&dn[x]));
     }
     let origin = window.first + start;
     if D == 1 {
-        let [value, slope] = row::<S, D, L, W>(s, &weights, nodal, origin);
+        let [value, slope] = row::<S, D, L, W>(s, &weights, nodal, origin, width);
         out.value[0] = s.add(out.value[0], value[0]);
         out.gradient[0][0] = s.add(out.gradient[0][0], slope[0]);
     } else if D == 2 {
-        let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin);
+        let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin, width);
         for c in 0..D {
             out.value[c] = s.add(out.value[c], value[c]);
             out.gradient[c][0] = s.add(out.gradient[c][0], x[c]);
@@ -221,7 +226,7 @@ fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, c
     } else {
         let (nz, dz) = window.axis(2);
         for z in 0..nz.len() {
-            let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin + z * window.stride[1]);
+            let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin + z * window.stride[1], width);
             let (nz, dz) = (s.load(&nz[z]), s.load(&dz[z]));
             for c in 0..D {
                 if VALUE {
@@ -241,20 +246,30 @@ pub(super) trait Terms {
     const VALUE: bool;
     /// σ ∇N_I
     const GRADIENT: bool;
-    /// |N_I| and |∇N_I| for N_I and ∇N_I.
-    const MAGNITUDE: bool;
 }
 
-/// A weight, or its magnitude.
-#[inline(always)]
-fn weight<S: Lanes<L>, M: Terms, const L: usize>(s: S, x: &[S::X; L]) -> S::N {
-    if M::MAGNITUDE { s.abs(s.load(x)) } else { s.load(x) }
+/// q N_I + σ ∇N_I
+pub(super) struct Both;
+
+impl Terms for Both {
+    const VALUE: bool = true;
+    const GRADIENT: bool = true;
 }
 
-/// The same in all lanes.
-#[inline(always)]
-fn broadcast<S: Lanes<L>, M: Terms, const L: usize>(s: S, x: S::X) -> S::N {
-    if M::MAGNITUDE { s.abs(s.splat(x)) } else { s.splat(x) }
+/// q N_I
+pub(super) struct OnlyValue;
+
+impl Terms for OnlyValue {
+    const VALUE: bool = true;
+    const GRADIENT: bool = false;
+}
+
+/// σ ∇N_I
+pub(super) struct OnlyGradient;
+
+impl Terms for OnlyGradient {
+    const VALUE: bool = false;
+    const GRADIENT: bool = true;
 }
 
 /// f_I += σ ∇N_I + q N_I, with σ in the place of L and q in that of u, a lane a particle; `out` is the box as in [`gather`],
@@ -271,7 +286,7 @@ pub(super) fn scatter<S: Lanes<L>, M: Terms, const D: usize, const L: usize>(
     let from = rows;
     let rows = window.width[1] * window.width[2];
     for chunk in 0..rows.div_ceil(L) {
-        let pairs = Pairs::<S, D, L>::new::<M>(s, window, chunk * L);
+        let pairs = Pairs::<S, D, L>::new(s, window, chunk * L);
         let mut start = 0;
         while start < window.width[0] {
             let tile = tile::<L>(window.width[0] - start);
@@ -290,7 +305,7 @@ pub(super) struct Pairs<S: Lanes<L>, const D: usize, const L: usize> {
 
 impl<S: Lanes<L>, const D: usize, const L: usize> Pairs<S, D, L> {
     #[inline(always)]
-    pub(super) fn new<M: Terms>(s: S, window: &Window<'_, S::X, L>, start: usize) -> Self {
+    pub(super) fn new(s: S, window: &Window<'_, S::X, L>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
         let count = (wy * wz - start).min(L);
         let mut products = [[s.zero(); L]; D];
@@ -302,12 +317,12 @@ impl<S: Lanes<L>, const D: usize, const L: usize> Pairs<S, D, L> {
                 products[0][lane] = s.splat(S::X::one());
             } else {
                 let (n, dn) = window.axis(1);
-                let (ny, dy) = (weight::<S, M, L>(s, &n[y]), weight::<S, M, L>(s, &dn[y]));
+                let (ny, dy) = (s.load(&n[y]), s.load(&dn[y]));
                 if D == 2 {
                     (products[0][lane], products[D - 1][lane]) = (ny, dy);
                 } else {
                     let (n, dn) = window.axis(2);
-                    let (nz, dz) = (weight::<S, M, L>(s, &n[z]), weight::<S, M, L>(s, &dn[z]));
+                    let (nz, dz) = (s.load(&n[z]), s.load(&dn[z]));
                     products[0][lane] = s.mul(ny, nz);
                     products[1 % D][lane] = s.mul(dy, nz);
                     products[2 % D][lane] = s.mul(ny, dz);
@@ -351,11 +366,13 @@ fn scatter_tile<S: Lanes<L>, M: Terms, const D: usize, const L: usize, const W: 
     pairs: &Pairs<S, D, L>,
     from: &Rows<S::X, L>,
     out: &mut [S::X],
+    width: usize,
 ) {
     let zero = s.zero();
     let (n, dn) = window.axis(0);
-    let (n, dn) = (&n[start..start + W], &dn[start..start + W]);
+    let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
     let mut sums = [[zero; D]; W];
+    let sums = &mut sums[..width.min(W)];
     for p in 0..window.lanes.min(L) {
         let (mut across, mut along) = ([zero; D], [zero; D]);
         for c in 0..D {
@@ -370,8 +387,8 @@ fn scatter_tile<S: Lanes<L>, M: Terms, const D: usize, const L: usize, const W: 
                 across[c] = s.mul_add(s.splat(from[c][p]), pairs.products[0][p], across[c]);
             }
         }
-        for x in 0..W {
-            let (nx, dx) = (broadcast::<S, M, L>(s, n[x][p]), broadcast::<S, M, L>(s, dn[x][p]));
+        for x in 0..sums.len() {
+            let (nx, dx) = (s.splat(n[x][p]), s.splat(dn[x][p]));
             for c in 0..D {
                 sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
                 if M::GRADIENT {
@@ -381,15 +398,6 @@ fn scatter_tile<S: Lanes<L>, M: Terms, const D: usize, const L: usize, const W: 
         }
     }
     pairs.add(s, sums.as_flattened(), start, D, out);
-}
-
-/// q N_I + σ ∇N_I
-pub(super) struct Signed;
-
-impl Terms for Signed {
-    const VALUE: bool = true;
-    const GRADIENT: bool = true;
-    const MAGNITUDE: bool = false;
 }
 
 #[cfg(test)]
@@ -419,7 +427,7 @@ mod tests {
             let window = Window { width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
             let at = gather::<S, 3, L, true>(s, &window, self.1);
             let mut out = vec![X::zero(); self.1.len() + L];
-            scatter::<S, Signed, 3, L>(s, &window, &at, &mut out);
+            scatter::<S, Both, 3, L>(s, &window, &at, &mut out);
             let mut rows = [[X::zero(); L]; 12];
             store(s, &at, &mut rows);
             let gathered = rows[3..].iter().chain(&rows[..3]).flatten().copied().collect();

@@ -16,6 +16,8 @@ pub(super) const SINGLE_LANES: usize = 16;
 pub(super) trait Lanes<const L: usize>: Arithmetic {
     /// The number in a lane.
     type X: Real;
+    /// Whether these lanes are there for the rare processor that has no other: kernels then do without a copy for every width.
+    const RARE: bool = false;
     fn splat(self, x: Self::X) -> Self::N;
     fn load(self, x: &[Self::X; L]) -> Self::N;
     fn store(self, v: Self::N, out: &mut [Self::X; L]);
@@ -78,6 +80,8 @@ macro_rules! portable {
 
         impl Lanes<$lanes> for $name {
             type X = $number;
+            // An x86-64 without AVX2.
+            const RARE: bool = cfg!(target_arch = "x86_64");
             #[inline(always)]
             fn splat(self, x: $number) -> Self::N {
                 [x; $lanes]
