@@ -1,5 +1,5 @@
-//! Vectors whose memory serves again, as deal.II's `GrowingVectorMemory` does: a step that takes as many as the one before asks the
-//! system for nothing.
+//! Vectors whose memory serves again, as that of deal.II's `GrowingVectorMemory` does: a step that takes as many as the one before
+//! allocates none of them.
 
 use crate::parallel::held;
 use bytemuck::Pod;

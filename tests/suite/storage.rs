@@ -4,6 +4,7 @@ use crate::support::{Failure, Random, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
 use bfree::mechanics::sweep::Supports;
 use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 
 /// A dead load and a follower pressure on some particles each, of two bodies with two laws.
@@ -84,9 +85,9 @@ fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
     Ok(())
 }
 
-/// (particles, bytes allocated in a step by the thread that takes it) of a block of `cells`³ cells under its weight; the least of some
-/// steps, as other tests may have taken the memory left for this one.
-fn allocated(cells: u32, method: &str) -> Result<(f64, f64), Failure> {
+/// Bytes that a block of `cells`³ cells under its weight holds in a step, and bytes allocated in one by the thread that takes it; the
+/// least of some steps, as other tests may have taken the memory left for this one.
+fn held_and_allocated(cells: u32, method: &str) -> Result<[f64; 2], Failure> {
     let side = f64::from(cells) * 0.1;
     let overrides = [
         format!("grid.size=[{0},{0},{0}]", side + 0.4),
@@ -104,16 +105,16 @@ fn allocated(cells: u32, method: &str) -> Result<(f64, f64), Failure> {
     step();
     step();
     let least = (0..4).map(|_| step()).min().ok_or("no steps")?;
-    Ok((simulation.particles.len() as f64, least as f64))
+    Ok([Plan::of(&simulation)?.bytes() as f64, least as f64])
 }
 
 #[test]
-fn a_step_that_writes_nothing_allocates_nothing_that_grows_with_the_scene() -> Result<(), Failure> {
+fn a_step_that_writes_nothing_allocates_none_of_its_arrays() -> Result<(), Failure> {
     for method in [r#"{"method":{"gmres":{}}}"#, r#"{"method":"conjugate_gradient","precision":"mixed"}"#] {
-        let ((few, before), (many, after)) = (allocated(10, method)?, allocated(18, method)?);
-        let each = (after - before) / (many - few);
-        // Handing blocks to threads, and the nodes on walls; the arrays of a step take several hundred bytes a particle.
-        assert!(each < 2.0, "{method}: {each} bytes for each particle, {before} and {after} in all");
+        let (small, large) = (held_and_allocated(10, method)?, held_and_allocated(18, method)?);
+        // What grows are lists of blocks, partial sums, and the nodes on walls.
+        let share = (large[1] - small[1]) / (large[0] - small[0]);
+        assert!(share < 0.01, "{method}: {share} of the arrays, {small:?} and {large:?} bytes");
     }
     Ok(())
 }
