@@ -153,7 +153,7 @@ impl<const D: usize> Particles<D> {
         sorted
     }
 
-    /// Puts what lies at `order[i]` to the place `i`, one array after the other.
+    /// Puts what lies at `order[i]` to the place `i`, each array within its own memory; `order` must be a permutation.
     ///
     /// ```
     /// use bfree::particles::Particles;
@@ -169,16 +169,12 @@ impl<const D: usize> Particles<D> {
     /// assert_eq!(particles.by_id().position.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
-        fn array<T: Copy>(array: &mut Vec<T>, order: &[u32]) {
-            if !array.is_empty() {
-                *array = order.iter().map(|&from| array[from as usize]).collect();
-            }
-        }
+        let mut moved = vec![false; self.len()];
         let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id } = self;
-        [position, velocity, acceleration].into_iter().for_each(|vectors| array(vectors, order));
-        array(displacement_gradient, order);
-        [volume, mass].into_iter().for_each(|numbers| array(numbers, order));
-        [body, id].into_iter().for_each(|numbers| array(numbers, order));
+        [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, order, &mut moved));
+        permute(displacement_gradient, order, &mut moved);
+        [volume, mass].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
+        [body, id].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
     }
 
     /// Σ m v
@@ -191,5 +187,19 @@ impl<const D: usize> Particles<D> {
         let energies = self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared());
         // Of no velocities the sum would be −0.
         energies.fold(0.0, |sum, energy| sum + energy)
+    }
+}
+
+/// Puts what lies at `order[i]` to the place `i`, cycle after cycle.
+fn permute<T: Copy>(array: &mut [T], order: &[u32], moved: &mut [bool]) {
+    moved.fill(false);
+    for start in 0..array.len() {
+        let (first, mut to) = (array[start], start);
+        while !moved[to] {
+            moved[to] = true;
+            let from = order[to] as usize;
+            array[to] = if from == start { first } else { array[from] };
+            to = from;
+        }
     }
 }

@@ -288,8 +288,9 @@ fn arrays<const D: usize, L: Law, A>(
     let smooths = moves && simulation.settings.smoothing.is_some();
     let tiled = supports.closed_bytes(false, false, Precision::Double).is_some();
     let krylov_vectors = match simulation.settings.newton.krylov {
-        Krylov::Gmres { restart } => restart + 1,
-        Krylov::ConjugateGradient => 4,
+        // The basis; residual, correction, trial and product.
+        Krylov::Gmres { restart } => restart + 5,
+        Krylov::ConjugateGradient => 5,
     };
     let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
     let precision = precision_used(simulation, supports);
@@ -301,19 +302,23 @@ fn arrays<const D: usize, L: Law, A>(
     [
         only(true, array("particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES)),
         only(moves, array("particles: v, a", particles * 2 * vector)),
+        // At the start and at the end of the step.
+        only(consistent, array("particles: prediction for the consistent inertia", particles * 2 * vector)),
         // The field without what nodes can carry, what it changes by, and the change of the other field.
         only(smooths, array("particles: smoothing", particles * 3 * vector)),
-        only(consistent, array("particles: prediction for the consistent inertia", particles * vector)),
         only(true, array("shape functions: N, dN/dx by axis", supports.bytes())),
         only(tiled, array("particles: the order of the sweep", particles * 2 * size_of::<u64>())),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
         only(true, array("nodal fields: loads, Δφ, residuals", nodes * 8 * vector)),
-        // As projected, and with prescribed values in place.
+        // Both as projected, and with prescribed values in place.
         only(weighs, array("nodal mass", nodes * 2 * size_of::<f64>())),
         only(moves, array("nodal fields: v, a", nodes * 4 * vector)),
         only(faces > 0, array("loaded surfaces", faces * size_of::<SurfacePoint<D>>())),
         only(true, array("frozen tangent", frozen)),
-        only(true, array("preconditioner: diagonal blocks", nodes * tensor / share)),
+        only(
+            true,
+            array("preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        ),
         only(true, array("Krylov vectors", nodes * vector / share * krylov_vectors)),
     ]
     .into_iter()

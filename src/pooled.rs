@@ -79,20 +79,30 @@ macro_rules! kept_as_numbers {
 kept_as_numbers!(SMatrix<X, R, C>, R * C, <const R, const C>);
 kept_as_numbers!([X; N], N, <const N>);
 
+/// Gives all memory that waits back to the system.
+///
+/// Example: [`Pooled`].
+pub fn release() {
+    let all = std::mem::take(&mut *held(&SPARE));
+    drop(all);
+}
+
 /// A vector of anything with room for `count`: the smallest one there is, or a new one in the place of one that has become too small.
 fn taken<T: Element>(count: usize) -> Vec<T> {
     if count * size_of::<T>() < SMALL {
         return Vec::with_capacity(count);
     }
     let length = count * T::LENGTH;
+    let fits = |one: &Vec<T::Kept>| (length..=TOO_LARGE * length).contains(&one.capacity());
     let kept = held(&SPARE).get_mut(&TypeId::of::<T::Kept>()).and_then(|list| {
         let list = list.downcast_mut::<Vec<Vec<T::Kept>>>()?;
-        let fits = |one: &Vec<T::Kept>| (length..=TOO_LARGE * length).contains(&one.capacity());
         let smallest = list.iter().enumerate().filter(|(_, one)| fits(one)).min_by_key(|(_, one)| one.capacity());
         let small = || list.iter().position(|one| one.capacity() < length && length <= TOO_LARGE * one.capacity());
         let at = smallest.map(|(at, _)| at).or_else(small)?;
-        Some(list.swap_remove(at)).filter(fits)
+        Some(list.swap_remove(at))
     });
+    // What is too small goes now that nobody waits.
+    let kept = kept.filter(fits);
     let anew = || T::from_kept(Vec::with_capacity((length + length / ROOM).next_multiple_of(MULTIPLE)));
     kept.and_then(T::from_kept).or_else(anew).unwrap_or_else(|| Vec::with_capacity(count))
 }
@@ -110,6 +120,8 @@ fn taken<T: Element>(count: usize) -> Vec<T> {
 /// // A little shorter, and in the same place.
 /// let next: Pooled<f64> = (0..99_990).map(f64::from).collect();
 /// assert_eq!((next.len(), next[7], next.as_ptr()), (99_990, 7.0, at));
+/// drop(next);
+/// bfree::pooled::release();
 /// ```
 #[derive(PartialEq)]
 pub struct Pooled<T: Element>(Vec<T>);

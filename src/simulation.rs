@@ -139,8 +139,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub workspace: Workspace<D>,
 }
 
-/// The large arrays of the last step, in whose memory the next one works, and its order of particles, from which the next one starts to
-/// sort. It is no state: a clone is empty, no checkpoint holds it, and a step that fails leaves none.
+/// The shape functions of the last step, in whose memory the next one makes its own, and from whose order of particles it starts to
+/// sort. They are no state: a clone has none, no checkpoint holds them, and a step that fails leaves none.
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
@@ -265,8 +265,9 @@ pub struct AdvanceError {
 }
 
 impl<const D: usize, L, A> Simulation<D, L, A> {
-    /// Puts the particle that lies at `order[i]` in memory to the place `i`, wherever places are known. [`Self::step`] does it where it
-    /// saves time; results do not depend on it.
+    /// Puts the particle that lies at `order[i]` in memory to the place `i`, wherever places are known; `order` must be a permutation.
+    /// [`Self::step`] does it where it saves time. Sums over nodes do not depend on it, sums over all particles, such as energies, in their
+    /// last bits.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
@@ -286,10 +287,11 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace = Workspace::default();
         self.particles.rearrange(order);
-        let mut places = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(to, &from)| places[from as usize] = to);
-        for point in self.loads.surface.iter_mut().flat_map(|load| &mut load.points) {
-            point.particle = places[point.particle];
+        let mut points = self.loads.surface.iter_mut().flat_map(|load| &mut load.points).peekable();
+        if points.peek().is_some() {
+            let mut places = vec![0; order.len()];
+            order.iter().enumerate().for_each(|(to, &from)| places[from as usize] = to);
+            points.for_each(|point| point.particle = places[point.particle]);
         }
     }
 }
@@ -349,14 +351,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
         update.commit(&mut self.particles, &supports);
-        watch.lap(Phase::Update, supports.passes());
+        let passes = supports.passes();
 
         let projection_iterations = projected.iterations;
-        match supports.leaping() {
-            // The workspace knows the particles by their places of before.
-            Some(order) => self.rearrange(&order),
-            None => self.workspace.supports = Some(supports),
-        }
+        self.workspace.supports = Some(match supports.leaping() {
+            Some(order) => {
+                self.rearrange(&order);
+                supports.rearranged()
+            }
+            None => supports,
+        });
+        watch.lap(Phase::Update, passes);
         self.external_work += work;
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
         self.clock.advance_and_grow_if(error.is_none_or(small));
@@ -559,7 +564,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let at_rest = Pooled::filled(dphi.len(), Vector::zeros());
         let start = self.equilibrium(end.supports, end.nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let residual = start.residual::<f64>(&at_rest, Carry::ALL)?;
+            let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
+            start.residual_into::<f64>(&at_rest, Carry::ALL, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }
@@ -693,9 +699,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// simulation.set_initial_acceleration()?;
     /// assert!(simulation.particles.acceleration.iter().all(|a| (a - g).norm() < 1e-13));
     /// // So the first step already falls by ½ g Δt², and not by half of it.
-    /// let (x, v, dt) = (simulation.particles.position[0], simulation.particles.velocity[0], simulation.clock.step());
+    /// let before = simulation.particles.by_id();
+    /// let dt = simulation.clock.step();
     /// simulation.step()?;
-    /// assert!((simulation.particles.position[0] - x - v * dt - g * (0.5 * dt * dt)).norm() < 1e-9);
+    /// let fallen = simulation.particles.by_id().position[0] - before.position[0] - before.velocity[0] * dt;
+    /// assert!((fallen - g * (0.5 * dt * dt)).norm() < 1e-9);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

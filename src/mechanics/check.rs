@@ -159,7 +159,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         self.supports.interpolate(u, |p, _, l| {
             let scale = geometric[p].norm() + material[p].norm();
             let bound = tangent_bound(&states[p].f);
-            let site = Site::Particle(p);
+            let site = Site::Particle(self.particles.id[p] as usize);
             for (term, dual) in [(Term::Geometric, &geometric[p]), (Term::Material, &material[p])] {
                 let analytic = self.particle_product(term, p, &states[p], &l);
                 compare(Compared::Term(term), site, &analytic, dual, bound, scale)?;

@@ -220,7 +220,8 @@ impl<const D: usize> LinearOperator for EffectiveMass<'_, D> {
         for ((y, x), m) in y.iter_mut().zip(x).zip(self.mass) {
             *y = x * (self.lumping * m);
         }
-        let at_particles = self.supports.values(x);
+        let mut at_particles = Pooled::filled(self.particles.len(), Vector::zeros());
+        self.supports.each_value(x, |p, value| at_particles[p] = value);
         self.supports.spread(y, |p| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p]));
     }
 }

@@ -109,8 +109,9 @@ fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failu
         Ok((simulation, attempts))
     };
     let distance = |a: &Simulation<2>, b: &Simulation<2>| {
-        let squares = a.particles.position.iter().zip(&b.particles.position).map(|(x, y)| (x - y).norm_squared());
-        (squares.sum::<f64>() / a.particles.len() as f64).sqrt()
+        let (a, b) = (a.particles.by_id(), b.particles.by_id());
+        let squares = a.position.iter().zip(&b.position).map(|(x, y)| (x - y).norm_squared());
+        (squares.sum::<f64>() / a.len() as f64).sqrt()
     };
     let (exact, _) = run(&["time.step=0.00625"])?;
     let (uniform, all) = run(&["time.step=0.025"])?;

@@ -90,8 +90,8 @@ fn a_dimension_less_is_fewer_bytes_of_each_particle() -> Result<(), Failure> {
     ];
     // x, v and a; H; volume, mass, body, id; cell, id and place in the order of the sweep.
     let expected = |d: f64| 8.0 * (3.0 * d + d * d) + 24.0 + 16.0;
-    // The bar has a mass that is partly consistent: another vector.
-    assert_eq!([one, two, three], [expected(1.0) + 8.0, expected(2.0), expected(3.0)]);
+    // The bar has a mass that is partly consistent: two more vectors.
+    assert_eq!([one, two, three], [expected(1.0) + 16.0, expected(2.0), expected(3.0)]);
     Ok(())
 }
 

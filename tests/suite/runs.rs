@@ -101,7 +101,7 @@ fn mixed_precision_meets_the_same_residual_and_takes_the_same_path() -> Result<(
         // Single precision was in use, and it costs an iteration or two a step.
         assert!(tight <= 1e-8 && (1e-7..1e-5).contains(&loose), "{tight:e} {loose:e}");
         assert!(most_mixed <= most + 2, "{most_mixed} iterations for {most}");
-        for (x, y) in double.particles.position.iter().zip(&mixed.particles.position) {
+        for (x, y) in double.particles.by_id().position.iter().zip(&mixed.particles.by_id().position) {
             assert!((x - y).amax() < 1e-8, "{x} {y}");
         }
     }

@@ -11,7 +11,7 @@ use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::solver::{NewtonError, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
 
-/// One step of `simulation` with the force `force(p, t)` per unit mass on particle `p`, in place of all its loads but the
+/// One step of `simulation` with the force `force(p, t)` per unit mass on the particle that lies at `p` in memory, where it stays, in place of all its loads but the
 /// prescribed motion. It mirrors [`Simulation::step`], with one line changed: f_I = Σ_p m b_p(t_{n+1}) N_I.
 ///
 /// # Errors

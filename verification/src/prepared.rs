@@ -4,7 +4,7 @@ use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
 use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::residual::Equilibrium;
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::{SupportError, Supports};
 use bfree::mechanics::time::Alphas;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
@@ -57,4 +57,16 @@ impl<const D: usize> Prepared<D> {
             dphi[dof.node][dof.component] = dof.step.increment;
         }
     }
+}
+
+/// The simulation with its particles where the sweep looks for them, as they are after a step.
+///
+/// # Errors
+/// A particle without shape functions.
+pub fn arranged<const D: usize>(mut simulation: Simulation<D>) -> Result<Simulation<D>, SupportError> {
+    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    if let Some(order) = supports.leaping() {
+        simulation.rearrange(&order);
+    }
+    Ok(simulation)
 }

@@ -24,7 +24,8 @@ pub(super) struct Scratch {
     groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
 
-/// The block of the particles `keys`, without its number of groups before it and its node numbers. With `single` it has groups for single precision too. The arrays of `spare` are used again.
+/// The block of the particles `keys`, without its number of groups before it and its node numbers. With `single` it has groups for
+/// single precision too. The arrays of `spare` are used again.
 ///
 /// # Errors
 /// Those of the functions of one of the particles.
@@ -276,7 +277,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> No
         }
     }
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
-    // About as many as boxes have inside, where they do not overlap.
+    // About as many as there are groups: eight particles have a node.
     let mut ids = Pooled::with_room(blocks.iter().map(|block| block.groups.len()).sum());
     let mut numbers: Vec<u32> = Vec::new();
     for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {

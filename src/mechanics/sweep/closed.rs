@@ -18,11 +18,11 @@ use std::ops::Range;
 pub struct ClosedTangents<const D: usize>(Numbers<f64, LANES>);
 
 /// The same in single precision and without units: divided by h² and by `scale`.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct SingleTangents<const D: usize>(Numbers<f32, SINGLE_LANES>);
 
 /// For each group its numbers, a row of lanes each.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Numbers<X, const L: usize> {
     numbers: Vec<[X; L]>,
     pub(super) form: Form,
@@ -36,7 +36,7 @@ impl<X, const L: usize> Numbers<X, L> {
 }
 
 /// Which numbers there are: A, B, κ, q, then b and c, then the weight of the inertia.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Form {
     /// Whether the laws have the term b L c.
     pub both: bool,
@@ -143,7 +143,9 @@ impl<const D: usize> Tiled<D> {
     ) -> Result<ClosedTangents<D>, Option<Inadmissible>> {
         let form = Form { both, inertia: inertia.is_some() };
         let array = |rows| Pooled::unspecified(rows, [0.0; LANES]).into_vec();
-        Ok(ClosedTangents(self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, array)?))
+        let (numbers, done) = self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, array);
+        let tangents = ClosedTangents(numbers);
+        done.map(|()| tangents)
     }
 
     /// As [`Self::closed`], in single precision; `None` if the blocks are not prepared for it.
@@ -159,8 +161,9 @@ impl<const D: usize> Tiled<D> {
         let form = Form { both, inertia: inertia.is_some() };
         let factor = 1.0 / (scale * h * h);
         let array = |rows| Pooled::unspecified(rows, [0.0; SINGLE_LANES]).into_vec();
-        let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, array);
-        Some(numbers.map(SingleTangents))
+        let (numbers, done) = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, array);
+        let tangents = SingleTangents(numbers);
+        Some(done.map(|()| tangents))
     }
 
     /// The numbers of the groups that `groups` picks, tangents times `factor`; the deformation is gathered in double precision.
@@ -174,7 +177,7 @@ impl<const D: usize> Tiled<D> {
         inertia: Weight<'_>,
         factor: f64,
         array: impl FnOnce(usize) -> Vec<[X; N]>,
-    ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
+    ) -> (Numbers<X, N>, Result<(), Option<Inadmissible>>) {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
         // What they hold is written over.
@@ -222,8 +225,7 @@ impl<const D: usize> Tiled<D> {
             }
             failure.map_or(Ok(()), Err)
         });
-        first_error(results)?;
-        Ok(Numbers { numbers, form })
+        (Numbers { numbers, form }, first_error(results).map(|_| ()))
     }
 
     /// `out_I += Σ_p (δP_p) ∇_n N_I + q_p N_I`, the product of the tangents with `field`.

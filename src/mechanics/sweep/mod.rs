@@ -43,7 +43,7 @@ use tiled::Tiled;
 /// Particles per block of the plain sweep: large enough to pay for a task, small enough to keep a block's nodes in cache.
 const BLOCK: usize = 256;
 
-/// Particles lie well in memory if fewer than one in so many lies elsewhere than behind the one before it in the sweep.
+/// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
 const LEAPS: usize = 8;
 
 /// Products with more nodes than this along an axis take the plain sweep: the box of a block would leave the cache.
@@ -85,13 +85,13 @@ enum Way<const D: usize> {
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("particle {particle} has no shape functions")]
 pub struct SupportError {
-    /// Number of the particle.
+    /// Id of the particle; where none are given, its place.
     pub particle: usize,
     /// What went wrong.
     pub source: ApproximationError,
 }
 
-/// q of a particle from its number and u.
+/// q of the particle at a place in memory, from that and u.
 pub type Inertia<'a, const D: usize> = &'a (dyn Fn(usize, &Vector<f64, D>) -> Vector<f64, D> + Sync);
 
 /// Whether the weights of a scatter are taken as they are or by their magnitude.
@@ -125,7 +125,7 @@ impl<const D: usize> Supports<D> {
     /// Evaluates the shape functions at all positions and numbers the active nodes.
     ///
     /// # Errors
-    /// The first particle, in their order, that lies outside the grid or whose shape functions do not exist.
+    /// The first particle that lies outside the grid or whose shape functions do not exist.
     pub fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -192,7 +192,9 @@ impl<const D: usize> Supports<D> {
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
                 Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
             }
-            _ => Self::plain(approximation, grid, positions),
+            _ => Self::plain(approximation, grid, positions).map_err(|SupportError { particle, source }| {
+                SupportError { particle: ids.map_or(particle, |ids| ids[particle] as usize), source }
+            }),
         }
     }
 
@@ -233,7 +235,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
-    /// [`LEAPS`].
+    /// eight.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -253,6 +255,14 @@ impl<const D: usize> Supports<D> {
         let mut next = 0;
         let leaps = tiled.order().filter(|&p| std::mem::replace(&mut next, p + 1) != p).count();
         (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
+    }
+
+    /// The same, the particles having been put in [`Self::leaping`]'s order.
+    pub(crate) fn rearranged(mut self) -> Self {
+        if let Way::Tiled(tiled) = &mut self.0 {
+            tiled.rearrange();
+        }
+        self
     }
 
     /// Number of particles.
@@ -423,7 +433,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// The error of the first particle, in their order, whose `point` fails.
+    /// The error of the first particle in memory whose `point` fails.
     pub fn assemble<T: Real, E: Send>(
         &self,
         field: &[Vector<T, D>],
@@ -561,7 +571,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// The first particle, in their order, with det F ≤ 0.
+    /// A particle with det F ≤ 0, the same for any number of threads.
     pub fn forces<T: Real, L: Law>(
         &self,
         laws: &Laws<'_, D, L>,
@@ -628,7 +638,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// The first particle, in their order, with det F ≤ 0; `None` in its place if a law has no closed tangent at its state.
+    /// A particle with det F ≤ 0, the same for any number of threads; `None` in its place if a law has no closed tangent at its state.
     pub fn closed_tangents<L: Law>(
         &self,
         laws: &Laws<'_, D, L>,
@@ -765,7 +775,7 @@ impl<const D: usize> Supports<D> {
     /// Example: [`Self::assemble`].
     ///
     /// # Errors
-    /// The error of the first particle, in their order, whose `point` fails.
+    /// The error of the first particle in memory whose `point` fails.
     pub fn interpolate<T: Real, R: Send, E: Send>(
         &self,
         field: &[Vector<T, D>],

@@ -55,8 +55,9 @@ impl<const D: usize> Tiled<D> {
         let failure = |particle: usize, source: ApproximationError| {
             let (mut scratch, mut support) = (Scratch::default(), Support::default());
             let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
-            let first = positions.iter().enumerate().find_map(|(p, x)| Some((p, error(x)?)));
-            let (particle, source) = first.unwrap_or((particle, source));
+            let id = |p: usize| ids.map_or(p, |ids| ids[p] as usize);
+            let failing = positions.iter().enumerate().filter_map(|(p, x)| Some((id(p), error(x)?)));
+            let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((id(particle), source));
             SupportError { particle, source }
         };
         let spare = spare.filter(|spare| spare.particles() == positions.len());
@@ -102,6 +103,17 @@ impl<const D: usize> Tiled<D> {
     /// The particles, block by block and group by group.
     pub(super) fn order(&self) -> impl Iterator<Item = u32> {
         self.blocks.iter().flat_map(|block| block.groups.in_order())
+    }
+
+    /// As if particles had been put in [`Self::order`], for the next step to start from.
+    pub(super) fn rearrange(&mut self) {
+        let mut next = 0..;
+        for block in &mut self.blocks {
+            let Groups { windows, particles, .. } = &mut block.groups;
+            for (window, particles) in windows.iter().zip(particles) {
+                particles[..usize::from(window.lanes)].iter_mut().zip(&mut next).for_each(|(p, place)| *p = place);
+            }
+        }
     }
 
     /// Number of groups.
@@ -369,7 +381,7 @@ impl<const D: usize> Tiled<D> {
         self.blocks_by(out, &|block, buffer| of_block::quadratics(&block.groups, buffer, &quadratic));
     }
 
-    /// `f` of every block, in their order; the error is that of the particle with the smallest number.
+    /// `f` of every block, in their order; the error is that of the particle with the smallest id or place.
     fn in_order<R: Send, E: Send>(&self, f: impl Fn(&Block) -> Result<R, (usize, E)> + Sync) -> Result<Vec<R>, E> {
         first_error(infallible(ordered(self.blocks.len(), |b| Ok(f(&self.blocks[b])))))
     }
@@ -384,7 +396,7 @@ impl<const D: usize> Tiled<D> {
     }
 }
 
-/// The results, or the error of the particle with the smallest number.
+/// The results, or the error with the smallest number before it.
 pub(super) fn first_error<R, E>(all: Vec<Result<R, (usize, E)>>) -> Result<Vec<R>, E> {
     let mut failure = None;
     let mut results = Vec::with_capacity(all.len());
@@ -402,7 +414,7 @@ fn is_f64<T: Real>() -> bool {
     TypeId::of::<T>() == TypeId::of::<f64>()
 }
 
-/// Keeps the failure of the smallest particle.
+/// Keeps the failure with the smallest number.
 pub(super) fn keep_first<E>(first: &mut Option<(usize, E)>, p: usize, error: E) {
     if first.as_ref().is_none_or(|(q, _)| p < *q) {
         *first = Some((p, error));

@@ -53,7 +53,7 @@ pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
     for p in 0..eq.supports.particles() {
         let h_n = &eq.particles.displacement_gradient[p];
         let at = admissible(compose(&eq.supports.gradient_at(p, dphi), h_n))
-            .map_err(|source| Inadmissible { particle: p, source })?;
+            .map_err(|source| Inadmissible { particle: eq.particles.id[p] as usize, source })?;
         let f_n_t = (identity::<f64, D>() + h_n).transpose();
         nodes.clear();
         values.clear();

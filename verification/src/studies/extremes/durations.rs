@@ -80,7 +80,7 @@ fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, t
     // In long steps the forces that balance are large impulses, and so is what Newton leaves of them.
     let bound = if exponent > 0 { impulse / scale } else { bodies::MOMENTUM };
     solvable(report, &what, &format!("{case}: linear momentum"), stepped.map(|()| momentum), bound);
-    let particles = &simulation.particles;
+    let particles = simulation.particles.by_id();
     let waves = f64::from(STEPS) * ratio;
     let unit = |error: f64| Ok::<_, StudyError>(error);
     if exponent <= -3 {

@@ -248,7 +248,7 @@ fn residual<const D: usize, L: Law>(
             let mut change: Field<D> = vec![Vector::zeros(); r.len()];
             let at_particles: Vec<Tensor<f64, D>> = (states.iter().enumerate())
                 .map(|(p, at)| {
-                    let piola = first_piola(eq.law(p), &at.f, at.h).map_err(|source| Inadmissible { particle: p, source })?;
+                    let piola = first_piola(eq.law(p), &at.f, at.h).map_err(|source| Inadmissible { particle: eq.particles.id[p] as usize, source })?;
                     let f_n_t = (identity::<f64, D>() + eq.particles.displacement_gradient[p]).transpose();
                     let wrong = match fault {
                         Fault::ResidualNotPulledBack => piola,
@@ -271,7 +271,7 @@ fn states<const D: usize, L: Law>(
     dphi: &[Vector<f64, D>],
 ) -> Result<Vec<Deformation<f64, D>>, Inadmissible> {
     eq.supports.interpolate(dphi, |p, _, g| {
-        admissible(compose(&g, &eq.particles.displacement_gradient[p])).map_err(|source| Inadmissible { particle: p, source })
+        admissible(compose(&g, &eq.particles.displacement_gradient[p])).map_err(|source| Inadmissible { particle: eq.particles.id[p] as usize, source })
     })
 }
 

@@ -4,7 +4,7 @@ use super::block::block;
 use super::machine::{copy_bandwidth, peak, read_bandwidth};
 use super::work::Work;
 use crate::baseline::{BFree, Pattern, assemble};
-use crate::prepared::Prepared;
+use crate::prepared::{Prepared, arranged};
 use crate::random::Random;
 use crate::shipped;
 use crate::studies::{Outcome, StudyError};
@@ -191,7 +191,7 @@ fn step<const D: usize>(
     cells: u32,
     precision: Precision,
 ) -> Result<(), StudyError> {
-    let mut simulation = block::<D>(shape.clone(), None, cells, 0.1, 1.0)?;
+    let mut simulation = arranged(block::<D>(shape.clone(), None, cells, 0.1, 1.0)?)?;
     simulation.settings.newton.precision = precision;
     let particles = simulation.particles.len();
     let planned = Plan::of(&simulation)?.bytes();

@@ -3,7 +3,7 @@
 use super::setting::Setting;
 use crate::baseline::{Assembled, BFree, Pattern, assemble};
 use crate::forced;
-use crate::prepared::Prepared;
+use crate::prepared::{Prepared, arranged};
 use crate::studies::StudyError;
 use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
@@ -172,6 +172,7 @@ impl Units {
 
     /// Measures them, and asks the plan for the most bytes at one time.
     pub fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<(Self, u64), StudyError> {
+        let simulation = &arranged(simulation.clone())?;
         let prepared = Prepared::new(simulation)?;
         let equilibrium = prepared.equilibrium(simulation);
         let (count, lumping) = (prepared.nodes.len(), simulation.settings.lumping);
