@@ -5,7 +5,7 @@ use super::schemata::{MODULE, Misfit, VARIABLE, apply, module};
 use crate::report::{Bound, Report};
 use crate::studies::Outcome;
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -114,7 +114,8 @@ fn judge(
     Ok(())
 }
 
-/// Copies every file git knows or would add, patched, to `source`; files that are there already stay untouched, and so stay built.
+/// Copies every file git knows or would add, patched, to `source`; files that are there already stay untouched, and so stay built, others
+/// go.
 fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
     let list = output(Command::new("git").args(["ls-files", "--cached", "--others", "--exclude-standard", "-z"]).current_dir(root))?;
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
@@ -136,6 +137,8 @@ fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
         }
     }
     files.push((MODULE.0, module().into_bytes()));
+    let kept: HashSet<PathBuf> = files.iter().map(|(file, _)| source.join(file)).collect();
+    remove_others(source, &kept).map_err(|error| ShippedFaultError::Copy { path: source.to_owned(), source: error })?;
     for (file, bytes) in files {
         let path = source.join(file);
         if fs::read(&path).is_ok_and(|old| old == bytes) {
@@ -143,6 +146,23 @@ fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
         }
         let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(&path, &bytes));
         written.map_err(|source| ShippedFaultError::Copy { path, source })?;
+    }
+    Ok(())
+}
+
+/// Removes what an earlier copy had and this one has not: a module may have become a folder.
+fn remove_others(folder: &Path, kept: &HashSet<PathBuf>) -> io::Result<()> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let path = entry?.path();
+        if path.is_dir() {
+            remove_others(&path, kept)?;
+        } else if !kept.contains(&path) {
+            fs::remove_file(path)?;
+        }
     }
     Ok(())
 }
