@@ -240,12 +240,14 @@ impl<const D: usize> Supports<D> {
     /// ```
     /// use bfree::mechanics::sweep::Supports;
     ///
-    /// // The disc is filled row by row: two particles of a cell, then those of the next.
+    /// // A disc with its last particle first: the sweep goes backwards through memory, cell by cell.
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &mut simulation.particles;
+    /// let backwards: Vec<u32> = (0..particles.len() as u32).rev().collect();
+    /// particles.rearrange(&backwards);
     /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// particles.rearrange(&supports.leaping().ok_or("by rows")?);
+    /// particles.rearrange(&supports.leaping().ok_or("backwards")?);
     /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
     /// assert_eq!(supports.leaping(), None);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
