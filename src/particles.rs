@@ -1,5 +1,6 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
+use crate::material::{Law, Start};
 use crate::tensor::{Tensor, Vector};
 
 /// A body: a law and a density shared by its particles.
@@ -51,6 +52,10 @@ pub struct Particles<const D: usize> {
     pub body: Vec<u32>,
     /// Number of the particle in the order of their making, from 0.
     pub id: Vec<u32>,
+    /// What laws remember, [`Self::remembered`] numbers a particle, one particle after the other.
+    pub memory: Vec<f64>,
+    /// Numbers that the law with the longest memory remembers; 0 where all are elastic.
+    pub remembered: usize,
 }
 
 impl<const D: usize> Default for Particles<D> {
@@ -64,6 +69,8 @@ impl<const D: usize> Default for Particles<D> {
             mass: Vec::new(),
             body: Vec::new(),
             id: Vec::new(),
+            memory: Vec::new(),
+            remembered: 0,
         }
     }
 }
@@ -88,7 +95,7 @@ impl<const D: usize> Particles<D> {
     ///
     /// Example: [`Self::push_without_inertia`].
     pub fn reserve(&mut self, more: usize) {
-        let Self { position, velocity: _, acceleration: _, displacement_gradient, volume, mass, body, id } = self;
+        let Self { position, displacement_gradient, volume, mass, body, id, .. } = self;
         position.reserve_exact(more);
         displacement_gradient.reserve_exact(more);
         [volume, mass].into_iter().for_each(|array| array.reserve_exact(more));
@@ -124,6 +131,23 @@ impl<const D: usize> Particles<D> {
         self.volume.push(volume);
         self.mass.push(mass);
         self.body.push(body);
+    }
+
+    /// What the law of the particle at the place `p` is given for a step of length `dt`.
+    #[inline(always)]
+    pub fn start(&self, p: usize, dt: f64) -> Start<'_> {
+        Start { dt, memory: &self.memory[p * self.remembered..(p + 1) * self.remembered] }
+    }
+
+    /// Gives every particle the memory that its law has at rest.
+    pub fn remember_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
+        self.remembered = bodies.iter().map(|body| body.law.memory().len()).max().unwrap_or(0);
+        let width = self.remembered;
+        let at_rest = |&body: &u32| {
+            let names = bodies[body as usize].law.memory().iter().map(|one| one.at_rest);
+            names.chain(std::iter::repeat(0.0)).take(width)
+        };
+        self.memory = self.body.iter().flat_map(at_rest).collect();
     }
 
     /// Where the particles lie in memory, by id.
@@ -170,11 +194,15 @@ impl<const D: usize> Particles<D> {
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
         let mut moved = vec![false; self.len()];
-        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id } = self;
+        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id, .. } = self;
         [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, order, &mut moved));
         permute(displacement_gradient, order, &mut moved);
         [volume, mass].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
         [body, id].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
+        if self.remembered > 0 {
+            let of = |&p: &u32| self.memory[p as usize * self.remembered..][..self.remembered].iter().copied();
+            self.memory = order.iter().flat_map(of).collect();
+        }
     }
 
     /// Σ m v

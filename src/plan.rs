@@ -4,7 +4,7 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::tangent::{frozen_bytes, has_closed_form};
+use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::time::{Inertia, Newmark};
 use crate::particles::Particles;
 use crate::simulation::{Settings, Simulation};
@@ -243,12 +243,10 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         term("work of moving walls", moving, "only where a prescribed motion does not rest"),
         term(
             "single precision",
-            precision_used(simulation, supports) == Precision::Mixed,
+            precision_used(supports) == Precision::Mixed,
             match simulation.settings.newton.precision {
                 Precision::Double => "only with solver.krylov.precision = \"mixed\"",
-                Precision::Mixed => {
-                    "of the linear systems; for shape functions that are products and laws with a closed tangent"
-                }
+                Precision::Mixed => "of the linear systems; for shape functions that are products",
             },
         ),
     ]
@@ -256,9 +254,9 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
 
 /// How often the sweep asks which law it evaluates.
 fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> String {
-    let often = match supports.closed_bytes(false, false, Precision::Double) {
-        Some(_) => "once in a pass over the particles",
-        None => "for every particle: the shape functions are no products, or too wide",
+    let often = match supports.is_tiled() {
+        true => "once in a pass over the particles",
+        false => "for every particle: the shape functions are no products, or too wide",
     };
     match simulation.bodies.len() {
         1 => format!("only with several bodies; the law of the only one is looked up {often}"),
@@ -267,11 +265,8 @@ fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, s
 }
 
 /// What the linear systems are solved in.
-fn precision_used<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Precision {
-    match supports.unit() {
-        Some(_) if has_closed_form::<D, L>(&simulation.bodies) => Precision::Mixed,
-        _ => Precision::Double,
-    }
+fn precision_used<const D: usize>(supports: &Supports<D>) -> Precision {
+    supports.unit().map_or(Precision::Double, |_| Precision::Mixed)
 }
 
 fn arrays<const D: usize, L: Law, A>(
@@ -286,15 +281,15 @@ fn arrays<const D: usize, L: Law, A>(
     let lumping = if moves { simulation.settings.lumping } else { 1.0 };
     let consistent = moves && lumping < 1.0;
     let smooths = moves && simulation.settings.smoothing.is_some();
-    let tiled = supports.closed_bytes(false, false, Precision::Double).is_some();
+    let tiled = supports.is_tiled();
     let krylov_vectors = match simulation.settings.newton.krylov {
         // The basis; residual, correction, trial and product.
         Krylov::Gmres { restart } => restart + 5,
         Krylov::ConjugateGradient => 5,
     };
     let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
-    let precision = precision_used(simulation, supports);
-    let frozen = frozen_bytes(&simulation.bodies, supports, lumping, precision);
+    let precision = precision_used(supports);
+    let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
     // What is not there does not appear.

@@ -7,10 +7,11 @@ use crate::grid::Grid;
 use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::{Carry, Equilibrium, Inadmissible};
+use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::terms::{self, Role};
 use crate::mechanics::time::{Alphas, Inertia, Newmark};
 use crate::mechanics::transfer::{Nodal, Update, WallUpdate};
 use crate::nodes::Nodes;
@@ -135,6 +136,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub clock: Clock,
     /// Work of gravity, tractions, pressure and moving walls since the start.
     pub external_work: f64,
+    /// Energy that damping has taken since the start.
+    pub dissipated: f64,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
 }
@@ -349,8 +352,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        let (reactions, work) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
-        update.commit(&mut self.particles, &supports);
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
+        update.commit(&mut self.particles, &self.bodies, &supports, dt);
         let passes = supports.passes();
 
         let projection_iterations = projected.iterations;
@@ -363,6 +366,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         });
         watch.lap(Phase::Update, passes);
         self.external_work += work;
+        self.dissipated += dissipated;
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
         self.clock.advance_and_grow_if(error.is_none_or(small));
         let active_nodes = nodes.len();
@@ -467,10 +471,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         alphas: Alphas,
         t: f64,
     ) -> Equilibrium<'a, D, L> {
-        let dead_load = self.loads.dead(t, &nodal.mass, supports);
-        let pressures = self.loads.pressures(t);
-        let (particles, bodies, lumping) = (&self.particles, self.bodies.as_slice(), self.settings.lumping);
-        Equilibrium::new(particles, bodies, supports, alphas, lumping, nodal, dead_load, pressures, prescribed)
+        let Self { particles, bodies, loads, settings, .. } = self;
+        // Without inertia nothing is weighed, and nothing is consistent.
+        let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, settings.lumping) };
+        let dt = self.clock.step();
+        Equilibrium::new(
+            terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt },
+            prescribed,
+        )
     }
 
     /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.
@@ -492,10 +500,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Particle velocities so large that the projection overflows.
     pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
         match self.settings.inertia {
-            Inertia::Newmark => Nodal::project(&self.particles, supports, supports.nodes(), self.settings.lumping),
-            Inertia::None if self.loads.gravity.is_some() => {
-                Ok(Nodal::mass_alone(&self.particles, supports, supports.nodes()))
-            }
+            Inertia::Newmark => Nodal::project(&self.particles, supports, self.settings.lumping),
+            Inertia::None if self.loads.gravity.is_some() => Ok(Nodal::mass_alone(&self.particles, supports)),
             Inertia::None => Ok(Nodal::default()),
         }
     }
@@ -515,7 +521,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         nodes: &Nodes,
     ) -> StepError {
-        let loose = equilibrium.nodal.is_static().then(|| loose(&self.grid, equilibrium, nodes));
+        let loose = equilibrium.step.nodal.is_static().then(|| loose(&self.grid, equilibrium, nodes));
         match loose.flatten() {
             Some(loose) => StepError::Loose { loose, source: error },
             None => StepError::Newton(error),
@@ -548,12 +554,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         dt: f64,
         dphi: &[Vector<f64, D>],
         impulses: &[f64],
-    ) -> Result<(Vec<Vector<f64, D>>, f64), StepError> {
+    ) -> Result<(Vec<Vector<f64, D>>, f64, f64), StepError> {
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
-            end.residual_into::<f64>(dphi, Carry::ALL, &mut residual)?;
+            end.residual_into::<f64>(dphi, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(impulses) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 reactions[dof.owner][dof.component] += reaction + blow;
@@ -562,18 +568,21 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         // At t_n: a = a_n and Δφ = 0.
         let at_rest = Pooled::filled(dphi.len(), Vector::zeros());
-        let start = self.equilibrium(end.supports, end.nodal, end.prescribed, Alphas::START, t);
+        let start = self.equilibrium(end.step.supports, end.step.nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
             let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
-            start.residual_into::<f64>(&at_rest, Carry::ALL, &mut residual)?;
+            start.residual_into::<f64>(&at_rest, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }
         }
-        for ((f_end, f_start), dphi) in end.external_force(dphi).iter().zip(&start.external_force(&at_rest)).zip(dphi) {
-            work += 0.5 * (f_end + f_start).dot(dphi);
+        work += mean_work(&end.external_force(dphi)?, &start.external_force(&at_rest)?, dphi);
+        let mut dissipated = 0.0;
+        if self.loads.damping.is_some() {
+            let lost = |equilibrium: &Equilibrium<'_, D, L>, dphi| equilibrium.forces(Role::Dissipates, dphi);
+            dissipated = mean_work(&lost(end, dphi)?, &lost(&start, &at_rest)?, dphi);
         }
-        Ok((reactions, work))
+        Ok((reactions, work, dissipated))
     }
 
     /// The check a run may ask for: the tangent at the solution against dual numbers, in a direction of its own for each step.
@@ -623,6 +632,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             settings: self.settings,
             clock: self.clock,
             external_work: self.external_work,
+            dissipated: self.dissipated,
             workspace: Workspace::default(),
         }
     }
@@ -647,7 +657,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         (0..particles.len())
             .map(|p| {
                 let at = Deformation::new(particles.displacement_gradient[p]);
-                particles.volume[p] * self.bodies[particles.body[p] as usize].law.energy(&at)
+                let law = &self.bodies[particles.body[p] as usize].law;
+                particles.volume[p] * law.energy(&at, &particles.start(p, 0.0))
             })
             .sum()
     }
@@ -715,13 +726,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
         let prescribed = self.prescribed(&nodes);
-        let mut nodal = Nodal::at_rest(&self.particles, &supports, nodes.len());
+        let mut nodal = Nodal::at_rest(&self.particles, &supports);
         // Δφ, v_n and a_n are zero, and with them the inertia, whatever α is.
         let alphas = self.settings.alphas(self.clock.step());
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, self.clock.time());
-        let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration, Carry::ALL)?;
+        let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
         nodal.accelerate(&self.particles, &unbalanced);
         self.particles.acceleration = supports.values(&nodal.with_prescribed(&prescribed).acceleration);
         Ok(())
     }
+}
+
+/// The work of a force along Δφ, by the mean of its values at the ends of the step.
+fn mean_work<const D: usize>(end: &[Vector<f64, D>], start: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
+    end.iter().zip(start).zip(dphi).map(|((end, start), dphi)| 0.5 * (end + start).dot(dphi)).sum()
 }

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 
 /// The arrays a step inherits, by name. A field of the simulation that is added later does not compile here until somebody has
 /// decided on which side it belongs; a new array has its place in [`inherited`] and in [`restore`].
-pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, Cow<'_, [f64]>); 6] {
+pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, Cow<'_, [f64]>); 8] {
     let Simulation {
         grid: _,
         approximation: _,
@@ -19,10 +19,21 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         settings: _,
         clock: _,
         external_work,
+        dissipated,
         workspace: _,
     } = simulation;
-    let Particles { position, velocity, acceleration, displacement_gradient, volume: _, mass: _, body: _, id } =
-        particles;
+    let Particles {
+        position,
+        velocity,
+        acceleration,
+        displacement_gradient,
+        volume: _,
+        mass: _,
+        body: _,
+        id,
+        memory,
+        remembered: _,
+    } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
     [
         ("id", id.into()),
@@ -30,7 +41,9 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("velocity", bytemuck::cast_slice(velocity).into()),
         ("acceleration", bytemuck::cast_slice(acceleration).into()),
         ("displacement_gradient", bytemuck::cast_slice(displacement_gradient).into()),
+        ("memory", memory.as_slice().into()),
         ("external_work", std::slice::from_ref(external_work).into()),
+        ("dissipated", std::slice::from_ref(dissipated).into()),
     ]
 }
 
@@ -72,6 +85,8 @@ pub(super) fn restore<const D: usize, L, A>(
             "velocity" => bytemuck::cast_slice_mut(&mut particles.velocity),
             "acceleration" => bytemuck::cast_slice_mut(&mut particles.acceleration),
             "displacement_gradient" => bytemuck::cast_slice_mut(&mut particles.displacement_gradient),
+            "memory" => &mut particles.memory,
+            "dissipated" => std::slice::from_mut(&mut simulation.dissipated),
             "external_work" => std::slice::from_mut(&mut simulation.external_work),
             _ => continue,
         };
@@ -82,8 +97,7 @@ pub(super) fn restore<const D: usize, L, A>(
 
 /// Checksums of the particles at the start of a run: they may come from files that have changed since.
 pub(super) fn fingerprint<const D: usize>(particles: &Particles<D>) -> Vec<(String, u32)> {
-    let Particles { position, velocity, acceleration: _, displacement_gradient: _, volume, mass, body, id: _ } =
-        particles;
+    let Particles { position, velocity, volume, mass, body, .. } = particles;
     [
         ("position", hash(bytemuck::cast_slice(position))),
         ("velocity", hash(bytemuck::cast_slice(velocity))),

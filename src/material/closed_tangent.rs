@@ -1,6 +1,5 @@
 //! The frozen tangent in closed form: what isotropic laws without history need, from a handful of numbers.
 
-use super::FrozenTangent;
 use crate::scalar::{Arithmetic, Real, Single};
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
@@ -9,13 +8,14 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// `N` is a number, or a whole vector of lanes with a particle in each.
 ///
 /// ```
-/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::material::{Elastic, Lame, NeoHookean};
 /// use bfree::scalar::Single;
 /// use bfree::tensor::{Deformation, Tensor, identity};
 ///
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
-/// let (closed, with) = (law.freeze(&identity(), &at, 1.0), Single::<f64>::default());
+/// let closed = law.closed(&identity(), &at, 1.0).ok_or("neo-Hooke has one")?;
+/// let with = Single::<f64>::default();
 /// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
 /// let (k, l, j) = (0, 1, 1);
 /// let mut unit = [[0.0; 2]; 2];
@@ -24,7 +24,7 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// for i in 0..2 {
 ///     assert!((product[i][k] - block[i][j]).abs() < 1e-15);
 /// }
-/// # Ok::<(), bfree::material::LameError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedTangent<N, const D: usize> {
@@ -128,15 +128,17 @@ fn tensor<T: Real, const D: usize>(a: &[[T; D]; D]) -> Tensor<T, D> {
     Tensor::from_fn(|i, k| a[i][k])
 }
 
-impl<T: Real, const D: usize> FrozenTangent<T, D> for ClosedTangent<T, D> {
-    #[inline(always)]
-    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
-        tensor(&self.product(Single::<T>::default(), &rows(l)))
+impl<const D: usize> ClosedTangent<f64, D> {
+    /// V₀ δP F_nᵀ from L.
+    ///
+    /// Example: [`Elastic::closed`](super::Elastic::closed).
+    pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
+        tensor(&self.product(Single::<f64>::default(), &rows(l)))
     }
 
+    /// The block of two nodes with gradients ∇_n N_I and ∇_n N_J:
     /// κ g_I ⊗ g_J − q g_J ⊗ g_I + (∇N_I·B ∇N_J) I + (∇N_I·c ∇N_J) b,  g = A ∇_n N
-    #[inline(always)]
-    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
+    pub fn block(&self, grad_i: &Vector<f64, D>, grad_j: &Vector<f64, D>) -> Tensor<f64, D> {
         let a = tensor(&self.a);
         let (g_i, g_j) = (a * grad_i, a * grad_j);
         let block = scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
@@ -147,8 +149,12 @@ impl<T: Real, const D: usize> FrozenTangent<T, D> for ClosedTangent<T, D> {
         }
     }
 
-    #[inline(always)]
-    fn closed(&self) -> Option<ClosedTangent<T, D>> {
-        Some(*self)
+    /// The geometric part alone, L B with B = V₀ F_n S F_nᵀ, or all but it.
+    pub(crate) fn part(&self, b: &Tensor<f64, D>, geometric: bool) -> Self {
+        if geometric {
+            let nothing = [[0.0; D]; D];
+            return Self { a: nothing, right: rows(b), bulk: 0.0, q: 0.0, both: self.both.map(|_| [nothing; 2]) };
+        }
+        Self { right: rows(&(tensor(&self.right) - b)), ..*self }
     }
 }

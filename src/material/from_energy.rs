@@ -1,6 +1,6 @@
 //! A law given by its energy alone; stress and tangent come from dual numbers.
 
-use super::{FrozenGeneral, Law, embed};
+use super::{Elastic, embed};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, symmetric};
 use num_dual::Dual;
@@ -12,7 +12,7 @@ use num_dual::Dual;
 /// are wrong or NaN at E = 0; use invariants.
 ///
 /// ```
-/// use bfree::material::{Energy, FromEnergy, Law};
+/// use bfree::material::{Elastic, Energy, FromEnergy};
 /// use bfree::scalar::Real;
 /// use bfree::tensor::{Deformation, Tensor, contract, trace};
 ///
@@ -70,9 +70,7 @@ impl<W: Energy> FromEnergy<W> {
     }
 }
 
-impl<W: Energy> Law for FromEnergy<W> {
-    type Frozen<T: Real, const D: usize> = FrozenGeneral<T, D>;
-
+impl<W: Energy> Elastic for FromEnergy<W> {
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         self.0.energy(&embed(&at.green_lagrange()))
     }
@@ -83,14 +81,5 @@ impl<W: Energy> Law for FromEnergy<W> {
 
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
         self.elasticity_at(&embed(&at.green_lagrange()), &embed(&symmetric(x)))
-    }
-
-    fn freeze<T: Real, const D: usize>(
-        &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> FrozenGeneral<T, D> {
-        FrozenGeneral::new(self, f_n, at, volume)
     }
 }

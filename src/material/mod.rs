@@ -7,14 +7,12 @@
 
 mod closed_tangent;
 mod from_energy;
-mod frozen_general;
 mod lame;
 mod neo_hookean;
 mod st_venant_kirchhoff;
 
 pub use closed_tangent::ClosedTangent;
 pub use from_energy::{Energy, FromEnergy};
-pub use frozen_general::FrozenGeneral;
 pub use lame::{Lame, LameError};
 pub use neo_hookean::{NeoHookean, Volumetric};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
@@ -30,13 +28,172 @@ pub struct NonPositiveJacobian {
     pub det_f: f64,
 }
 
-/// A pointwise hyperelastic law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions.
+/// What a particle remembers of a law from step to step: one number, by name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Remembered {
+    /// As in outputs, checkpoints and `bfree check`.
+    pub name: &'static str,
+    /// Its value in a body at rest.
+    pub at_rest: f64,
+}
+
+/// What a law is given beside F: how long the step is, and what the particle remembers at its beginning.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Δt
+    pub dt: f64,
+    /// The numbers that [`Law::memory`] names, at t_n.
+    pub memory: &'a [f64],
+}
+
+impl Start<'_> {
+    /// Nothing to remember, and no time: all that an elastic law needs.
+    pub const NONE: Self = Self { dt: 0.0, memory: &[] };
+}
+
+/// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions, as the residual asks it. An elastic law is written as
+/// [`Elastic`], and is one; a law with memory says here what it remembers and what becomes of that in a step.
+///
+/// ```
+/// use bfree::material::{Law, Remembered, Start};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Deformation, Tensor, symmetric};
+///
+/// /// S = 2G e^{−d} E, softer by the largest |E| met so far, d.
+/// struct Softening { shear: f64 }
+///
+/// impl Softening {
+///     fn damage<const D: usize>(&self, e: f64, start: &Start<'_>) -> f64 {
+///         start.memory[0].max(e)
+///     }
+/// }
+///
+/// impl Law for Softening {
+///     fn memory(&self) -> &[Remembered] {
+///         &[Remembered { name: "damage", at_rest: 0.0 }]
+///     }
+///     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+///         let e = at.green_lagrange();
+///         bfree::tensor::contract(&e, &e) * T::lit(self.shear * (-start.memory[0]).exp())
+///     }
+///     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+///         at.green_lagrange().map(|e| e * T::lit(2.0 * self.shear * (-start.memory[0]).exp()))
+///     }
+///     fn elasticity<T: Real, const D: usize>(
+///         &self, _: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
+///     ) -> Tensor<T, D> {
+///         symmetric(x).map(|x| x * T::lit(2.0 * self.shear * (-start.memory[0]).exp()))
+///     }
+///     fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+///         next[0] = self.damage::<D>(at.green_lagrange().norm(), start);
+///     }
+/// }
+///
+/// let (law, mut next) = (Softening { shear: 1.0 }, [0.0]);
+/// let at = Deformation::<f64, 1>::new(Tensor::from_element(1.0)); // E = 3/2
+/// law.remember(&at, &Start { dt: 1.0, memory: &[0.5] }, &mut next);
+/// assert_eq!(next, [1.5]);
+/// assert!(law.stress(&at, &Start { dt: 1.0, memory: &next })[(0, 0)] < law.stress(&at, &Start { dt: 1.0, memory: &[0.5] })[(0, 0)]);
+/// ```
+pub trait Law: Send + Sync {
+    /// What a particle remembers; nothing of an elastic law.
+    fn memory(&self) -> &[Remembered] {
+        &[]
+    }
+
+    /// Whether ℂ has major symmetry.
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    /// Whether stresses derive from [`Self::energy`] within a step.
+    fn has_potential(&self) -> bool {
+        true
+    }
+
+    /// Strain energy density `W`, or the incremental potential of the step.
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T;
+
+    /// Second Piola–Kirchhoff stress `S`, symmetric.
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D>;
+
+    /// `ℂ:X = ∂S/∂E : sym X`.
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D>;
+
+    /// The B-free tangent density, `ℂmat{v,b} a = [ℂ:(a ⊗ b)] v` (eq. 37).
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        density(v, |a| self.elasticity(at, start, &outer(a, b)))
+    }
+
+    /// As [`Elastic::closed`].
+    fn closed<const D: usize>(
+        &self,
+        _f_n: &Tensor<f64, D>,
+        _at: &Deformation<f64, D>,
+        _volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        None
+    }
+
+    /// What is remembered at the end of a step that ends at `at`.
+    fn remember<const D: usize>(&self, _at: &Deformation<f64, D>, _start: &Start<'_>, _next: &mut [f64]) {}
+
+    /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, Material, NeoHookean};
+    ///
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let material = Material::from(law);
+    /// // The law in the list is one of the shipped ones: itself.
+    /// assert_eq!(material.shipped(), Some(&material));
+    /// assert_eq!(law.shipped(), None);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    fn shipped(&self) -> Option<&Material> {
+        None
+    }
+
+    /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
+    /// By embedding into 3D.
+    fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>) -> f64 {
+        let embedded = Deformation::new(embed(&at.h));
+        // σ_zz = P_zz F_zz / J with F_zz = 1
+        self.stress(&embedded, start)[(2, 2)] / at.jacobian
+    }
+}
+
+/// ℂmat{v, b}, column by column from what ℂ makes of a ⊗ b.
+fn density<T: Real, const D: usize>(
+    v: &Vector<T, D>,
+    elasticity: impl Fn(&Vector<T, D>) -> Tensor<T, D>,
+) -> Tensor<T, D> {
+    let mut density: Tensor<T, D> = Tensor::zeros();
+    for k in 0..D {
+        let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
+        density.set_column(k, &(elasticity(&e_k) * v));
+    }
+    density
+}
+
+/// A pointwise hyperelastic law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions: a [`Law`] that remembers nothing.
 ///
 /// Every method takes the deformation as H = F − I wrapped in a [`Deformation`] whose Jacobian is positive (the callers in this
 /// module make sure of it). Stresses have the unit of the law's moduli; `W` is per unit reference volume.
 ///
 /// ```
-/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::material::{Elastic, Lame, NeoHookean};
 /// use bfree::scalar::Real;
 /// use bfree::tensor::{Deformation, Tensor, Vector, contract, outer, symmetric};
 /// use num_dual::Dual64;
@@ -57,10 +214,7 @@ pub struct NonPositiveJacobian {
 /// assert!((left - right).norm() < 1e-14);
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
-pub trait Law: Send + Sync {
-    /// The tangent frozen at one state, see [`FrozenTangent`].
-    type Frozen<T: Real, const D: usize>: FrozenTangent<T, D>;
-
+pub trait Elastic: Send + Sync {
     /// Strain energy density `W`.
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T;
 
@@ -77,50 +231,36 @@ pub trait Law: Send + Sync {
         v: &Vector<T, D>,
         b: &Vector<T, D>,
     ) -> Tensor<T, D> {
-        let mut density: Tensor<T, D> = Tensor::zeros();
-        for k in 0..D {
-            let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
-            density.set_column(k, &(self.elasticity(at, &outer(&e_k, b)) * v));
-        }
-        density
+        density(v, |a| self.elasticity(at, &outer(a, b)))
     }
 
-    /// Freezes the whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`,
-    /// for gradients taken in the configuration `n` whose deformation gradient is `f_n`.
+    /// The whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`, for gradients taken in the
+    /// configuration `n` whose deformation gradient is `f_n`, if it has this form; the same answer at every state.
     ///
     /// ```
-    /// use bfree::material::{FrozenTangent, Lame, Law, NeoHookean, first_piola};
+    /// use bfree::material::{Elastic, Lame, NeoHookean, first_piola};
     /// use bfree::tensor::{Deformation, Tensor, identity};
     /// use num_dual::Dual64;
     ///
     /// // V₀ δP, geometric and material together, is the derivative of V₀ P = V₀ F S. Here F_n = I, so that δF = L.
     /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
     /// let (h, l) = (Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1), Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0));
-    /// let frozen = law.freeze(&identity(), &Deformation::new(h), 3.0);
+    /// let closed = law.closed(&identity(), &Deformation::new(h), 3.0).ok_or("closed")?;
     /// let dual = h.zip_map(&l, Dual64::new);
     /// let delta = first_piola(&law, &Deformation::new(dual).f, dual)?.map(|x| 3.0 * x.eps);
-    /// assert!((frozen.apply(&l) - delta).norm() < 1e-14 * delta.norm());
+    /// assert!((closed.apply(&l) - delta).norm() < 1e-14 * delta.norm());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    fn freeze<T: Real, const D: usize>(
+    fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> Self::Frozen<T, D>;
+        _f_n: &Tensor<f64, D>,
+        _at: &Deformation<f64, D>,
+        _volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        None
+    }
 
-    /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
-    ///
-    /// ```
-    /// use bfree::material::{Lame, Law, Material, NeoHookean};
-    ///
-    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
-    /// let material = Material::from(law);
-    /// // The law in the list is one of the shipped ones: itself.
-    /// assert_eq!(material.shipped(), Some(&material));
-    /// assert_eq!(law.shipped(), None);
-    /// # Ok::<(), bfree::material::LameError>(())
-    /// ```
+    /// See [`Law::shipped`].
     fn shipped(&self) -> Option<&Material> {
         None
     }
@@ -146,48 +286,58 @@ pub trait Law: Send + Sync {
     }
 }
 
+/// An elastic law as the residual asks it.
+impl<E: Elastic> Law for E {
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> T {
+        Elastic::energy(self, at)
+    }
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> Tensor<T, D> {
+        Elastic::stress(self, at)
+    }
+    #[inline(always)]
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        _: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        Elastic::elasticity(self, at, x)
+    }
+    #[inline(always)]
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        _: &Start<'_>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        Elastic::tangent_density(self, at, v, b)
+    }
+    #[inline(always)]
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        Elastic::closed(self, f_n, at, volume)
+    }
+    fn shipped(&self) -> Option<&Material> {
+        Elastic::shipped(self)
+    }
+    fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>, _: &Start<'_>) -> f64 {
+        Elastic::out_of_plane_stress(self, at)
+    }
+}
+
 /// Something to be done with a law of whatever type.
 pub(crate) trait LawVisitor {
     /// What comes out.
     type Output;
     /// Does it.
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output;
-}
-
-/// The tangent of one particle, frozen: everything its product needs and nothing more.
-///
-/// With `L = Σ_J u_J ⊗ ∇_n N_J` and δF = L F_n the product is `L ↦ V₀ δP F_nᵀ`, where δP = δF S + F [ℂ : FᵀδF]: the
-/// nodal forces are that tensor times `∇_n N_I`.
-///
-/// ```
-/// use bfree::material::{FrozenTangent, Lame, Law, NeoHookean};
-/// use bfree::tensor::{Deformation, Tensor, Vector, contract, identity, outer};
-///
-/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
-/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
-/// let frozen = law.freeze(&identity(), &at, 2.0);
-/// // A node's displacement u_J makes L = u_J ⊗ ∇N_J, and the force on node I is (V₀ δP) ∇N_I = K_IJ u_J.
-/// let (grad_i, grad_j) = (Vector::from([1.0, -0.5]), Vector::from([0.25, 2.0]));
-/// let u = Vector::from([3.0, 1.0]);
-/// let force = frozen.apply(&outer(&u, &grad_j)) * grad_i;
-/// assert!((force - frozen.block(&grad_i, &grad_j) * u).norm() < 1e-14);
-/// // The law has an energy, so its tangent is symmetric: A : K B = B : K A.
-/// let (a, b) = (Tensor::<f64, 2>::new(1.0, 2.0, 0.5, -1.0), Tensor::<f64, 2>::new(0.0, 1.0, 3.0, 0.5));
-/// assert!((contract(&a, &frozen.apply(&b)) - contract(&b, &frozen.apply(&a))).abs() < 1e-14);
-/// assert!(frozen.closed().is_some());
-/// # Ok::<(), bfree::material::LameError>(())
-/// ```
-pub trait FrozenTangent<T: Real, const D: usize>: Clone + Send + Sync {
-    /// `V₀ (δF S + F [ℂ : Fᵀ δF]) F_nᵀ` with δF = L F_n.
-    fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D>;
-
-    /// The block `V₀ { F ℂmat{∇N_I, ∇N_J} Fᵀ + (∇N_I · S ∇N_J) I }` (eqs. 34, 38), from gradients in the configuration n.
-    fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D>;
-
-    /// The same in closed form, which the vectorised product is made for; `None` if there is none.
-    fn closed(&self) -> Option<ClosedTangent<T, D>> {
-        None
-    }
 }
 
 /// Whether a body can have this det F.
@@ -251,8 +401,9 @@ pub(crate) fn piola<L: Law, T: Real, const D: usize>(
     law: &L,
     f_left: &Tensor<T, D>,
     at: &Deformation<T, D>,
+    start: &Start<'_>,
 ) -> Tensor<T, D> {
-    f_left * law.stress(at)
+    f_left * law.stress(at, start)
 }
 
 /// `P = F S` (eq. 7), with the F on the left and the H = F − I inside S given separately.
@@ -274,12 +425,12 @@ pub(crate) fn piola<L: Law, T: Real, const D: usize>(
 /// # Errors
 /// det F ≤ 0 of the F inside S.
 #[inline(always)]
-pub fn first_piola<L: Law, T: Real, const D: usize>(
+pub fn first_piola<L: Elastic, T: Real, const D: usize>(
     law: &L,
     f_left: &Tensor<T, D>,
     h_inside: Tensor<T, D>,
 ) -> Result<Tensor<T, D>, NonPositiveJacobian> {
-    Ok(piola(law, f_left, &admissible(h_inside)?))
+    Ok(piola(law, f_left, &admissible(h_inside)?, &Start::NONE))
 }
 
 /// A D×D tensor as the upper left part of a 3×3 one, the rest zero.
@@ -296,50 +447,39 @@ macro_rules! materials {
             $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),*
         }
 
-        /// The frozen tangent of any of the shipped laws.
-        #[derive(Clone, Debug)]
-        pub enum FrozenMaterial<T: Real, const D: usize> {
-            $(#[doc = concat!("See [`", stringify!($law), "`].")] $law(<$law as Law>::Frozen<T, D>)),*
-        }
-
-        impl<T: Real, const D: usize> FrozenTangent<T, D> for FrozenMaterial<T, D> {
-            #[inline(always)]
-            fn apply(&self, l: &Tensor<T, D>) -> Tensor<T, D> {
-                match self { $(Self::$law(frozen) => frozen.apply(l)),* }
-            }
-            #[inline(always)]
-            fn block(&self, grad_i: &Vector<T, D>, grad_j: &Vector<T, D>) -> Tensor<T, D> {
-                match self { $(Self::$law(frozen) => frozen.block(grad_i, grad_j)),* }
-            }
-            #[inline(always)]
-            fn closed(&self) -> Option<ClosedTangent<T, D>> {
-                match self { $(Self::$law(frozen) => frozen.closed()),* }
-            }
-        }
-
         impl Law for Material {
-            type Frozen<T: Real, const D: usize> = FrozenMaterial<T, D>;
-            #[inline(always)]
-            fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-                match self { $(Self::$law(law) => law.energy(at)),* }
+            fn memory(&self) -> &[Remembered] {
+                match self { $(Self::$law(law) => law.memory()),* }
             }
-            #[inline(always)]
-            fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => law.stress(at)),* }
+            fn is_symmetric(&self) -> bool {
+                match self { $(Self::$law(law) => law.is_symmetric()),* }
             }
-            #[inline(always)]
-            fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => law.elasticity(at, x)),* }
+            fn has_potential(&self) -> bool {
+                match self { $(Self::$law(law) => law.has_potential()),* }
+            }
+            fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+                match self { $(Self::$law(law) => Law::energy(law, at, start)),* }
+            }
+            fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+                match self { $(Self::$law(law) => Law::stress(law, at, start)),* }
+            }
+            fn elasticity<T: Real, const D: usize>(
+                &self, at: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
+            ) -> Tensor<T, D> {
+                match self { $(Self::$law(law) => Law::elasticity(law, at, start, x)),* }
             }
             fn tangent_density<T: Real, const D: usize>(
-                &self, at: &Deformation<T, D>, v: &Vector<T, D>, b: &Vector<T, D>,
+                &self, at: &Deformation<T, D>, start: &Start<'_>, v: &Vector<T, D>, b: &Vector<T, D>,
             ) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => law.tangent_density(at, v, b)),* }
+                match self { $(Self::$law(law) => Law::tangent_density(law, at, start, v, b)),* }
             }
-            fn freeze<T: Real, const D: usize>(
-                &self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, volume: T,
-            ) -> Self::Frozen<T, D> {
-                match self { $(Self::$law(law) => FrozenMaterial::$law(law.freeze(f_n, at, volume))),* }
+            fn closed<const D: usize>(
+                &self, f_n: &Tensor<f64, D>, at: &Deformation<f64, D>, volume: f64,
+            ) -> Option<ClosedTangent<f64, D>> {
+                match self { $(Self::$law(law) => Law::closed(law, f_n, at, volume)),* }
+            }
+            fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+                match self { $(Self::$law(law) => law.remember(at, start, next)),* }
             }
             fn shipped(&self) -> Option<&Material> {
                 Some(self)

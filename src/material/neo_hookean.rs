@@ -1,7 +1,7 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Lame, Law, LawVisitor};
+use super::{ClosedTangent, Elastic, Lame, LawVisitor};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 
@@ -17,7 +17,7 @@ pub enum Volumetric {
 /// Compressible neo-Hookean solid, W = U(J) − G ln J + G tr E.
 ///
 /// ```
-/// use bfree::material::{Lame, Law, NeoHookean};
+/// use bfree::material::{Elastic, Lame, NeoHookean};
 /// use bfree::tensor::{Deformation, Tensor};
 ///
 /// let lame = Lame::new(1.0, 1.0)?;
@@ -81,9 +81,7 @@ impl NeoHookean {
     }
 }
 
-impl Law for NeoHookean {
-    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
-
+impl Elastic for NeoHookean {
     /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
@@ -136,20 +134,20 @@ impl Law for NeoHookean {
     /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_nᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
     /// forward to the configuration n.
     #[inline(always)]
-    fn freeze<T: Real, const D: usize>(
+    fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> ClosedTangent<T, D> {
-        let shear = T::lit(self.lame.shear);
-        ClosedTangent {
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        let shear = self.lame.shear;
+        Some(ClosedTangent {
             a: rows(&(at.inverse_transpose() * f_n.transpose())),
             right: rows(&scaled(&(f_n * f_n.transpose()), shear * volume)),
             bulk: self.volumetric_stiffness(at) * volume,
             q: (self.volumetric_stress(at) - shear) * volume,
             both: None,
-        }
+        })
     }
 }
 
@@ -163,9 +161,7 @@ impl<const LOGARITHMIC: bool> Of<LOGARITHMIC> {
     }
 }
 
-impl<const LOGARITHMIC: bool> Law for Of<LOGARITHMIC> {
-    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
-
+impl<const LOGARITHMIC: bool> Elastic for Of<LOGARITHMIC> {
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         self.law().energy(at)
@@ -182,12 +178,12 @@ impl<const LOGARITHMIC: bool> Law for Of<LOGARITHMIC> {
     }
 
     #[inline(always)]
-    fn freeze<T: Real, const D: usize>(
+    fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> ClosedTangent<T, D> {
-        self.law().freeze(f_n, at, volume)
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        self.law().closed(f_n, at, volume)
     }
 }

@@ -1,7 +1,7 @@
 //! St. Venant–Kirchhoff solid (the paper's appendix B.2).
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Lame, Law, LawVisitor};
+use super::{ClosedTangent, Elastic, Lame, LawVisitor};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
@@ -25,9 +25,7 @@ fn hooke<T: Real, const D: usize>(lambda: T, shear: T, x: &Tensor<T, D>) -> Tens
     scaled(&identity(), lambda * trace(x)) + scaled(x, T::lit(2.0) * shear)
 }
 
-impl Law for StVenantKirchhoff {
-    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
-
+impl Elastic for StVenantKirchhoff {
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         let e = at.green_lagrange();
@@ -63,19 +61,19 @@ impl Law for StVenantKirchhoff {
     /// V₀ [ L F_n S F_nᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_n ],  M = F F_nᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_n, pushed
     /// forward to the configuration n.
     #[inline(always)]
-    fn freeze<T: Real, const D: usize>(
+    fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> ClosedTangent<T, D> {
-        let shear = T::lit(self.lame.shear) * volume;
-        ClosedTangent {
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        let shear = self.lame.shear * volume;
+        Some(ClosedTangent {
             a: rows(&(at.f * f_n.transpose())),
             right: rows(&scaled(&(f_n * self.stress(at) * f_n.transpose()), volume)),
-            bulk: T::lit(self.lame.lambda) * volume,
+            bulk: self.lame.lambda * volume,
             q: -shear,
             both: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_n * f_n.transpose()), shear))]),
-        }
+        })
     }
 }

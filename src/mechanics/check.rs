@@ -1,10 +1,12 @@
-//! A run checks its own tangent: every term's formula against dual numbers through the residual, particle by particle.
+//! A run checks its own tangent: every piece of it, through the products that the solver applies, against dual numbers through the
+//! residual.
 
-use crate::material::{FrozenTangent, Law};
+use crate::material::{Law, admissible};
+use crate::mechanics::point::{Part, compose};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::tangent::Term;
+use crate::mechanics::tangent::Tangent;
+use crate::mechanics::terms::Piece;
 use crate::tensor::{Tensor, Vector, identity, inverse};
-use num_dual::Dual64;
 
 /// The largest relative difference accepted: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
 ///
@@ -23,42 +25,22 @@ pub fn tangent_bound<const D: usize>(f: &Tensor<f64, D>) -> f64 {
     (64.0 * f64::EPSILON * condition * condition).min(1e-10)
 }
 
-/// What was compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Compared {
-    /// One term's formula.
-    Term(Term),
-    /// The frozen product that the solver applies, geometric and material together.
-    Frozen,
-}
-
-/// Where a part of the tangent was found wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Site {
-    /// At a particle.
-    Particle(usize),
-    /// At a node, by its active number.
-    Node(usize),
-}
-
-/// The tangent's formula and the derivative of the residual part.
+/// The tangent's product and the derivative of the residual.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the {compared:?} part of the tangent is wrong at {site:?}: component ({row}, {column}) is {analytic:e} by its formula and \
-     {dual:e} by dual numbers; allowed is a difference of {bound:e} relative to {scale:e}"
+    "the tangent is wrong ({compared}): the force on node {node} along axis {axis} is {analytic:e} by the product and {dual:e} by dual \
+     numbers; allowed is a difference of {bound:e} relative to {scale:e}"
 )]
 pub struct TangentMismatch {
-    /// What was compared.
-    pub compared: Compared,
-    /// Where.
-    pub site: Site,
-    /// Row of the component that differs most.
-    pub row: usize,
-    /// Its column (0 for a force on a node).
-    pub column: usize,
-    /// By the formula.
+    /// What was compared: a term, a part of one, the whole product, its precision, or its diagonal blocks.
+    pub compared: &'static str,
+    /// Active number of the node with the largest difference.
+    pub node: usize,
+    /// The component.
+    pub axis: usize,
+    /// By the product, or the block.
     pub analytic: f64,
-    /// By dual numbers.
+    /// By dual numbers, or by the product.
     pub dual: f64,
     /// The relative difference allowed.
     pub bound: f64,
@@ -71,10 +53,16 @@ pub struct TangentMismatch {
 pub enum CheckError {
     /// The tangent is wrong.
     #[error(transparent)]
-    Mismatch(#[from] Box<TangentMismatch>),
+    Mismatch(Box<TangentMismatch>),
     /// The state cannot be evaluated.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
+}
+
+impl From<TangentMismatch> for CheckError {
+    fn from(mismatch: TangentMismatch) -> Self {
+        Self::Mismatch(Box::new(mismatch))
+    }
 }
 
 /// A direction without pattern, entries in (−1, 1): the golden-ratio sequence from a start that differs with `seed`.
@@ -96,8 +84,12 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
     (0..nodes).map(|node| Vector::from_fn(|i, _| entry(node * D + i))).collect()
 }
 
+/// Relative difference allowed in single precision: rounding of the numbers of a tangent and of sums over a few hundred of them.
+const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
+
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Compares, at Δφ and in the direction `u`, every term's formula and the solver's frozen product with dual numbers.
+    /// Compares, at Δφ and in the direction `u`, every piece of the tangent and the whole of it, through the products that the solver applies, with dual numbers through
+    /// the same sweep; then the diagonal blocks of the preconditioner, and single precision where it is used, with the product.
     ///
     /// ```
     /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
@@ -106,7 +98,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let nodal = Nodal::project(particles, &supports, 1.0)?;
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
     /// let u = direction::<2>(nodes.len(), 2);
     /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
@@ -118,74 +110,99 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// ```
     ///
     /// # Errors
-    /// The first mismatch, by particle for the geometric and the material term, by node for inertia and pressure.
+    /// The first mismatch.
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
-        self.check_particles(dphi, u)?;
-        let pressure = self.pressure_magnitude(u);
-        for term in [Term::Inertia, Term::Pressure] {
-            let (analytic, dual) = (self.product(term, dphi, u)?, self.dual_product(term, dphi, u)?);
-            for (node, (a, d)) in analytic.iter().zip(&dual).enumerate() {
-                let (a, d) = (Tensor::<f64, D>::from_fn(|i, k| if k == 0 { a[i] } else { 0.0 }), {
-                    Tensor::<f64, D>::from_fn(|i, k| if k == 0 { d[i] } else { 0.0 })
-                });
-                let scale = d.norm() + if term == Term::Pressure { pressure[node] } else { 0.0 };
-                compare(Compared::Term(term), Site::Node(node), &a, &d, 1e-10, scale)?;
+        let mut u = u.to_vec();
+        self.clear_prescribed(&mut u);
+        let bound = self.worst_bound(dphi)?;
+        let product = |tangent: &Tangent<'_, D>| {
+            let mut out = vec![Vector::zeros(); u.len()];
+            tangent.product(&u, &mut out);
+            out
+        };
+        let mut whole = vec![Vector::zeros(); u.len()];
+        for piece in self.terms.pieces() {
+            let mut dual = self.derivative(piece, dphi, &u)?;
+            self.clear_prescribed(&mut dual);
+            let analytic = product(&self.tangent_of(piece, dphi)?);
+            // Where all that a piece does cancels, as what pressure does in 1D, its contributions say what round-off is.
+            let scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
+            compare(piece.name, &analytic, &dual, bound, scale)?;
+            if piece.part == Part::Whole {
+                whole.iter_mut().zip(&dual).for_each(|(sum, x)| *sum += x);
             }
+        }
+        let tangent = self.tangent(dphi)?;
+        compare("whole product", &product(&tangent), &whole, bound, norm(&whole))?;
+        self.check_blocks(&tangent, bound)?;
+        if let Some(single) = self.single_tangent(None, dphi)? {
+            let mut out = vec![Vector::zeros(); u.len()];
+            single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut out);
+            let product: Vec<_> = out.iter().map(|x| x.map(f64::from) * single.scale()).collect();
+            compare("single precision", &product, &whole, SINGLE, norm(&whole))?;
         }
         Ok(())
     }
 
-    /// Σ p A ‖L‖ N_I: the size of the two parts of the pressure's tangent, which cancel in 1D, where cof F = 1.
-    fn pressure_magnitude(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
-        let mut magnitude = vec![0.0; u.len()];
-        for point in &self.pressures {
-            let l = self.supports.gradient_at(point.particle, u);
-            for (node, n, _) in self.supports.of(point.particle) {
-                magnitude[node] += point.force.norm() * l.norm() * n.abs();
-            }
-        }
-        magnitude
+    /// The bound of the particle that is deformed most.
+    fn worst_bound(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        let particles = self.step.particles;
+        let bounds = self.step.supports.interpolate(dphi, |p, _, g| {
+            let at = admissible(compose(&g, &particles.displacement_gradient[p]))
+                .map_err(|source| Inadmissible { particle: particles.id[p] as usize, source })?;
+            Ok(tangent_bound(&at.f))
+        })?;
+        Ok(bounds.into_iter().fold(tangent_bound(&identity::<f64, D>()), f64::max))
     }
 
-    fn check_particles(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
-        let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-        let states = self.states(dphi)?;
-        let by_dual = |term: Term| {
-            self.supports.interpolate(&seeded, |p, _, g| {
-                Ok::<_, Inadmissible>(self.internal(p, &g, term.carry())?.map(|x| x.eps))
-            })
-        };
-        let (geometric, material) = (by_dual(Term::Geometric)?, by_dual(Term::Material)?);
-        self.supports.interpolate(u, |p, _, l| {
-            let scale = geometric[p].norm() + material[p].norm();
-            let bound = tangent_bound(&states[p].f);
-            let site = Site::Particle(self.particles.id[p] as usize);
-            for (term, dual) in [(Term::Geometric, &geometric[p]), (Term::Material, &material[p])] {
-                let analytic = self.particle_product(term, p, &states[p], &l);
-                compare(Compared::Term(term), site, &analytic, dual, bound, scale)?;
+    /// What a piece's contributions to K u amount to, where they may cancel: forces of loads times |u|/h.
+    fn size_of(&self, piece: Piece, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
+        let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
+        Ok(if self.terms.is_load(piece) { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
+    }
+
+    /// The diagonal blocks against the product with unit vectors at nodes far enough apart: each sees only its own.
+    fn check_blocks(&self, tangent: &Tangent<'_, D>, bound: f64) -> Result<(), CheckError> {
+        let blocks = tangent.diagonal_blocks();
+        let held = |node, i| self.prescribed.iter().any(|dof| dof.node == node && dof.component == i);
+        for node in (0..blocks.len()).step_by(blocks.len().div_ceil(BLOCKS).max(1)) {
+            for i in (0..D).filter(|&i| !held(node, i)) {
+                let (mut unit, mut out) = (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
+                unit[node][i] = 1.0;
+                tangent.product(&unit, &mut out);
+                let (mut column, scale) = (blocks[node].column(i).into_owned(), blocks[node].norm());
+                // Prescribed rows are the identity's.
+                (0..D).filter(|&k| held(node, k)).for_each(|k| column[k] = 0.0);
+                let found = compare("diagonal blocks", &[column], &[out[node]], bound, scale);
+                found.map_err(|error| CheckError::Mismatch(Box::new(TangentMismatch { node, ..error })))?;
             }
-            let f_n = identity::<f64, D>() + self.particles.displacement_gradient[p];
-            let frozen = self.law(p).freeze(&f_n, &states[p], self.particles.volume[p]).apply(&l);
-            compare(Compared::Frozen, site, &frozen, &(geometric[p] + material[p]), bound, scale)
-        })?;
+        }
         Ok(())
     }
 }
 
+/// Nodes whose blocks are compared.
+const BLOCKS: usize = 4;
+
+fn norm<const D: usize>(a: &[Vector<f64, D>]) -> f64 {
+    a.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
+}
+
 fn compare<const D: usize>(
-    compared: Compared,
-    site: Site,
-    analytic: &Tensor<f64, D>,
-    dual: &Tensor<f64, D>,
+    compared: &'static str,
+    analytic: &[Vector<f64, D>],
+    dual: &[Vector<f64, D>],
     bound: f64,
     scale: f64,
-) -> Result<(), CheckError> {
-    let difference = analytic - dual;
+) -> Result<(), TangentMismatch> {
+    let apart: Vec<_> = analytic.iter().zip(dual).map(|(a, b)| a - b).collect();
     // Written so that NaN is a mismatch.
-    if difference.norm() <= bound * scale {
+    if norm(&apart) <= bound * scale {
         return Ok(());
     }
-    let (row, column) = difference.abs().iamax_full();
-    let (analytic, dual) = (analytic[(row, column)], dual[(row, column)]);
-    Err(Box::new(TangentMismatch { compared, site, row, column, analytic, dual, bound, scale }).into())
+    let worst = |a: &Vector<f64, D>| a.amax();
+    let node = (0..apart.len()).max_by(|&a, &b| worst(&apart[a]).total_cmp(&worst(&apart[b]))).unwrap_or(0);
+    let axis = apart[node].iamax();
+    let (analytic, dual) = (analytic[node][axis], dual[node][axis]);
+    Err(TangentMismatch { compared, node, axis, analytic, dual, bound, scale })
 }

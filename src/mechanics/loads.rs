@@ -1,9 +1,8 @@
 //! Loads and prescribed motion: gravity and its curve, tractions, follower pressure, moving walls.
 
 use crate::grid::Grid;
-use crate::mechanics::sweep::Supports;
+use crate::mechanics::terms::{ForceField, Rayleigh};
 use crate::nodes::Nodes;
-use crate::pooled::Pooled;
 use crate::shape::Shape;
 use crate::tensor::Vector;
 
@@ -268,6 +267,10 @@ pub struct Loads<const D: usize> {
     pub surface: Vec<SurfaceLoad<D>>,
     /// Prescribed motion; where two hold the same component of a node, the later one wins.
     pub prescribed: Vec<Prescribed<D>>,
+    /// A body force that varies in space, given in code.
+    pub field: Option<ForceField<D>>,
+    /// Damping, if any.
+    pub damping: Option<Rayleigh>,
 }
 
 /// p A N of a particle under follower pressure.
@@ -280,45 +283,6 @@ pub struct PressurePoint<const D: usize> {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Nodal dead loads at time `t`: Σ_p m b N_I + Σ_Γ T N_I A, one vector per active node; `mass` is the lumped nodal mass, not
-    /// looked at without gravity.
-    ///
-    /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
-    ///
-    /// let falling = "gravity={\"acceleration\": [0, -10], \"curve\": [[0, 0], [2, 1]]}".parse()?;
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[falling])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let mass = Nodal::at_rest(particles, &supports, nodes.len()).mass;
-    /// // The nodes carry the weight of the particles, M g, half of it at half of the ramp.
-    /// let weight = -10.0 * particles.mass.iter().sum::<f64>();
-    /// let carried = |t| simulation.loads.dead(t, &mass, &supports).iter().map(|force| force[1]).sum::<f64>();
-    /// assert!((carried(2.0) / weight - 1.0).abs() < 1e-13);
-    /// assert!((carried(1.0) / weight - 0.5).abs() < 1e-13);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Pooled<Vector<f64, D>> {
-        let mut force = Pooled::filled(supports.nodes(), Vector::zeros());
-        if let Some(gravity) = &self.gravity {
-            // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
-            let b = gravity.acceleration * gravity.curve.value(t);
-            force.iter_mut().zip(mass).for_each(|(force, &m)| *force = b * m);
-        }
-        for load in &self.surface {
-            if let Pressing::Traction(traction) = load.pressing {
-                let traction = traction * load.curve.value(t);
-                for point in &load.points {
-                    for (node, n, _) in supports.of(point.particle) {
-                        force[node] += traction * (point.area * n);
-                    }
-                }
-            }
-        }
-        force
-    }
-
     /// p A N of every particle under follower pressure at time `t`.
     ///
     /// ```

@@ -2,12 +2,13 @@
 
 pub mod check;
 pub mod loads;
+pub mod mass;
 mod point;
 pub mod residual;
 pub mod rigid;
-pub mod single;
 pub mod smoothing;
 pub mod sweep;
 pub mod tangent;
+pub mod terms;
 pub mod time;
 pub mod transfer;

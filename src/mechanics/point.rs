@@ -3,9 +3,9 @@
 //! Written once, for every number. Nothing here returns early: a loop over particles is then arithmetic alone, which the
 //! compiler turns into vector instructions where the law is arithmetic alone too.
 
-use crate::material::{Law, NonPositiveJacobian, admissible_or_rest, piola};
+use crate::material::{ClosedTangent, Law, NonPositiveJacobian, Start, admissible_or_rest, piola};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, identity, scaled};
+use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// A particle whose deformation is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -17,30 +17,22 @@ pub struct Inadmissible {
     pub source: NonPositiveJacobian,
 }
 
-/// Which occurrences of Δφ carry derivatives. In the code that computes `F S`, letting only the left F carry the dual part gives the
-/// geometric term of the tangent, only the F inside S the material term, and so on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Carry {
-    /// Δφ in the acceleration.
-    pub inertia: bool,
-    /// F on the left of P = F S.
-    pub left: bool,
-    /// F inside S.
-    pub inside: bool,
-    /// F in the follower pressure.
-    pub pressure: bool,
-}
-
-impl Carry {
-    /// All of them: the residual itself.
-    pub const ALL: Self = Self { inertia: true, left: true, inside: true, pressure: true };
-    /// None of them.
-    pub const NONE: Self = Self { inertia: false, left: false, inside: false, pressure: false };
+/// A part of a term's tangent that can be frozen alone. In the code that computes `F S`, letting only the left F carry derivatives gives
+/// the geometric part, and only the F inside S the material part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Part {
+    /// All of it.
+    #[default]
+    Whole,
+    /// δF S, from the F on the left of P = F S.
+    Geometric,
+    /// F [ℂ : Fᵀ δF], from the F inside S.
+    Material,
 }
 
 /// `x`, or its real part alone.
 #[inline(always)]
-pub(super) fn carried<T: Real>(x: T, carries: bool) -> T {
+fn carried<T: Real>(x: T, carries: bool) -> T {
     if carries { x } else { T::lit(x.value()) }
 }
 
@@ -62,31 +54,67 @@ pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) 
 }
 
 /// V₀ F S F_nᵀ at ∇u = `g`: times ∇_n N_I it is the internal force on node I. With it det F, which the caller judges: where it is
-/// not positive, S is that of the body at rest.
+/// not positive, S is that of the body at rest. Only the F of `part` carry derivatives.
 #[inline(always)]
 pub(super) fn internal<L: Law, T: Real, const D: usize>(
     law: &L,
+    start: &Start<'_>,
     g: &Tensor<T, D>,
     h_n: &Tensor<f64, D>,
     volume: f64,
-    carry: Carry,
+    part: Part,
 ) -> (Tensor<T, D>, f64) {
     let h = compose(g, h_n);
-    let f_left = identity::<T, D>() + h.map(|x| carried(x, carry.left));
-    let (at, det_f) = admissible_or_rest(h.map(|x| carried(x, carry.inside)));
-    let piola = piola(law, &f_left, &at);
+    let f_left = identity::<T, D>() + h.map(|x| carried(x, part != Part::Material));
+    let (at, det_f) = admissible_or_rest(h.map(|x| carried(x, part != Part::Geometric)));
+    let piola = piola(law, &f_left, &at, start);
     let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
     (scaled(&(piola * f_n_t), T::lit(volume)), det_f)
 }
 
-/// The law frozen at ∇u = `g`, and det F as in [`internal`].
+/// δσ = V₀ δP F_nᵀ as a linear map of L = Σ u ⊗ ∇_n N.
+pub(super) enum Frozen<const D: usize> {
+    Closed(ClosedTangent<f64, D>),
+    /// The blocks F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ + (F_nᵀe_k · S F_nᵀe_l) I of all pairs of unit gradients (eqs. 37, 38), times V₀.
+    General([[[[f64; D]; D]; D]; D]),
+}
+
+/// The law frozen at ∇u = `g`, a part of it alone if asked for, and det F as in [`internal`].
 #[inline(always)]
 pub(super) fn freeze<L: Law, const D: usize>(
     law: &L,
+    start: &Start<'_>,
     g: &Tensor<f64, D>,
     h_n: &Tensor<f64, D>,
     volume: f64,
-) -> (L::Frozen<f64, D>, f64) {
+    part: Part,
+) -> (Frozen<D>, f64) {
     let (at, det_f) = admissible_or_rest(compose(g, h_n));
-    (law.freeze(&(identity::<f64, D>() + h_n), &at, volume), det_f)
+    let f_n = identity::<f64, D>() + h_n;
+    let frozen = match law.closed(&f_n, &at, volume) {
+        Some(closed) if part == Part::Whole => Frozen::Closed(closed),
+        Some(closed) => {
+            // δF S F_nᵀ = L B with B = F_n S F_nᵀ
+            let geometric = scaled(&(f_n * law.stress(&at, start) * f_n.transpose()), volume);
+            Frozen::Closed(closed.part(&geometric, part == Part::Geometric))
+        }
+        None => {
+            let stress = law.stress(&at, start);
+            let unit = |k: usize| f_n.transpose() * Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+            Frozen::General(std::array::from_fn(|k| {
+                std::array::from_fn(|l| {
+                    let (v, b) = (unit(k), unit(l));
+                    let mut block = Tensor::zeros();
+                    if part != Part::Geometric {
+                        block += at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose();
+                    }
+                    if part != Part::Material {
+                        block += scaled(&identity(), v.dot(&(stress * b)));
+                    }
+                    std::array::from_fn(|i| std::array::from_fn(|j| volume * block[(i, j)]))
+                })
+            }))
+        }
+    };
+    (frozen, det_f)
 }

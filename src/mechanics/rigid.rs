@@ -60,20 +60,20 @@ pub fn loose<const D: usize, L: Law>(
 ) -> Option<Loose> {
     let positions: Vec<Vector<f64, D>> = nodes.positions(grid).map(|(_, x)| x).collect();
     let group = groups(equilibrium, positions.len());
-    let force = equilibrium.external_force(&vec![Vector::zeros(); positions.len()]);
+    let force = equilibrium.external_force(&vec![Vector::zeros(); positions.len()]).ok()?;
     let mut of_group = vec![Vec::new(); positions.len()];
     group.iter().enumerate().for_each(|(node, &root)| of_group[root].push(node));
     for (root, members) in of_group.iter().enumerate().filter(|(_, members)| !members.is_empty()) {
         let held = equilibrium.prescribed.iter().filter(|dof| group[dof.node] == root);
         let held = held.map(|dof| (dof.node, dof.component));
         if let Some(axis) = pushed(&positions, members, held, &force) {
-            let mut bodies: Vec<u32> = (0..equilibrium.supports.particles())
-                .filter(|&p| equilibrium.supports.of(p).next().is_some_and(|(node, ..)| group[node] == root))
-                .map(|p| equilibrium.particles.body[p])
+            let mut bodies: Vec<u32> = (0..equilibrium.step.supports.particles())
+                .filter(|&p| equilibrium.step.supports.of(p).next().is_some_and(|(node, ..)| group[node] == root))
+                .map(|p| equilibrium.step.particles.body[p])
                 .collect();
             bodies.sort_unstable();
             bodies.dedup();
-            let bodies = bodies.into_iter().map(|body| equilibrium.bodies[body as usize].name.clone()).collect();
+            let bodies = bodies.into_iter().map(|body| equilibrium.step.bodies[body as usize].name.clone()).collect();
             return Some(Loose { bodies, axis });
         }
     }
@@ -90,9 +90,9 @@ fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: us
         node
     }
     let mut parent: Vec<usize> = (0..count).collect();
-    for p in 0..equilibrium.supports.particles() {
+    for p in 0..equilibrium.step.supports.particles() {
         let mut last = None;
-        for (node, ..) in equilibrium.supports.of(p) {
+        for (node, ..) in equilibrium.step.supports.of(p) {
             let one = root(&mut parent, node);
             let other = last.map_or(one, |last| root(&mut parent, last));
             parent[one.max(other)] = one.min(other);

@@ -120,11 +120,12 @@ impl Smoothing {
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
         let velocity: Pooled<_> = particles.velocity.iter().map(|v| v - frame).collect();
         let mean = nodal_mean(particles, supports, mass, &velocity);
-        let mut at_particles: Pooled<_> = velocity.iter().map(|v| scalar(v.norm_squared())).collect();
-        let mean_square = nodal_mean(particles, supports, mass, &at_particles);
+        let squares: Pooled<_> = velocity.iter().map(|v| Vector::from([v.norm_squared()])).collect();
+        let mean_square = nodal_mean(particles, supports, mass, &squares);
+        let mut at_particles = velocity;
         supports.each_value(&mean, |p, mean| at_particles[p] = mean);
         let mean_of_mean = nodal_mean(particles, supports, mass, &at_particles);
-        let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, D>)| {
+        let share = |((v, v_twice), square): ((&Vector<f64, D>, &Vector<f64, D>), &Vector<f64, 1>)| {
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
             let kink = (q / KINK).powi(SHARPNESS).min(1.0);
@@ -158,22 +159,20 @@ impl Smoothing {
         if let Some(shares) = at_kinks {
             let mut drawn = nodal_mean(particles, supports, mass, field);
             drawn.iter_mut().zip(shares).for_each(|(u, &share)| *u *= share);
-            let share: Pooled<_> = shares.iter().map(|&share| scalar(share)).collect();
-            let mut own = Pooled::filled(field.len(), Vector::zeros());
-            supports.each_value(&share, |p, share| own[p] = field[p] * share[0]);
-            supports.each_value(&drawn, |p, drawn| change[p] += drawn - own[p]);
+            supports.each_value::<1>(bytemuck::cast_slice(shares), |p, share| change[p] -= field[p] * share[0]);
+            supports.each_value(&drawn, |p, drawn| change[p] += drawn);
         }
         change
     }
 }
 
 /// M_L⁻¹ Σ_p N m u_p
-fn nodal_mean<const D: usize>(
+fn nodal_mean<const C: usize, const D: usize>(
     particles: &Particles<D>,
     supports: &Supports<D>,
     mass: &[f64],
-    field: &[Vector<f64, D>],
-) -> Pooled<Vector<f64, D>> {
+    field: &[Vector<f64, C>],
+) -> Pooled<Vector<f64, C>> {
     let mut out = Pooled::filled(mass.len(), Vector::zeros());
     supports.spread(&mut out, |p| field[p] * particles.mass[p]);
     for (w, &m) in out.iter_mut().zip(mass) {
@@ -181,9 +180,4 @@ fn nodal_mean<const D: usize>(
         *w = if m > 0.0 { *w / m } else { Vector::zeros() };
     }
     out
-}
-
-/// A number where a vector is asked for.
-fn scalar<const D: usize>(value: f64) -> Vector<f64, D> {
-    Vector::from_fn(|i, _| if i == 0 { value } else { 0.0 })
 }

@@ -1,21 +1,17 @@
 //! Particles → nodes (eqs. 40–42) and nodes → particles (eqs. 45, 50–52).
 
 use crate::grid::Grid;
+use crate::material::{Law, Start, admissible_or_rest};
 use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::mass::{Mass, is_light, lumped};
 use crate::mechanics::residual::compose;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
-use crate::particles::Particles;
+use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
+use crate::solver::LinearError;
 use crate::tensor::Vector;
-
-/// A node lighter than this fraction of the heaviest particle gets no projected velocity: its Δφ comes from the stiffness.
-const LIGHT: f64 = 1e-14;
-
-/// Tolerance of the projection (42) when ε < 1.
-const PROJECTION_TOLERANCE: f64 = 1e-12;
 
 /// Lumped mass, velocity and acceleration at the active nodes: each array as long as there are nodes, or empty where nothing
 /// needs it.
@@ -58,43 +54,17 @@ impl<const D: usize> Nodal<D> {
     ///
     /// # Errors
     /// Particle velocities so large that the projection overflows.
-    pub fn project(
-        particles: &Particles<D>,
-        supports: &Supports<D>,
-        count: usize,
-        lumping: f64,
-    ) -> Result<Self, LinearError> {
-        let Self { mass, .. } = Self::mass_alone(particles, supports, count);
-        let right = |field: &[Vector<f64, D>]| {
-            let mut out = Pooled::filled(count, Vector::zeros());
-            supports.spread(&mut out, |p| field[p] * particles.mass[p]);
-            out
-        };
-        let (mut velocity, mut acceleration) = (right(&particles.velocity), right(&particles.acceleration));
-        let light = light(particles);
-        let mut iterations = 0;
-        if lumping < 1.0 {
-            let effective = EffectiveMass::new(particles, supports, &mass, lumping);
-            iterations += effective.solve(&mut velocity)? + effective.solve(&mut acceleration)?;
-        } else {
-            for (field, m) in velocity.iter_mut().zip(&mut acceleration).zip(&mass) {
-                *field.0 /= *m;
-                *field.1 /= *m;
-            }
-        }
-        for (node, &m) in mass.iter().enumerate() {
-            if m < light {
-                velocity[node] = Vector::zeros();
-                acceleration[node] = Vector::zeros();
-            }
-        }
-        Ok(Self { mass, velocity, acceleration, iterations })
+    pub fn project(particles: &Particles<D>, supports: &Supports<D>, lumping: f64) -> Result<Self, LinearError> {
+        let lumped = lumped(particles, supports);
+        let mass = Mass { particles, supports, lumped: &lumped, lumping };
+        let ([velocity, acceleration], iterations) = mass.project([&particles.velocity, &particles.acceleration])?;
+        Ok(Self { mass: lumped, velocity, acceleration, iterations })
     }
 
     /// The lumped mass, and no motion.
-    pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let still = Pooled::filled(count, Vector::zeros());
-        Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports, count) }
+    pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+        let still = Pooled::filled(supports.nodes(), Vector::zeros());
+        Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports) }
     }
 
     /// The lumped mass, which gravity acts on, and no inertia.
@@ -112,10 +82,8 @@ impl<const D: usize> Nodal<D> {
     /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports, nodes.len()).is_static());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let mut mass = Pooled::filled(count, Vector::<f64, D>::zeros());
-        supports.spread(&mut mass, |p| Vector::from_fn(|i, _| if i == 0 { particles.mass[p] } else { 0.0 }));
-        Self { mass: mass.iter().map(|m| m[0]).collect(), ..Self::default() }
+    pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+        Self { mass: lumped(particles, supports), ..Self::default() }
     }
 
     /// Whether there is no inertia.
@@ -144,9 +112,9 @@ impl<const D: usize> Nodal<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn accelerate(&mut self, particles: &Particles<D>, unbalanced: &[Vector<f64, D>]) {
-        let light = light(particles);
+        let is_light = is_light(particles);
         for ((a, r), &m) in self.acceleration.iter_mut().zip(unbalanced).zip(&self.mass) {
-            *a = if m >= light { -r / m } else { Vector::zeros() };
+            *a = if is_light(m) { Vector::zeros() } else { -r / m };
         }
     }
 
@@ -174,63 +142,6 @@ impl<const D: usize> Nodal<D> {
             overwritten.acceleration[dof.node][dof.component] = dof.step.acceleration_start;
         }
         overwritten
-    }
-}
-
-/// The mass below which a node counts as light.
-fn light<const D: usize>(particles: &Particles<D>) -> f64 {
-    LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m))
-}
-
-/// M̃ u = Σ_p (1−ε) m N_I (Σ_J N_J u_J) + ε m_I u_I, with its diagonal as preconditioner.
-struct EffectiveMass<'a, const D: usize> {
-    particles: &'a Particles<D>,
-    supports: &'a Supports<D>,
-    mass: &'a [f64],
-    lumping: f64,
-    inverse_diagonal: Pooled<f64>,
-}
-
-impl<'a, const D: usize> EffectiveMass<'a, D> {
-    fn new(particles: &'a Particles<D>, supports: &'a Supports<D>, mass: &'a [f64], lumping: f64) -> Self {
-        let mut diagonal: Pooled<f64> = mass.iter().map(|m| lumping * m).collect();
-        supports.scatter(&mut diagonal, |p, n, _| (1.0 - lumping) * particles.mass[p] * n * n);
-        // Of the least numbers above 0 there is no inverse.
-        let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
-        diagonal.iter_mut().for_each(|d| *d = inverse(*d));
-        Self { particles, supports, mass, lumping, inverse_diagonal: diagonal }
-    }
-
-    /// Overwrites the right-hand side by the solution; from zero, so that a singular M gives the answer of least norm.
-    fn solve(&self, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
-        let right: Pooled<_> = field.iter().copied().collect();
-        field.fill(Vector::zeros());
-        let settings = ConjugateGradientSettings {
-            relative_tolerance: PROJECTION_TOLERANCE,
-            max_iterations: 10 * right.len() + 100,
-        };
-        let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        Ok(conjugate_gradient(self, self, right, solution, &settings)?.iterations)
-    }
-}
-
-impl<const D: usize> LinearOperator for EffectiveMass<'_, D> {
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
-        let (x, y): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
-        for ((y, x), m) in y.iter_mut().zip(x).zip(self.mass) {
-            *y = x * (self.lumping * m);
-        }
-        let mut at_particles = Pooled::filled(self.particles.len(), Vector::zeros());
-        self.supports.each_value(x, |p, value| at_particles[p] = value);
-        self.supports.spread(y, |p| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p]));
-    }
-}
-
-impl<const D: usize> Preconditioner for EffectiveMass<'_, D> {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
-        for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
-            *z = r * self.inverse_diagonal[k / D];
-        }
     }
 }
 
@@ -391,14 +302,23 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// Writes to the particles, in place: the only place that does, once per step.
-    pub fn commit(self, particles: &mut Particles<D>, supports: &Supports<D>) {
-        let Particles { position, velocity, acceleration, displacement_gradient, .. } = particles;
+    pub fn commit<L: Law>(self, particles: &mut Particles<D>, bodies: &[Body<L>], supports: &Supports<D>, dt: f64) {
+        let remembered = particles.remembered;
+        let mut next = vec![0.0; remembered];
+        let Particles { position, velocity, acceleration, displacement_gradient, memory, body, .. } = particles;
         supports.each_particle(
             self.dphi,
             |_, delta_x, g| (delta_x, g),
             |p, (delta_x, g)| {
                 position[p] += delta_x;
                 displacement_gradient[p] = compose(&g, &displacement_gradient[p]);
+                if remembered > 0 {
+                    let memory = &mut memory[p * remembered..(p + 1) * remembered];
+                    let (at, _) = admissible_or_rest(displacement_gradient[p]);
+                    next.copy_from_slice(memory);
+                    bodies[body[p] as usize].law.remember(&at, &Start { dt, memory }, &mut next);
+                    memory.copy_from_slice(&next);
+                }
             },
         );
         if self.delta_velocity.is_empty() {

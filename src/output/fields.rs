@@ -2,7 +2,7 @@
 
 use super::{OutputError, Reference};
 use crate::field::Field;
-use crate::material::{Law, first_piola};
+use crate::material::{Law, Start, admissible, piola};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 
@@ -41,7 +41,10 @@ impl Field {
         let id = particles.id[particle] as usize;
         let h = || particles.displacement_gradient[particle];
         let law = || &simulation.bodies[particles.body[particle] as usize].law;
-        let stress = || cauchy_stress(law(), h()).map_err(|source| OutputError::Inadmissible { particle: id, source });
+        let stress = || {
+            cauchy_stress(law(), &particles.start(particle, 0.0), h())
+                .map_err(|source| OutputError::Inadmissible { particle: id, source })
+        };
         match self {
             Self::Position => out.extend(padded(&particles.position[particle])),
             Self::Displacement => {
@@ -66,7 +69,7 @@ impl Field {
             }
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
-            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()))),
+            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(particle, 0.0))),
             Self::Mass => out.push(particles.mass[particle]),
             Self::Volume => out.push(particles.volume[particle]),
             Self::Body => out.push(f64::from(particles.body[particle])),
@@ -115,13 +118,14 @@ pub(crate) fn padded<const D: usize>(v: &Vector<f64, D>) -> [f64; 3] {
 /// σ = P Fᵀ / J with P = F S (eq. 7), and the out-of-plane normal stress of plane or uniaxial strain on the rest of the diagonal.
 fn cauchy_stress<const D: usize, L: Law>(
     law: &L,
+    start: &Start<'_>,
     h: Tensor<f64, D>,
 ) -> Result<Tensor<f64, 3>, crate::material::NonPositiveJacobian> {
-    let at = Deformation::new(h);
-    let piola = first_piola(law, &at.f, h)?;
+    let at = admissible(h)?;
+    let piola = piola(law, &at.f, &at, start);
     let mut stress = crate::material::embed(&(piola * at.f.transpose() / at.jacobian));
     for i in D..3 {
-        stress[(i, i)] = law.out_of_plane_stress(&at);
+        stress[(i, i)] = law.out_of_plane_stress(&at, start);
     }
     Ok(stress)
 }

@@ -233,6 +233,7 @@ impl Scene {
             self.fill(body, &path, &means, &grid, i as u32, &mut particles)?;
             bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
         }
+        particles.remember_rest(&bodies);
         let loads = self.loads(&grid, &particles)?;
         let mut simulation = Simulation {
             grid,
@@ -243,6 +244,7 @@ impl Scene {
             settings: self.settings(),
             clock: Clock::new(self.time.step, self.time.max_halvings),
             external_work: 0.0,
+            dissipated: 0.0,
             workspace: Default::default(),
         };
         self.set_initial_velocity(&mut simulation)?;

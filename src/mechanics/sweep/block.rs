@@ -1,17 +1,14 @@
 //! A block of cells: its groups of particles, their weights, and its box of nodes.
 
 use super::kernel::Window;
-use super::lanes::{LANES, SINGLE_LANES};
-use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector};
+use super::lanes::LANES;
+use crate::tensor::Vector;
 
 /// A cube of cells: its groups, its box of nodes, and which of them are active.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
     /// The particles.
-    pub(super) groups: Groups<f64, LANES>,
-    /// The same particles in the same order, for products in single precision.
-    pub(super) single: Option<Groups<f32, SINGLE_LANES>>,
+    pub(super) groups: Groups,
     /// Index of the first node of the box along each axis.
     pub(super) origin: [u32; 3],
     /// Nodes of the box along each axis; 1 along axes that do not exist.
@@ -24,25 +21,27 @@ pub(super) struct Block {
     pub(super) active: Vec<u64>,
 }
 
-/// Groups of up to `L` particles of a block, with a common window each.
+/// Groups of up to eight particles of a block, with a common window each.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Groups<X, const L: usize> {
+pub struct Groups {
     /// 1, 2 or 3.
     pub(super) dimension: usize,
     /// Nodes of the box from one row to the next, and from one plane to the next.
     pub(super) stride: [usize; 2],
     /// Number of the first group, over all blocks.
     pub(super) first: usize,
-    pub(super) windows: Vec<Group>,
-    /// Weights of the groups, one after the other, as in [`Window`]; in single precision dN/dx is in units of 1/h.
-    pub(super) weights: Vec<[X; L]>,
+    pub(super) windows: Vec<Span>,
+    /// Weights of the groups, one after the other, as in [`Window`].
+    pub(super) weights: Vec<[f64; LANES]>,
+    /// The same in single precision, dN/dx in units of 1/h; empty where no product asks for it.
+    pub(super) single: Vec<[f32; LANES]>,
     /// Particles of each group; the lanes behind them hold zeros.
-    pub(super) particles: Vec<[u32; L]>,
+    pub(super) particles: Vec<[u32; LANES]>,
 }
 
-/// Particles and their common window.
+/// Where the window and the weights of a group are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Group {
+pub struct Span {
     /// Where its weights begin.
     pub(super) weights: u32,
     /// The first node of the window, as a place in the box.
@@ -53,19 +52,28 @@ pub(super) struct Group {
     pub(super) lanes: u8,
 }
 
-impl<X, const L: usize> Groups<X, L> {
+/// The particles of a group, by their places in memory, and its number over all blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Group<'a> {
+    /// From 0.
+    pub number: usize,
+    /// Up to eight, a lane each.
+    pub particles: &'a [u32],
+}
+
+impl Groups {
     /// No groups yet, in the arrays of others.
-    pub(super) fn renewed(self, dimension: usize, size: [usize; 3]) -> Self {
-        let Self { mut windows, mut weights, mut particles, .. } = self;
-        windows.clear();
-        weights.clear();
-        particles.clear();
-        Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, windows, weights, particles }
+    pub(super) fn renewed(mut self, dimension: usize, size: [usize; 3]) -> Self {
+        self.windows.clear();
+        self.weights.clear();
+        self.single.clear();
+        self.particles.clear();
+        Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, ..self }
     }
 
     /// The particles, group by group.
     pub(super) fn in_order(&self) -> impl Iterator<Item = u32> {
-        (0..self.len()).flat_map(|group| self.particles(group).iter().copied())
+        (0..self.len()).flat_map(|group| self.group(group).particles.iter().copied())
     }
 
     /// Number of groups.
@@ -73,39 +81,33 @@ impl<X, const L: usize> Groups<X, L> {
         self.windows.len()
     }
 
-    /// The particles of a group.
+    /// A group of the block.
     #[inline(always)]
-    pub(super) fn particles(&self, group: usize) -> &[u32] {
-        &self.particles[group][..usize::from(self.windows[group].lanes)]
+    pub(super) fn group(&self, group: usize) -> Group<'_> {
+        let lanes = usize::from(self.windows[group].lanes);
+        Group { number: self.first + group, particles: &self.particles[group][..lanes] }
     }
 
-    /// Window and weights of a group.
+    /// Window and weights of a group, `weights` being those of all groups.
     #[inline(always)]
-    pub(super) fn window(&self, group: usize) -> Window<'_, X, L> {
-        let Group { weights, first, width, lanes } = self.windows[group];
+    pub(super) fn window<'w, X>(&self, group: usize, weights: &'w [[X; LANES]]) -> Window<'w, X> {
+        let Span { weights: start, first, width, lanes } = self.windows[group];
         let width = width.map(usize::from);
         let rows = 2 * width[..self.dimension].iter().sum::<usize>();
         Window {
+            dimension: self.dimension,
             width,
-            weights: &self.weights[weights as usize..weights as usize + rows],
+            weights: &weights[start as usize..start as usize + rows],
             lanes: usize::from(lanes),
             first: first as usize,
             stride: self.stride,
         }
     }
 
-    /// Calls `visit(group, lane, particle)`.
-    pub(super) fn each(&self, mut visit: impl FnMut(usize, usize, usize)) {
-        for group in 0..self.len() {
-            for (lane, &p) in self.particles(group).iter().enumerate() {
-                visit(group, lane, p as usize);
-            }
-        }
-    }
-
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.windows.as_slice())
             + size_of_val(self.weights.as_slice())
+            + size_of_val(self.single.as_slice())
             + size_of_val(self.particles.as_slice())
     }
 }
@@ -119,45 +121,35 @@ impl Block {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self)
             + self.groups.bytes()
-            + self.single.as_ref().map_or(0, Groups::bytes)
             + size_of_val(self.nodes.as_slice())
             + size_of_val(self.places.as_slice())
             + size_of_val(self.active.as_slice())
     }
 
-    /// Fills the box from a field on the active nodes; zero at the others.
-    pub(super) fn fill<X: Real, T: Real, const D: usize>(&self, field: &[Vector<T, D>], nodal: &mut [X]) {
+    /// Fills the box with `components` numbers a node, those from `at` on of the `numbers` numbers that `field` has; zero at nodes that
+    /// are not active.
+    pub(super) fn fill<X: Copy + num_traits::Zero>(
+        &self,
+        field: &[X],
+        numbers: usize,
+        at: usize,
+        components: usize,
+        nodal: &mut [X],
+    ) {
         nodal.fill(X::zero());
         for (&node, &place) in self.nodes.iter().zip(&self.places) {
-            for c in 0..D {
-                nodal[place as usize * D + c] = X::lit(field[node as usize][c].value());
-            }
+            let (to, from) = (place as usize * components, node as usize * numbers + at);
+            nodal[to..to + components].copy_from_slice(&field[from..from + components]);
         }
     }
 
-    /// Adds the part of the box, `numbers` numbers a node, that lies on the active nodes `first ..` of which `out` holds the sums.
-    pub(super) fn add<X, O>(
-        &self,
-        buffer: &[X],
-        numbers: usize,
-        first: usize,
-        out: &mut [O],
-        add: impl Fn(&mut O, &[X]),
-    ) {
-        let start = self.nodes.partition_point(|&node| (node as usize) < first);
-        let end = self.nodes.partition_point(|&node| (node as usize) < first + out.len());
-        for (&node, &place) in self.nodes[start..end].iter().zip(&self.places[start..end]) {
-            let place = place as usize * numbers;
-            add(&mut out[node as usize - first], &buffer[place..place + numbers]);
+    /// Calls `add(place in the box, node − first)` for the active nodes `first .. end`.
+    pub(super) fn each_node(&self, first: usize, end: usize, mut add: impl FnMut(usize, usize)) {
+        let place_of = |bound: usize| self.nodes.partition_point(|&node| (node as usize) < bound);
+        let range = place_of(first)..place_of(end);
+        for (&node, &place) in self.nodes[range.clone()].iter().zip(&self.places[range]) {
+            add(place as usize, node as usize - first);
         }
-    }
-
-    pub(super) fn boxed<T: Real, const D: usize>(&self, field: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
-        let mut nodal = vec![Vector::zeros(); self.box_nodes()];
-        for (&node, &place) in self.nodes.iter().zip(&self.places) {
-            nodal[place as usize] = field[node as usize];
-        }
-        nodal
     }
 
     /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
@@ -168,7 +160,7 @@ impl Block {
         lane: usize,
         mut visit: impl FnMut(usize, f64, Vector<f64, D>),
     ) {
-        let window = self.groups.window(group);
+        let window = self.groups.window(group, &self.groups.weights);
         let weights = |k: usize, at: usize| {
             let (n, dn) = window.axis(k);
             [n[at][lane], dn[at][lane]]
@@ -195,26 +187,5 @@ impl Block {
                 }
             }
         }
-    }
-
-    /// (Σ u_I N_I, Σ u_I ⊗ ∇_n N_I)
-    #[inline(always)]
-    pub(super) fn gather<T: Real, const D: usize>(
-        &self,
-        group: usize,
-        lane: usize,
-        nodal: &[Vector<T, D>],
-    ) -> (Vector<T, D>, Tensor<T, D>) {
-        let (mut value, mut gradient) = (Vector::<T, D>::zeros(), Tensor::<T, D>::zeros());
-        self.entries::<D>(group, lane, |place, n, grad_n| {
-            let (u, n) = (&nodal[place], T::lit(n));
-            for i in 0..D {
-                value[i] += u[i] * n;
-                for k in 0..D {
-                    gradient[(i, k)] += u[i] * T::lit(grad_n[k]);
-                }
-            }
-        });
-        (value, gradient)
     }
 }

@@ -1,15 +1,14 @@
 //! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
 
-use super::block::{Block, Group, Groups};
+use super::block::{Block, Groups, Span};
 use super::columns::{Along, Columns, Family};
-use super::kernel::widest_window;
+use super::kernel::WIDEST_TILE;
 use super::lanes::LANES;
 use super::order::{Key, follows};
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::pooled::{Element, Pooled, kept_as_it_is};
-use crate::scalar::Real;
 use crate::tensor::Vector;
 use std::ops::Range;
 
@@ -18,8 +17,8 @@ use std::ops::Range;
 pub(super) struct Scratch {
     /// The particles of a block on each axis.
     along: [Along; 3],
-    /// The functions of a group along each axis, eight particles after eight.
-    columns: Vec<Columns>,
+    /// The functions of a group along each axis.
+    columns: [Columns; 3],
     /// Groups and their windows.
     groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
@@ -47,16 +46,32 @@ pub(super) fn block<const D: usize>(
         size[k] = (high - low) as usize;
         origin[k] = low;
     }
-    let Block { groups, single: other, mut nodes, mut places, mut active, .. } = spare;
+    let Block { groups, mut nodes, mut places, mut active, .. } = spare;
     active.clear();
     active.resize(size[1] * size[2], 0);
     let building = Building { family, grid, keys, origin, size };
-    let groups = building.groups(groups, 1.0, scratch, Some(&mut active))?;
-    let in_single = || building.groups(other.unwrap_or_default(), grid.spacing, scratch, None);
-    let single = single.then(in_single).transpose()?;
+    let mut groups = building.groups(groups, scratch, &mut active)?;
+    if single {
+        groups.round(grid.spacing);
+    }
     nodes.clear();
     places.clear();
-    Ok(Block { groups, single, origin, size, nodes, places, active })
+    Ok(Block { groups, origin, size, nodes, places, active })
+}
+
+impl Groups {
+    /// Adds the weights in single precision, dN/dx in units of 1/h.
+    fn round(&mut self, h: f64) {
+        let Self { dimension, windows, weights, single, .. } = self;
+        single.reserve_exact(weights.len());
+        for window in windows {
+            for nodes in window.width[..*dimension].iter().map(|&nodes| usize::from(nodes)) {
+                let (values, derivatives) = weights[single.len()..single.len() + 2 * nodes].split_at(nodes);
+                single.extend(values.iter().map(|row| row.map(|n| n as f32)));
+                single.extend(derivatives.iter().map(|row| row.map(|dn| (dn * h) as f32)));
+            }
+        }
+    }
 }
 
 /// The smallest interval that holds all.
@@ -75,20 +90,14 @@ struct Building<'a, const D: usize> {
 }
 
 impl<const D: usize> Building<'_, D> {
-    /// The particles by groups, dN/dx times `unit`, in the arrays of `spare`; marks the nodes of their functions in `active`.
-    fn groups<X: Real, const L: usize>(
-        &self,
-        spare: Groups<X, L>,
-        unit: f64,
-        scratch: &mut Scratch,
-        mut active: Option<&mut Vec<u64>>,
-    ) -> Result<Groups<X, L>, ApproximationError> {
+    /// The particles by groups, in the arrays of `spare`; marks the nodes of their functions in `active`.
+    fn groups(&self, spare: Groups, scratch: &mut Scratch, active: &mut [u64]) -> Result<Groups, ApproximationError> {
         let mut built = spare.renewed(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
         groups.clear();
         let (mut start, mut rows) = (0, 0);
         while start < self.keys.len() {
-            let end = group_end::<L, D>(self.keys, &scratch.along[0].spans, start);
+            let end = group_end::<D>(self.keys, &scratch.along[0].spans, start);
             let mut windows = [[0; 2]; 3];
             for (window, along) in windows.iter_mut().zip(&scratch.along).take(D) {
                 *window = union(&along.spans[start..end]);
@@ -105,31 +114,24 @@ impl<const D: usize> Building<'_, D> {
         built.particles.shrink_to(2 * groups.len());
         built.weights.shrink_to(2 * rows);
         for (particles, windows) in &groups {
-            self.push(&mut built, particles.clone(), windows, unit, scratch, active.as_deref_mut())?;
+            self.push(&mut built, particles.clone(), windows, scratch, active)?;
         }
         scratch.groups = groups;
         Ok(built)
     }
 
     /// Appends a group.
-    fn push<X: Real, const L: usize>(
+    fn push(
         &self,
-        groups: &mut Groups<X, L>,
+        groups: &mut Groups,
         particles: Range<usize>,
         windows: &[[u32; 2]; 3],
-        unit: f64,
         scratch: &mut Scratch,
-        active: Option<&mut Vec<u64>>,
+        active: &mut [u64],
     ) -> Result<(), ApproximationError> {
         let (keys, Scratch { along, columns, .. }) = (&self.keys[particles.clone()], scratch);
-        let eights = keys.len().div_ceil(LANES);
-        columns.resize_with(columns.len().max(D * eights), Columns::default);
-        for (part, keys) in keys.chunks(LANES).enumerate() {
-            let start = particles.start + part * LANES;
-            for k in 0..D {
-                let columns = &mut columns[part * D + k];
-                self.family.columns(&self.grid.axis(k), &mut along[k], start..start + keys.len(), columns)?;
-            }
+        for k in 0..D {
+            self.family.columns(&self.grid.axis(k), &mut along[k], particles.clone(), &mut columns[k])?;
         }
         let mut width = [1; 3];
         let mut first = 0;
@@ -137,22 +139,16 @@ impl<const D: usize> Building<'_, D> {
             width[k] = (windows[k][1] - windows[k][0]) as u8;
             first = first * self.size[k] + (windows[k][0] - self.origin[k]) as usize;
         }
-        let group = Group { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
+        let group = Span { weights: groups.weights.len() as u32, first: first as u32, width, lanes: keys.len() as u8 };
         for k in 0..D {
             let (start, nodes) = (groups.weights.len(), usize::from(width[k]));
-            groups.weights.resize(start + 2 * nodes, [X::zero(); L]);
+            groups.weights.resize(start + 2 * nodes, [0.0; LANES]);
             let (values, derivatives) = groups.weights[start..].split_at_mut(nodes);
-            for (part, keys) in keys.chunks(LANES).enumerate() {
-                columns[part * D + k].write(keys.len(), windows[k][0], unit, values, derivatives, part * LANES);
-            }
+            columns[k].write(keys.len(), windows[k][0], values, derivatives);
         }
         groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
         groups.windows.push(group);
-        if let Some(active) = active {
-            for (part, keys) in keys.chunks(LANES).enumerate() {
-                self.mark(&columns[part * D..(part + 1) * D], keys.len(), active);
-            }
-        }
+        self.mark(&columns[..D], keys.len(), active);
         Ok(())
     }
 
@@ -193,21 +189,21 @@ impl<const D: usize> Building<'_, D> {
 
 /// Where the group that begins at `start` ends: as many particles of a cell as there are lanes, or whole neighbouring cells
 /// along x while all fit into the lanes and their window is not too wide.
-fn group_end<const L: usize, const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
+fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
     // No further than a group reaches: a cell may hold very many.
     let cell_end =
-        |from: usize| from + keys[from..].iter().take(L + 1).take_while(|key| key.cell == keys[from].cell).count();
+        |from: usize| from + keys[from..].iter().take(LANES + 1).take_while(|key| key.cell == keys[from].cell).count();
     let mut end = cell_end(start);
-    if end - start > L {
-        return start + L;
+    if end - start > LANES {
+        return start + LANES;
     }
     while end < keys.len() && follows::<D>(&keys[end - 1], &keys[end]) {
         let next = cell_end(end);
-        if next - start > L {
+        if next - start > LANES {
             break;
         }
         let [low, high] = union(&along_x[start..next]);
-        if (high - low) as usize > widest_window(L) {
+        if (high - low) as usize > WIDEST_TILE {
             break;
         }
         end = next;

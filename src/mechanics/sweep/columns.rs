@@ -4,13 +4,12 @@
 //! particle asks for its list.
 
 use super::WIDEST;
-use super::lanes::{LANES, Lanes, Number, WithLanes};
+use super::lanes::{LANES, Lanes, Widest, WithLanes};
 use crate::approximation::{
     self, ApproximationError, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED, Separable,
     Shipped,
 };
 use crate::grid::Axis;
-use crate::scalar::Real;
 use std::ops::{Add, Div, Mul, Range, Sub};
 
 /// A product of functions, and how far they reach if they have vector lanes.
@@ -106,11 +105,11 @@ struct Places<'a> {
     along: &'a mut Along,
 }
 
-impl WithLanes<f64, LANES> for Places<'_> {
+impl WithLanes<f64> for Places<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes<LANES, X = f64>>(self, _: S) {
+    fn run<S: Lanes<X = f64>>(self, _: S) {
         let Self { axis, radius, along } = self;
         let count = along.x.len();
         along.cells.resize(count, 0);
@@ -170,29 +169,17 @@ impl Columns {
         [self.values[row][lane], self.derivatives[row][lane]]
     }
 
-    /// Writes N and dN/dx times `unit` of the first `count` lanes to the rows of the nodes `low ..`, in the lanes from `at` on, which
-    /// hold zeros.
-    #[inline(always)]
-    pub(super) fn write<X: Real, const L: usize>(
-        &self,
-        count: usize,
-        low: u32,
-        unit: f64,
-        values: &mut [[X; L]],
-        derivatives: &mut [[X; L]],
-        at: usize,
-    ) {
+    /// Writes N and dN/dx of the first `count` lanes to the rows of the nodes `low ..`, which hold zeros.
+    pub(super) fn write(&self, count: usize, low: u32, values: &mut [[f64; LANES]], derivatives: &mut [[f64; LANES]]) {
         // The same nodes in all lanes, as in one cell: whole rows.
         let skipped = usize::try_from(i64::from(low) - self.first[0]);
-        let fits = skipped.is_ok_and(|skipped| skipped + values.len() <= WIDEST);
-        if fits && count == LANES && self.first.iter().all(|&first| first == self.first[0]) {
-            for (i, (values, derivatives)) in values.iter_mut().zip(derivatives).enumerate() {
-                let row = (i64::from(low) - self.first[0]) as usize + i;
-                for lane in 0..LANES {
-                    values[at + lane] = X::lit(self.values[row][lane]);
-                    derivatives[at + lane] = X::lit(self.derivatives[row][lane] * unit);
-                }
-            }
+        if let Ok(skipped) = skipped
+            && skipped + values.len() <= WIDEST
+            && count == LANES
+            && self.first.iter().all(|&first| first == self.first[0])
+        {
+            values.copy_from_slice(&self.values[skipped..skipped + values.len()]);
+            derivatives.copy_from_slice(&self.derivatives[skipped..skipped + derivatives.len()]);
             return;
         }
         for lane in 0..count {
@@ -200,8 +187,8 @@ impl Columns {
             let rows = (i64::from(first) - self.first[lane]) as usize;
             for (i, node) in (first..end).enumerate() {
                 let to = (node - low) as usize;
-                values[to][at + lane] = X::lit(self.values[rows + i][lane]);
-                derivatives[to][at + lane] = X::lit(self.derivatives[rows + i][lane] * unit);
+                values[to][lane] = self.values[rows + i][lane];
+                derivatives[to][lane] = self.derivatives[rows + i][lane];
             }
         }
     }
@@ -232,11 +219,11 @@ struct Evaluate<'a, 'b, I, const M: usize> {
     lanes: InLanes<'b>,
 }
 
-impl<I: Interior, const M: usize> WithLanes<f64, LANES> for Evaluate<'_, '_, I, M> {
+impl<I: Interior, const M: usize> WithLanes<f64> for Evaluate<'_, '_, I, M> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes<LANES, X = f64>>(self, s: S) {
+    fn run<S: Lanes<X = f64>>(self, s: S) {
         let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;
         let wide = |x: &[f64; LANES]| Wide(s, s.load(x));
         let (below, above) = (wide(&below), wide(&above));
@@ -257,20 +244,20 @@ impl<I: Interior, const M: usize> WithLanes<f64, LANES> for Evaluate<'_, '_, I, 
 }
 
 /// The lanes of a vector, with operators.
-struct Wide<S: Lanes<LANES, X = f64>>(S, S::N);
+struct Wide<S: Lanes<X = f64>>(S, S::N);
 
-impl<S: Lanes<LANES, X = f64>> Clone for Wide<S> {
+impl<S: Lanes<X = f64>> Clone for Wide<S> {
     #[inline(always)]
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<S: Lanes<LANES, X = f64>> Copy for Wide<S> {}
+impl<S: Lanes<X = f64>> Copy for Wide<S> {}
 
 macro_rules! operator {
     ($operator:ident, $method:ident) => {
-        impl<S: Lanes<LANES, X = f64>> $operator for Wide<S> {
+        impl<S: Lanes<X = f64>> $operator for Wide<S> {
             type Output = Self;
 
             #[inline(always)]
@@ -286,7 +273,7 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-impl<S: Lanes<LANES, X = f64>> Lane for Wide<S> {
+impl<S: Lanes<X = f64>> Lane for Wide<S> {
     #[inline(always)]
     fn constant(self, x: f64) -> Self {
         Self(self.0, self.0.splat(x))

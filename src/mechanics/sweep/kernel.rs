@@ -1,32 +1,27 @@
-//! Gather and scatter of one group of particles, sum-factorised.
+//! Gather and scatter of one group of particles, sum-factorised, for C components a node.
 //!
-//! A group is up to `L` particles, one for each lane, that share one window of nodes, so that the nodes of a window are read
-//! and written once for all of them. `L` is 8 in double and 16 in single precision.
+//! A group is up to eight particles, one for each lane, that share one window of nodes, so that the nodes of a window are read
+//! and written once for all of them.
 //!
 //! gather, a lane a particle:  u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z;
 //! scatter, a lane a row (y, z) of the window: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector};
-use num_traits::{One, Zero};
+use num_traits::One;
 
-/// The widest window along x of a group of neighbouring cells.
-pub(super) const fn widest_window(lanes: usize) -> usize {
-    if lanes == LANES { 6 } else { 8 }
-}
-
-/// The widest tile along x that a kernel keeps in registers; in single precision the entries of a row in 3D fill a vector.
-const fn widest_tile(lanes: usize) -> usize {
-    if lanes == LANES { 6 } else { 5 }
-}
+/// The widest window along x of a group of neighbouring cells, and the widest tile that a kernel sums at a time.
+pub(super) const WIDEST_TILE: usize = 6;
 
 /// A group's window of nodes and its weights.
-pub(super) struct Window<'a, X, const L: usize> {
+#[derive(Clone, Copy)]
+pub struct Window<'a, X> {
+    /// 1, 2 or 3.
+    pub dimension: usize,
     /// Nodes along each axis; 1 along axes that do not exist.
     pub width: [usize; 3],
     /// Axis after axis: N of each node, then dN/dx of each node, a lane a particle.
-    pub weights: &'a [[X; L]],
+    pub weights: &'a [[X; LANES]],
     /// Particles: lanes from here on are empty, with weights zero.
     pub lanes: usize,
     /// Number of the first node in the box of the block.
@@ -35,20 +30,54 @@ pub(super) struct Window<'a, X, const L: usize> {
     pub stride: [usize; 2],
 }
 
-impl<X, const L: usize> Window<'_, X, L> {
+impl<X> Window<'_, X> {
     /// N of axis `k`, and behind it dN/dx.
     #[inline(always)]
-    pub(super) fn axis(&self, k: usize) -> (&[[X; L]], &[[X; L]]) {
+    pub(super) fn axis(&self, k: usize) -> (&[[X; LANES]], &[[X; LANES]]) {
         let start: usize = 2 * self.width[..k].iter().sum::<usize>();
         self.weights[start..start + 2 * self.width[k]].split_at(self.width[k])
     }
 }
 
+/// What components are at the particles of a group: values, and gradients by rows, a lane each.
+#[derive(Clone, Copy, Debug)]
+pub struct At<X, const C: usize, const D: usize> {
+    /// `value[c]`, of each lane
+    pub value: [[X; LANES]; C],
+    /// `gradient[c][k]`, of each lane
+    pub gradient: [[[X; LANES]; D]; C],
+}
+
+impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
+    /// Zero everywhere.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self { value: [[X::zero(); LANES]; C], gradient: [[[X::zero(); LANES]; D]; C] }
+    }
+}
+
+/// Whether values and gradients are there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parts {
+    /// Σ u_I N_I, or q N_I
+    pub value: bool,
+    /// Σ u_I ⊗ ∇N_I, or σ ∇N_I
+    pub gradient: bool,
+}
+
+impl Parts {
+    /// Both.
+    pub const BOTH: Self = Self { value: true, gradient: true };
+    /// Values alone.
+    pub const VALUE: Self = Self { value: true, gradient: false };
+    /// Gradients alone.
+    pub const GRADIENT: Self = Self { value: false, gradient: true };
+}
+
 /// The width of the next tile where `left` nodes are left along x: 1 only for a window of one node.
 #[inline(always)]
-pub(super) fn tile<const L: usize>(left: usize) -> usize {
-    let widest = widest_tile(L);
-    if left <= widest { left } else { left.div_ceil(2).min(widest - 1) }
+pub(super) fn tile(left: usize) -> usize {
+    if left <= WIDEST_TILE { left } else { left.div_ceil(2).min(WIDEST_TILE - 1) }
 }
 
 /// Calls a function of the width of a tile: compiled for every width, or once for all where the lanes are rare.
@@ -68,103 +97,61 @@ macro_rules! by_tile {
 
 pub(super) use by_tile;
 
-/// u and L of a group: `value[c]`, `gradient[c][k]`.
-#[derive(Clone, Copy)]
-pub(super) struct Gathered<N, const D: usize> {
-    pub value: [N; D],
-    pub gradient: [[N; D]; D],
+/// Fills value and gradient, C and C·D rows, from the box `nodal`, component after component of each node.
+pub(super) struct Gather<'a, X, const C: usize, const D: usize> {
+    pub window: Window<'a, X>,
+    pub nodal: &'a [X],
+    pub parts: Parts,
+    pub value: &'a mut [[X; LANES]],
+    pub gradient: &'a mut [[X; LANES]],
 }
 
-/// u and L of a group in memory: the components of u, then those of L by rows, a lane a particle; the rest is not used.
-pub(super) type Rows<X = f64, const L: usize = LANES> = [[X; L]; 12];
+impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Gather<'_, X, C, D> {
+    type Output = ();
 
-/// Writes u and L.
-#[inline(always)]
-pub(super) fn store<S: Lanes<L>, const D: usize, const L: usize>(
-    s: S,
-    from: &Gathered<S::N, D>,
-    rows: &mut Rows<S::X, L>,
-) {
-    for c in 0..D {
-        s.store(from.value[c], &mut rows[c]);
-        for k in 0..D {
-            s.store(from.gradient[c][k], &mut rows[D + c * D + k]);
+    #[inline(always)]
+    fn run<S: Lanes<X = X>>(self, s: S) {
+        let Self { window, nodal, parts, value, gradient } = self;
+        let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
+        let mut start = 0;
+        while start < window.width[0] {
+            let tile = tile(window.width[0] - start);
+            by_tile!(tile, gather_tile::<S, C, D>(s, &window, start, nodal, parts.value, &mut out));
+            start += tile;
+        }
+        if parts.value {
+            value.iter_mut().zip(out.value).for_each(|(row, value)| s.store(value, row));
+        }
+        if parts.gradient {
+            gradient.iter_mut().zip(out.gradient.as_flattened()).for_each(|(row, &slope)| s.store(slope, row));
         }
     }
 }
 
-/// Reads u and L.
-#[inline(always)]
-pub(super) fn load<S: Lanes<L>, const D: usize, const L: usize>(s: S, rows: &Rows<S::X, L>) -> Gathered<S::N, D> {
-    let mut loaded = Gathered { value: [s.zero(); D], gradient: [[s.zero(); D]; D] };
-    for c in 0..D {
-        loaded.value[c] = s.load(&rows[c]);
-        for k in 0..D {
-            loaded.gradient[c][k] = s.load(&rows[D + c * D + k]);
-        }
-    }
-    loaded
-}
-
-/// u and L of one particle.
-#[inline(always)]
-pub(super) fn of_lane<T: Real, const D: usize>(rows: &Rows, lane: usize) -> (Vector<T, D>, Tensor<T, D>) {
-    let value = Vector::from_fn(|i, _| T::lit(rows[i][lane]));
-    (value, Tensor::from_fn(|i, k| T::lit(rows[D + i * D + k][lane])))
-}
-
-/// Sets q and σ of one particle.
-#[inline(always)]
-pub(super) fn set_lane<T: Real, const D: usize>(
-    rows: &mut Rows,
-    lane: usize,
-    value: &Vector<T, D>,
-    gradient: &Tensor<T, D>,
-) {
-    for i in 0..D {
-        rows[i][lane] = value[i].value();
-        for k in 0..D {
-            rows[D + i * D + k][lane] = gradient[(i, k)].value();
-        }
-    }
-}
-
-/// u = Σ u_I N_I (if `VALUE`) and L = Σ u_I ⊗ ∇N_I of a group; `nodal` holds the box, component after component of each node.
-#[inline(always)]
-pub(super) fn gather<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool>(
-    s: S,
-    window: &Window<'_, S::X, L>,
-    nodal: &[S::X],
-) -> Gathered<S::N, D> {
-    let zero = s.zero();
-    let mut out = Gathered { value: [zero; D], gradient: [[zero; D]; D] };
-    let mut start = 0;
-    while start < window.width[0] {
-        let tile = tile::<L>(window.width[0] - start);
-        by_tile!(tile, gather_tile::<S, D, L, VALUE>(s, window, start, nodal, &mut out));
-        start += tile;
-    }
-    out
+/// u and L of a group in registers.
+struct Gathered<N, const C: usize, const D: usize> {
+    value: [N; C],
+    gradient: [[N; D]; C],
 }
 
 /// What is known of a row of nodes, a plane of them, or all, contracted with N_x, N_y, N_z: Σ u N, and with one derivative.
-type Sums<N, const D: usize, const K: usize> = [[N; D]; K];
+type Sums<N, const C: usize, const K: usize> = [[N; C]; K];
 
 /// (Σ_x u N_x, Σ_x u N_x') of the row that begins at the node `first`.
 // Functions, not closures: a closure that is not inlined loses the wide instructions.
 #[inline(always)]
-fn row<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
+fn row<S: Lanes, const C: usize, const W: usize>(
     s: S,
     weights: &[[S::N; W]; 2],
     nodal: &[S::X],
     first: usize,
     width: usize,
-) -> Sums<S::N, D, 2> {
-    let row = &nodal[first * D..(first + width) * D];
-    let mut sums = [[s.zero(); D]; 2];
+) -> Sums<S::N, C, 2> {
+    let row = &nodal[first * C..(first + width) * C];
+    let mut sums = [[s.zero(); C]; 2];
     for x in 0..width.min(W) {
-        for c in 0..D {
-            let u = s.splat(row[x * D + c]);
+        for c in 0..C {
+            let u = s.splat(row[x * C + c]);
             sums[0][c] = s.mul_add(u, weights[0][x], sums[0][c]);
             sums[1][c] = s.mul_add(u, weights[1][x], sums[1][c]);
         }
@@ -174,20 +161,20 @@ fn row<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
 
 /// (Σ u N_x N_y, Σ u N_x' N_y, Σ u N_x N_y') of the plane that begins at the node `first`.
 #[inline(always)]
-fn plane<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
+fn plane<S: Lanes, const C: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X, L>,
+    window: &Window<'_, S::X>,
     weights: &[[S::N; W]; 2],
     nodal: &[S::X],
     first: usize,
     width: usize,
-) -> Sums<S::N, D, 3> {
+) -> Sums<S::N, C, 3> {
     let (ny, dy) = window.axis(1);
-    let mut sums = [[s.zero(); D]; 3];
+    let mut sums = [[s.zero(); C]; 3];
     for y in 0..ny.len() {
-        let [value, slope] = row::<S, D, L, W>(s, weights, nodal, first + y * window.stride[0], width);
+        let [value, slope] = row::<S, C, W>(s, weights, nodal, first + y * window.stride[0], width);
         let (ny, dy) = (s.load(&ny[y]), s.load(&dy[y]));
-        for c in 0..D {
+        for c in 0..C {
             sums[0][c] = s.mul_add(value[c], ny, sums[0][c]);
             sums[1][c] = s.mul_add(slope[c], ny, sums[1][c]);
             sums[2][c] = s.mul_add(value[c], dy, sums[2][c]);
@@ -197,12 +184,13 @@ fn plane<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
 }
 
 #[inline(always)]
-fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, const W: usize>(
+fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X, L>,
+    window: &Window<'_, S::X>,
     start: usize,
     nodal: &[S::X],
-    out: &mut Gathered<S::N, D>,
+    with_value: bool,
+    out: &mut Gathered<S::N, C, D>,
     width: usize,
 ) {
     let (n, dn) = window.axis(0);
@@ -213,12 +201,14 @@ fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, c
     }
     let origin = window.first + start;
     if D == 1 {
-        let [value, slope] = row::<S, D, L, W>(s, &weights, nodal, origin, width);
-        out.value[0] = s.add(out.value[0], value[0]);
-        out.gradient[0][0] = s.add(out.gradient[0][0], slope[0]);
+        let [value, slope] = row::<S, C, W>(s, &weights, nodal, origin, width);
+        for c in 0..C {
+            out.value[c] = s.add(out.value[c], value[c]);
+            out.gradient[c][0] = s.add(out.gradient[c][0], slope[c]);
+        }
     } else if D == 2 {
-        let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin, width);
-        for c in 0..D {
+        let [value, x, y] = plane::<S, C, W>(s, window, &weights, nodal, origin, width);
+        for c in 0..C {
             out.value[c] = s.add(out.value[c], value[c]);
             out.gradient[c][0] = s.add(out.gradient[c][0], x[c]);
             out.gradient[c][1] = s.add(out.gradient[c][1], y[c]);
@@ -226,10 +216,10 @@ fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, c
     } else {
         let (nz, dz) = window.axis(2);
         for z in 0..nz.len() {
-            let [value, x, y] = plane::<S, D, L, W>(s, window, &weights, nodal, origin + z * window.stride[1], width);
+            let [value, x, y] = plane::<S, C, W>(s, window, &weights, nodal, origin + z * window.stride[1], width);
             let (nz, dz) = (s.load(&nz[z]), s.load(&dz[z]));
-            for c in 0..D {
-                if VALUE {
+            for c in 0..C {
+                if with_value {
                     out.value[c] = s.mul_add(value[c], nz, out.value[c]);
                 }
                 out.gradient[c][0] = s.mul_add(x[c], nz, out.gradient[c][0]);
@@ -240,76 +230,51 @@ fn gather_tile<S: Lanes<L>, const D: usize, const L: usize, const VALUE: bool, c
     }
 }
 
-/// Which terms a scatter has.
-pub(super) trait Terms {
-    /// q N_I
-    const VALUE: bool;
-    /// σ ∇N_I
-    const GRADIENT: bool;
+/// f_I += σ ∇N_I + q N_I, with q in the place of u, C rows, and σ in that of L, C·D rows, a lane a particle; `out` is a box as in
+/// [`Gather`], a vector longer than its nodes.
+pub(super) struct Scatter<'a, X, const C: usize, const D: usize> {
+    pub window: Window<'a, X>,
+    pub parts: Parts,
+    pub value: &'a [[X; LANES]],
+    pub gradient: &'a [[X; LANES]],
+    pub out: &'a mut [X],
 }
 
-/// q N_I + σ ∇N_I
-pub(super) struct Both;
+impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Scatter<'_, X, C, D> {
+    type Output = ();
 
-impl Terms for Both {
-    const VALUE: bool = true;
-    const GRADIENT: bool = true;
-}
-
-/// q N_I
-pub(super) struct OnlyValue;
-
-impl Terms for OnlyValue {
-    const VALUE: bool = true;
-    const GRADIENT: bool = false;
-}
-
-/// σ ∇N_I
-pub(super) struct OnlyGradient;
-
-impl Terms for OnlyGradient {
-    const VALUE: bool = false;
-    const GRADIENT: bool = true;
-}
-
-/// f_I += σ ∇N_I + q N_I, with σ in the place of L and q in that of u, a lane a particle; `out` is the box as in [`gather`],
-/// a vector longer than its nodes.
-#[inline(always)]
-pub(super) fn scatter<S: Lanes<L>, M: Terms, const D: usize, const L: usize>(
-    s: S,
-    window: &Window<'_, S::X, L>,
-    from: &Gathered<S::N, D>,
-    out: &mut [S::X],
-) {
-    let mut rows = [[S::X::zero(); L]; 12];
-    store(s, from, &mut rows);
-    let from = rows;
-    let rows = window.width[1] * window.width[2];
-    for chunk in 0..rows.div_ceil(L) {
-        let pairs = Pairs::<S, D, L>::new(s, window, chunk * L);
-        let mut start = 0;
-        while start < window.width[0] {
-            let tile = tile::<L>(window.width[0] - start);
-            by_tile!(tile, scatter_tile::<S, M, D, L>(s, window, start, &pairs, &from, out));
-            start += tile;
+    #[inline(always)]
+    fn run<S: Lanes<X = X>>(self, s: S) {
+        let Self { window, parts, value, gradient, out } = self;
+        // Fixed lengths, so that no place in them is checked.
+        let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
+        let rows = window.width[1] * window.width[2];
+        for chunk in 0..rows.div_ceil(LANES) {
+            let pairs = Pairs::<S, D>::new(s, &window, chunk * LANES);
+            let mut start = 0;
+            while start < window.width[0] {
+                let tile = tile(window.width[0] - start);
+                by_tile!(tile, scatter_tile::<S, C, D>(s, &window, start, &pairs, parts, value, gradient, out));
+                start += tile;
+            }
         }
     }
 }
 
-/// Of `L` rows (y, z) of a window: N_y N_z, N_y' N_z, N_y N_z', a lane a row, for each particle; and where the rows begin.
-pub(super) struct Pairs<S: Lanes<L>, const D: usize, const L: usize> {
-    pub(super) products: [[S::N; L]; D],
-    places: [usize; L],
+/// Of eight rows (y, z) of a window: N_y N_z, N_y' N_z, N_y N_z', a lane a row, for each particle; and where the rows begin.
+pub(super) struct Pairs<S: Lanes, const D: usize> {
+    pub(super) products: [[S::N; LANES]; D],
+    places: [usize; LANES],
     count: usize,
 }
 
-impl<S: Lanes<L>, const D: usize, const L: usize> Pairs<S, D, L> {
+impl<S: Lanes, const D: usize> Pairs<S, D> {
     #[inline(always)]
-    pub(super) fn new(s: S, window: &Window<'_, S::X, L>, start: usize) -> Self {
+    pub(super) fn new(s: S, window: &Window<'_, S::X>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
-        let count = (wy * wz - start).min(L);
-        let mut products = [[s.zero(); L]; D];
-        let mut places = [0; L];
+        let count = (wy * wz - start).min(LANES);
+        let mut products = [[s.zero(); LANES]; D];
+        let mut places = [0; LANES];
         let (mut y, mut z) = (start % wy, start / wy);
         for lane in 0..count {
             places[lane] = window.first + y * window.stride[0] + z * window.stride[1];
@@ -343,13 +308,13 @@ impl<S: Lanes<L>, const D: usize, const L: usize> Pairs<S, D, L> {
     /// row in their order.
     #[inline(always)]
     pub(super) fn add(&self, s: S, sums: &[S::N], at: usize, numbers: usize, out: &mut [S::X]) {
-        for (part, some) in sums.chunks(L).enumerate() {
-            let mut rows = [s.zero(); L];
+        for (part, some) in sums.chunks(LANES).enumerate() {
+            let mut rows = [s.zero(); LANES];
             rows[..some.len()].copy_from_slice(some);
             let rows = s.transpose(rows);
             for lane in 0..self.count {
-                let place = (self.places[lane] + at) * numbers + part * L;
-                if let Some(slot) = out[place..].first_chunk_mut::<L>() {
+                let place = (self.places[lane] + at) * numbers + part * LANES;
+                if let Some(slot) = out[place..].first_chunk_mut::<LANES>() {
                     let sum = s.add(s.load(slot), rows[lane]);
                     s.store(sum, slot);
                 }
@@ -359,50 +324,53 @@ impl<S: Lanes<L>, const D: usize, const L: usize> Pairs<S, D, L> {
 }
 
 #[inline(always)]
-fn scatter_tile<S: Lanes<L>, M: Terms, const D: usize, const L: usize, const W: usize>(
+#[allow(clippy::too_many_arguments)] // what a window, its rows and its particles are
+fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X, L>,
+    window: &Window<'_, S::X>,
     start: usize,
-    pairs: &Pairs<S, D, L>,
-    from: &Rows<S::X, L>,
+    pairs: &Pairs<S, D>,
+    parts: Parts,
+    value: &[[S::X; LANES]; C],
+    gradient: &[[[S::X; LANES]; D]; C],
     out: &mut [S::X],
     width: usize,
 ) {
     let zero = s.zero();
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
-    let mut sums = [[zero; D]; W];
+    let mut sums = [[zero; C]; W];
     let sums = &mut sums[..width.min(W)];
-    for p in 0..window.lanes.min(L) {
-        let (mut across, mut along) = ([zero; D], [zero; D]);
-        for c in 0..D {
+    for p in 0..window.lanes.min(LANES) {
+        let (mut across, mut along) = ([zero; C], [zero; C]);
+        for c in 0..C {
             // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z
-            if M::GRADIENT {
+            if parts.gradient {
                 for k in 1..D {
-                    across[c] = s.mul_add(s.splat(from[D + c * D + k][p]), pairs.products[k][p], across[c]);
+                    across[c] = s.mul_add(s.splat(gradient[c][k][p]), pairs.products[k][p], across[c]);
                 }
-                along[c] = s.mul(s.splat(from[D + c * D][p]), pairs.products[0][p]);
+                along[c] = s.mul(s.splat(gradient[c][0][p]), pairs.products[0][p]);
             }
-            if M::VALUE {
-                across[c] = s.mul_add(s.splat(from[c][p]), pairs.products[0][p], across[c]);
+            if parts.value {
+                across[c] = s.mul_add(s.splat(value[c][p]), pairs.products[0][p], across[c]);
             }
         }
         for x in 0..sums.len() {
             let (nx, dx) = (s.splat(n[x][p]), s.splat(dn[x][p]));
-            for c in 0..D {
+            for c in 0..C {
                 sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
-                if M::GRADIENT {
+                if parts.gradient {
                     sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);
                 }
             }
         }
     }
-    pairs.add(s, sums.as_flattened(), start, D, out);
+    pairs.add(s, sums.as_flattened(), start, C, out);
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::{Number, Portable, PortableSingle, SINGLE_LANES, WithLanes};
+    use super::super::lanes::{Portable, Widest};
     use super::*;
 
     const WIDTH: [usize; 3] = [7, 3, 5];
@@ -416,28 +384,29 @@ mod tests {
 
     /// Gathers and scatters what was gathered.
     #[derive(Clone, Copy)]
-    struct ThereAndBack<'a, X, const L: usize>(&'a [[X; L]], &'a [X]);
+    struct ThereAndBack<'a, X>(&'a [[X; LANES]], &'a [X]);
 
-    impl<X: Real, const L: usize> WithLanes<X, L> for ThereAndBack<'_, X, L> {
+    impl<X: Real> WithLanes<X> for ThereAndBack<'_, X> {
         type Output = (Vec<X>, Vec<X>);
 
         #[inline(always)]
-        fn run<S: Lanes<L, X = X>>(self, s: S) -> Self::Output {
+        fn run<S: Lanes<X = X>>(self, s: S) -> Self::Output {
             let stride = [BOX[0], BOX[0] * BOX[1]];
-            let window = Window { width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
-            let at = gather::<S, 3, L, true>(s, &window, self.1);
-            let mut out = vec![X::zero(); self.1.len() + L];
-            scatter::<S, Both, 3, L>(s, &window, &at, &mut out);
-            let mut rows = [[X::zero(); L]; 12];
-            store(s, &at, &mut rows);
-            let gathered = rows[3..].iter().chain(&rows[..3]).flatten().copied().collect();
-            (gathered, out)
+            let window = Window { dimension: 3, width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
+            let (parts, mut at) = (Parts::BOTH, At::<X, 3, 3>::zero());
+            let At { value, gradient } = &mut at;
+            let gradient = gradient.as_flattened_mut();
+            Gather::<X, 3, 3> { window, nodal: self.1, parts, value, gradient }.run(s);
+            let mut out = vec![X::zero(); self.1.len() + LANES];
+            let (value, gradient) = (at.value.as_slice(), at.gradient.as_flattened());
+            Scatter::<X, 3, 3> { window, parts, value, gradient, out: &mut out }.run(s);
+            (gradient.iter().chain(value).flatten().copied().collect(), out)
         }
     }
 
     /// Weights, nodal values, and the results of these sums written down: place, N and ∇N of every node of the window.
     #[allow(clippy::type_complexity)]
-    fn problem<X: Real, const L: usize>() -> (Vec<[X; L]>, Vec<X>, Vec<f64>, Vec<f64>) {
+    fn problem<X: Real>() -> (Vec<[X; LANES]>, Vec<X>, Vec<f64>, Vec<f64>) {
         let rows = 2 * WIDTH.iter().sum::<usize>();
         let weight = |row: usize, lane: usize| if lane < PARTICLES { irregular(row * 8 + lane) } else { 0.0 };
         let weights = (0..rows).map(|row| std::array::from_fn(|lane| X::lit(weight(row, lane)))).collect();
@@ -447,7 +416,7 @@ mod tests {
             [weight(start, lane), weight(start + WIDTH[k], lane)]
         };
         let mut expected = vec![0.0; nodal.len()];
-        let mut gathered = vec![[0.0; L]; 12];
+        let mut gathered = vec![[0.0; LANES]; 12];
         for scattering in [false, true] {
             for lane in 0..PARTICLES {
                 for (x, y, z) in
@@ -481,9 +450,9 @@ mod tests {
 
     #[test]
     fn all_instruction_sets_give_the_plain_sums() {
-        let (weights, nodal, gathered, scattered) = problem::<f64, LANES>();
+        let (weights, nodal, gathered, scattered) = problem::<f64>();
         let work = ThereAndBack(&weights, &nodal);
-        judge(vec![work.run(Portable), f64::widest(work)], &gathered, &scattered, 1e-13);
+        judge(vec![work.run(Portable::<f64>::NEW), f64::widest(work)], &gathered, &scattered, 1e-13);
         #[cfg(target_arch = "x86_64")]
         if let Some(s) = pulp::x86::V3::try_new() {
             judge(vec![work.run(s)], &gathered, &scattered, 1e-13);
@@ -492,8 +461,8 @@ mod tests {
 
     #[test]
     fn so_they_do_in_single_precision() {
-        let (weights, nodal, gathered, scattered) = problem::<f32, SINGLE_LANES>();
+        let (weights, nodal, gathered, scattered) = problem::<f32>();
         let work = ThereAndBack(&weights, &nodal);
-        judge(vec![work.run(PortableSingle), f32::widest(work)], &gathered, &scattered, 1e-4);
+        judge(vec![work.run(Portable::<f32>::NEW), f32::widest(work)], &gathered, &scattered, 1e-4);
     }
 }

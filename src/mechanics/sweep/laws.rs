@@ -4,35 +4,52 @@
 //! turns the loop into vector instructions, with the same bits; their loops are compiled here, once. Any other law keeps a plain loop.
 //! Which loop a body takes is chosen once a pass over the particles.
 
-use super::kernel::Rows;
-use super::lanes::{LANES, Lanes, Number, WithLanes};
-use crate::material::{ClosedTangent, FrozenTangent, Law, LawVisitor, Material, NonPositiveJacobian};
-use crate::mechanics::point::{Carry, Inadmissible, freeze, internal};
+use super::lanes::{LANES, Lanes, Widest, WithLanes};
+use super::tangents::{Form, general};
+use super::{At, Group, Number};
+use crate::material::{ClosedTangent, Law, LawVisitor, Material, NonPositiveJacobian, Start};
+use crate::mechanics::point::{self, Inadmissible, Part};
 use crate::particles::{Body, Particles};
-use crate::tensor::Tensor;
+use crate::scalar::{Real, Single};
+use crate::tensor::{Deformation, Tensor, identity};
 
 /// The laws of all particles, and the states they begin the step with.
+#[derive(Clone, Copy)]
 pub struct Laws<'a, const D: usize, L> {
     /// The particles.
     pub particles: &'a Particles<D>,
     /// Their laws.
     pub bodies: &'a [Body<L>],
+    /// Δt
+    pub dt: f64,
 }
+
+/// A tensor by rows, a lane a particle; the first D·D of them.
+type Rows<T> = [[T; LANES]; 9];
+
+/// The rows of a closed tangent, the longest form that vector lanes write.
+type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
 
 /// The particles of a group, a lane each; zero in the lanes behind them.
-struct States<'a> {
-    /// u, and ∇u by rows.
-    rows: &'a Rows,
-    /// H_n by rows.
-    h_n: [[f64; LANES]; 9],
+pub struct States<'a, T> {
+    /// ∇u
+    gradient: Rows<T>,
+    h_n: Rows<f64>,
     /// V₀
     volume: [f64; LANES],
+    /// Δt, and what each particle remembers.
+    start: [Start<'a>; LANES],
 }
 
-impl<'a> States<'a> {
-    fn of<const D: usize>(particles: &Particles<D>, group: &[u32], rows: &'a Rows) -> Self {
-        let mut states = Self { rows, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES] };
+impl<'a, T: Real> States<'a, T> {
+    fn of<const D: usize>(particles: &'a Particles<D>, dt: f64, group: &[u32], at: &[[T; LANES]]) -> Self {
+        let mut gradient = [[T::zero(); LANES]; 9];
+        gradient[..D * D].copy_from_slice(at);
+        // An empty lane remembers what the first particle does.
+        let start = [particles.start(group[0] as usize, dt); LANES];
+        let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], start };
         for (lane, &p) in group.iter().enumerate().take(LANES) {
+            states.start[lane] = particles.start(p as usize, dt);
             let h_n = &particles.displacement_gradient[p as usize];
             for i in 0..D {
                 for k in 0..D {
@@ -46,177 +63,197 @@ impl<'a> States<'a> {
 
     /// ∇u, H_n and V₀ of one particle.
     #[inline(always)]
-    fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<f64, D>, Tensor<f64, D>, f64) {
-        let gradient = Tensor::from_fn(|i, k| self.rows[D + i * D + k][lane]);
+    fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<T, D>, Tensor<f64, D>, f64) {
+        let gradient = Tensor::from_fn(|i, k| self.gradient[i * D + k][lane]);
         (gradient, Tensor::from_fn(|i, k| self.h_n[i * D + k][lane]), self.volume[lane])
     }
 }
 
-/// V₀ F S F_nᵀ by rows, then det F.
-type Stresses = [[f64; LANES]; 10];
-
-/// The row of det F.
-const DET_F: usize = 9;
-
-/// The rows of a tangent (A, B, κ, q, then b and c), space for that of the inertia, then det F and the form.
-pub(super) type Tangents = [[f64; LANES]; 32];
-
-/// The row of det F behind a tangent.
-const TANGENT_DET_F: usize = 30;
-
-/// The row that tells the form of a tangent.
-const FORM: usize = 31;
-/// No closed form.
-const NOT_CLOSED: f64 = 0.0;
-/// A closed form without b and c.
-const SIMPLE: f64 = 1.0;
-/// A closed form with b and c.
-const BOTH: f64 = 2.0;
-
-/// The loop over the lanes of one law, which fills `ROWS` rows.
-type Evaluate<'l, const ROWS: usize> = dyn Fn(&States<'_>, &mut [[f64; LANES]; ROWS]) + Sync + 'l;
+/// The loop over the lanes of one law: fills rows, and det F.
+pub type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
 /// For each body the loop of its law.
-struct Chosen<'a, const ROWS: usize> {
+struct Chosen<'a, T> {
     body: &'a [u32],
-    loops: Vec<Box<Evaluate<'a, ROWS>>>,
+    ids: &'a [u32],
+    loops: Vec<Box<Loop<'a, T>>>,
 }
 
-impl<const ROWS: usize> Chosen<'_, ROWS> {
+impl<T: Real> Chosen<'_, T> {
     /// Evaluates the laws that are in the group, and keeps the lanes of their particles.
-    fn evaluate(&self, group: &[u32], states: &States<'_>, out: &mut [[f64; LANES]; ROWS]) {
-        if let [only] = self.loops.as_slice() {
-            return only(states, out);
-        }
+    ///
+    /// # Errors
+    /// The particle with the smallest id where det F ≤ 0.
+    fn evaluate(&self, group: &[u32], states: &States<'_, T>, out: &mut [[T; LANES]]) -> Result<(), Inadmissible> {
+        let mut det_f = [1.0; LANES];
         let body = |lane: usize| self.body[group[lane] as usize];
-        self.loops[body(0) as usize](states, out);
+        self.loops[body(0) as usize](states, out, &mut det_f);
         for lane in 1..group.len() {
             if (0..lane).any(|before| body(before) == body(lane)) {
                 continue;
             }
-            let mut other = [[0.0; LANES]; ROWS];
-            self.loops[body(lane) as usize](states, &mut other);
+            let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
+            self.loops[body(lane) as usize](states, &mut other, &mut other_det_f);
             for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
-                for (out, other) in out.iter_mut().zip(&other) {
-                    out[same] = other[same];
-                }
+                det_f[same] = other_det_f[same];
+                out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
             }
         }
+        let check = |(&p, &det_f): (&u32, &f64)| {
+            let error = NonPositiveJacobian::check(det_f).err();
+            error.map(|source| Inadmissible { particle: self.ids[p as usize] as usize, source })
+        };
+        let first = group.iter().zip(&det_f).filter_map(check).min_by_key(|error| error.particle);
+        first.map_or(Ok(()), Err)
     }
 }
 
 impl<const D: usize, L: Law> Laws<'_, D, L> {
-    /// What puts σ = V₀ F S F_nᵀ in the place of ∇u, a group at a time, for one pass; its error is the smallest particle of the group
-    /// with det F ≤ 0.
-    pub(super) fn stresses(&self) -> impl Fn(&[u32], &mut Rows) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(|law| match law.shipped() {
-            Some(material) => shipped_stresses(material, D),
-            None => Box::new(|states, out| *out = stresses_of::<L, D>(law, states)),
+    /// What adds σ = V₀ F S F_nᵀ at ∇u, a group at a time, for one pass; only the F of `part` carry derivatives.
+    pub(crate) fn stresses<T: Number>(
+        &self,
+        part: Part,
+    ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
+        let chosen = self.chosen(|law| match law.shipped().and_then(|material| T::stresses_of(material, D, part)) {
+            Some(shipped) => shipped,
+            None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, det_f, out)),
         });
-        move |group, rows| {
-            let mut stresses: Stresses = [[0.0; LANES]; 10];
-            chosen.evaluate(group, &States::of(self.particles, group, rows), &mut stresses);
-            judge(&self.particles.id, group, &stresses[DET_F])?;
-            rows[D..D + D * D].copy_from_slice(&stresses[..D * D]);
+        move |group, at, sums| {
+            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
+            let mut stresses = [[[T::zero(); LANES]; D]; D];
+            chosen.evaluate(group.particles, &states, stresses.as_flattened_mut())?;
+            for (sums, rows) in sums.gradient.as_flattened_mut().iter_mut().zip(stresses.as_flattened()) {
+                sums.iter_mut().zip(rows).for_each(|(sum, &x)| *sum += x);
+            }
             Ok(())
         }
     }
 
-    /// What computes the tangents at ∇u times `factor` in closed form, a group at a time, for one pass; with `both` their b and c are
-    /// there, zero where a law has none. Its error is the smallest particle of the group with det F ≤ 0, or `None` in its place where a
-    /// tangent has not that form.
-    pub(super) fn tangents(
+    /// The form that holds the tangents of all laws. It does not depend on the state.
+    pub(crate) fn form(&self) -> Form {
+        self.bodies.iter().map(|body| form::<L, D>(&body.law)).max().unwrap_or(Form::Closed)
+    }
+
+    /// What fills the rows of frozen tangents at ∇u times `factor`, a group at a time, for one pass.
+    pub(crate) fn tangents(
         &self,
-        both: bool,
+        part: Part,
+        form: Form,
         factor: f64,
-    ) -> impl Fn(&[u32], &Rows, &mut Tangents) -> Result<(), Option<Inadmissible>> + Sync {
-        let chosen = self.chosen(|law| match law.shipped() {
-            Some(material) => shipped_tangents(material, D, factor),
-            None => Box::new(move |states, out| *out = tangents_of::<L, D>(law, states, factor)),
+    ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
+        let chosen = self.chosen(move |law| match law.shipped() {
+            Some(material) if part == Part::Whole && form != Form::General => {
+                shipped_tangents(material, D, form, factor)
+            }
+            _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, (part, form, factor), out, det_f)),
         });
-        move |group, rows, tangents| {
-            chosen.evaluate(group, &States::of(self.particles, group, rows), tangents);
-            judge(&self.particles.id, group, &tangents[TANGENT_DET_F]).map_err(Some)?;
-            let fits = |&form: &f64| form == SIMPLE || (both && form == BOTH);
-            if tangents[FORM][..group.len()].iter().all(fits) { Ok(()) } else { Err(None) }
+        move |group, at, rows| {
+            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
+            chosen.evaluate(group.particles, &states, rows)
         }
     }
 
     /// `choose` of the law of every body.
-    fn chosen<'s, const ROWS: usize>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluate<'s, ROWS>>) -> Chosen<'s, ROWS> {
-        Chosen { body: &self.particles.body, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
+    fn chosen<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Loop<'s, T>>) -> Chosen<'s, T> {
+        let Particles { body, id, .. } = self.particles;
+        Chosen { body, ids: id, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
     }
 }
 
-/// The particle of a group with the smallest id whose det F is none of a body.
-fn judge(ids: &[u32], group: &[u32], det_f: &[f64; LANES]) -> Result<(), Inadmissible> {
-    let check = |(&p, &det_f): (&u32, &f64)| {
-        let error = NonPositiveJacobian::check(det_f).err();
-        error.map(|source| Inadmissible { particle: ids[p as usize] as usize, source })
-    };
-    match group.iter().zip(det_f).filter_map(check).min_by_key(|error| error.particle) {
-        Some(first) => Err(first),
-        None => Ok(()),
+/// The form of a law's tangents.
+fn form<L: Law, const D: usize>(law: &L) -> Form {
+    match law.closed(&identity::<f64, D>(), &Deformation::new(Tensor::zeros()), 1.0) {
+        None => Form::General,
+        Some(closed) if closed.both.is_some() => Form::ClosedWithBoth,
+        Some(_) => Form::Closed,
     }
 }
 
-/// V₀ F S F_nᵀ and det F of every lane.
+/// σ and det F of every lane.
 #[inline(always)]
-fn stresses_of<L: Law, const D: usize>(law: &L, states: &States<'_>) -> Stresses {
-    let mut out = [[0.0; LANES]; 10];
+fn stresses_of<L: Law, T: Real, const D: usize>(
+    law: &L,
+    states: &States<'_, T>,
+    part: Part,
+    det_f: &mut [f64; LANES],
+    out: &mut [[T; LANES]],
+) {
+    // Fixed lengths, so that no place in them is checked and the loop becomes vector instructions.
+    let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
     for lane in 0..LANES {
         let (gradient, h_n, volume) = states.of_lane::<D>(lane);
-        let (stress, det_f) = internal(law, &gradient, &h_n, volume, Carry::ALL);
+        let (stress, det) = point::internal(law, &states.start[lane], &gradient, &h_n, volume, part);
         for i in 0..D {
             for k in 0..D {
-                out[i * D + k][lane] = stress[(i, k)];
+                rows[i * D + k][lane] = stress[(i, k)];
             }
         }
-        out[DET_F][lane] = det_f;
+        det_f[lane] = det;
     }
-    out
+    out.copy_from_slice(&rows[..D * D]);
 }
 
-/// The tangents of every lane times `factor`.
+/// The tangents of every lane, of one part and in one form, times a factor.
 #[inline(always)]
-fn tangents_of<L: Law, const D: usize>(law: &L, states: &States<'_>, factor: f64) -> Tangents {
-    let mut out = [[0.0; LANES]; 32];
+fn tangents_of<L: Law, const D: usize>(
+    law: &L,
+    states: &States<'_, f64>,
+    (part, form, factor): (Part, Form, f64),
+    out: &mut [[f64; LANES]],
+    det_f: &mut [f64; LANES],
+) {
+    let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
     for lane in 0..LANES {
         let (gradient, h_n, volume) = states.of_lane::<D>(lane);
-        let (frozen, det_f) = freeze(law, &gradient, &h_n, volume);
-        out[TANGENT_DET_F][lane] = det_f;
-        out[FORM][lane] = match frozen.closed() {
-            Some(form) => {
-                write(&form, factor, &mut out, lane);
-                if form.both.is_some() { BOTH } else { SIMPLE }
+        let (frozen, det) = point::freeze(law, &states.start[lane], &gradient, &h_n, volume, part);
+        det_f[lane] = det;
+        match (frozen, form) {
+            (point::Frozen::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
+                write(&closed, factor, form, &mut rows, lane);
             }
-            None => NOT_CLOSED,
-        };
+            (frozen, _) => {
+                for k in 0..D {
+                    for l in 0..D {
+                        let block = match &frozen {
+                            point::Frozen::Closed(closed) => closed.unit_block(Single::default(), k, l),
+                            point::Frozen::General(blocks) => blocks[k][l],
+                        };
+                        for i in 0..D {
+                            for j in 0..D {
+                                out[general::<D>(k, l, i, j)][lane] = factor * block[i][j];
+                            }
+                        }
+                    }
+                }
+            }
+        }
     }
-    out
+    if form != Form::General {
+        out.copy_from_slice(&rows[..form.rows(D)]);
+    }
 }
 
 /// Writes A, the upper triangle of B column by column, κ, q, and those of b and c: the tangent times `factor`.
 #[inline(always)]
-fn write<const D: usize>(form: &ClosedTangent<f64, D>, factor: f64, out: &mut Tangents, lane: usize) {
+fn write<const D: usize>(closed: &ClosedTangent<f64, D>, factor: f64, form: Form, out: &mut ClosedRows, lane: usize) {
     let symmetric = D * (D + 1) / 2;
     let scalars = D * D + symmetric;
     for i in 0..D {
         for k in 0..D {
-            out[i * D + k][lane] = form.a[i][k];
+            out[i * D + k][lane] = closed.a[i][k];
         }
     }
-    write_upper(&form.right, factor, out, D * D, lane);
-    out[scalars][lane] = form.bulk * factor;
-    out[scalars + 1][lane] = form.q * factor;
-    if let Some([b, c]) = &form.both {
+    write_upper(&closed.right, factor, out, D * D, lane);
+    out[scalars][lane] = closed.bulk * factor;
+    out[scalars + 1][lane] = closed.q * factor;
+    if let (Some([b, c]), Form::ClosedWithBoth) = (&closed.both, form) {
         write_upper(b, 1.0, out, scalars + 2, lane);
         write_upper(c, factor, out, scalars + 2 + symmetric, lane);
     }
 }
 
 #[inline(always)]
-fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut Tangents, first: usize, lane: usize) {
+fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedRows, first: usize, lane: usize) {
     for k in 0..D {
         for i in 0..D {
             if i <= k {
@@ -226,87 +263,96 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut Tangent
     }
 }
 
-/// A loop over the lanes with a law, in `D` dimensions.
-struct InLanes<'l, L, W, const D: usize>(&'l L, W);
-
-/// Not generic, so that it is compiled here and not by every crate that uses it.
+/// The loop of a shipped law's stresses. Not generic, so that it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped_stresses(law: &Material, dimension: usize) -> Box<Evaluate<'static, 10>> {
-    law.with(ChooseStresses { dimension })
+pub(super) fn shipped_stresses(law: &Material, dimension: usize, part: Part) -> Box<Loop<'static, f64>> {
+    law.with(ChooseStresses { dimension, part })
 }
 
-/// As [`shipped_stresses`].
+/// As [`shipped_stresses`], of its whole tangent.
 #[inline(never)]
-fn shipped_tangents(law: &Material, dimension: usize, factor: f64) -> Box<Evaluate<'static, 32>> {
-    law.with(ChooseTangents { dimension, factor })
+fn shipped_tangents(law: &Material, dimension: usize, form: Form, factor: f64) -> Box<Loop<'static, f64>> {
+    law.with(ChooseTangents { dimension, form, factor })
 }
 
 struct ChooseStresses {
     dimension: usize,
+    part: Part,
 }
 
 impl LawVisitor for ChooseStresses {
-    type Output = Box<Evaluate<'static, 10>>;
+    type Output = Box<Loop<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L) -> Box<Evaluate<'static, 10>> {
-            Box::new(move |states, stresses| f64::widest(InLanes::<_, _, D>(&law, StressesOf { states, stresses })))
+        fn in_dimension<L: Law + 'static, const D: usize>(law: L, part: Part) -> Box<Loop<'static, f64>> {
+            if part != Part::Whole {
+                // Plain numbers carry no derivatives.
+                return Box::new(move |states, out, det_f| stresses_of::<L, f64, D>(&law, states, part, det_f, out));
+            }
+            Box::new(move |states, out, det_f| f64::widest(StressesOf::<L, D> { law: &law, states, out, det_f }))
         }
         match self.dimension {
-            1 => in_dimension::<L, 1>(law),
-            2 => in_dimension::<L, 2>(law),
-            _ => in_dimension::<L, 3>(law),
+            1 => in_dimension::<L, 1>(law, self.part),
+            2 => in_dimension::<L, 2>(law, self.part),
+            _ => in_dimension::<L, 3>(law, self.part),
         }
     }
 }
 
 struct ChooseTangents {
     dimension: usize,
+    form: Form,
     factor: f64,
 }
 
 impl LawVisitor for ChooseTangents {
-    type Output = Box<Evaluate<'static, 32>>;
+    type Output = Box<Loop<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L, factor: f64) -> Box<Evaluate<'static, 32>> {
-            Box::new(move |states, tangents| {
-                f64::widest(InLanes::<_, _, D>(&law, TangentsOf { states, factor, tangents }))
+        fn in_dimension<L: Law + 'static, const D: usize>(law: L, form: Form, factor: f64) -> Box<Loop<'static, f64>> {
+            Box::new(move |states, out, det_f| {
+                f64::widest(TangentsOf::<L, D> { law: &law, states, form, factor, out, det_f });
             })
         }
         match self.dimension {
-            1 => in_dimension::<L, 1>(law, self.factor),
-            2 => in_dimension::<L, 2>(law, self.factor),
-            _ => in_dimension::<L, 3>(law, self.factor),
+            1 => in_dimension::<L, 1>(law, self.form, self.factor),
+            2 => in_dimension::<L, 2>(law, self.form, self.factor),
+            _ => in_dimension::<L, 3>(law, self.form, self.factor),
         }
     }
 }
 
-struct StressesOf<'a> {
-    states: &'a States<'a>,
-    stresses: &'a mut Stresses,
+struct StressesOf<'a, L, const D: usize> {
+    law: &'a L,
+    states: &'a States<'a, f64>,
+    out: &'a mut [[f64; LANES]],
+    det_f: &'a mut [f64; LANES],
 }
 
-impl<L: Law, const D: usize> WithLanes<f64, LANES> for InLanes<'_, L, StressesOf<'_>, D> {
+impl<L: Law, const D: usize> WithLanes<f64> for StressesOf<'_, L, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes<LANES, X = f64>>(self, _: S) {
-        *self.1.stresses = stresses_of::<L, D>(self.0, self.1.states);
+    fn run<S: Lanes<X = f64>>(self, _: S) {
+        stresses_of::<L, f64, D>(self.law, self.states, Part::Whole, self.det_f, self.out);
     }
 }
 
-struct TangentsOf<'a> {
-    states: &'a States<'a>,
+struct TangentsOf<'a, L, const D: usize> {
+    law: &'a L,
+    states: &'a States<'a, f64>,
+    form: Form,
     factor: f64,
-    tangents: &'a mut Tangents,
+    out: &'a mut [[f64; LANES]],
+    det_f: &'a mut [f64; LANES],
 }
 
-impl<L: Law, const D: usize> WithLanes<f64, LANES> for InLanes<'_, L, TangentsOf<'_>, D> {
+impl<L: Law, const D: usize> WithLanes<f64> for TangentsOf<'_, L, D> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes<LANES, X = f64>>(self, _: S) {
-        *self.1.tangents = tangents_of::<L, D>(self.0, self.1.states, self.1.factor);
+    fn run<S: Lanes<X = f64>>(self, _: S) {
+        let which = (Part::Whole, self.form, self.factor);
+        tangents_of::<L, D>(self.law, self.states, which, self.out, self.det_f);
     }
 }

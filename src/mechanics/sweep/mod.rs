@@ -1,47 +1,54 @@
-//! The loop over particles: gather → point → scatter. With the vectors of the solver the only user of threads, and the only one of vector
-//! instructions.
+//! The loop over particles: gather (N, ∇N) → at the point → scatter (N, ∇N). With the vectors of the solver the only user of threads,
+//! and the only one of vector instructions.
+//!
+//! The sweep knows components, not meanings. A field has C numbers a node; gathered, C values u = Σ u_I N_I and C gradients
+//! L = Σ u_I ⊗ ∇_n N_I a particle; a point function turns them into q and σ, and f_I += q N_I + σ ∇_n N_I is scattered. A mass is one
+//! component, a motion D; a dual number is two fields, since both ways are linear: derivatives go through the kernels of production.
+//!
+//! - A *lane* is one particle of eight, side by side in a vector of the processor.
+//! - A *group* is up to eight particles of one cell, or of neighbours along x, that share a window of nodes.
+//! - A *block* is a cube of cells with a box of nodes. Blocks do not depend on the number of threads; each gathers from its own nodes and
+//!   scatters into a buffer of its own, and buffers are added in the order of the blocks: the same bits for any number of threads.
 //!
 //! Two ways with one answer: `plain` is the specification, and the way of shape functions that are no products;
-//! `tiled` is for products, N = Π_k N_k. Both cut the particles into blocks that do not depend on the number of threads.
-//! A block gathers from its own nodes, scatters into its own buffer, and the buffers are added in the order of the blocks:
-//! the same bits for any number of threads.
+//! `tiled` is for products, N = Π_k N_k.
 
 mod block;
+mod blocks;
 mod builder;
-mod closed;
 mod columns;
-mod diagonal;
 mod kernel;
+mod laned;
 mod lanes;
 mod laws;
-mod of_block;
+mod number;
 mod order;
 mod plain;
-mod tally;
+mod tangents;
 mod tiled;
 mod waves;
 
-pub use closed::{ClosedTangents, SingleTangents};
+pub use block::Group;
+pub use blocks::Quadratic;
+pub use kernel::{At, Parts};
+pub use laned::Laned;
+pub(crate) use laned::add_quadratic;
+pub use lanes::LANES;
 pub use laws::Laws;
+pub use number::Number;
+pub use tangents::Form;
 
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
-use crate::material::Law;
-use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
-use crate::parallel;
+use crate::parallel::held;
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
-use kernel::{Rows, of_lane};
-use num_traits::Zero;
 use plain::Plain;
-use std::ops::AddAssign;
-use tally::Tally;
-use tiled::Tiled;
-
-/// Particles per block of the plain sweep: large enough to pay for a task, small enough to keep a block's nodes in cache.
-const BLOCK: usize = 256;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use tiled::{Tiled, keep_first};
 
 /// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
 const LEAPS: usize = 8;
@@ -72,8 +79,23 @@ const WIDEST: usize = 16;
 /// assert!((sum - 1.0).abs() < 1e-14);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
-pub struct Supports<const D: usize>(Way<D>, Tally);
+#[derive(Debug)]
+pub struct Supports<const D: usize> {
+    way: Way<D>,
+    /// Active nodes.
+    nodes: usize,
+    /// h, if weights in single precision are there.
+    unit: Option<f64>,
+    /// How often the sweeps have gone through all particles.
+    passes: AtomicU64,
+}
+
+impl<const D: usize> Clone for Supports<D> {
+    fn clone(&self) -> Self {
+        let Self { way, nodes, unit, .. } = self;
+        Self { way: way.clone(), nodes: *nodes, unit: *unit, passes: AtomicU64::new(self.passes()) }
+    }
+}
 
 #[derive(Clone, Debug)]
 enum Way<const D: usize> {
@@ -91,30 +113,83 @@ pub struct SupportError {
     pub source: ApproximationError,
 }
 
-/// q of the particle at a place in memory, from that and u.
-pub type Inertia<'a, const D: usize> = &'a (dyn Fn(usize, &Vector<f64, D>) -> Vector<f64, D> + Sync);
-
-/// Whether the weights of a scatter are taken as they are or by their magnitude.
+/// What a pass gathers and scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Magnitude {
-    No,
-    Yes,
+pub struct Flow {
+    /// Of u and L.
+    pub gather: Parts,
+    /// Of q and σ.
+    pub scatter: Parts,
+    /// The weights of the scatter.
+    pub weights: Weights,
 }
 
-impl Magnitude {
-    #[inline(always)]
-    fn of<const D: usize>(self, n: f64, grad_n: Vector<f64, D>) -> (f64, Vector<f64, D>) {
+impl Flow {
+    /// Values and gradients, both ways.
+    pub const BOTH: Self = Self { gather: Parts::BOTH, scatter: Parts::BOTH, weights: Weights::Signed };
+    /// Gradients alone.
+    pub const GRADIENT: Self = Self { gather: Parts::GRADIENT, scatter: Parts::GRADIENT, ..Self::BOTH };
+    /// Values alone.
+    pub const VALUE: Self = Self { gather: Parts::VALUE, scatter: Parts::VALUE, ..Self::BOTH };
+
+    /// What one or the other needs.
+    pub fn and(self, other: Self) -> Self {
+        let either = |a: Parts, b: Parts| Parts { value: a.value || b.value, gradient: a.gradient || b.gradient };
+        Self { gather: either(self.gather, other.gather), scatter: either(self.scatter, other.scatter), ..self }
+    }
+}
+
+/// How N and ∇N enter a scatter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// As they are.
+    Signed,
+    /// By their magnitude.
+    Magnitude,
+    /// N²: the diagonal of a mass matrix, since N is a product.
+    Square,
+}
+
+impl Weights {
+    /// What is done to every weight.
+    fn changed<X: Real>(self) -> Option<fn(X) -> X> {
         match self {
-            Self::No => (n, grad_n),
-            Self::Yes => (n.abs(), grad_n.abs()),
+            Self::Signed => None,
+            Self::Magnitude => Some(|n| n.abs()),
+            Self::Square => Some(|n| n * n),
         }
+    }
+
+    fn of<const D: usize>(self, n: f64, grad_n: Vector<f64, D>) -> (f64, Vector<f64, D>) {
+        self.changed().map_or((n, grad_n), |changed| (changed(n), grad_n.map(changed)))
+    }
+}
+
+/// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.
+type Point<'a, X, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<X, C, D>], &mut [At<X, C, D>]) + Sync + 'a;
+
+impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
+    fn clear(&mut self, parts: Parts) {
+        if parts.value {
+            self.value = [[X::zero(); LANES]; C];
+        }
+        if parts.gradient {
+            self.gradient = [[[X::zero(); LANES]; D]; C];
+        }
+    }
+
+    /// u and L of one particle.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> (Vector<X, C>, nalgebra::SMatrix<X, C, D>) {
+        let value = Vector::from_fn(|c, _| self.value[c][lane]);
+        (value, nalgebra::SMatrix::from_fn(|c, k| self.gradient[c][k][lane]))
     }
 }
 
 /// Calls the same method of the way taken.
 macro_rules! either {
     ($self:expr, $way:ident => $call:expr) => {
-        match &$self.0 {
+        match &$self.way {
             Way::Plain($way) => $call,
             Way::Tiled($way) => $call,
         }
@@ -136,7 +211,7 @@ impl<const D: usize> Supports<D> {
 
     /// As [`Self::new`], prepared for products in single precision if they are asked for and shape functions are products.
     ///
-    /// Example: [`Self::single_tangents`].
+    /// Example: [`Self::freeze`].
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -185,12 +260,12 @@ impl<const D: usize> Supports<D> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
                 let single = precision == Precision::Mixed;
-                let spare = spare.and_then(|spare| match spare.0 {
+                let spare = spare.and_then(|spare| match spare.way {
                     Way::Plain(_) => None,
                     Way::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
-                Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
+                Ok((Self::of_way(Way::Tiled(tiled), &nodes, single.then_some(grid.spacing)), nodes))
             }
             _ => Self::plain(approximation, grid, positions).map_err(|SupportError { particle, source }| {
                 SupportError { particle: ids.map_or(particle, |ids| ids[particle] as usize), source }
@@ -231,7 +306,11 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
-        Ok((Self(Way::Plain(plain), Tally::of(nodes.len())), nodes))
+        Ok((Self::of_way(Way::Plain(plain), &nodes, None), nodes))
+    }
+
+    fn of_way(way: Way<D>, nodes: &Nodes, unit: Option<f64>) -> Self {
+        Self { way, nodes: nodes.len(), unit, passes: AtomicU64::new(0) }
     }
 
     /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
@@ -253,7 +332,7 @@ impl<const D: usize> Supports<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn leaping(&self) -> Option<Vec<u32>> {
-        let Way::Tiled(tiled) = &self.0 else { return None };
+        let Way::Tiled(tiled) = &self.way else { return None };
         let mut next = 0;
         let leaps = tiled.order().filter(|&p| std::mem::replace(&mut next, p + 1) != p).count();
         (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
@@ -261,7 +340,7 @@ impl<const D: usize> Supports<D> {
 
     /// The same, the particles having been put in [`Self::leaping`]'s order.
     pub(crate) fn rearranged(mut self) -> Self {
-        if let Way::Tiled(tiled) = &mut self.0 {
+        if let Way::Tiled(tiled) = &mut self.way {
             tiled.rearrange();
         }
         self
@@ -276,7 +355,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::passes`].
     pub fn nodes(&self) -> usize {
-        self.1.nodes
+        self.nodes
     }
 
     /// How often the methods below have gone through all particles so far.
@@ -294,7 +373,27 @@ impl<const D: usize> Supports<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn passes(&self) -> u64 {
-        self.1.passes()
+        self.passes.load(Ordering::Relaxed)
+    }
+
+    /// Another pass through the particles begins.
+    fn pass(&self) {
+        self.passes.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The spacing in which weights in single precision are measured; `None` where there are none.
+    pub fn unit(&self) -> Option<f64> {
+        self.unit
+    }
+
+    /// Whether functions are products, so that particles are summed in vector lanes.
+    pub fn is_tiled(&self) -> bool {
+        matches!(self.way, Way::Tiled(_))
+    }
+
+    /// Number of groups.
+    pub(crate) fn groups(&self) -> usize {
+        either!(self, way => way.groups())
     }
 
     /// The groups of particles that share a window of nodes in vector lanes: nodes along each axis, and particles; none where the
@@ -302,7 +401,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::plain`].
     pub fn windows(&self) -> Vec<([usize; 3], usize)> {
-        match &self.0 {
+        match &self.way {
             Way::Plain(_) => Vec::new(),
             Way::Tiled(tiled) => tiled.windows(),
         }
@@ -317,7 +416,7 @@ impl<const D: usize> Supports<D> {
 
     /// The entries (active node, N, ∇_n N) of one particle.
     pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
-        let (plain, tiled) = match &self.0 {
+        let (plain, tiled) = match &self.way {
             Way::Plain(plain) => (Some(plain.of(particle)), None),
             Way::Tiled(tiled) => (None, Some(tiled.of(particle))),
         };
@@ -333,78 +432,62 @@ impl<const D: usize> Supports<D> {
         gradient
     }
 
-    /// Σ u_I N_I at every particle.
-    pub fn values(&self, field: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
-        let mut values = vec![Vector::zeros(); self.particles()];
-        self.each_value(field, |p, value| values[p] = value);
-        values
-    }
-
-    /// `take(p, Σ u_I N_I)` of every particle, in an order that does not depend on the number of threads.
+    /// `f_I += Σ_p q N_I + σ ∇_n N_I` with q and σ that `point(group, u and L, q and σ)` adds to zero, for C components: 1 or D. Without
+    /// a field u and L are not specified.
     ///
-    /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// let field = direction(nodes.len(), 1);
-    /// let (values, mut visited) = (supports.values(&field), 0);
-    /// supports.each_value(&field, |p, value| {
-    ///     assert_eq!(value, values[p]);
-    ///     visited += 1;
-    /// });
-    /// assert_eq!(visited, values.len());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn each_value(&self, field: &[Vector<f64, D>], mut take: impl FnMut(usize, Vector<f64, D>)) {
-        match &self.0 {
-            Way::Plain(_) => self.each_particle(field, |_, value, _| value, take),
-            Way::Tiled(tiled) => {
-                self.1.pass();
-                let point = |_: usize, rows: &Rows, lane: usize| Vector::from_fn(|i, _| rows[i][lane]);
-                waves::each_particle(tiled, field, of_block::gather_values, point, &mut take);
+    /// # Errors
+    /// Of the errors of `point`, each with a number, the one with the smallest; what was added is then unspecified.
+    pub fn sweep<T: Number, const C: usize, E: Send>(
+        &self,
+        field: Option<&[Vector<T, C>]>,
+        flow: Flow,
+        out: &mut [Vector<T, C>],
+        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
+    ) -> Result<(), E> {
+        self.pass();
+        let failure = Mutex::new(None);
+        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            if let Err((number, error)) = T::at(fields, sums, |at, sums| point(group, at, sums)) {
+                keep_first(&mut held(&failure), number, error);
             }
-        }
+        };
+        let field = field.map(T::flat);
+        T::add_flat(out, |out| {
+            either!(self, way => way.sweep::<f64, C>(T::FIELDS, field.as_deref(), flow, out, &point));
+        });
+        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
+        failure.map_or(Ok(()), |(_, error)| Err(error))
     }
 
-    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
-    ///
-    /// ```
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
-    /// let (supports, nodes) = bfree::mechanics::sweep::Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// // A rotation about the origin, u = ω × x, has no divergence.
-    /// let rotation: Vec<_> = nodes.positions(grid).map(|(_, x)| bfree::tensor::Vector::from([-x[1], x[0]])).collect();
-    /// let mut visited = vec![false; particles.len()];
-    /// supports.each_particle(&rotation, |_, _, gradient| gradient.trace(), |p, divergence| {
-    ///     assert!(divergence.abs() < 1e-12);
-    ///     visited[p] = true;
-    /// });
-    /// assert!(visited.iter().all(|&once| once));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn each_particle<R: Send>(
+    /// As [`Self::sweep`], for D plain numbers a node in either precision: what a product with a tangent is.
+    pub(crate) fn product<X: Laned>(
+        &self,
+        field: &[X],
+        flow: Flow,
+        out: &mut [X],
+        point: &(dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync),
+    ) {
+        self.pass();
+        let point = |group: Group<'_>, at: &[At<X, D, D>], sums: &mut [At<X, D, D>]| point(group, &at[0], &mut sums[0]);
+        either!(self, way => way.sweep::<X, D>(1, Some(field), flow, out, &point));
+    }
+
+    /// `fill(group, L, rows)` of every group, each with `count` rows of its own.
+    pub(crate) fn fill_rows<Y: Send>(
         &self,
         field: &[Vector<f64, D>],
-        point: impl Fn(usize, Vector<f64, D>, Tensor<f64, D>) -> R + Sync,
-        mut take: impl FnMut(usize, R),
+        count: usize,
+        rows: &mut [Y],
+        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
     ) {
-        self.1.pass();
-        match &self.0 {
-            Way::Plain(plain) => {
-                let results = infallible(plain.interpolate(field, |p, value, gradient| Ok(point(p, value, gradient))));
-                results.into_iter().enumerate().for_each(|(p, result)| take(p, result));
-            }
-            Way::Tiled(tiled) => {
-                let point = |p: usize, rows: &Rows, lane: usize| {
-                    let (value, gradient) = of_lane(rows, lane);
-                    point(p, value, gradient)
-                };
-                waves::each_particle(tiled, field, of_block::gather_all, point, take);
-            }
-        }
+        self.pass();
+        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
+    }
+
+    /// `out_I +=` the diagonal blocks Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I of the quadratic forms that `quadratic` adds up, group by group.
+    pub(crate) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
+        self.pass();
+        either!(self, way => way.blocks(out, quadratic));
     }
 
     /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
@@ -436,14 +519,13 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn assemble<T: Real, E: Send>(
+    pub fn assemble<T: Number, E: Send>(
         &self,
         field: &[Vector<T, D>],
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        self.1.pass();
-        either!(self, way => way.assemble(field, out, Magnitude::No, point))
+        self.sweep(Some(field), Flow::BOTH, out, each_lane(point))
     }
 
     /// As [`Self::assemble`] with |N_I| and |∇_n N_I| in the sum.
@@ -470,306 +552,99 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// As [`Self::assemble`].
-    pub fn assemble_magnitudes<T: Real, E: Send>(
+    pub fn assemble_magnitudes<T: Number, E: Send>(
         &self,
         field: &[Vector<T, D>],
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        self.1.pass();
-        either!(self, way => way.assemble(field, out, Magnitude::Yes, point))
+        self.sweep(Some(field), Flow { weights: Weights::Magnitude, ..Flow::BOTH }, out, each_lane(point))
     }
 
-    /// `out_I += Σ_p scatter(p, N_I, ∇_n N_I)`: nothing is gathered.
-    ///
-    /// Example: [`Self::spread`].
-    pub fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)
-    where
-        O: Copy + Zero + AddAssign + Send + Sync,
-    {
-        self.1.pass();
-        either!(self, way => way.scatter(out, scatter));
+    /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
+    pub fn spread<const C: usize>(&self, out: &mut [Vector<f64, C>], value: impl Fn(usize) -> Vector<f64, C> + Sync) {
+        self.spread_with(Weights::Signed, out, value);
     }
 
-    /// `out_I += Σ_p value(p) N_I`
-    ///
-    /// ```
-    /// use bfree::mechanics::sweep::Supports;
-    /// use bfree::tensor::{Tensor, Vector};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let particles = &simulation.particles;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// // Σ_p m v N_I has the momentum of the particles.
-    /// let mut momentum = vec![Vector::zeros(); nodes.len()];
-    /// supports.spread(&mut momentum, |p| particles.velocity[p] * particles.mass[p]);
-    /// assert!((momentum.iter().sum::<Vector<f64, 2>>() - particles.momentum()).norm() < 1e-13);
-    /// // The diagonal of M, Σ_p m N_I², in two ways; as N ≤ 1 it is at most the lumped mass, Σ_p m N_I.
-    /// let (mut lumped, mut diagonal) = (vec![0.0; nodes.len()], vec![0.0; nodes.len()]);
-    /// supports.scatter(&mut lumped, |p, n, _| particles.mass[p] * n);
-    /// supports.scatter(&mut diagonal, |p, n, _| particles.mass[p] * n * n);
-    /// let mut blocks = vec![Tensor::zeros(); nodes.len()];
-    /// supports.scatter_blocks(&mut blocks, |_, _, _| Tensor::zeros(), |p| particles.mass[p]);
-    /// for ((block, diagonal), lumped) in blocks.iter().zip(diagonal).zip(lumped) {
-    ///     assert!((block - Tensor::identity() * diagonal).norm() < 1e-14 && diagonal <= lumped);
-    /// }
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn spread(&self, out: &mut [Vector<f64, D>], value: impl Fn(usize) -> Vector<f64, D> + Sync) {
-        self.1.pass();
-        match &self.0 {
-            Way::Plain(plain) => plain.scatter(out, |p, n, _| value(p) * n),
-            Way::Tiled(tiled) => tiled.spread(out, value),
-        }
-    }
-
-    /// `out_I += Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I`, with the bilinear form B_p = `bilinear`(p, ·, ·) and m_p = `mass`(p).
-    ///
-    /// Example: [`Self::spread`].
-    pub fn scatter_blocks(
+    /// As [`Self::spread`], with other weights than N.
+    pub(crate) fn spread_with<const C: usize>(
         &self,
-        out: &mut [Tensor<f64, D>],
-        bilinear: impl Fn(usize, &Vector<f64, D>, &Vector<f64, D>) -> Tensor<f64, D> + Sync,
-        mass: impl Fn(usize) -> f64 + Sync,
+        weights: Weights,
+        out: &mut [Vector<f64, C>],
+        value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        self.1.pass();
-        match &self.0 {
-            Way::Plain(plain) => {
-                plain.scatter(out, |p, n, grad_n| bilinear(p, grad_n, grad_n) + Tensor::identity() * (mass(p) * n * n))
+        self.pass();
+        let point = |group: Group<'_>, _: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let value = value(p as usize);
+                (0..C).for_each(|c| sums[0].value[c][lane] = value[c]);
             }
-            Way::Tiled(tiled) => tiled.scatter_blocks(out, bilinear, mass),
-        }
+        };
+        let flow = Flow { weights, ..Flow::VALUE };
+        either!(self, way => way.sweep::<f64, C>(1, None, flow, bytemuck::cast_slice_mut(out), &point));
     }
 
-    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with σ_p = V₀ F S F_nᵀ of the particle's law at ∇u_p, and q_p = `inertia`(p, u_p) if there
-    /// is one: the laws in vector lanes. `None` where the sweep has none, or `T` is not the number they hold.
+    /// Σ u_I N_I at every particle.
+    pub fn values<const C: usize>(&self, field: &[Vector<f64, C>]) -> Vec<Vector<f64, C>> {
+        let mut values = vec![Vector::zeros(); self.particles()];
+        self.each_value(field, |p, value| values[p] = value);
+        values
+    }
+
+    /// `take(p, Σ u_I N_I)` of every particle, in an order that does not depend on the number of threads.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, residual::Carry, sweep::{Laws, Supports}, transfer::Nodal};
-    /// use bfree::tensor::Vector;
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let particles = &simulation.particles;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-    /// let laws = Laws { particles, bodies: &simulation.bodies };
-    /// let (mut force, mut magnitude) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
-    /// supports.forces(&laws, &dphi, None, &mut force).ok_or("LME has vector lanes")??;
-    /// supports.force_magnitudes(&laws, &dphi, &mut magnitude).ok_or("LME has vector lanes")??;
-    /// // A body pulls at all of its nodes with no force in all: Σ ∇N = 0.
-    /// let sum: Vector<f64, 2> = force.iter().sum();
-    /// assert!(sum.norm() < 1e-13 * magnitude.iter().map(|size| size.norm()).sum::<f64>());
-    /// assert!(force.iter().zip(&magnitude).all(|(force, size)| force.norm() <= size.norm()));
-    /// // And what the residual adds to inertia and loads is that.
-    /// let nodal = Nodal::at_rest(particles, &supports, nodes.len());
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], bfree::mechanics::time::Alphas::START, 0.0);
-    /// let residual = equilibrium.residual(&dphi, Carry::ALL)?;
-    /// let inertia = dphi.iter().zip(&nodal.mass).map(|(dphi, &m)| dphi * m);
-    /// let apart = residual.iter().zip(inertia).zip(&force).map(|((r, inertia), force)| (r - inertia - force).norm());
-    /// assert!(apart.fold(0.0, f64::max) < 1e-12);
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// let field = direction(nodes.len(), 1);
+    /// let (values, mut visited) = (supports.values(&field), 0);
+    /// supports.each_value(&field, |p, value| {
+    ///     assert_eq!(value, values[p]);
+    ///     visited += 1;
+    /// });
+    /// assert_eq!(visited, values.len());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
+    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], mut take: impl FnMut(usize, Vector<f64, C>)) {
+        self.pass();
+        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
+        let field = bytemuck::cast_slice(field);
+        either!(self, way => way.each::<_, C>(1, field, Parts::VALUE, &point, &mut take));
+    }
+
+    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
     ///
-    /// # Errors
-    /// A particle with det F ≤ 0, the same for any number of threads.
-    pub fn forces<T: Real, L: Law>(
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
+    /// let (supports, nodes) = bfree::mechanics::sweep::Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// // A rotation about the origin, u = ω × x, has no divergence.
+    /// let rotation: Vec<_> = nodes.positions(grid).map(|(_, x)| bfree::tensor::Vector::from([-x[1], x[0]])).collect();
+    /// let mut visited = vec![false; particles.len()];
+    /// supports.each_particle(&rotation, |_, _, gradient| gradient.trace(), |p, divergence| {
+    ///     assert!(divergence.abs() < 1e-12);
+    ///     visited[p] = true;
+    /// });
+    /// assert!(visited.iter().all(|&once| once));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn each_particle<T: Number, R: Send>(
         &self,
-        laws: &Laws<'_, D, L>,
         field: &[Vector<T, D>],
-        inertia: Option<Inertia<'_, D>>,
-        out: &mut [Vector<T, D>],
-    ) -> Option<Result<(), Inadmissible>> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => tiled.forces(laws, field, inertia, out).inspect(|_| self.1.pass()),
-        }
-    }
-
-    /// As [`Self::forces`] without inertia, with |σ_p| and |∇_n N_I| in the sum.
-    ///
-    /// Example: [`Self::forces`].
-    ///
-    /// # Errors
-    /// As [`Self::forces`].
-    pub fn force_magnitudes<T: Real, L: Law>(
-        &self,
-        laws: &Laws<'_, D, L>,
-        field: &[Vector<T, D>],
-        out: &mut [Vector<T, D>],
-    ) -> Option<Result<(), Inadmissible>> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => tiled.force_magnitudes(laws, field, out).inspect(|_| self.1.pass()),
-        }
-    }
-
-    /// The closed tangents of all particles at ∇u_p, `both` telling whether they have the term b L c, with the weights of
-    /// a consistent inertia if there is one; `None` where the sweep has no vector lanes.
-    ///
-    /// ```
-    /// use bfree::material::{FrozenTangent, Law, NonPositiveJacobian, admissible};
-    /// use bfree::mechanics::{check::direction, sweep::{Laws, Supports}};
-    /// use bfree::solver::Precision;
-    /// use bfree::tensor::{Tensor, Vector, identity};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, law) = (&simulation.particles, &simulation.bodies[0].law);
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
-    /// let freeze = |p: usize, g: Tensor<f64, 2>| {
-    ///     Ok::<_, NonPositiveJacobian>(law.freeze(&identity(), &admissible(g)?, particles.volume[p]))
-    /// };
-    /// let laws = Laws { particles, bodies: &simulation.bodies };
-    /// let tangents = supports.closed_tangents(&laws, &dphi, false, None).ok_or("LME has vector lanes")?;
-    /// let tangents = tangents.map_err(|_| "deformed too far")?;
-    /// assert_eq!(Some(tangents.bytes()), supports.closed_bytes(false, false, Precision::Double));
-    /// // In vector lanes as particle by particle: K u = Σ_p (V₀ δP F_nᵀ) ∇N, and its diagonal blocks.
-    /// let (u, mut fast, mut plain) = (direction(nodes.len(), 2), vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
-    /// supports.product(&tangents, &u, &mut fast);
-    /// let frozen = supports.interpolate(&dphi, |p, _, g| freeze(p, g))?;
-    /// supports.assemble(&u, &mut plain, |p, _, l| Ok::<_, NonPositiveJacobian>((Vector::zeros(), frozen[p].apply(&l))))?;
-    /// assert!(fast.iter().zip(&plain).all(|(a, b)| (a - b).norm() < 1e-10));
-    /// let (mut blocks, mut same) = (vec![Tensor::zeros(); nodes.len()], vec![Tensor::zeros(); nodes.len()]);
-    /// supports.add_blocks(&tangents, &mut blocks);
-    /// supports.scatter_blocks(&mut same, |p, a, b| frozen[p].block(a, b), |_| 0.0);
-    /// assert!(blocks.iter().zip(&same).all(|(a, b)| (a - b).norm() < 1e-10));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// A particle with det F ≤ 0, the same for any number of threads; `None` in its place if a law has no closed tangent at its state.
-    pub fn closed_tangents<L: Law>(
-        &self,
-        laws: &Laws<'_, D, L>,
-        field: &[Vector<f64, D>],
-        both: bool,
-        inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
-    ) -> Option<Result<ClosedTangents<D>, Option<Inadmissible>>> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => {
-                self.1.pass();
-                Some(tiled.closed(laws, field, both, inertia))
-            }
-        }
-    }
-
-    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with the stress of each tangent under ∇u_p, and q of its inertia under u_p. The
-    /// tangents must be those of these supports.
-    ///
-    /// Example: [`Self::closed_tangents`].
-    pub fn product(&self, tangents: &ClosedTangents<D>, field: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        if let Way::Tiled(tiled) = &self.0 {
-            self.1.pass();
-            tiled.product(tangents, field, out);
-        }
-    }
-
-    /// `out_I += Σ_p K_II` of each tangent and its inertia. The tangents must be those of these supports.
-    ///
-    /// Example: [`Self::closed_tangents`].
-    pub fn add_blocks(&self, tangents: &ClosedTangents<D>, out: &mut [Tensor<f64, D>]) {
-        if let Way::Tiled(tiled) = &self.0 {
-            self.1.pass();
-            tiled.add_blocks(tangents, out);
-        }
-    }
-
-    /// The spacing h, if the supports are prepared for products in single precision.
-    ///
-    /// Example: [`Self::single_tangents`].
-    pub fn unit(&self) -> Option<f64> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => tiled.unit,
-        }
-    }
-
-    /// As [`Self::closed_tangents`], divided by `scale`, in single precision: for gradients in units of 1/h. `None` also where the
-    /// supports are not prepared for it.
-    ///
-    /// ```
-    /// use bfree::mechanics::{check::direction, sweep::{Laws, Supports}};
-    /// use bfree::solver::Precision;
-    /// use bfree::tensor::{Tensor, Vector};
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, positions) = (&simulation.particles, &simulation.particles.position);
-    /// let (approximation, grid) = (&simulation.approximation, &simulation.grid);
-    /// let (supports, nodes) = Supports::with_precision(approximation, grid, positions, Precision::Mixed)?;
-    /// let h = supports.unit().ok_or("prepared for single precision")?;
-    /// assert_eq!(h, grid.spacing);
-    /// // Gradients are in units of 1/h, and K comes divided by a number, h² to leave it as it is.
-    /// let (laws, rest) = (Laws { particles, bodies: &simulation.bodies }, vec![Vector::zeros(); nodes.len()]);
-    /// let tangents = supports.closed_tangents(&laws, &rest, false, None).ok_or("LME has vector lanes")?;
-    /// let single = supports.single_tangents(&laws, &rest, false, None, 1.0).ok_or("and in single precision")?;
-    /// let (tangents, single) = (tangents.map_err(|_| "at rest")?, single.map_err(|_| "at rest")?);
-    /// assert!(single.bytes() < tangents.bytes());
-    /// let u = direction::<2>(nodes.len(), 2);
-    /// let rough_u: Vec<Vector<f32, 2>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-    /// let (mut exact, mut rough) = (rest.clone(), vec![Vector::zeros(); nodes.len()]);
-    /// supports.product(&tangents, &u, &mut exact);
-    /// supports.single_product(&single, &rough_u, &mut rough);
-    /// let size = exact.iter().map(|x| x.norm()).fold(0.0, f64::max);
-    /// assert!(exact.iter().zip(&rough).all(|(a, b)| (a - b.map(f64::from)).norm() < 1e-5 * size));
-    /// let mut blocks = vec![Tensor::zeros(); nodes.len()];
-    /// supports.add_single_blocks(&single, &mut blocks);
-    /// assert!(blocks.iter().all(|block| (block - block.transpose()).norm() <= 1e-6 * block.norm()));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`Self::closed_tangents`].
-    #[allow(clippy::too_many_arguments)] // as above, with a scale
-    pub fn single_tangents<L: Law>(
-        &self,
-        laws: &Laws<'_, D, L>,
-        field: &[Vector<f64, D>],
-        both: bool,
-        inertia: Option<&(dyn Fn(usize) -> f64 + Sync)>,
-        scale: f64,
-    ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => {
-                self.1.pass();
-                tiled.closed_single(laws, field, both, inertia, scale)
-            }
-        }
-    }
-
-    /// [`Self::product`] in single precision, gradients in units of 1/h.
-    ///
-    /// Example: [`Self::single_tangents`].
-    pub fn single_product(&self, tangents: &SingleTangents<D>, field: &[Vector<f32, D>], out: &mut [Vector<f32, D>]) {
-        if let Way::Tiled(tiled) = &self.0 {
-            self.1.pass();
-            tiled.product_single(tangents, field, out);
-        }
-    }
-
-    /// [`Self::add_blocks`] in single precision, gradients in units of 1/h.
-    ///
-    /// Example: [`Self::single_tangents`].
-    pub fn add_single_blocks(&self, tangents: &SingleTangents<D>, out: &mut [Tensor<f32, D>]) {
-        if let Way::Tiled(tiled) = &self.0 {
-            self.1.pass();
-            tiled.add_blocks_single(tangents, out);
-        }
-    }
-
-    /// Bytes of [`Self::closed_tangents`], or of [`Self::single_tangents`]; `None` where the sweep has no vector lanes.
-    ///
-    /// Example: [`Self::closed_tangents`].
-    pub fn closed_bytes(&self, both: bool, inertia: bool, precision: Precision) -> Option<usize> {
-        match &self.0 {
-            Way::Plain(_) => None,
-            Way::Tiled(tiled) => Some(tiled.closed_bytes(both, inertia, precision == Precision::Mixed)),
-        }
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
+        mut take: impl FnMut(usize, R),
+    ) {
+        self.pass();
+        let point = |p: usize, fields: &[At<f64, D, D>], lane: usize| {
+            let value = Vector::from_fn(|c, _| T::from_fields(|i| fields[i].value[c][lane]));
+            let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
+            point(p, value, gradient)
+        };
+        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Parts::BOTH, &point, &mut take));
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in their order.
@@ -778,24 +653,39 @@ impl<const D: usize> Supports<D> {
     ///
     /// # Errors
     /// The error of the first particle in memory whose `point` fails.
-    pub fn interpolate<T: Real, R: Send, E: Send>(
+    pub fn interpolate<T: Number, R: Send, E: Send>(
         &self,
         field: &[Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
-        self.1.pass();
-        either!(self, way => way.interpolate(field, point))
+        let mut results: Vec<Option<R>> = (0..self.particles()).map(|_| None).collect();
+        let mut failure = None;
+        self.each_particle(field, point, |p, result| match result {
+            Ok(result) => results[p] = Some(result),
+            Err(error) => keep_first(&mut failure, p, error),
+        });
+        failure.map_or(Ok(results.into_iter().flatten().collect()), |(_, error)| Err(error))
     }
 }
 
-/// `f(0), …, f(count − 1)`, on all cores; the error is that of the smallest index.
-fn ordered<R: Send, E: Send>(count: usize, f: impl Fn(usize) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
-    parallel::map(0..count, f).into_iter().collect()
-}
-
-fn infallible<R>(result: Result<R, std::convert::Infallible>) -> R {
-    match result {
-        Ok(value) => value,
-        Err(never) => match never {},
+/// A point function of the particles, one after the other.
+fn each_lane<T: Real, E, const D: usize>(
+    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), (usize, E)> + Sync {
+    move |group, at, sums| {
+        let mut failure = None;
+        for (lane, &p) in group.particles.iter().enumerate() {
+            let (value, gradient) = at.lane(lane);
+            match point(p as usize, value, gradient) {
+                Ok((q, sigma)) => {
+                    for c in 0..D {
+                        sums.value[c][lane] += q[c];
+                        (0..D).for_each(|k| sums.gradient[c][k][lane] += sigma[(c, k)]);
+                    }
+                }
+                Err(error) => keep_first(&mut failure, p as usize, error),
+            }
+        }
+        failure.map_or(Ok(()), Err)
     }
 }

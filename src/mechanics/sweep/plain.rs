@@ -1,54 +1,60 @@
 //! The sweep written down plainly, one list of (node, N, ∇N) a particle: the specification, and the way of shape functions
 //! that are no products.
 
-use super::{BLOCK, Magnitude, SupportError, infallible, ordered};
+use super::block::Group;
+use super::blocks::{Quadratic, pair};
+use super::kernel::{At, Parts};
+use super::lanes::LANES;
+use super::{Flow, Point, SupportError};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
+use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
-use num_traits::Zero;
 use std::ops::{AddAssign, Range};
 
-/// Shape functions of all particles at the last converged positions, and the active nodes they name.
+/// Particles of a block: enough to pay for a task, few enough to keep a block's nodes in cache.
+const BLOCK: usize = 256;
+
+/// Groups of a block.
+const GROUPS: usize = BLOCK / LANES;
+
+/// Shape functions of all particles, node by node.
 #[derive(Clone, Debug)]
 pub(super) struct Plain<const D: usize> {
     blocks: Vec<Block<D>>,
-    particles: usize,
+    /// The particles, as groups name them.
+    particles: Vec<u32>,
 }
 
-/// Shape functions of a run of particles, numbered by the block's own list of nodes.
+/// The entries (node, N, ∇_n N) of consecutive particles; `local` refers to the block's own list of nodes.
 #[derive(Clone, Debug)]
 struct Block<const D: usize> {
-    /// The particles of the block.
     particles: Range<usize>,
-    /// Active numbers of the nodes the block touches.
+    /// Active numbers of the block's nodes, ascending.
     nodes: Vec<u32>,
-    /// Entries of the k-th particle: `offsets[k]..offsets[k + 1]`.
+    /// Start of each particle's entries, and the end of the last one's.
     offsets: Vec<u32>,
-    /// Node of each entry, as a place in `nodes`.
     local: Vec<u32>,
-    /// N of each entry.
     values: Vec<f64>,
-    /// ∇_n N of each entry.
     gradients: Vec<Vector<f64, D>>,
 }
 
 impl<const D: usize> Plain<D> {
-    /// Evaluates the shape functions at all positions and numbers the active nodes.
-    ///
-    /// # Errors
-    /// The first particle, in their order, that lies outside the grid or whose shape functions do not exist.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let count = positions.len().div_ceil(BLOCK);
-        let built = ordered(count, |b| {
+        let built: Result<Vec<_>, _> = parallel::map(0..count, |b| {
             let particles = b * BLOCK..((b + 1) * BLOCK).min(positions.len());
             Block::new(approximation, grid, positions, particles)
-        })?;
+        })
+        .into_iter()
+        .collect();
+        let built = built?;
         let nodes = Nodes::new(built.iter().map(|(_, ids)| ids.as_slice()));
         let blocks = built
             .into_iter()
@@ -57,24 +63,25 @@ impl<const D: usize> Plain<D> {
                 block
             })
             .collect();
-        Ok((Self { blocks, particles: positions.len() }, nodes))
+        Ok((Self { blocks, particles: (0..positions.len() as u32).collect() }, nodes))
     }
 
-    /// Number of particles.
     pub(super) fn particles(&self) -> usize {
-        self.particles
+        self.particles.len()
     }
 
-    /// Bytes of all arrays.
+    pub(super) fn groups(&self) -> usize {
+        self.particles.len().div_ceil(LANES)
+    }
+
     pub(super) fn bytes(&self) -> usize {
         let entry = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
         let of_block = |block: &Block<D>| {
             block.values.len() * entry + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
         };
-        self.blocks.iter().map(of_block).sum()
+        self.blocks.iter().map(of_block).sum::<usize>() + size_of_val(self.particles.as_slice())
     }
 
-    /// The entries (active node, N, ∇_n N) of one particle.
     pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
         block
@@ -82,88 +89,134 @@ impl<const D: usize> Plain<D> {
             .map(move |e| (block.nodes[block.local[e] as usize] as usize, block.values[e], block.gradients[e]))
     }
 
-    /// See [`super::Supports::assemble`] and [`super::Supports::assemble_magnitudes`].
-    pub(super) fn assemble<T: Real, E: Send>(
-        &self,
-        field: &[Vector<T, D>],
-        out: &mut [Vector<T, D>],
-        magnitude: Magnitude,
-        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
-    ) -> Result<(), E> {
-        let buffers = ordered(self.blocks.len(), |b| {
-            let block = &self.blocks[b];
-            let nodal: Vec<Vector<T, D>> = block.nodes.iter().map(|&n| field[n as usize]).collect();
-            let mut buffer = vec![Vector::zeros(); block.nodes.len()];
-            for p in block.particles.clone() {
-                let entries = block.entries(p);
-                let (value, gradient) = block.gather(&nodal, entries.clone());
-                let (force, stress) = point(p, value, gradient)?;
-                for e in entries {
-                    let (n, grad_n) = magnitude.of(block.values[e], block.gradients[e]);
-                    buffer[block.local[e] as usize] += stress * grad_n.map(T::lit) + force * T::lit(n);
-                }
-            }
-            Ok(buffer)
-        })?;
-        for (block, buffer) in self.blocks.iter().zip(buffers) {
-            for (&node, contribution) in block.nodes.iter().zip(buffer) {
-                out[node as usize] += contribution;
-            }
-        }
-        Ok(())
+    /// The groups of a block.
+    fn groups_of<'a>(&'a self, b: usize) -> impl Iterator<Item = Group<'a>> {
+        let groups = self.particles[self.blocks[b].particles.clone()].chunks(LANES).enumerate();
+        groups.map(move |(group, particles)| Group { number: b * GROUPS + group, particles })
     }
 
-    /// `out_I += Σ_p scatter(p, N_I, ∇_n N_I)`: nothing is gathered.
-    pub(super) fn scatter<O>(&self, out: &mut [O], scatter: impl Fn(usize, f64, &Vector<f64, D>) -> O + Sync)
-    where
-        O: Copy + Zero + AddAssign + Send,
-    {
-        let buffers = infallible(ordered(self.blocks.len(), |b| {
+    pub(super) fn sweep<X: Real + Send + Sync, const C: usize>(
+        &self,
+        fields: usize,
+        field: Option<&[X]>,
+        flow: Flow,
+        out: &mut [X],
+        point: &Point<'_, X, C, D>,
+    ) {
+        let numbers = fields * C;
+        let buffers = parallel::map(0..self.blocks.len(), |b| {
             let block = &self.blocks[b];
-            let mut buffer = vec![O::zero(); block.nodes.len()];
-            for p in block.particles.clone() {
-                for e in block.entries(p) {
-                    buffer[block.local[e] as usize] += scatter(p, block.values[e], &block.gradients[e]);
+            let mut buffer = vec![X::zero(); block.nodes.len() * numbers];
+            for group in self.groups_of(b) {
+                let mut at = vec![At::<X, C, D>::zero(); fields];
+                let mut sums = at.clone();
+                if let Some(field) = field {
+                    block.gather(group, field, &mut at);
+                }
+                point(group, &at, &mut sums);
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    for e in block.entries(p as usize) {
+                        let (n, grad_n) = flow.weights.of(block.values[e], block.gradients[e]);
+                        let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
+                        for (f, sums) in sums.iter().enumerate() {
+                            for c in 0..C {
+                                let to = &mut buffer[block.local[e] as usize * numbers + f * C + c];
+                                if flow.scatter.value {
+                                    *to += sums.value[c][lane] * n;
+                                }
+                                for k in (0..D).filter(|_| flow.scatter.gradient) {
+                                    *to += sums.gradient[c][k][lane] * grad_n[k];
+                                }
+                            }
+                        }
+                    }
                 }
             }
-            Ok(buffer)
-        }));
-        for (block, buffer) in self.blocks.iter().zip(buffers) {
-            for (&node, contribution) in block.nodes.iter().zip(buffer) {
-                out[node as usize] += contribution;
-            }
-        }
+            buffer
+        });
+        self.add(&buffers, numbers, out);
     }
 
-    /// `point(p, u_p, ∇u_p)` of every particle, in their order.
-    ///
-    /// # Errors
-    /// The error of the first particle, in their order, whose `point` fails.
-    pub(super) fn interpolate<T: Real, R: Send, E: Send>(
-        &self,
-        field: &[Vector<T, D>],
-        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
-    ) -> Result<Vec<R>, E> {
-        let parts = ordered(self.blocks.len(), |b| {
+    pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
+        let buffers = parallel::map(0..self.blocks.len(), |b| {
             let block = &self.blocks[b];
-            let nodal: Vec<Vector<T, D>> = block.nodes.iter().map(|&n| field[n as usize]).collect();
-            let mut part = Vec::with_capacity(block.particles.len());
-            for p in block.particles.clone() {
-                let (value, gradient) = block.gather(&nodal, block.entries(p));
-                part.push(point(p, value, gradient)?);
+            let mut buffer = vec![Tensor::<f64, D>::zeros(); block.nodes.len()];
+            for group in self.groups_of(b) {
+                let mut form = Quadratic::zero();
+                quadratic(group, &mut form);
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    for e in block.entries(p as usize) {
+                        let (n, grad_n) = (block.values[e], &block.gradients[e]);
+                        let sum = &mut buffer[block.local[e] as usize];
+                        *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
+                        for l in 0..D {
+                            for k in 0..=l {
+                                let of_pair = &form.bilinear[pair(k, l)];
+                                *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
+                            }
+                        }
+                    }
+                }
             }
-            Ok(part)
-        })?;
-        let mut results = Vec::with_capacity(self.particles);
-        for part in parts {
-            results.extend(part);
+            buffer
+        });
+        self.add(&buffers, 1, out);
+    }
+
+    pub(super) fn each<R: Send, const C: usize>(
+        &self,
+        fields: usize,
+        field: &[f64],
+        _: Parts,
+        point: &(dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync),
+        take: &mut dyn FnMut(usize, R),
+    ) {
+        let parts = parallel::map(0..self.blocks.len(), |b| {
+            let mut part = Vec::with_capacity(BLOCK);
+            for group in self.groups_of(b) {
+                let mut at = vec![At::<f64, C, D>::zero(); fields];
+                self.blocks[b].gather(group, field, &mut at);
+                let results = group.particles.iter().enumerate();
+                part.extend(results.map(|(lane, &p)| point(p as usize, &at, lane)));
+            }
+            part
+        });
+        parts.into_iter().flatten().enumerate().for_each(|(p, result)| take(p, result));
+    }
+
+    pub(super) fn fill_rows<Y: Send>(
+        &self,
+        field: &[f64],
+        count: usize,
+        rows: &mut [Y],
+        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
+    ) {
+        parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), |(b, rows)| {
+            for (group, rows) in self.groups_of(b).zip(rows.chunks_mut(count)) {
+                let mut at = [At::zero()];
+                self.blocks[b].gather(group, field, &mut at);
+                fill(group, &at[0], rows);
+            }
+        });
+    }
+
+    /// Adds the buffers of the blocks, `numbers` numbers a node, in their order.
+    fn add<X: Copy + AddAssign>(&self, buffers: &[Vec<X>], numbers: usize, out: &mut [X]) {
+        for (block, buffer) in self.blocks.iter().zip(buffers) {
+            for (&node, sums) in block.nodes.iter().zip(buffer.chunks(numbers)) {
+                for (out, &sum) in out[node as usize * numbers..].iter_mut().zip(sums) {
+                    *out += sum;
+                }
+            }
         }
-        Ok(results)
     }
 }
 
 impl<const D: usize> Block<D> {
-    /// The block with its nodes numbered by the sorted list of grid numbers returned beside it.
+    /// The block with an empty node list, and the grid numbers that `local` refers to.
+    ///
+    /// # Errors
+    /// The first particle that has no support.
     fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -190,27 +243,28 @@ impl<const D: usize> Block<D> {
         Ok((Self { particles, nodes: Vec::new(), offsets, local, values, gradients }, unique))
     }
 
-    #[inline(always)]
     fn entries(&self, particle: usize) -> Range<usize> {
         let k = particle - self.particles.start;
         self.offsets[k] as usize..self.offsets[k + 1] as usize
     }
 
-    /// (Σ u_I N_I, Σ u_I ⊗ ∇_n N_I)
-    #[inline(always)]
-    fn gather<T: Real>(&self, nodal: &[Vector<T, D>], entries: Range<usize>) -> (Vector<T, D>, Tensor<T, D>) {
-        let mut value = Vector::<T, D>::zeros();
-        let mut gradient = Tensor::<T, D>::zeros();
-        for e in entries {
-            let u = &nodal[self.local[e] as usize];
-            let (n, grad_n) = (T::lit(self.values[e]), &self.gradients[e]);
-            for i in 0..D {
-                value[i] += u[i] * n;
-                for k in 0..D {
-                    gradient[(i, k)] += u[i] * T::lit(grad_n[k]);
+    /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
+    fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
+        let numbers = at.len() * C;
+        for (lane, &p) in group.particles.iter().enumerate() {
+            for e in self.entries(p as usize) {
+                let node = self.nodes[self.local[e] as usize] as usize;
+                let (n, grad_n) = (X::lit(self.values[e]), self.gradients[e].map(X::lit));
+                for (f, at) in at.iter_mut().enumerate() {
+                    for c in 0..C {
+                        let u = field[node * numbers + f * C + c];
+                        at.value[c][lane] += u * n;
+                        for k in 0..D {
+                            at.gradient[c][k][lane] += u * grad_n[k];
+                        }
+                    }
                 }
             }
         }
-        (value, gradient)
     }
 }

@@ -1,17 +1,19 @@
-//! The sweep of vector lanes over all blocks, on all cores.
+//! The sweep over all blocks, on all cores.
 //!
 //! Blocks are taken in waves of fixed length: each block of a wave scatters into a buffer of its own, and then the buffers
 //! are added to the nodes in the order of the blocks, every slab of nodes by one thread. Neither the waves nor the order
 //! depend on the number of threads.
 
-use super::block::{Block, Groups};
-use super::kernel::Rows;
-use super::lanes::{LANES, SINGLE_LANES};
-use super::of_block;
+use super::block::{Block, Group};
+use super::blocks::Quadratic;
+use super::kernel::{At, Parts, Window};
+use super::laned::{self, Laned};
+use super::lanes::LANES;
 use super::tiled::Tiled;
+use super::{Flow, Point};
 use crate::parallel;
-use crate::scalar::Real;
-use crate::tensor::Vector;
+use crate::tensor::Tensor;
+use num_traits::Zero;
 
 /// Blocks of a wave: their buffers stay in the second-level caches.
 const WAVE: usize = 64;
@@ -22,141 +24,212 @@ const SLAB: usize = 1024;
 /// Below this number of groups waking the threads costs more than the work.
 const PARALLEL: usize = 256;
 
-/// `(block, nodal, buffer)`: adds the sums of a block to its buffer, from the field in its box.
-type Sums<'a, X> = dyn Fn(&Block, &[X], &mut [X]) + Sync + 'a;
-
 /// `(block, scratch, buffer)`: fills the buffer of a block.
 type Work<'a, X> = dyn Fn(&Block, &mut Vec<X>, &mut [X]) + Sync + 'a;
 
-/// `(block, buffer, first, slab)`: adds what lies on the active nodes `first ..` of the slab.
-type Add<'a, X, O> = dyn Fn(&Block, &[X], usize, &mut [O]) + Sync + 'a;
+/// `(block, buffer, first, slab)`: adds what lies on the active nodes of the slab, which begins at the node `first`.
+type Add<'a, X> = dyn Fn(&Block, &[X], usize, &mut [X]) + Sync + 'a;
 
-/// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with boxes of the number `X`, which is `T`; without a field the box is empty.
-pub(super) fn run<X: Real + Send + Sync, T: Real, const D: usize>(
-    tiled: &Tiled<D>,
-    field: Option<&[Vector<T, D>]>,
-    out: &mut [Vector<T, D>],
-    sums: &Sums<'_, X>,
-) {
-    let work = |block: &Block, nodal: &mut Vec<X>, buffer: &mut [X]| {
-        if let Some(field) = field {
-            nodal.resize(block.box_nodes() * D, X::zero());
-            block.fill(field, nodal);
-        }
-        sums(block, nodal, buffer);
-    };
-    let add = |block: &Block, buffer: &[X], first: usize, out: &mut [Vector<T, D>]| {
-        block.add(buffer, D, first, out, |sum, numbers| {
-            for (sum, &x) in sum.iter_mut().zip(numbers) {
-                *sum += T::lit(x.value());
+impl<const D: usize> Tiled<D> {
+    fn in_parallel(&self) -> bool {
+        parallel::several() && self.groups() >= PARALLEL
+    }
+
+    /// As [`super::Supports::sweep`], for `fields` fields of C components side by side; without a field nothing is gathered.
+    pub(super) fn sweep<X: Laned, const C: usize>(
+        &self,
+        fields: usize,
+        field: Option<&[X]>,
+        flow: Flow,
+        out: &mut [X],
+        point: &Point<'_, X, C, D>,
+    ) {
+        let numbers = fields * C;
+        // The buffer of a field is a vector longer than its nodes.
+        let length = |block: &Block| block.box_nodes() * C + LANES;
+        let work = |block: &Block, nodal: &mut Vec<X>, buffer: &mut [X]| {
+            let (mut at, mut sums) = (vec![At::<X, C, D>::zero(); fields], vec![At::<X, C, D>::zero(); fields]);
+            let boxed = block.box_nodes() * C;
+            if let Some(field) = field {
+                gather_boxes::<X, C>(block, field, fields, nodal);
             }
-        });
-    };
-    each_block(tiled, D, out, &work, &add);
-}
-
-/// The waves, with `numbers` numbers a node in the buffers.
-pub(super) fn each_block<X: Real + Send + Sync, O: Send, const D: usize>(
-    tiled: &Tiled<D>,
-    numbers: usize,
-    out: &mut [O],
-    work: &Work<'_, X>,
-    add: &Add<'_, X, O>,
-) {
-    let length = tiled.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + SINGLE_LANES;
-    let parallel = parallel::several() && tiled.groups() >= PARALLEL;
-    let one = |scratch: &mut Vec<X>, buffer: &mut [X], block: &Block| {
-        buffer[..block.box_nodes() * numbers + SINGLE_LANES].fill(X::zero());
-        work(block, scratch, buffer);
-    };
-    if !parallel {
-        let (mut scratch, mut buffer) = (Vec::new(), vec![X::zero(); length]);
-        for block in &tiled.blocks {
-            one(&mut scratch, &mut buffer, block);
-            add(block, &buffer, 0, out);
-        }
-        return;
-    }
-    let mut buffers = vec![X::zero(); WAVE.min(tiled.blocks.len()) * length];
-    for blocks in tiled.blocks.chunks(WAVE) {
-        let parts = buffers.chunks_mut(length).zip(blocks);
-        parallel::for_each_with(parts, |scratch, (buffer, block)| one(scratch, buffer, block));
-        let first = blocks.iter().filter_map(|block| block.nodes.first()).min().map_or(0, |&n| n as usize);
-        let last = blocks.iter().filter_map(|block| block.nodes.last()).max().map_or(0, |&n| n as usize + 1);
-        parallel::for_each(out[first..last].chunks_mut(SLAB).enumerate(), |(slab, out)| {
-            for (block, buffer) in blocks.iter().zip(buffers.chunks(length)) {
-                add(block, buffer, first + slab * SLAB, out);
+            let mut weights = Vec::new();
+            for group in 0..block.groups.len() {
+                let mut window = block.groups.window(group, X::weights(&block.groups));
+                if field.is_some() {
+                    for (at, nodal) in at.iter_mut().zip(nodal.chunks(boxed)) {
+                        X::gather(C, window, nodal, flow.gather, &mut at.value, at.gradient.as_flattened_mut());
+                    }
+                }
+                sums.iter_mut().for_each(|sums| sums.clear(flow.scatter));
+                point(block.groups.group(group), &at, &mut sums);
+                if let Some(changed) = flow.weights.changed() {
+                    weights.clear();
+                    weights.extend(window.weights.iter().map(|row| row.map(changed)));
+                    window = Window { weights: &weights, ..window };
+                }
+                for (sums, buffer) in sums.iter().zip(buffer.chunks_mut(length(block))) {
+                    X::scatter(C, window, flow.scatter, &sums.value, sums.gradient.as_flattened(), buffer);
+                }
             }
-        });
+        };
+        let add = |block: &Block, buffer: &[X], first: usize, out: &mut [X]| {
+            for (f, buffer) in buffer.chunks(length(block)).take(fields).enumerate() {
+                block.each_node(first, first + out.len() / numbers, |place, node| {
+                    let to = node * numbers + f * C;
+                    for (out, &sum) in out[to..to + C].iter_mut().zip(&buffer[place * C..(place + 1) * C]) {
+                        *out += sum;
+                    }
+                });
+            }
+        };
+        self.each_block(numbers, fields * LANES, out, &work, &add);
+    }
+
+    /// `out_I += ` the diagonal blocks of the quadratic forms that `quadratic` fills in, group by group.
+    pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
+        let numbers = D * D;
+        let work = |block: &Block, _: &mut Vec<f64>, buffer: &mut [f64]| {
+            for group in 0..block.groups.len() {
+                let mut form = Quadratic::zero();
+                quadratic(block.groups.group(group), &mut form);
+                laned::blocks(block.groups.window(group, &block.groups.weights), &form, buffer);
+            }
+        };
+        let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [f64]| {
+            block.each_node(first, first + out.len() / numbers, |place, node| {
+                // Rows of the kernel, columns of nalgebra.
+                for i in 0..D {
+                    for k in 0..D {
+                        out[node * numbers + k * D + i] += buffer[place * numbers + i * D + k];
+                    }
+                }
+            });
+        };
+        self.each_block(numbers, LANES, bytemuck::cast_slice_mut(out), &work, &add);
+    }
+
+    /// The waves, with `numbers` numbers a node in the buffers and `more` behind them.
+    fn each_block<X: Laned>(&self, numbers: usize, more: usize, out: &mut [X], work: &Work<'_, X>, add: &Add<'_, X>) {
+        let length = self.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + more;
+        let one = |scratch: &mut Vec<X>, buffer: &mut [X], block: &Block| {
+            buffer[..block.box_nodes() * numbers + more].fill(X::zero());
+            work(block, scratch, buffer);
+        };
+        if !self.in_parallel() {
+            let (mut scratch, mut buffer) = (Vec::new(), vec![X::zero(); length]);
+            for block in &self.blocks {
+                one(&mut scratch, &mut buffer, block);
+                add(block, &buffer, 0, out);
+            }
+            return;
+        }
+        let mut buffers = vec![X::zero(); WAVE.min(self.blocks.len()) * length];
+        for blocks in self.blocks.chunks(WAVE) {
+            let parts = buffers.chunks_mut(length).zip(blocks);
+            parallel::for_each_with(parts, |scratch, (buffer, block)| one(scratch, buffer, block));
+            let first = blocks.iter().filter_map(|block| block.nodes.first()).min().map_or(0, |&n| n as usize);
+            let last = blocks.iter().filter_map(|block| block.nodes.last()).max().map_or(0, |&n| n as usize + 1);
+            let slabs = out[first * numbers..last * numbers].chunks_mut(SLAB * numbers).enumerate();
+            parallel::for_each(slabs, |(slab, out)| {
+                for (block, buffer) in blocks.iter().zip(buffers.chunks(length)) {
+                    add(block, buffer, first + slab * SLAB, out);
+                }
+            });
+        }
+    }
+
+    /// `take(p, point(p, what was gathered, lane))` of every particle in the order of the blocks; no more results wait to be taken than
+    /// those of a wave.
+    pub(super) fn each<R: Send, const C: usize>(
+        &self,
+        fields: usize,
+        field: &[f64],
+        parts: Parts,
+        point: &(dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync),
+        take: &mut dyn FnMut(usize, R),
+    ) {
+        let gather = |nodal: &mut Vec<f64>, block: &Block, take: &mut dyn FnMut(usize, R)| {
+            gathered::<C, D>(block, field, fields, parts, nodal, |group, at| {
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    take(p as usize, point(p as usize, at, lane));
+                }
+            });
+        };
+        if !self.in_parallel() {
+            let mut nodal = Vec::new();
+            self.blocks.iter().for_each(|block| gather(&mut nodal, block, take));
+            return;
+        }
+        let mut waiting: Vec<Vec<(usize, R)>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
+        for blocks in self.blocks.chunks(WAVE) {
+            parallel::for_each_with(blocks.iter().zip(&mut waiting), |nodal, (block, part)| {
+                gather(nodal, block, &mut |p, result| part.push((p, result)));
+            });
+            for (p, result) in waiting.iter_mut().flat_map(|part| part.drain(..)) {
+                take(p, result);
+            }
+        }
+    }
+
+    /// `fill(group, what was gathered, rows)` of every group, each with `count` rows of its own.
+    pub(super) fn fill_rows<Y: Send>(
+        &self,
+        field: &[f64],
+        count: usize,
+        rows: &mut [Y],
+        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
+    ) {
+        let mut chunks = Vec::with_capacity(self.blocks.len());
+        let mut rest = rows;
+        for block in &self.blocks {
+            let (chunk, behind) = rest.split_at_mut(block.groups.len() * count);
+            chunks.push(chunk);
+            rest = behind;
+        }
+        let one = |nodal: &mut Vec<f64>, (block, chunk): (&Block, &mut [Y])| {
+            let mut rows = chunk.chunks_mut(count);
+            gathered::<D, D>(block, field, 1, Parts::GRADIENT, nodal, |group, at| {
+                if let Some(rows) = rows.next() {
+                    fill(group, &at[0], rows);
+                }
+            });
+        };
+        let both = self.blocks.iter().zip(chunks);
+        if self.in_parallel() {
+            parallel::for_each_with(both, one);
+        } else {
+            let mut nodal = Vec::new();
+            both.for_each(|both| one(&mut nodal, both));
+        }
     }
 }
 
-/// What is gathered of each group.
-pub(super) type GatherKernel = fn(&Groups<f64, LANES>, &[f64], &mut [Rows]);
-
-/// `take(p, point(p, rows, lane))` of every particle with what `kernel` gathered in the rows of its group, in
-/// the order of the blocks; no more results wait to be taken than those of a wave.
-pub(super) fn each_particle<T: Real, R: Send, const D: usize>(
-    tiled: &Tiled<D>,
-    field: &[Vector<T, D>],
-    kernel: GatherKernel,
-    point: impl Fn(usize, &Rows, usize) -> R + Sync,
-    mut take: impl FnMut(usize, R),
-) {
-    let gather = |scratch: &mut (Vec<f64>, Vec<Rows>), block: &Block, take: &mut dyn FnMut(usize, R)| {
-        let (nodal, rows) = scratch;
-        gather_block(block, field, kernel, nodal, rows);
-        block.groups.each(|group, lane, p| take(p, point(p, &rows[group], lane)));
-    };
-    if !parallel::several() || tiled.groups() < PARALLEL {
-        let mut scratch = Default::default();
-        for block in &tiled.blocks {
-            gather(&mut scratch, block, &mut take);
-        }
-        return;
-    }
-    let mut parts: Vec<Vec<(usize, R)>> = tiled.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
-    for blocks in tiled.blocks.chunks(WAVE) {
-        parallel::for_each_with(blocks.iter().zip(&mut parts), |scratch, (block, part)| {
-            gather(scratch, block, &mut |p, result| part.push((p, result)));
-        });
-        for (p, result) in parts.iter_mut().flat_map(|part| part.drain(..)) {
-            take(p, result);
-        }
+/// The boxes of the fields, one after the other.
+fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
+    let boxed = block.box_nodes() * C;
+    nodal.resize(fields * boxed, X::zero());
+    for (f, nodal) in nodal.chunks_mut(boxed).enumerate() {
+        block.fill(field, fields * C, f * C, C, nodal);
     }
 }
 
-/// What `kernel` gathers of each group of a block.
-fn gather_block<T: Real, const D: usize>(
+/// `visit(group, what was gathered)` of every group of a block.
+fn gathered<const C: usize, const D: usize>(
     block: &Block,
-    field: &[Vector<T, D>],
-    kernel: GatherKernel,
+    field: &[f64],
+    fields: usize,
+    parts: Parts,
     nodal: &mut Vec<f64>,
-    rows: &mut Vec<Rows>,
+    mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
 ) {
-    nodal.resize(block.box_nodes() * D, 0.0);
-    block.fill(field, nodal);
-    // What is left of another block is written over.
-    rows.resize(block.groups.len(), [[0.0; LANES]; 12]);
-    kernel(&block.groups, nodal, rows);
-}
-
-/// `visit(block, chunk, u and L of each group)` of every block; `chunks` hands out a part of the result to each.
-pub(super) fn gathered<T: Real, C: Send, R: Send, const D: usize>(
-    tiled: &Tiled<D>,
-    field: &[Vector<T, D>],
-    chunks: Vec<C>,
-    visit: impl Fn(&Block, C, &[Rows]) -> R + Sync,
-) -> Vec<R> {
-    let one = |scratch: &mut (Vec<f64>, Vec<Rows>), (block, chunk): (&Block, C)| {
-        let (nodal, rows) = scratch;
-        gather_block(block, field, of_block::gather_all, nodal, rows);
-        visit(block, chunk, rows)
-    };
-    if parallel::several() && tiled.groups() >= PARALLEL {
-        parallel::map_with(tiled.blocks.iter().zip(chunks), one)
-    } else {
-        let mut scratch = Default::default();
-        tiled.blocks.iter().zip(chunks).map(|both| one(&mut scratch, both)).collect()
+    gather_boxes::<f64, C>(block, field, fields, nodal);
+    let mut at = vec![At::<f64, C, D>::zero(); fields];
+    for group in 0..block.groups.len() {
+        let window = block.groups.window(group, &block.groups.weights);
+        for (at, nodal) in at.iter_mut().zip(nodal.chunks(block.box_nodes() * C)) {
+            f64::gather(C, window, nodal, parts, &mut at.value, at.gradient.as_flattened_mut());
+        }
+        visit(block.groups.group(group), &at);
     }
 }

@@ -1,27 +1,28 @@
 //! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
 
 use super::kernel::{Pairs, Window, by_tile, tile};
-use super::lanes::{LANES, Lanes};
-use crate::scalar::Real;
+use super::lanes::{LANES, Lanes, WithLanes};
 
 /// Pairs (k, l) with k ≤ l of D axes.
 const MOST_PAIRS: usize = 6;
 
 /// The quadratic form of one group: B(∇N, ∇N) + m N² I, a lane a particle.
-pub(super) struct Quadratic<X = f64, const L: usize = LANES> {
+#[derive(Clone, Debug)]
+pub struct Quadratic {
     /// B(e_k, e_l) + B(e_l, e_k) for k < l, B(e_k, e_k) for k = l, by `pair`; the first D rows and columns.
-    pub bilinear: [[[[X; L]; 3]; 3]; MOST_PAIRS],
+    pub bilinear: [[[[f64; LANES]; 3]; 3]; MOST_PAIRS],
     /// m
-    pub mass: [X; L],
+    pub mass: [f64; LANES],
 }
 
-impl<X: Real, const L: usize> Quadratic<X, L> {
-    pub(super) fn zero() -> Self {
-        Self { bilinear: [[[[X::zero(); L]; 3]; 3]; MOST_PAIRS], mass: [X::zero(); L] }
+impl Quadratic {
+    /// Nothing yet.
+    pub fn zero() -> Self {
+        Self { bilinear: [[[[0.0; LANES]; 3]; 3]; MOST_PAIRS], mass: [0.0; LANES] }
     }
 }
 
-/// The number of the pair (k, l), k ≤ l.
+/// The place of B(e_k, e_l) in [`Quadratic::bilinear`].
 pub(super) const fn pair(k: usize, l: usize) -> usize {
     k + l * (l + 1) / 2
 }
@@ -31,33 +32,39 @@ pub(super) const fn pair(k: usize, l: usize) -> usize {
 ///
 /// With ∇N = (N_x' P_x, N_x P_y, N_x P_z), P_x = N_y N_z, …, row i of the block is
 /// N_x'² B_xx P_x P_x + N_x N_x' (B_xy P_x P_y + B_xz P_x P_z) + N_x² (B_yy P_y P_y + B_yz P_y P_z + B_zz P_z P_z + m P_x P_x e_i).
-#[inline(always)]
-pub(super) fn scatter_blocks<S: Lanes<L>, const D: usize, const L: usize>(
-    s: S,
-    window: &Window<'_, S::X, L>,
-    from: &Quadratic<S::X, L>,
-    out: &mut [S::X],
-) {
-    let rows = window.width[1] * window.width[2];
-    for chunk in 0..rows.div_ceil(L) {
-        let pairs = Pairs::<S, D, L>::new(s, window, chunk * L);
-        let mut start = 0;
-        while start < window.width[0] {
-            let tile = tile::<L>(window.width[0] - start);
-            by_tile!(tile, blocks_tile::<S, D, L>(s, window, start, &pairs, from, out));
-            start += tile;
+pub(super) struct ScatterBlocks<'a, const D: usize> {
+    pub window: Window<'a, f64>,
+    pub from: &'a Quadratic,
+    pub out: &'a mut [f64],
+}
+
+impl<const D: usize> WithLanes<f64> for ScatterBlocks<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<X = f64>>(self, s: S) {
+        let Self { window, from, out } = self;
+        let rows = window.width[1] * window.width[2];
+        for chunk in 0..rows.div_ceil(LANES) {
+            let pairs = Pairs::<S, D>::new(s, &window, chunk * LANES);
+            let mut start = 0;
+            while start < window.width[0] {
+                let tile = tile(window.width[0] - start);
+                by_tile!(tile, blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
+                start += tile;
+            }
         }
     }
 }
 
 #[inline(always)]
-fn blocks_tile<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
+fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X, L>,
+    window: &Window<'_, f64>,
     start: usize,
-    pairs: &Pairs<S, D, L>,
-    from: &Quadratic<S::X, L>,
-    out: &mut [S::X],
+    pairs: &Pairs<S, D>,
+    from: &Quadratic,
+    out: &mut [f64],
     width: usize,
 ) {
     let zero = s.zero();
@@ -67,7 +74,7 @@ fn blocks_tile<S: Lanes<L>, const D: usize, const L: usize, const W: usize>(
     let sums = &mut sums[..width.min(W)];
     for i in 0..D {
         let mut row = [[zero; D]; W];
-        for p in 0..window.lanes.min(L) {
+        for p in 0..window.lanes.min(LANES) {
             // By powers of N_x': 2, 1, 0.
             let mut powers = [[zero; D]; 3];
             for l in 0..D {

@@ -1,0 +1,130 @@
+//! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
+
+use crate::mechanics::sweep::{Supports, Weights};
+use crate::particles::Particles;
+use crate::pooled::Pooled;
+use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
+use crate::tensor::Vector;
+
+/// Below this fraction of the largest particle mass, a node's velocity and acceleration are zero.
+const LIGHT: f64 = 1e-14;
+
+/// Relative residual of the projection with a consistent mass.
+const PROJECTION_TOLERANCE: f64 = 1e-12;
+
+/// M̃ on the active nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Mass<'a, const D: usize> {
+    /// The particles.
+    pub particles: &'a Particles<D>,
+    /// Their shape functions.
+    pub supports: &'a Supports<D>,
+    /// The lumped mass of every active node.
+    pub lumped: &'a [f64],
+    /// ε
+    pub lumping: f64,
+}
+
+/// Σ_p m N_I at every active node.
+pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
+    let mut mass = Pooled::filled(supports.nodes(), 0.0);
+    supports.spread(bytemuck::cast_slice_mut(&mut mass), |p| Vector::from([particles.mass[p]]));
+    mass
+}
+
+/// Whether a node has so little mass that it gets no projected velocity: its Δφ comes from the stiffness.
+pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64) -> bool + use<D> {
+    let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+    move |mass| mass < light
+}
+
+impl<const D: usize> Mass<'_, D> {
+    /// (1−ε) m of a particle; `None` if the mass is lumped.
+    #[inline(always)]
+    pub fn consistent(&self, p: usize) -> Option<f64> {
+        (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
+    }
+
+    /// `out += factor M̃ u`
+    pub fn add_product(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        for ((out, u), m) in out.iter_mut().zip(u).zip(self.lumped) {
+            *out += u * (factor * (self.lumping * m));
+        }
+        if self.lumping < 1.0 {
+            let mut at_particles = Pooled::filled(self.particles.len(), Vector::zeros());
+            self.supports.each_value(u, |p, value| at_particles[p] = value);
+            let weight = factor * (1.0 - self.lumping);
+            self.supports.spread(out, |p| at_particles[p] * (weight * self.particles.mass[p]));
+        }
+    }
+
+    /// Solves M̃ w = Σ_p m u_p N_I for every field `u` of the particles; at light nodes w = 0. With it the iterations taken, 0 for a
+    /// lumped mass.
+    ///
+    /// # Errors
+    /// Sums that overflow.
+    pub fn project<const K: usize>(
+        &self,
+        fields: [&[Vector<f64, D>]; K],
+    ) -> Result<([Pooled<Vector<f64, D>>; K], usize), LinearError> {
+        let right = |field: &[Vector<f64, D>]| {
+            let mut out = Pooled::filled(self.lumped.len(), Vector::zeros());
+            self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
+            out
+        };
+        let (mut nodal, mut iterations) = (fields.map(right), 0);
+        let inverse_diagonal = (self.lumping < 1.0).then(|| self.inverse_diagonal());
+        let is_light = is_light(self.particles);
+        for field in &mut nodal {
+            match &inverse_diagonal {
+                Some(inverse_diagonal) => iterations += self.solve(&Jacobi(inverse_diagonal), field)?,
+                None => field.iter_mut().zip(self.lumped).for_each(|(w, &m)| *w /= m),
+            }
+            let light = field.iter_mut().zip(self.lumped).filter(|(_, m)| is_light(**m));
+            light.for_each(|(w, _)| *w = Vector::zeros());
+        }
+        Ok((nodal, iterations))
+    }
+
+    /// 1/M̃_II, zero where there is none.
+    fn inverse_diagonal(&self) -> Pooled<f64> {
+        let mut diagonal: Pooled<f64> = self.lumped.iter().map(|m| self.lumping * m).collect();
+        self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
+            Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
+        });
+        // Of the least numbers above 0 there is no inverse.
+        let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
+        diagonal.iter_mut().for_each(|d| *d = inverse(*d));
+        diagonal
+    }
+
+    /// By conjugate gradients from zero: where M̃ is singular, the solution of least norm.
+    fn solve(&self, jacobi: &Jacobi<'_, D>, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
+        let right: Pooled<_> = field.iter().copied().collect();
+        field.fill(Vector::zeros());
+        let settings = ConjugateGradientSettings {
+            relative_tolerance: PROJECTION_TOLERANCE,
+            max_iterations: 10 * right.len() + 100,
+        };
+        let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
+        Ok(conjugate_gradient(self, jacobi, right, solution, &settings)?.iterations)
+    }
+}
+
+impl<const D: usize> LinearOperator for Mass<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        self.add_product(1.0, bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+    }
+}
+
+/// The inverse diagonal of M̃.
+struct Jacobi<'a, const D: usize>(&'a [f64]);
+
+impl<const D: usize> Preconditioner for Jacobi<'_, D> {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+        for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
+            *z = r * self.0[k / D];
+        }
+    }
+}

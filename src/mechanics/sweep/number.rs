@@ -1,0 +1,133 @@
+//! Numbers of which fields go through the sweep: gather and scatter are linear, so a dual number is two fields of plain numbers.
+
+use super::kernel::At;
+use super::lanes::LANES;
+use super::laws::{Loop, shipped_stresses};
+use crate::material::Material;
+use crate::mechanics::point::Part;
+use crate::scalar::Real;
+use crate::tensor::Vector;
+use num_dual::{Dual2_64, Dual64};
+use std::borrow::Cow;
+
+/// A number made of one or more plain numbers, each of which the sweep takes through the same kernels.
+pub trait Number: Real + Send + Sync {
+    /// How many.
+    const FIELDS: usize;
+
+    /// The `i`-th of them.
+    fn field(&self, i: usize) -> f64;
+
+    /// The number made of them.
+    fn from_fields(field: impl FnMut(usize) -> f64) -> Self;
+
+    /// A nodal field as plain numbers: node after node, field after field, component after component.
+    fn flat<const C: usize>(nodal: &[Vector<Self, C>]) -> Cow<'_, [f64]> {
+        let numbers = |x: &Vector<Self, C>| {
+            let x = *x;
+            (0..Self::FIELDS).flat_map(move |i| (0..C).map(move |c| x[c].field(i)))
+        };
+        Cow::Owned(nodal.iter().flat_map(numbers).collect())
+    }
+
+    /// Lets `point` add to sums of numbers, from numbers whose fields were gathered.
+    #[doc(hidden)]
+    fn at<R, const C: usize, const D: usize>(
+        fields: &[At<f64, C, D>],
+        sums: &mut [At<f64, C, D>],
+        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
+    ) -> R {
+        let (mut at, mut sum) = (At::zero(), At::<Self, C, D>::zero());
+        for c in 0..C {
+            for lane in 0..LANES {
+                at.value[c][lane] = Self::from_fields(|i| fields[i].value[c][lane]);
+                for k in 0..D {
+                    at.gradient[c][k][lane] = Self::from_fields(|i| fields[i].gradient[c][k][lane]);
+                }
+            }
+        }
+        let result = point(&at, &mut sum);
+        for (i, sums) in sums.iter_mut().enumerate() {
+            for c in 0..C {
+                for lane in 0..LANES {
+                    sums.value[c][lane] = sum.value[c][lane].field(i);
+                    for k in 0..D {
+                        sums.gradient[c][k][lane] = sum.gradient[c][k][lane].field(i);
+                    }
+                }
+            }
+        }
+        result
+    }
+
+    /// The loop over lanes with the stresses of a shipped law, if there is one in vector instructions.
+    #[doc(hidden)]
+    fn stresses_of(_law: &Material, _dimension: usize, _part: Part) -> Option<Box<Loop<'static, Self>>> {
+        None
+    }
+
+    /// Lets `add` add to a nodal field as plain numbers.
+    fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {
+        let mut sums = vec![0.0; nodal.len() * C * Self::FIELDS];
+        add(&mut sums);
+        for (x, sums) in nodal.iter_mut().zip(sums.chunks(C * Self::FIELDS)) {
+            *x += Vector::from_fn(|c, _| Self::from_fields(|i| sums[i * C + c]));
+        }
+    }
+}
+
+impl Number for f64 {
+    const FIELDS: usize = 1;
+
+    #[inline(always)]
+    fn field(&self, _: usize) -> f64 {
+        *self
+    }
+
+    #[inline(always)]
+    fn from_fields(mut field: impl FnMut(usize) -> f64) -> Self {
+        field(0)
+    }
+
+    fn flat<const C: usize>(nodal: &[Vector<Self, C>]) -> Cow<'_, [f64]> {
+        Cow::Borrowed(bytemuck::cast_slice(nodal))
+    }
+
+    fn at<R, const C: usize, const D: usize>(
+        fields: &[At<f64, C, D>],
+        sums: &mut [At<f64, C, D>],
+        point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
+    ) -> R {
+        point(&fields[0], &mut sums[0])
+    }
+
+    fn stresses_of(law: &Material, dimension: usize, part: Part) -> Option<Box<Loop<'static, Self>>> {
+        Some(shipped_stresses(law, dimension, part))
+    }
+
+    fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {
+        add(bytemuck::cast_slice_mut(nodal));
+    }
+}
+
+macro_rules! dual {
+    ($number:ident, $fields:expr, $($field:ident),*) => {
+        impl Number for $number {
+            const FIELDS: usize = $fields;
+
+            #[inline(always)]
+            fn field(&self, i: usize) -> f64 {
+                [$(self.$field),*][i]
+            }
+
+            #[inline(always)]
+            fn from_fields(field: impl FnMut(usize) -> f64) -> Self {
+                let [$($field),*] = std::array::from_fn(field);
+                Self::new($($field),*)
+            }
+        }
+    };
+}
+
+dual!(Dual64, 2, re, eps);
+dual!(Dual2_64, 3, re, v1, v2);

@@ -1,0 +1,164 @@
+//! Frozen tangents, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
+
+use super::blocks::{Quadratic, pair};
+use super::lanes::{LANES, Lanes, WithLanes};
+use crate::material::ClosedTangent;
+use crate::scalar::Real;
+
+/// Which numbers a frozen tangent is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Form {
+    /// A, B, κ and q of a [`ClosedTangent`].
+    Closed,
+    /// The same, then b and c.
+    ClosedWithBoth,
+    /// 𝔸 itself: the blocks of all pairs of unit gradients.
+    General,
+}
+
+impl Form {
+    /// Numbers of a particle.
+    pub const fn rows(self, dimension: usize) -> usize {
+        let symmetric = dimension * (dimension + 1) / 2;
+        let closed = dimension * dimension + symmetric + 2;
+        match self {
+            Self::Closed => closed,
+            Self::ClosedWithBoth => closed + 2 * symmetric,
+            Self::General => dimension.pow(4),
+        }
+    }
+
+    /// The closed tangent from the rows of a group.
+    #[inline(always)]
+    fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[S::X; LANES]]) -> ClosedTangent<S::N, D> {
+        let mut at = 0;
+        let mut a = [[s.zero(); D]; D];
+        for i in 0..D {
+            for k in 0..D {
+                a[i][k] = s.load(&rows[at]);
+                at += 1;
+            }
+        }
+        let right = symmetric(s, rows, &mut at);
+        let (bulk, q) = (s.load(&rows[at]), s.load(&rows[at + 1]));
+        at += 2;
+        let with_both = self == Self::ClosedWithBoth;
+        let both = if with_both { Some([symmetric(s, rows, &mut at), symmetric(s, rows, &mut at)]) } else { None };
+        ClosedTangent { a, right, bulk, q, both }
+    }
+}
+
+/// The place of entry (i, j) of the block of e_k and e_l among the rows of a general tangent.
+#[inline(always)]
+pub(super) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usize) -> usize {
+    ((k * D + l) * D + i) * D + j
+}
+
+/// A symmetric tensor from its upper triangle, column by column.
+#[inline(always)]
+fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut usize) -> [[S::N; D]; D] {
+    let mut b = [[s.zero(); D]; D];
+    for k in 0..D {
+        for i in 0..=k {
+            b[i][k] = s.load(&rows[*at]);
+            b[k][i] = b[i][k];
+            *at += 1;
+        }
+    }
+    b
+}
+
+/// `out` += 𝔸 : L of a group; L and what is added to by rows.
+pub(super) struct Product<'a, X, const D: usize> {
+    pub form: Form,
+    pub rows: &'a [[X; LANES]],
+    pub l: &'a [[X; LANES]],
+    pub out: &'a mut [[X; LANES]],
+}
+
+impl<X: Real, const D: usize> WithLanes<X> for Product<'_, X, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<X = X>>(self, s: S) {
+        let Self { form, rows, l, out } = self;
+        let mut gradient = [[s.zero(); D]; D];
+        for i in 0..D {
+            for k in 0..D {
+                gradient[i][k] = s.load(&l[i * D + k]);
+            }
+        }
+        let product = match form {
+            Form::Closed => Form::Closed.read::<S, D>(s, rows).product(s, &gradient),
+            Form::ClosedWithBoth => Form::ClosedWithBoth.read::<S, D>(s, rows).product(s, &gradient),
+            Form::General => {
+                // δσ e_k = Σ_l 𝔸_kl L e_l
+                let mut product = [[s.zero(); D]; D];
+                for k in 0..D {
+                    for l in 0..D {
+                        let block = entries::<S, D>(s, rows, k, l);
+                        for i in 0..D {
+                            for j in 0..D {
+                                product[i][k] = s.mul_add(block[i][j], gradient[j][l], product[i][k]);
+                            }
+                        }
+                    }
+                }
+                product
+            }
+        };
+        for i in 0..D {
+            for k in 0..D {
+                let sum = s.add(s.load(&out[i * D + k]), product[i][k]);
+                s.store(sum, &mut out[i * D + k]);
+            }
+        }
+    }
+}
+
+/// Adds a multiple of the quadratic form of the tangents of a group.
+pub(super) struct AddTo<'a, const D: usize> {
+    pub form: Form,
+    pub rows: &'a [[f64; LANES]],
+    pub factor: f64,
+    pub into: &'a mut Quadratic,
+}
+
+impl<const D: usize> WithLanes<f64> for AddTo<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes<X = f64>>(self, s: S) {
+        let Self { form, rows, factor, into } = self;
+        let factor = s.splat(factor);
+        let closed = if form == Form::General { None } else { Some(form.read::<S, D>(s, rows)) };
+        for l in 0..D {
+            for k in 0..=l {
+                let (one, other) = match &closed {
+                    Some(closed) => (closed.unit_block(s, k, l), closed.unit_block(s, l, k)),
+                    None => (entries::<S, D>(s, rows, k, l), entries::<S, D>(s, rows, l, k)),
+                };
+                for i in 0..D {
+                    for j in 0..D {
+                        let sum = if k < l { s.add(one[i][j], other[i][j]) } else { one[i][j] };
+                        let slot = &mut into.bilinear[pair(k, l)][i][j];
+                        let sum = s.mul_add(factor, sum, s.load(slot));
+                        s.store(sum, slot);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// 𝔸_kl of a general tangent.
+#[inline(always)]
+fn entries<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], k: usize, l: usize) -> [[S::N; D]; D] {
+    let mut block = [[s.zero(); D]; D];
+    for i in 0..D {
+        for j in 0..D {
+            block[i][j] = s.load(&rows[general::<D>(k, l, i, j)]);
+        }
+    }
+    block
+}

@@ -1,0 +1,172 @@
+//! Rayleigh damping, (a M̃ + b K_n) v, with the material part of the stiffness at the beginning of the step: a body that turns as a
+//! whole is not damped by it.
+
+use super::inertia::FrozenMass;
+use super::stress::FrozenStress;
+use super::{BlocksAtPoints, Frozen, ProductAtPoints, Role, Step, Stress, Sum, Term, Unit};
+use crate::material::Law;
+use crate::mechanics::point::{Inadmissible, Part};
+use crate::mechanics::sweep::{Flow, Laned, Number};
+use crate::mechanics::time::Alphas;
+use crate::tensor::{Tensor, Vector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Rayleigh damping: both constants in units that make a M + b K a damping, 1/time and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rayleigh {
+    /// a ≥ 0, 1/time: damps slow motions, rigid ones too, by the share a/(2ω) of critical damping.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub mass: f64,
+    /// b ≥ 0, time: damps fast deformations, by the share b ω/2 of critical damping; the stiffness is that of the material at the
+    /// beginning of each step.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub stiffness: f64,
+}
+
+/// (a M̃ + b K_n) v; not there without inertia.
+pub struct Damping<'a, const D: usize, L> {
+    rayleigh: Rayleigh,
+    step: Step<'a, D, L>,
+    /// K_n; a state without one has no stress either, and the step fails there.
+    stiffness: Option<FrozenStress<f64>>,
+}
+
+impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
+    pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
+        let rayleigh = step.loads.damping.filter(|_| !step.nodal.is_static())?;
+        let stiff = (rayleigh.stiffness > 0.0).then(|| Self::stiffness::<f64>(step, Unit::ONE));
+        Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok) })
+    }
+
+    /// The material part of the stiffness at Δφ = 0.
+    fn stiffness<X: Laned>(step: &Step<'a, D, L>, unit: Unit) -> Result<FrozenStress<X>, Inadmissible> {
+        let at_rest = vec![Vector::zeros(); step.supports.nodes()];
+        match Stress::of(step) {
+            Some(stress) => stress.frozen(&at_rest, Part::Material, unit),
+            None => unreachable!("every step has stresses"),
+        }
+    }
+}
+
+impl<const D: usize, L: Law> Damping<'_, D, L> {
+    /// (a M̃ + b K_n) v
+    fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+        let mut force = vec![Vector::zeros(); v.len()];
+        self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
+        if let Some((flow, add)) = self.stiffness.as_ref().and_then(Frozen::<f64, D>::product_at_points) {
+            let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
+            let out = bytemuck::cast_slice_mut(&mut of_stiffness);
+            self.step.supports.product::<f64>(bytemuck::cast_slice(v), flow, out, &add);
+            force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
+        }
+        force
+    }
+
+    /// v = v_n + Δv at the nodes.
+    fn velocity<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
+        let state = self.step.nodal.velocity.iter().zip(&self.step.nodal.acceleration);
+        let Alphas { dt, a4, a6, .. } = self.step.alphas;
+        let one = |(dphi, (v, a)): (&Vector<T, D>, (&Vector<f64, D>, &Vector<f64, D>))| {
+            let known = v - v * (dt * a4) + a * a6;
+            Vector::from_fn(|i, _| dphi[i] * T::lit(a4) + T::lit(known[i]))
+        };
+        dphi.iter().zip(state).map(one).collect()
+    }
+
+    /// (a M̃ + b K_n) v, for every number: it is linear in v.
+    fn force_of<T: Number>(&self, v: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
+        let mut force = vec![Vector::<T, D>::zeros(); v.len()];
+        for field in 0..T::FIELDS {
+            let plain: Vec<_> = v.iter().map(|v| v.map(|x| x.field(field))).collect();
+            for (force, of_field) in force.iter_mut().zip(self.force(&plain)) {
+                *force += of_field.map(|x| T::from_fields(|i| if i == field { x } else { 0.0 }));
+            }
+        }
+        force
+    }
+}
+
+impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
+    const NAME: &'static str = "damping";
+    const ROLE: Role = Role::Dissipates;
+
+    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        let force = self.force_of(&self.velocity(dphi));
+        out.iter_mut().zip(force).for_each(|(out, force)| *out += force);
+    }
+
+    /// ½ v·C v/α₄, whose gradient is C v
+    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let v = self.velocity(dphi);
+        let (mut sum, mut magnitude) = (T::zero(), 0.0);
+        for (force, v) in self.force_of(&v).iter().zip(&v) {
+            let energy = T::lit(0.5 / self.step.alphas.a4) * force.dot(v);
+            sum += energy;
+            magnitude += energy.value().abs();
+        }
+        Some(Ok((sum, magnitude)))
+    }
+
+    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let Alphas { dt, a4, a6, .. } = self.step.alphas;
+        let state = self.step.nodal.velocity.iter().zip(&self.step.nodal.acceleration);
+        let sizes = dphi.iter().zip(state).map(|(dphi, (v, a))| dphi * a4 + v * (1.0 - dt * a4) + a * a6);
+        let force = self.force(&sizes.collect::<Vec<_>>());
+        out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
+    }
+
+    fn freeze<X: Laned>(
+        &self,
+        _: &[Vector<f64, D>],
+        _: Part,
+        unit: Unit,
+    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+        let Rayleigh { mass, stiffness } = self.rayleigh;
+        let a4 = self.step.alphas.a4;
+        let mut of_stress = None;
+        if stiffness > 0.0 {
+            of_stress = Some(Self::stiffness::<X>(&self.step, unit)?.times(a4 * stiffness));
+        }
+        let of_mass = FrozenMass { mass: self.step.mass(), factor: a4 * mass / unit.scale };
+        Ok(Some(Box::new(FrozenDamping { of_mass, of_stress })))
+    }
+}
+
+/// α₄ (a M̃ + b K_n)
+struct FrozenDamping<'a, X: Laned, const D: usize> {
+    of_mass: FrozenMass<'a, D>,
+    of_stress: Option<FrozenStress<X>>,
+}
+
+impl<X: Laned, const D: usize> FrozenDamping<'_, X, D> {
+    fn each(&self) -> impl Iterator<Item = &dyn Frozen<X, D>> {
+        let of_mass: &dyn Frozen<X, D> = &self.of_mass;
+        let of_stress = self.of_stress.as_ref().map(|frozen| frozen as &dyn Frozen<X, D>);
+        [Some(of_mass), of_stress].into_iter().flatten()
+    }
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenDamping<'_, X, D> {
+    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+        self.each().for_each(|frozen| frozen.add_product_at_nodes(u, out));
+    }
+
+    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+        let (flows, all): (Vec<_>, Vec<_>) = self.each().filter_map(Frozen::product_at_points).unzip();
+        let flow = flows.into_iter().reduce(Flow::and)?;
+        Some((flow, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))
+    }
+
+    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+        self.each().for_each(|frozen| frozen.add_blocks_at_nodes(blocks));
+    }
+
+    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
+        let all: Vec<_> = self.each().filter_map(Frozen::blocks_at_points).collect();
+        Some(Box::new(move |group, form| all.iter().for_each(|add| add(group, form))))
+    }
+}

@@ -1,0 +1,146 @@
+//! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
+
+use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, Unit};
+use crate::mechanics::mass::Mass;
+use crate::mechanics::point::{Inadmissible, Part};
+use crate::mechanics::sweep::{Flow, Laned, Number};
+use crate::mechanics::time::Alphas;
+use crate::mechanics::transfer::Nodal;
+use crate::pooled::Pooled;
+use crate::tensor::{Tensor, Vector, identity, scaled};
+
+/// M̃ a; not there without inertia.
+pub struct Inertia<'a, const D: usize> {
+    mass: Mass<'a, D>,
+    nodal: &'a Nodal<D>,
+    alphas: Alphas,
+    /// Δφ̂ at the particles; empty for a lumped mass.
+    predicted: Pooled<Vector<f64, D>>,
+}
+
+impl<'a, const D: usize> Inertia<'a, D> {
+    pub(super) fn of<L>(step: &Step<'a, D, L>) -> Option<Self> {
+        let (mass, nodal, alphas) = (step.mass(), step.nodal, step.alphas);
+        if nodal.is_static() {
+            return None;
+        }
+        let mut predicted = Pooled::default();
+        if mass.lumping < 1.0 {
+            let state = nodal.velocity.iter().zip(&nodal.acceleration);
+            let of_nodes: Pooled<_> = state.map(|(v, a)| alphas.predicted(v, a)).collect();
+            predicted = Pooled::filled(mass.particles.len(), Vector::zeros());
+            mass.supports.each_value(&of_nodes, |p, value| predicted[p] = value);
+        }
+        Some(Self { mass, nodal, alphas, predicted })
+    }
+
+    /// ε m_I and a_I of every node.
+    fn motion<T: Number>(&self, dphi: &[Vector<T, D>]) -> impl Iterator<Item = (T, Vector<T, D>)> {
+        let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration);
+        dphi.iter().zip(state).zip(self.mass.lumped).map(|((dphi, (v, a)), m)| {
+            let predicted = self.alphas.predicted(v, a);
+            let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (dphi[i] - T::lit(predicted[i])));
+            (T::lit(self.mass.lumping * m), a)
+        })
+    }
+}
+
+impl<const D: usize> Term<D> for Inertia<'_, D> {
+    const NAME: &'static str = "inertia";
+
+    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        out.iter_mut().zip(self.motion(dphi)).for_each(|(out, (m, a))| *out += a * m);
+    }
+
+    /// q = (1−ε) m a
+    fn at_points<T: Number>(&self, _: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
+        let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize).unwrap_or(0.0));
+                for c in 0..D {
+                    sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(self.predicted[p as usize][c]));
+                }
+            }
+            Ok(())
+        });
+        (self.mass.lumping < 1.0).then_some((Flow::VALUE, add))
+    }
+
+    /// ½ a·M̃ a/α₁
+    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let half_over_a1 = T::lit(0.5 / self.alphas.a1);
+        let (mut sum, mut magnitude) = (T::zero(), 0.0);
+        let mut add = |energy: T| {
+            sum += energy;
+            magnitude += energy.value().abs();
+        };
+        self.motion(dphi).for_each(|(m, a)| add(half_over_a1 * m * a.dot(&a)));
+        if self.mass.lumping < 1.0 {
+            let half_a1 = T::lit(0.5 * self.alphas.a1);
+            let energy = |p: usize, u: Vector<T, D>, _: Tensor<T, D>| {
+                let u = u - self.predicted[p].map(T::lit);
+                half_a1 * T::lit(self.mass.consistent(p).unwrap_or(0.0)) * u.dot(&u)
+            };
+            self.mass.supports.each_particle(dphi, energy, |_, energy| add(energy));
+        }
+        Some(Ok((sum, magnitude)))
+    }
+
+    /// The whole mass, also for ε < 1: the consistent part is of the same size.
+    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        let Alphas { a1, a2, a3, .. } = self.alphas;
+        let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration).zip(self.mass.lumped);
+        for ((out, dphi), ((v, a), &m)) in out.iter_mut().zip(dphi).zip(state) {
+            *out += (dphi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * m;
+        }
+    }
+
+    fn freeze<X: Laned>(
+        &self,
+        _: &[Vector<f64, D>],
+        _: Part,
+        unit: Unit,
+    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+        Ok(Some(Box::new(FrozenMass { mass: self.mass, factor: self.alphas.a1 / unit.scale })))
+    }
+}
+
+/// A multiple of M̃.
+pub(super) struct FrozenMass<'a, const D: usize> {
+    pub(super) mass: Mass<'a, D>,
+    pub(super) factor: f64,
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMass<'_, D> {
+    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+        for ((out, u), m) in out.iter_mut().zip(u).zip(self.mass.lumped) {
+            let weight = X::lit(self.factor * self.mass.lumping * m);
+            (0..D).for_each(|i| out[i] += u[i] * weight);
+        }
+    }
+
+    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+        let add: ProductAtPoints<'_, X, D> = Box::new(|group, at, sums| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let weight = X::lit(self.factor * self.mass.consistent(p as usize).unwrap_or(0.0));
+                (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
+            }
+        });
+        (self.mass.lumping < 1.0).then_some((Flow::VALUE, add))
+    }
+
+    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+        for (block, m) in blocks.iter_mut().zip(self.mass.lumped) {
+            *block += scaled(&identity(), self.factor * self.mass.lumping * m);
+        }
+    }
+
+    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
+        let add: BlocksAtPoints<'_> = Box::new(|group, form| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                form.mass[lane] += self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);
+            }
+        });
+        (self.mass.lumping < 1.0).then_some(add)
+    }
+}

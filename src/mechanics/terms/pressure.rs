@@ -1,0 +1,104 @@
+//! Follower pressure, +p cof(F) N A on the particles of a surface: with an exact tangent, not symmetric on an open surface.
+
+use super::{Frozen, Role, Step, Sum, Term, Unit};
+use crate::mechanics::loads::PressurePoint;
+use crate::mechanics::point::{Inadmissible, Part, compose};
+use crate::mechanics::sweep::{Laned, Number, Supports};
+use crate::particles::Particles;
+use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity, outer, scaled};
+
+/// Σ_Γ p cof(F) N A N_I: it has no potential.
+pub struct Pressure<'a, const D: usize> {
+    particles: &'a Particles<D>,
+    supports: &'a Supports<D>,
+    points: Vec<PressurePoint<D>>,
+}
+
+impl<'a, const D: usize> Pressure<'a, D> {
+    pub(super) fn of<L>(step: &Step<'a, D, L>) -> Option<Self> {
+        let points = step.loads.pressures(step.time);
+        (!points.is_empty()).then_some(Self { particles: step.particles, supports: step.supports, points })
+    }
+}
+
+impl<const D: usize> Term<D> for Pressure<'_, D> {
+    const NAME: &'static str = "follower pressure";
+    const ROLE: Role = Role::Loads;
+
+    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        for point in &self.points {
+            let g = self.supports.gradient_at(point.particle, dphi);
+            let f = identity::<T, D>() + compose(&g, &self.particles.displacement_gradient[point.particle]);
+            let force = cofactor(&f) * point.force.map(T::lit);
+            for (node, n, _) in self.supports.of(point.particle) {
+                out[node] += force * T::lit(n);
+            }
+        }
+    }
+
+    fn energy<T: Number>(&self, _: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        None
+    }
+
+    fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        for point in &self.points {
+            for (node, n, _) in self.supports.of(point.particle) {
+                out[node] += point.force.abs() * n.abs();
+            }
+        }
+    }
+
+    fn freeze<X: Laned>(
+        &self,
+        dphi: &[Vector<f64, D>],
+        _: Part,
+        unit: Unit,
+    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+        let freeze = |point: &PressurePoint<D>| {
+            let (p, h_n) = (point.particle, &self.particles.displacement_gradient[point.particle]);
+            let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));
+            let f_inv_t = at.inverse_transpose();
+            FrozenPoint {
+                particle: p,
+                df_inv_t: f_inv_t * (identity::<f64, D>() + h_n).transpose(),
+                force: f_inv_t * point.force * (at.jacobian / unit.scale),
+            }
+        };
+        Ok(Some(Box::new(FrozenPressure { supports: self.supports, points: self.points.iter().map(freeze).collect() })))
+    }
+}
+
+struct FrozenPressure<'a, const D: usize> {
+    supports: &'a Supports<D>,
+    points: Vec<FrozenPoint<D>>,
+}
+
+/// δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
+struct FrozenPoint<const D: usize> {
+    particle: usize,
+    df_inv_t: Tensor<f64, D>,
+    force: Vector<f64, D>,
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenPressure<'_, D> {
+    /// At the particles themselves in double precision.
+    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+        for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
+            let l = self.supports.gradient_at(*particle, u).map(X::value);
+            let delta = w * contract(a, &l) - a * (l.transpose() * w);
+            for (node, n, _) in self.supports.of(*particle) {
+                (0..D).for_each(|i| out[node][i] += X::lit(delta[i] * n));
+            }
+        }
+    }
+
+    /// N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
+    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+        for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
+            for (node, n, grad_n) in self.supports.of(*particle) {
+                let g = a * grad_n;
+                blocks[node] += scaled(&(outer(w, &g) - outer(&g, w)), n);
+            }
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
+
+use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, Unit};
+use crate::material::{Law, admissible};
+use crate::mechanics::point::{Inadmissible, Part, compose};
+use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Supports, add_quadratic};
+use crate::pooled::{Element, Pooled};
+use crate::tensor::{Tensor, Vector, identity};
+
+/// Σ_p V₀ F S F_nᵀ ∇_n N_I
+pub struct Stress<'a, const D: usize, L> {
+    laws: Laws<'a, D, L>,
+    supports: &'a Supports<D>,
+}
+
+impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
+    pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
+        let Step { particles, bodies, dt, supports, .. } = *step;
+        Some(Self { laws: Laws { particles, bodies, dt }, supports })
+    }
+
+    fn law(&self, p: usize) -> &L {
+        &self.laws.bodies[self.laws.particles.body[p] as usize].law
+    }
+
+    /// The tangent frozen at Δφ, one part of it if asked for.
+    pub(super) fn frozen<X: Laned>(
+        &self,
+        dphi: &[Vector<f64, D>],
+        part: Part,
+        unit: Unit,
+    ) -> Result<FrozenStress<X>, Inadmissible>
+    where
+        [X; LANES]: Element,
+    {
+        let form = self.laws.form();
+        let count = form.rows(D);
+        let factor = 1.0 / (unit.scale * unit.length * unit.length);
+        let mut rows = Pooled::unspecified(self.supports.groups() * count, [X::zero(); LANES]);
+        let evaluate = self.laws.tangents(part, form, factor);
+        let failure = std::sync::Mutex::new(None::<Inadmissible>);
+        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
+            let mut tangents: [[f64; LANES]; MOST_ROWS];
+            let mut few = [[0.0; LANES]; FEW_ROWS];
+            let tangents = if count <= FEW_ROWS {
+                &mut few[..count]
+            } else {
+                tangents = [[0.0; LANES]; MOST_ROWS];
+                &mut tangents[..count]
+            };
+            if let Err(error) = evaluate(group, at, tangents) {
+                let mut first = crate::parallel::held(&failure);
+                if first.is_none_or(|first| error.particle < first.particle) {
+                    *first = Some(error);
+                }
+            }
+            rows.iter_mut().zip(tangents).for_each(|(to, from)| *to = from.map(X::lit));
+        });
+        match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(FrozenStress { form, rows, length: unit.length, factor: 1.0 }),
+        }
+    }
+}
+
+/// Rows of the longest closed form.
+const FEW_ROWS: usize = Form::ClosedWithBoth.rows(3);
+
+/// Rows of the largest form in three dimensions.
+const MOST_ROWS: usize = Form::General.rows(3);
+
+impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
+    const NAME: &'static str = "stress";
+    const PARTS: &'static [(Part, &'static str)] = &[(Part::Geometric, "geometric"), (Part::Material, "material")];
+
+    fn at_points<T: Number>(&self, part: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
+        Some((Flow::GRADIENT, Box::new(self.laws.stresses(part))))
+    }
+
+    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        if !self.laws.bodies.iter().all(|body| body.law.has_potential()) {
+            return None;
+        }
+        let particles = self.laws.particles;
+        let energies = self.supports.interpolate(dphi, |p, _, g| {
+            let id = particles.id[p] as usize;
+            let at = admissible(compose(&g, &particles.displacement_gradient[p]))
+                .map_err(|source| Inadmissible { particle: id, source })?;
+            Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at, &particles.start(p, self.laws.dt)))
+        });
+        let (mut sum, mut magnitude) = (T::zero(), 0.0);
+        let energies = match energies {
+            Ok(energies) => energies,
+            Err(error) => return Some(Err(error)),
+        };
+        for energy in energies {
+            sum += energy;
+            magnitude += energy.value().abs();
+        }
+        Some(Ok((sum, magnitude)))
+    }
+
+    fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], _: &mut [Vector<f64, D>]) {}
+
+    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖, the response to a change of volume standing for all, and δF of size ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖
+    fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
+        let particles = self.laws.particles;
+        self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
+            let h_n = &particles.displacement_gradient[p];
+            let id = particles.id[p] as usize;
+            let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: id, source })?;
+            let f_n = (identity::<f64, D>() + h_n).norm();
+            let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
+            let start = particles.start(p, self.laws.dt);
+            let response = self.law(p).elasticity(&at, &start, &(at.f.transpose() * at.f)).norm();
+            let change = response * (at.h.norm() + moved * f_n) * f_n * particles.volume[p];
+            Ok((Vector::zeros(), Tensor::repeat(change)))
+        })
+    }
+
+    fn freeze<X: Laned>(
+        &self,
+        dphi: &[Vector<f64, D>],
+        part: Part,
+        unit: Unit,
+    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+        Ok(Some(Box::new(self.frozen::<X>(dphi, part, unit)?)))
+    }
+}
+
+/// δσ = 𝔸 : L at all particles, a lane each.
+pub(super) struct FrozenStress<X: Laned>
+where
+    [X; LANES]: Element,
+{
+    form: Form,
+    rows: Pooled<[X; LANES]>,
+    /// In which gradients are taken.
+    length: f64,
+    /// What products are multiplied by.
+    factor: f64,
+}
+
+impl<X: Laned> FrozenStress<X>
+where
+    [X; LANES]: Element,
+{
+    pub(super) fn times(self, factor: f64) -> Self {
+        Self { factor: factor * self.factor, ..self }
+    }
+
+    fn of_group(&self, group: usize, dimension: usize) -> &[[X; LANES]] {
+        let count = self.form.rows(dimension);
+        &self.rows[group * count..(group + 1) * count]
+    }
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X>
+where
+    [X; LANES]: Element,
+{
+    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+        let factor = X::lit(self.factor);
+        Some((
+            Flow::GRADIENT,
+            Box::new(move |group, at, sums| {
+                let (rows, l) = (self.of_group(group.number, D), at.gradient.as_flattened());
+                if self.factor == 1.0 {
+                    <X as Laned>::product(self.form, D, rows, l, sums.gradient.as_flattened_mut());
+                } else {
+                    let mut product = [[[X::zero(); LANES]; D]; D];
+                    <X as Laned>::product(self.form, D, rows, l, product.as_flattened_mut());
+                    let both = sums.gradient.as_flattened_mut().iter_mut().zip(product.as_flattened());
+                    both.for_each(|(sum, x)| sum.iter_mut().zip(x).for_each(|(sum, &x)| *sum += factor * x));
+                }
+            }),
+        ))
+    }
+
+    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
+        let factor = self.factor * self.length * self.length;
+        Some(Box::new(move |group, form| add_quadratic(self.form, D, self.of_group(group.number, D), factor, form)))
+    }
+}
