@@ -151,6 +151,7 @@ pub mod particles;
 pub mod phases;
 pub mod plan;
 pub mod pooled;
+mod problems;
 pub mod scalar;
 pub mod scene;
 pub mod shape;

@@ -2,8 +2,11 @@
 
 use super::interior::Lane;
 use super::kernel::{Kernel, folded};
-use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
+use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
 use crate::grid::Axis;
+use crate::problems::Problems;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// The B-spline of the given degree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +15,39 @@ pub enum Bspline {
     Quadratic,
     /// Continuous second derivative, four nodes an axis.
     Cubic,
+}
+
+/// B-splines.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "Bspline")]
+#[serde(default, deny_unknown_fields)]
+pub struct BsplineParameters {
+    /// The polynomial degree, 2 or 3. Default 3.
+    #[schemars(range(min = 2, max = 3))]
+    pub degree: u32,
+}
+
+impl Default for BsplineParameters {
+    fn default() -> Self {
+        Self { degree: 3 }
+    }
+}
+
+impl Listed for Bspline {
+    type Parameters = BsplineParameters;
+
+    fn build(given: &BsplineParameters, _: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+        problems.whole(&format!("{path}.degree"), given.degree, 2, 3);
+        match given.degree {
+            2 => Some(Self::Quadratic.into()),
+            3 => Some(Self::Cubic.into()),
+            _ => None,
+        }
+    }
+
+    fn examples() -> Vec<(&'static str, Approximation)> {
+        vec![("quadratic", Self::Quadratic.into()), ("cubic", Self::Cubic.into())]
+    }
 }
 
 impl Validate for Bspline {

@@ -1,5 +1,7 @@
 //! What can go wrong with a shape function, and what is allowed instead.
 
+use crate::problems::Number;
+
 /// A particle no shape function can serve, or parameters of a family that mean nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ApproximationError {
@@ -21,23 +23,15 @@ pub enum ApproximationError {
         /// Cells along the axis.
         cells: u32,
     },
-    /// γ̂ must be finite and positive.
-    #[error("the locality γ of max-ent is {gamma}; it must be finite and > 0")]
-    Gamma {
-        /// γ̂ = β̂ h²
-        gamma: f64,
-    },
-    /// TOL₀ must lie in [`SMALLEST_TOLERANCE`](super::SMALLEST_TOLERANCE) … 1.
-    #[error("the support tolerance of max-ent is {tolerance:e}; it must be >= {smallest:e} and < 1", smallest = super::SMALLEST_TOLERANCE)]
-    Tolerance {
-        /// TOL₀
-        tolerance: f64,
-    },
-    /// The half-width of a GIMP particle must lie in (0, ½] of the spacing.
-    #[error("the half-width of a GIMP particle is {half_width} of the spacing; it must be > 0 and <= 0.5")]
-    HalfWidth {
-        /// l_p / h
-        half_width: f64,
+    /// A parameter of a family that means nothing.
+    #[error("{parameter} is {}; it must be {allowed}", Number(*value))]
+    Parameter {
+        /// What it is.
+        parameter: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its range.
+        allowed: &'static str,
     },
     /// The circle of max-ent holds too few nodes to have every particle in their convex hull.
     #[error(

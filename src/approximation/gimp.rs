@@ -2,8 +2,9 @@
 
 use super::interior::Lane;
 use super::kernel::{Kernel, folded};
-use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
+use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
 use crate::grid::Axis;
+use crate::problems::Problems;
 
 /// The hat averaged over a particle of constant width 2 l_p: Bardenhagen & Kober, CMES 5 (2004).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,10 +33,25 @@ impl Gimp {
     }
 }
 
+impl Listed for Gimp {
+    type Parameters = ();
+    const ONE_HALF_WIDTH: bool = true;
+
+    fn build(_: &(), cells: Cells, _: &mut Problems, _: &str) -> Option<Approximation> {
+        Some(Self::particles_per_axis(cells.particles_per_axis).into())
+    }
+
+    fn examples() -> Vec<(&'static str, Approximation)> {
+        vec![("gimp", Self::particles_per_axis(2).into())]
+    }
+}
+
 impl Validate for Gimp {
     fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
-        let half_width = self.half_width;
-        if half_width > 0.0 && half_width <= 0.5 { Ok(()) } else { Err(ApproximationError::HalfWidth { half_width }) }
+        let value = self.half_width;
+        let parameter = "the half-width of a GIMP particle over the spacing";
+        let error = ApproximationError::Parameter { parameter, value, allowed: "> 0 and <= 0.5" };
+        if value > 0.0 && value <= 0.5 { Ok(()) } else { Err(error) }
     }
 }
 

@@ -1,12 +1,27 @@
 //! Linear functions (Q4 in the plane).
 
 use super::interior::{Column, Interior};
-use super::{ApproximationError, AxisWeights, Separable, Shipped, Validate, product::Place};
+use super::{
+    Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate, product::Place,
+};
 use crate::grid::Axis;
+use crate::problems::Problems;
 
 /// The product of hats. On a cell face the gradient is the one of the upper cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Linear;
+
+impl Listed for Linear {
+    type Parameters = ();
+
+    fn build(_: &(), _: Cells, _: &mut Problems, _: &str) -> Option<Approximation> {
+        Some(Self.into())
+    }
+
+    fn examples() -> Vec<(&'static str, Approximation)> {
+        vec![("linear", Self.into())]
+    }
+}
 
 impl Validate for Linear {
     fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {

@@ -1,4 +1,5 @@
-//! Shape functions N and ∇N: one file a family, one list ([`Approximation`]).
+//! Shape functions N and ∇N: one file a family, with its functions and what a scene writes of it ([`Listed`]); one list, which makes
+//! [`Approximation`] and [`Parameters`].
 //!
 //! Linear, GIMP, B-splines and the separable local max-ent functions (LME) are products of functions of one coordinate
 //! ([`Separable`]) and share one tensor product; LME on the paper's circle of nodes is not. Positions and spacing are in
@@ -27,18 +28,21 @@ mod linear;
 mod lme;
 mod product;
 
-pub use bspline::Bspline;
+pub use bspline::{Bspline, BsplineParameters};
 pub use error::ApproximationError;
 pub use gimp::Gimp;
 pub use interior::Shipped;
 pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
-pub use lme::{Lme, LmeCircle, SMALLEST_TOLERANCE};
+pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport, SMALLEST_TOLERANCE};
 pub use product::{AxisWeights, Separable};
 pub(crate) use product::{Place, check};
 
 use crate::grid::Grid;
+use crate::problems::Problems;
 use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Parameters that can be judged before any particle is there.
 ///
@@ -172,15 +176,88 @@ impl<S: Separable> ShapeFunction for S {
     }
 }
 
-/// The list of families. A word here makes a family a variant of [`Approximation`]; CONTRIBUTING.md says what else it touches.
+/// What a family of the list has beside its functions.
+pub trait Listed: ShapeFunction {
+    /// What a scene writes of it: the doc comments of the fields are the manual. `()` if there is nothing but its key.
+    type Parameters;
+
+    /// Whether the functions depend on how wide particles are, which all bodies must then agree on.
+    const ONE_HALF_WIDTH: bool = false;
+
+    /// The functions; or `None`, and `problems` of the keys below `path`.
+    fn build(given: &Self::Parameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation>;
+
+    /// Members with their names: what tests and studies run over.
+    fn examples() -> Vec<(&'static str, Approximation)>;
+}
+
+/// The cells of a scene, which shape functions depend on beside their own parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cells {
+    /// D
+    pub dimension: usize,
+    /// Particles along each axis of a cell.
+    pub particles_per_axis: u32,
+}
+
+/// Makes of the list of families what every family is in.
 macro_rules! approximations {
-    ($($family:ident),*) => {
+    ($($(#[$sentence:meta])+ $key:literal => $family:ident $(($given:ident: $parameters:ty))? $(or $other:ident)?;)*) => {
         /// Any of the shipped shape functions.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Approximation {
-            $(#[doc = concat!("See [`", stringify!($family), "`].")] $family($family)),*
+            $($(#[$sentence])+ $family($family), $(#[doc = concat!("See [`", stringify!($other), "`].")] $other($other),)?)*
         }
 
+        /// The family of shape functions that joins particles and nodes.
+        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+        #[schemars(rename = "Approximation")]
+        pub enum Parameters {
+            $($(#[$sentence])+ #[serde(rename = $key)] $family $(($parameters))?),*
+        }
+
+        impl Parameters {
+            /// The key of the family.
+            pub(crate) fn key(&self) -> &'static str {
+                match self { $(Self::$family { .. } => $key),* }
+            }
+
+            /// Whether all bodies must agree on how wide particles are.
+            pub(crate) fn one_half_width(&self) -> bool {
+                match self { $(Self::$family { .. } => $family::ONE_HALF_WIDTH),* }
+            }
+
+            /// The functions; or `None`, and `problems` of the keys below `path`.
+            ///
+            /// ```
+            /// use bfree::approximation::{Gimp, Cells, Parameters};
+            /// use bfree::scene::Problems;
+            ///
+            /// let written: Parameters = serde_json::from_str(r#""gimp""#)?;
+            /// let cells = Cells { dimension: 2, particles_per_axis: 2 };
+            /// let functions = written.functions(cells, &mut Problems::default(), "approximation");
+            /// assert_eq!(functions, Some(Gimp { half_width: 0.25 }.into()));
+            /// # Ok::<(), Box<dyn std::error::Error>>(())
+            /// ```
+            pub fn functions(&self, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+                match self {
+                    $(Self::$family $(($given))? => {
+                        $family::build(&($(*$given)?), cells, problems, &format!("{path}.{}", $key))
+                    })*
+                }
+            }
+        }
+
+        impl Approximation {
+            /// Members of every family with their names: what tests and studies run over.
+            pub fn examples() -> Vec<(&'static str, Self)> {
+                [$($family::examples()),*].concat()
+            }
+        }
+
+        approximations!(@ $($family $($other)?)*);
+    };
+    (@ $($family:ident)*) => {
         impl Validate for Approximation {
             fn validate(&self, dimension: usize) -> Result<(), ApproximationError> {
                 match self { $(Self::$family(family) => family.validate(dimension)),* }
@@ -208,4 +285,23 @@ macro_rules! approximations {
     };
 }
 
-approximations!(Linear, Gimp, Bspline, Lme, LmeCircle);
+// The list of families: the sentence of the manual, the key of scenes, the type, and what else a scene may mean by the key.
+// CONTRIBUTING.md says what else a shipped family touches.
+approximations! {
+    /// Products of hat functions. Simple and rough: forces jump when a particle crosses a cell face.
+    "linear" => Linear;
+    /// Products of one-dimensional uGIMP functions; the half width of a particle follows from the bodies'
+    /// `particles_per_cell`, which must all agree.
+    "gimp" => Gimp;
+    /// Products of B-splines centred on the nodes.
+    "bspline" => Bspline(given: BsplineParameters);
+    /// Local maximum entropy functions.
+    "lme" => Lme(given: LmeParameters) or LmeCircle;
+}
+
+/// Cells the shape functions measured, those that nothing beats in error and work at once (study `tradeoff`).
+impl Default for Parameters {
+    fn default() -> Self {
+        Self::Bspline(BsplineParameters::default())
+    }
+}

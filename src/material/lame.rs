@@ -1,5 +1,9 @@
 //! The two constants of an isotropic solid, in any of the three usual pairs.
 
+use crate::problems::{Number, Problems};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Lamé's constants Λ and G, in the user's unit of stress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lame {
@@ -112,5 +116,96 @@ impl Lame {
     /// ```
     pub fn p_wave_modulus(&self) -> f64 {
         self.lambda + 2.0 * self.shear
+    }
+}
+
+/// The constants of an isotropic law: exactly one of the pairs `lambda` and `shear`, `young` and `poisson`, `bulk` and
+/// `shear`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "Constants")]
+#[serde(deny_unknown_fields)]
+pub struct LameParameters {
+    /// Lamé's Λ (stress), > −2/3 `shear`.
+    pub lambda: Option<f64>,
+    /// The shear modulus G (stress), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub shear: Option<f64>,
+    /// Young's modulus E (stress), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub young: Option<f64>,
+    /// Poisson's ratio ν (no unit), −1 < ν < 0.5.
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
+    pub poisson: Option<f64>,
+    /// The bulk modulus K = Λ + 2/3 G (stress), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bulk: Option<f64>,
+}
+
+impl LameParameters {
+    /// Λ and G; or `None`, and `problems` of the keys below `path`.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, LameParameters};
+    /// use bfree::scene::Problems;
+    ///
+    /// // The same solid by two pairs: E = 2.5, ν = ¼ is Λ = G = 1. Half of each pair is none.
+    /// let mut problems = Problems::default();
+    /// let mut lame = |text| serde_json::from_str::<LameParameters>(text).map(|given| given.lame(&mut problems, "material"));
+    /// assert_eq!(lame(r#"{"young": 2.5, "poisson": 0.25}"#)?, Lame::new(1.0, 1.0).ok());
+    /// assert_eq!(lame(r#"{"lambda": 1, "shear": 1}"#)?, Lame::new(1.0, 1.0).ok());
+    /// assert!(lame(r#"{"young": 2.5, "shear": 1}"#)?.is_none());
+    /// assert!(problems.to_string().contains("shear with young"), "{problems}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn lame(&self, problems: &mut Problems, path: &str) -> Option<Lame> {
+        let Self { lambda, shear, young, poisson, bulk } = *self;
+        let keys = [("lambda", lambda), ("shear", shear), ("young", young), ("poisson", poisson), ("bulk", bulk)];
+        let given: Vec<(&str, f64)> = keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect();
+        let mut sensible = true;
+        for (key, value) in &given {
+            sensible &= problems.number(&format!("{path}.{key}"), *value);
+        }
+        let lame = match (lambda, shear, young, poisson, bulk) {
+            (Some(lambda), Some(shear), None, None, None) => Lame::new(lambda, shear),
+            (None, None, Some(young), Some(poisson), None) => Lame::from_young_poisson(young, poisson),
+            (None, Some(shear), None, None, Some(bulk)) => Lame::from_bulk_shear(bulk, shear),
+            _ => {
+                let keys: Vec<&str> = given.iter().map(|(key, _)| *key).collect();
+                let found = if keys.is_empty() { "nothing".to_owned() } else { keys.join(" with ") };
+                let allowed = "must be exactly one of the pairs lambda and shear, young and poisson, bulk and shear";
+                problems.refuse(path, found, allowed);
+                return None;
+            }
+        };
+        let positive = || "must be finite and > 0".to_owned();
+        let (key, value, allowed) = match lame {
+            _ if !sensible => return None,
+            Ok(lame) => {
+                let finite = lame.lambda.is_finite() && lame.shear.is_finite();
+                problems.require(finite, path, "a solid with infinite moduli", "the moduli must be finite");
+                return finite.then_some(lame);
+            }
+            Err(LameError::Shear(shear)) => match young {
+                Some(young) => {
+                    ("young", young, "the shear modulus young / (2 (1 + poisson)) must be finite and > 0".to_owned())
+                }
+                None => ("shear", shear, positive()),
+            },
+            Err(LameError::Bulk(bulk)) => match (lambda, shear, poisson) {
+                (Some(lambda), Some(shear), _) => {
+                    ("lambda", lambda, format!("must be greater than -2/3 shear = {}", Number(-2.0 / 3.0 * shear)))
+                }
+                (_, _, Some(poisson)) => (
+                    "poisson",
+                    poisson,
+                    "the bulk modulus young / (3 (1 - 2 poisson)) must be finite and > 0".to_owned(),
+                ),
+                _ => ("bulk", bulk, positive()),
+            },
+            Err(LameError::Young(young)) => ("young", young, positive()),
+            Err(LameError::Poisson(poisson)) => ("poisson", poisson, "must be > -1 and < 0.5".to_owned()),
+        };
+        problems.refuse(&format!("{path}.{key}"), Number(value), allowed);
+        None
     }
 }

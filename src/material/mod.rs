@@ -1,4 +1,5 @@
-//! Hyperelastic laws: one file a law, one list ([`Material`]).
+//! Hyperelastic laws: one file a law, with its formulas and what a scene writes of it ([`Listed`]); one list, which makes [`Material`]
+//! and [`Parameters`].
 //!
 //! A law gives its energy `W`, the second Piola–Kirchhoff stress `S`, the action `ℂ:X` of its tangent and the B-free
 //! tangent density `ℂmat{v,b}` of Planas, Romero, Sancho (the paper's eq. 37). The first Piola–Kirchhoff stress `P = F S` is
@@ -13,12 +14,15 @@ mod st_venant_kirchhoff;
 
 pub use closed_tangent::ClosedTangent;
 pub use from_energy::{Energy, FromEnergy};
-pub use lame::{Lame, LameError};
-pub use neo_hookean::{NeoHookean, Volumetric};
+pub use lame::{Lame, LameError, LameParameters};
+pub use neo_hookean::{Ciarlet, Logarithmic, NeoHookean, Volumetric};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 
+use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, outer};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// det F ≤ 0 (or not a number): no body can be there.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -332,6 +336,39 @@ impl<E: Elastic> Law for E {
     }
 }
 
+/// What a law of the list has beside its formulas.
+pub trait Listed: Law + Sized {
+    /// What a scene writes of it: the doc comments of the fields are the manual. Isotropic laws share [`LameParameters`].
+    type Parameters;
+
+    /// Its name in reports.
+    const NAME: &'static str;
+
+    /// The law; or `None`, and `problems` of the keys below `path`.
+    fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self>;
+
+    /// A member that is Hooke's law of Λ and G at small strain, with other constants as it likes: what tests and studies take.
+    fn example(lame: Lame) -> Self;
+}
+
+/// The largest modulus of pressure waves along an axis of the body at rest, ℂ₁₁₁₁; Λ + 2G of isotropic laws.
+///
+/// ```
+/// use bfree::material::{Lame, NeoHookean, p_wave_modulus};
+///
+/// let lame = Lame::from_young_poisson(100.0, 0.3)?;
+/// assert_eq!(p_wave_modulus(&NeoHookean::logarithmic(lame)), lame.p_wave_modulus());
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+pub fn p_wave_modulus<L: Law>(law: &L) -> f64 {
+    let rest = Deformation::<f64, 3>::new(Tensor::zeros());
+    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
+    let start = Start { dt: 0.0, memory: &memory };
+    let along =
+        |k| law.elasticity(&rest, &start, &Tensor::from_fn(|i, j| if i == k && j == k { 1.0 } else { 0.0 }))[(k, k)];
+    along(0).max(along(1)).max(along(2))
+}
+
 /// Something to be done with a law of whatever type.
 pub(crate) trait LawVisitor {
     /// What comes out.
@@ -438,13 +475,41 @@ pub(crate) fn embed<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, 3> {
     Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { T::zero() })
 }
 
-/// The list of laws. A word here makes a law a variant of [`Material`]; CONTRIBUTING.md says what else a shipped law touches.
+/// Makes of the list of laws what every law is in.
 macro_rules! materials {
-    ($($law:ident),*) => {
+    ($($(#[$sentence:meta])+ $key:literal => $law:ident($formula:ty);)*) => {
         /// Any of the shipped laws.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Material {
-            $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),*
+            $($(#[$sentence])+ $law($formula)),*
+        }
+
+        /// A hyperelastic law with its constants.
+        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+        #[schemars(rename = "Material")]
+        pub enum Parameters {
+            $($(#[$sentence])+ #[serde(rename = $key)] $law(<$formula as Listed>::Parameters)),*
+        }
+
+        impl Parameters {
+            /// The law; or `None`, and `problems` of the keys below `path`.
+            ///
+            /// ```
+            /// use bfree::material::{Lame, NeoHookean, Parameters};
+            /// use bfree::scene::Problems;
+            ///
+            /// let written: Parameters = serde_json::from_str(r#"{"neo_hookean": {"lambda": 1, "shear": 2}}"#)?;
+            /// let law = written.law(&mut Problems::default(), "material");
+            /// assert_eq!(law, Some(NeoHookean::ciarlet(Lame::new(1.0, 2.0)?).into()));
+            /// # Ok::<(), Box<dyn std::error::Error>>(())
+            /// ```
+            pub fn law(&self, problems: &mut Problems, path: &str) -> Option<Material> {
+                match self {
+                    $(Self::$law(given) => {
+                        <$formula>::build(given, problems, &format!("{path}.{}", $key)).map(Material::$law)
+                    })*
+                }
+            }
         }
 
         impl Law for Material {
@@ -487,18 +552,31 @@ macro_rules! materials {
         }
 
         impl Material {
+            /// Every law with its name: what tests and studies run over. At small strain all are Hooke's law of Λ and G.
+            pub fn examples(lame: Lame) -> Vec<(&'static str, Self)> {
+                vec![$((<$formula>::NAME, Self::$law(Listed::example(lame)))),*]
+            }
+
             /// Calls `visitor` with the law, by a type that leaves no branch in a loop over particles.
             pub(crate) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
-                match self { $(Self::$law(law) => law.with(visitor)),* }
+                match self { $(Self::$law(law) => visitor.visit(law.clone())),* }
             }
         }
 
-        $(impl From<$law> for Material {
-            fn from(law: $law) -> Self {
+        $(impl From<$formula> for Material {
+            fn from(law: $formula) -> Self {
                 Self::$law(law)
             }
         })*
     };
 }
 
-materials!(NeoHookean, StVenantKirchhoff);
+// The list of laws: the sentence of the manual, the key of scenes, the type. CONTRIBUTING.md says what else a shipped law touches.
+materials! {
+    /// Neo-Hookean with Ciarlet's volumetric energy Λ/4 (J² − 1) − Λ/2 ln J: the paper's law.
+    "neo_hookean" => NeoHookean(NeoHookean<Ciarlet>);
+    /// Neo-Hookean with the volumetric energy Λ/2 (ln J)².
+    "neo_hookean_logarithmic" => NeoHookeanLogarithmic(NeoHookean<Logarithmic>);
+    /// St. Venant–Kirchhoff: linear in the Green–Lagrange strain; not for strong compression.
+    "st_venant_kirchhoff" => StVenantKirchhoff(StVenantKirchhoff);
+}

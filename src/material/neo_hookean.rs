@@ -1,17 +1,76 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Elastic, Lame, LawVisitor};
+use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed};
+use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 
-/// How the volume resists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Volumetric {
-    /// Ciarlet: Λ/4 (J²−1) − Λ/2 ln J, the paper's law (appendix B.1).
-    Ciarlet,
-    /// Λ/2 (ln J)², the law most other programs ship.
-    Logarithmic,
+/// How the volume resists: U(J) over Λ. A type, so that no branch is left in a loop over particles.
+pub trait Volumetric: Copy + Default + Send + Sync + 'static {
+    /// The name of the solid in reports.
+    const NAME: &'static str;
+
+    /// 2 U/Λ.
+    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T;
+
+    /// J U'(J) for Λ = `lambda`.
+    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
+
+    /// J (J U')' for Λ = `lambda`.
+    fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
+}
+
+/// Ciarlet: Λ/4 (J²−1) − Λ/2 ln J, the paper's law (appendix B.1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ciarlet;
+
+impl Volumetric for Ciarlet {
+    const NAME: &'static str = "neo-Hookean, Ciarlet";
+
+    /// ½ j² + (j − ln J)
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
+        T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian()
+    }
+
+    /// Λ/2 (J²−1)
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        T::lit(0.5 * lambda) * at.jacobian_squared_minus_one()
+    }
+
+    /// ΛJ²
+    #[inline(always)]
+    fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        T::lit(lambda) * at.jacobian * at.jacobian
+    }
+}
+
+/// Λ/2 (ln J)², the law most other programs ship.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Logarithmic;
+
+impl Volumetric for Logarithmic {
+    const NAME: &'static str = "neo-Hookean, logarithmic";
+
+    /// (ln J)²
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
+        at.log_jacobian() * at.log_jacobian()
+    }
+
+    /// Λ ln J
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        T::lit(lambda) * at.log_jacobian()
+    }
+
+    /// Λ
+    #[inline(always)]
+    fn stiffness<T: Real, const D: usize>(lambda: f64, _at: &Deformation<T, D>) -> T {
+        T::lit(lambda)
+    }
 }
 
 /// Compressible neo-Hookean solid, W = U(J) − G ln J + G tr E.
@@ -34,63 +93,48 @@ pub enum Volumetric {
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NeoHookean {
+pub struct NeoHookean<U = Ciarlet> {
     /// Λ and G.
     pub lame: Lame,
     /// U(J).
-    pub volumetric: Volumetric,
+    pub volumetric: U,
 }
 
-impl NeoHookean {
+impl NeoHookean<Ciarlet> {
     /// Ciarlet's law, the one of the paper.
     #[inline(always)]
     pub fn ciarlet(lame: Lame) -> Self {
-        Self { lame, volumetric: Volumetric::Ciarlet }
-    }
-
-    /// The law with a logarithmic volumetric energy.
-    #[inline(always)]
-    pub fn logarithmic(lame: Lame) -> Self {
-        Self { lame, volumetric: Volumetric::Logarithmic }
-    }
-
-    /// Calls `visitor` with a type for each volumetric response.
-    pub(super) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
-        match self.volumetric {
-            Volumetric::Ciarlet => visitor.visit(Of::<false>(self.lame)),
-            Volumetric::Logarithmic => visitor.visit(Of::<true>(self.lame)),
-        }
-    }
-
-    /// J U'(J): Λ/2 (J²−1), or Λ ln J
-    #[inline(always)]
-    fn volumetric_stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        match self.volumetric {
-            Volumetric::Ciarlet => T::lit(0.5 * self.lame.lambda) * at.jacobian_squared_minus_one(),
-            Volumetric::Logarithmic => T::lit(self.lame.lambda) * at.log_jacobian(),
-        }
-    }
-
-    /// J (J U')': ΛJ², or Λ
-    #[inline(always)]
-    fn volumetric_stiffness<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        match self.volumetric {
-            Volumetric::Ciarlet => T::lit(self.lame.lambda) * at.jacobian * at.jacobian,
-            Volumetric::Logarithmic => T::lit(self.lame.lambda),
-        }
+        Self { lame, volumetric: Ciarlet }
     }
 }
 
-impl Elastic for NeoHookean {
+impl NeoHookean<Logarithmic> {
+    /// The law with a logarithmic volumetric energy.
+    #[inline(always)]
+    pub fn logarithmic(lame: Lame) -> Self {
+        Self { lame, volumetric: Logarithmic }
+    }
+}
+
+impl<U: Volumetric> Listed for NeoHookean<U> {
+    type Parameters = LameParameters;
+    const NAME: &'static str = U::NAME;
+
+    fn build(given: &LameParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        given.lame(problems, path).map(Self::example)
+    }
+
+    fn example(lame: Lame) -> Self {
+        Self { lame, volumetric: U::default() }
+    }
+}
+
+impl<U: Volumetric> Elastic for NeoHookean<U> {
     /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         let half_lambda = T::lit(0.5 * self.lame.lambda);
-        let volumetric = match self.volumetric {
-            Volumetric::Ciarlet => T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian(),
-            Volumetric::Logarithmic => at.log_jacobian() * at.log_jacobian(),
-        };
-        half_lambda * volumetric + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
+        half_lambda * U::energy(at) + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
     }
 
     /// S = F⁻¹ P,  P = J U'(J) F⁻ᵀ + G (H + F⁻ᵀ Hᵀ)
@@ -101,7 +145,7 @@ impl Elastic for NeoHookean {
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();
         let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.lame.shear));
-        f_inv_t.transpose() * (scaled(&f_inv_t, self.volumetric_stress(at)) + shear)
+        f_inv_t.transpose() * (scaled(&f_inv_t, U::stress(self.lame.lambda, at)) + shear)
     }
 
     /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹, with q = J U'(J) − G
@@ -109,8 +153,8 @@ impl Elastic for NeoHookean {
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
-        let q = self.volumetric_stress(at) - T::lit(self.lame.shear);
-        scaled(&c_inv, self.volumetric_stiffness(at) * contract(&c_inv, x))
+        let q = U::stress(self.lame.lambda, at) - T::lit(self.lame.shear);
+        scaled(&c_inv, U::stiffness(self.lame.lambda, at) * contract(&c_inv, x))
             - scaled(&(c_inv * (x + x.transpose()) * c_inv), q)
     }
 
@@ -124,9 +168,9 @@ impl Elastic for NeoHookean {
     ) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
-        let q = self.volumetric_stress(at) - T::lit(self.lame.shear);
+        let q = U::stress(self.lame.lambda, at) - T::lit(self.lame.shear);
         let (cv, cb) = (c_inv * v, c_inv * b);
-        scaled(&outer(&cv, &cb), self.volumetric_stiffness(at))
+        scaled(&outer(&cv, &cb), U::stiffness(self.lame.lambda, at))
             - scaled(&c_inv, q * cb.dot(v))
             - scaled(&outer(&cb, &cv), q)
     }
@@ -144,46 +188,9 @@ impl Elastic for NeoHookean {
         Some(ClosedTangent {
             a: rows(&(at.inverse_transpose() * f_n.transpose())),
             right: rows(&scaled(&(f_n * f_n.transpose()), shear * volume)),
-            bulk: self.volumetric_stiffness(at) * volume,
-            q: (self.volumetric_stress(at) - shear) * volume,
+            bulk: U::stiffness::<f64, D>(self.lame.lambda, at) * volume,
+            q: (U::stress::<f64, D>(self.lame.lambda, at) - shear) * volume,
             both: None,
         })
-    }
-}
-
-/// The solid whose volumetric response is known to the compiler: no branch is left in a loop over particles.
-struct Of<const LOGARITHMIC: bool>(Lame);
-
-impl<const LOGARITHMIC: bool> Of<LOGARITHMIC> {
-    #[inline(always)]
-    fn law(&self) -> NeoHookean {
-        if LOGARITHMIC { NeoHookean::logarithmic(self.0) } else { NeoHookean::ciarlet(self.0) }
-    }
-}
-
-impl<const LOGARITHMIC: bool> Elastic for Of<LOGARITHMIC> {
-    #[inline(always)]
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        self.law().energy(at)
-    }
-
-    #[inline(always)]
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        self.law().stress(at)
-    }
-
-    #[inline(always)]
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.law().elasticity(at, x)
-    }
-
-    #[inline(always)]
-    fn closed<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        self.law().closed(f_n, at, volume)
     }
 }

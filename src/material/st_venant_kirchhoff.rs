@@ -1,7 +1,8 @@
 //! St. Venant–Kirchhoff solid (the paper's appendix B.2).
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Elastic, Lame, LawVisitor};
+use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed};
+use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
@@ -12,10 +13,16 @@ pub struct StVenantKirchhoff {
     pub lame: Lame,
 }
 
-impl StVenantKirchhoff {
-    /// Calls `visitor`.
-    pub(super) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
-        visitor.visit(*self)
+impl Listed for StVenantKirchhoff {
+    type Parameters = LameParameters;
+    const NAME: &'static str = "St. Venant-Kirchhoff";
+
+    fn build(given: &LameParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        given.lame(problems, path).map(Self::example)
+    }
+
+    fn example(lame: Lame) -> Self {
+        Self { lame }
     }
 }
 

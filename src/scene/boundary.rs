@@ -1,7 +1,7 @@
 //! Conditions at the faces of the box and prescribed motion inside of it.
 
-use super::check::{Number, Problems};
 use super::shape::Shape;
+use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

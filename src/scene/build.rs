@@ -1,15 +1,14 @@
 //! From a checked scene to a simulation. The dimension becomes a type here and nowhere else: see [`Scene::dimension`].
 
-use super::body::{Body, Material};
+use super::body::Body;
 use super::boundary::{Face, Table};
 use super::particle_file::{self, ParticleFileError};
 use super::solver::{Forcing, Method};
 use super::transfer::Transfer;
-use super::{Scene, approximation, load, scale, time};
-use crate::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use super::{Problems, Scene, load, scale, time};
+use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{LameError, NeoHookean, StVenantKirchhoff};
 use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
@@ -35,14 +34,9 @@ pub enum BuildError {
         /// The dimension asked for.
         dimension: usize,
     },
-    /// The constants of a law.
-    #[error("{path}: {source}")]
-    Material {
-        /// The key.
-        path: String,
-        /// What is wrong.
-        source: LameError,
-    },
+    /// The scene was not checked: constants of a law or of shape functions.
+    #[error("{0}")]
+    Values(Problems),
     /// A curve or table.
     #[error("{path}: {source}")]
     Curve {
@@ -226,18 +220,24 @@ impl Scene {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
         let means = Means { folder, memory };
+        let mut problems = Problems::default();
         let mut particles = Particles::default();
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
             let path = format!("bodies[{i}]");
             self.fill(body, &path, &means, &grid, i as u32, &mut particles)?;
-            bodies.push(particles::Body { name: body.name.clone(), law: body.law(&path)?, density: body.density });
+            if let Some(law) = body.material.law(&mut problems, &format!("{path}.material")) {
+                bodies.push(particles::Body { name: body.name.clone(), law, density: body.density });
+            }
         }
+        let Some(approximation) = self.shape_functions(&mut problems).filter(|_| problems.is_empty()) else {
+            return Err(BuildError::Values(problems));
+        };
         particles.remember_rest(&bodies);
         let loads = self.loads(&grid, &particles)?;
         let mut simulation = Simulation {
             grid,
-            approximation: self.shape_functions(),
+            approximation,
             bodies,
             particles,
             loads,
@@ -255,19 +255,11 @@ impl Scene {
         Ok(simulation)
     }
 
-    fn shape_functions(&self) -> Approximation {
-        match &self.approximation {
-            approximation::Approximation::Linear => Linear.into(),
-            approximation::Approximation::Gimp => {
-                Gimp::particles_per_axis(self.bodies.first().map_or(2, |body| body.particles_per_cell)).into()
-            }
-            approximation::Approximation::Bspline(spline) if spline.degree == 2 => Bspline::Quadratic.into(),
-            approximation::Approximation::Bspline(_) => Bspline::Cubic.into(),
-            approximation::Approximation::Lme(lme) => match lme.support {
-                approximation::Support::Separable => Lme::new(lme.gamma, lme.tolerance).into(),
-                approximation::Support::Circle => LmeCircle::new(lme.gamma, lme.tolerance).into(),
-            },
-        }
+    /// The shape functions; or `None`, and what is wrong with them.
+    pub(super) fn shape_functions(&self, problems: &mut Problems) -> Option<Approximation> {
+        let particles_per_axis = self.bodies.first().map_or(2, |body| body.particles_per_cell);
+        let cells = Cells { dimension: self.dimension(), particles_per_axis };
+        self.approximation.functions(cells, problems, "approximation")
     }
 
     fn settings(&self) -> Settings {
@@ -509,21 +501,6 @@ struct SurfaceOf<'a> {
     body: &'a str,
     region: &'a Option<super::shape::Shape>,
     given: &'a Option<load::Surface>,
-}
-
-impl Body {
-    fn law(&self, path: &str) -> Result<crate::material::Material, BuildError> {
-        let path = format!("{path}.material");
-        let lame = match self.material.constants().lame() {
-            Some(lame) => lame.map_err(|source| BuildError::Material { path, source })?,
-            None => return Err(BuildError::Dimension { path, dimension: 0 }),
-        };
-        Ok(match self.material {
-            Material::NeoHookean(_) => NeoHookean::ciarlet(lame).into(),
-            Material::NeoHookeanLogarithmic(_) => NeoHookean::logarithmic(lame).into(),
-            Material::StVenantKirchhoff(_) => StVenantKirchhoff { lame }.into(),
-        })
-    }
 }
 
 impl Face {

@@ -1,7 +1,7 @@
 //! The box and its background grid.
 
-use super::check::{Number, Problems, sensible};
 use crate::grid::Grid;
+use crate::problems::{Number, Problems, sensible};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

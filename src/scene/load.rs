@@ -2,9 +2,9 @@
 
 use super::body::Body;
 use super::boundary::check_times;
-use super::check::Problems;
 use super::shape::{Shape, check_normal};
 use super::suggest::nearest;
+use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -5,16 +5,13 @@
 //! where the text is wrong, or lists all values that are not allowed.
 
 pub mod accuracy;
-pub mod approximation;
 pub mod body;
 pub mod boundary;
-pub mod check;
 pub mod grid;
 pub mod keys;
 pub mod load;
 pub mod output;
 pub mod particle_file;
-pub mod place;
 pub mod shape;
 pub mod solver;
 pub mod time;
@@ -22,16 +19,17 @@ pub mod transfer;
 
 mod build;
 mod overrides;
+mod place;
 mod read;
 mod scale;
 mod suggest;
 
+pub use crate::problems::{Place, Problem, Problems};
 pub use build::BuildError;
-pub use check::{Problem, Problems};
 pub use overrides::{Override, OverrideError};
-pub use place::Place;
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
+use crate::approximation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -56,7 +54,7 @@ pub struct Scene {
     pub chosen: Vec<accuracy::Chosen>,
     /// The shape functions. Default: `{"bspline": {"degree": 3}}`; all shipped scenes name theirs.
     #[serde(default)]
-    pub approximation: approximation::Approximation,
+    pub approximation: approximation::Parameters,
     /// Time stepping.
     pub time: time::Time,
     /// From nodes to particles. Default: `"flip"`, as in the paper.
@@ -157,7 +155,7 @@ impl Scene {
             // Every other length is judged by this one.
             return problems;
         }
-        self.approximation.check(&mut problems, dimension);
+        self.shape_functions(&mut problems);
         self.time.check(&mut problems);
         self.transfer.iter().for_each(|transfer| transfer.check(&mut problems));
         self.check_bodies(&mut problems);
@@ -231,7 +229,7 @@ impl Scene {
 
     fn check_bodies(&self, problems: &mut Problems) {
         problems.require(!self.bodies.is_empty(), "bodies", "an empty list", "must have at least one body");
-        let gimp = self.approximation == approximation::Approximation::Gimp;
+        let (family, agree) = (self.approximation.key(), self.approximation.one_half_width());
         for (i, body) in problems.few("bodies", &self.bodies).iter().enumerate() {
             let path = format!("bodies[{i}]");
             body.check(problems, &path, &self.grid);
@@ -240,8 +238,9 @@ impl Scene {
             problems.require(!again, &format!("{path}.name"), format_args!("{:?}", body.name), allowed);
             let first = self.bodies.first().map_or(body.particles_per_cell, |first| first.particles_per_cell);
             let found = body.particles_per_cell;
-            let allowed = format!("must be {first} as in the first body: gimp has one half width for all particles");
-            problems.require(!gimp || found == first, &format!("{path}.particles_per_cell"), found, allowed);
+            let allowed =
+                format!("must be {first} as in the first body: {family} has one half width for all particles");
+            problems.require(!agree || found == first, &format!("{path}.particles_per_cell"), found, allowed);
         }
     }
 }

@@ -1,11 +1,11 @@
 //! What a run writes.
 
 use super::body::Body;
-use super::check::Problems;
 use super::grid::GridBox;
 use super::load::check_body;
 use super::time::{Inertia, word};
 use crate::field::Field;
+use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;

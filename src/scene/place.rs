@@ -1,27 +1,9 @@
-//! Where in the text something stands, printed with a caret.
+//! Where in the text something stands.
 
-use std::fmt::{self, Display};
+use crate::problems::Place;
 
 /// Characters of the line shown on each side of the caret.
 const CONTEXT: usize = 60;
-
-/// The place of a problem.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Place {
-    /// In the scene's text.
-    Text {
-        /// Line, from 1.
-        line: usize,
-        /// Column in characters, from 1.
-        column: usize,
-        /// The line itself, or the part of a long one around the column.
-        excerpt: String,
-        /// Characters of `excerpt` before the column.
-        indent: usize,
-    },
-    /// In the argument `KEY=JSON` that replaced a value.
-    Override(String),
-}
 
 impl Place {
     /// The place `offset` bytes into `text`; beyond the end it is the end.
@@ -49,21 +31,6 @@ impl Place {
     pub(super) fn at_line(text: &str, line: usize, column: usize) -> Self {
         let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
         Self::at(text, start + column.saturating_sub(1))
-    }
-}
-
-impl Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Text { line, column, excerpt, indent } => {
-                let number = line.to_string();
-                let margin = " ".repeat(number.len());
-                writeln!(f, "{margin}--> line {line}, column {column}")?;
-                writeln!(f, "{number} | {excerpt}")?;
-                write!(f, "{margin} | {}^", " ".repeat(*indent))
-            }
-            Self::Override(argument) => write!(f, "--> in the override {argument}"),
-        }
     }
 }
 

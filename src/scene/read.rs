@@ -1,9 +1,9 @@
 //! From text to a checked scene.
 
-use super::check::{KEPT, Problems};
 use super::overrides::{Override, OverrideError};
-use super::place::{Place, Step, locate, path, steps};
+use super::place::{Step, locate, path, steps};
 use super::{Scene, accuracy, keys, suggest};
+use crate::problems::{KEPT, Place, Problems};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use serde_path_to_error::Segment;

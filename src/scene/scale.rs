@@ -4,6 +4,7 @@ use super::Scene;
 use super::boundary::{Face, Table};
 use super::build::{BuildError, FACES};
 use super::load::Curve;
+use crate::material::p_wave_modulus;
 use crate::mechanics::loads::Pressing;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
@@ -22,7 +23,7 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
     let alphas = simulation.settings.alphas(simulation.clock.nominal());
     let (particles, h) = (&simulation.particles, simulation.grid.spacing);
     let mut heaviest: f64 = 0.0;
-    for (i, body) in scene.bodies.iter().enumerate() {
+    for (i, body) in simulation.bodies.iter().enumerate() {
         let mut extremes = Extremes::default();
         for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i) {
             let speed = particles.velocity.get(p).map_or(0.0, Vector::amax);
@@ -30,11 +31,7 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
         }
         let Extremes { volume, mass, speed } = extremes;
         heaviest = heaviest.max(mass.1);
-        let modulus = match body.material.constants().lame() {
-            Some(Ok(lame)) => lame.lambda.abs() + 2.0 * lame.shear,
-            // Refused before.
-            _ => continue,
-        };
+        let modulus = p_wave_modulus(&body.law);
         let normal = (f64::MIN_POSITIVE, f64::MAX);
         let resistance = (alphas.a1 * mass.0 * h).max(modulus * volume.0 / h);
         let quantities: [Quantity; 8] = [

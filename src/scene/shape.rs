@@ -1,6 +1,6 @@
 //! Regions of space in a scene.
 
-use super::check::{MOST, Number, Problems};
+use crate::problems::{MOST, Number, Problems};
 use crate::shape;
 use crate::tensor::Vector;
 use schemars::JsonSchema;

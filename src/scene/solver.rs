@@ -1,6 +1,6 @@
 //! Settings of Newton's method and of the linear solver.
 
-use super::check::Problems;
+use crate::problems::Problems;
 use crate::solver::Precision;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

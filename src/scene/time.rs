@@ -1,8 +1,8 @@
 //! Time stepping.
 
-use super::check::{Number, Problems};
 use crate::clock::MAX_HALVINGS;
 use crate::mechanics::time::Newmark;
+use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

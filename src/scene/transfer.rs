@@ -1,6 +1,6 @@
 //! From nodes to particles.
 
-use super::check::Problems;
+use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

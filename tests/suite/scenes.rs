@@ -1,5 +1,6 @@
 //! Scenes: the shipped ones are sound, wrong ones are refused with a message that helps, and no text brings the reader down.
 
+use bfree::material::{Lame, NeoHookean};
 use bfree::particles::Particles;
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Place, Scene, SceneError};
@@ -97,8 +98,8 @@ fn shipped_scenes_have_the_published_sizes() {
     assert!((3800..4600).contains(&filled::<3>("ball_drop.json").1));
     // Paper: Λ = 150 from K = 170 and G = 30
     let rebound = scene::read_file(&folder("scenes").join("rebound.json"), &[]).unwrap();
-    let lame = rebound.bodies[0].material.constants().lame().unwrap().unwrap();
-    assert_eq!((lame.lambda, lame.shear), (150.0, 30.0));
+    let law = rebound.bodies[0].material.law(&mut scene::Problems::default(), "material");
+    assert_eq!(law, Some(NeoHookean::ciarlet(Lame { lambda: 150.0, shear: 30.0 }).into()));
     assert_eq!((rebound.time.end / rebound.time.step).round(), 1600.0);
 }
 
@@ -594,7 +595,7 @@ fn overrides_replace_add_and_are_named() {
     let scene =
         overridden(&["time.step=0.02", "bodies.0.density=3", "bodies[1].density=4", "approximation=linear"]).unwrap();
     assert_eq!((scene.time.step, scene.bodies[0].density, scene.bodies[1].density), (0.02, 3.0, 4.0));
-    assert_eq!(scene.approximation, scene::approximation::Approximation::Linear);
+    assert_eq!(scene.approximation, bfree::approximation::Parameters::Linear);
     let scene =
         overridden(&["bodies.1.velocity=[1, 2]", "bodies.1.velocity.0=5", r#"boundary.left={"held": [true, true]}"#])
             .unwrap();

@@ -8,8 +8,8 @@ mod table;
 pub use table::{Level, levels};
 
 use super::body::Body;
-use super::check::Problems;
 use super::grid::GridBox;
+use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};

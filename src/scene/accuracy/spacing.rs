@@ -1,5 +1,7 @@
 //! The lengths and speeds of a scene, from which spacing and time step follow.
 
+use crate::material::p_wave_modulus;
+use crate::problems::Problems;
 use crate::scene::body::Body;
 use crate::scene::grid::GridBox;
 use crate::scene::shape::Shape;
@@ -94,12 +96,12 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
     found.ok_or(Unknown::NoDivisor { finest: coarsest / FINER as f64, coarsest })
 }
 
-/// The greatest speed of pressure waves at rest, c = √((Λ + 2G)/ρ).
+/// The greatest speed of pressure waves at rest, c = √(M/ρ), M = Λ + 2G in isotropic solids.
 pub(super) fn speed(bodies: &[Body]) -> Result<f64, Unknown> {
     let mut greatest: f64 = 0.0;
     for body in bodies {
-        let lame = body.material.constants().lame().and_then(Result::ok);
-        let speed = lame.map_or(f64::NAN, |lame| (lame.p_wave_modulus() / body.density).sqrt());
+        let law = body.material.law(&mut Problems::default(), "material");
+        let speed = law.map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(Unknown::NoSpeed(body.name.clone()));
         }

@@ -24,58 +24,25 @@ pub struct Level {
     pub tolerance: f64,
 }
 
+/// The first row; others have in common with it what they do not name.
+const DRAFT: Level = Level {
+    name: Some("draft"),
+    error: 0.035,
+    cells: 6.0,
+    courant: 2.0,
+    particles_per_cell: 2,
+    gamma: 1.4,
+    lumping: 0.1,
+    tolerance: 1e-4,
+};
+
 /// All rows, by falling error.
 const LEVELS: [Level; 5] = [
-    Level {
-        name: Some("draft"),
-        error: 0.035,
-        cells: 6.0,
-        courant: 2.0,
-        particles_per_cell: 2,
-        gamma: 1.4,
-        lumping: 0.1,
-        tolerance: 1e-4,
-    },
-    Level {
-        name: None,
-        error: 0.014,
-        cells: 8.0,
-        courant: 1.0,
-        particles_per_cell: 2,
-        gamma: 1.4,
-        lumping: 0.1,
-        tolerance: 1e-4,
-    },
-    Level {
-        name: Some("standard"),
-        error: 0.005,
-        cells: 12.0,
-        courant: 1.0,
-        particles_per_cell: 2,
-        gamma: 1.4,
-        lumping: 0.1,
-        tolerance: 1e-4,
-    },
-    Level {
-        name: None,
-        error: 0.0022,
-        cells: 18.0,
-        courant: 1.0,
-        particles_per_cell: 2,
-        gamma: 1.4,
-        lumping: 0.1,
-        tolerance: 1e-6,
-    },
-    Level {
-        name: Some("reference"),
-        error: 0.0014,
-        cells: 24.0,
-        courant: 0.5,
-        particles_per_cell: 2,
-        gamma: 1.4,
-        lumping: 0.1,
-        tolerance: 1e-9,
-    },
+    DRAFT,
+    Level { name: None, error: 0.014, cells: 8.0, courant: 1.0, ..DRAFT },
+    Level { name: Some("standard"), error: 0.005, cells: 12.0, courant: 1.0, ..DRAFT },
+    Level { name: None, error: 0.0022, cells: 18.0, courant: 1.0, tolerance: 1e-6, ..DRAFT },
+    Level { name: Some("reference"), error: 0.0014, cells: 24.0, courant: 0.5, tolerance: 1e-9, ..DRAFT },
 ];
 
 /// The rows of the table, by falling error.

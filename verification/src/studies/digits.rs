@@ -3,10 +3,10 @@
 //! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Formed from F or from J, S would keep
 //! 4 digits and W none. The checks of derivatives see only part of that: where W and S lose the same digits, they agree.
 
-use super::{Effort, Outcome, StudyError};
+use super::{Effort, Outcome, StudyError, short};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::material::{Lame, Law, Material};
 use bfree::tensor::{Deformation, Tensor, contract, symmetric};
 
 /// What the study shows.
@@ -20,14 +20,9 @@ const LINEAR: f64 = 100.0 * STRAIN;
 
 /// Runs the study.
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
-    let lame = Lame::from_young_poisson(1000.0, 0.3)?;
-    let laws: [(&str, Material); 3] = [
-        ("Ciarlet", NeoHookean::ciarlet(lame).into()),
-        ("logarithmic", NeoHookean::logarithmic(lame).into()),
-        ("St.V.-Kirchhoff", StVenantKirchhoff { lame }.into()),
-    ];
     let mut report = Report::new("strains of 1e-12 against the linear law", &["quantity", "law", "D"]);
-    for (name, law) in &laws {
+    for (name, law) in &Material::examples(Lame::from_young_poisson(1000.0, 0.3)?) {
+        let name = &short(name);
         linear::<1>(name, law, &mut report);
         linear::<2>(name, law, &mut report);
         linear::<3>(name, law, &mut report);

@@ -6,7 +6,7 @@ use crate::forced;
 use crate::manufactured::{AxisAligned, Motion, Vortex, body_force, state};
 use crate::report::{Bound, Report};
 use crate::table::Table;
-use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
@@ -43,20 +43,15 @@ struct Family {
     smooth: bool,
 }
 
+/// All families; of LME the widest and the paper's.
 fn families(effort: Effort) -> Vec<Family> {
-    let family = |name, shape, smooth| Family { name, shape, smooth };
-    let mut families = vec![
-        family("linear", Linear.into(), false),
-        family("gimp", Gimp::particles_per_axis(PER_AXIS).into(), false),
-        family("quadratic", Bspline::Quadratic.into(), false),
-        family("cubic", Bspline::Cubic.into(), true),
-        family("lme 0.8", Lme::new(0.8, 1e-6).into(), true),
-        family("lme 3", Lme::new(3.0, 1e-6).into(), false),
-    ];
-    if effort == Effort::Full {
-        families.push(family("lme circle 3", LmeCircle::new(3.0, 1e-6).into(), false));
-    }
-    families
+    let left_out = |name| match name {
+        "lme 1.8" | "lme circle 1.8" => true,
+        "lme circle 3" => effort == Effort::Short,
+        _ => false,
+    };
+    let examples = Approximation::examples().into_iter().filter(|(name, _)| !left_out(*name));
+    examples.map(|(name, shape)| Family { name, shape, smooth: matches!(name, "cubic" | "lme 0.8") }).collect()
 }
 
 /// Root mean squares over the reference volume at t = 1.

@@ -53,6 +53,11 @@ pub struct Study {
 /// The studies that repeat section 4 of the paper, for `cargo verify results`.
 pub const PAPER: &[&str] = &["riemann", "compaction", "rebound"];
 
+/// The name of a law in a narrow column.
+fn short(name: &str) -> String {
+    name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")
+}
+
 /// The list of studies. A word here makes a study known to the program.
 macro_rules! studies {
     ($($study:ident),* $(,)?) => {

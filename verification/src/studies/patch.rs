@@ -5,10 +5,10 @@ use crate::check_approximation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::table::Table;
-use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, LmeCircle};
+use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::material::{Lame, Law, Material, NeoHookean};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::time::{Alphas, Newmark};
@@ -30,16 +30,9 @@ const MOMENTUM: f64 = 1e-13;
 /// Cells along each axis of the patch.
 const CELLS: u32 = 6;
 
-fn families() -> [(&'static str, Approximation); 7] {
-    [
-        ("linear", Linear.into()),
-        ("gimp", Gimp::particles_per_axis(2).into()),
-        ("quadratic", Bspline::Quadratic.into()),
-        ("cubic", Bspline::Cubic.into()),
-        ("lme 0.8", Lme::new(0.8, 1e-6).into()),
-        ("lme 3", Lme::new(3.0, 1e-6).into()),
-        ("lme circle 3", LmeCircle::new(3.0, 1e-6).into()),
-    ]
+/// All families, LME as wide and as narrow as usual.
+fn families() -> Vec<(&'static str, Approximation)> {
+    Approximation::examples().into_iter().filter(|(name, _)| !matches!(*name, "lme 1.8" | "lme circle 1.8")).collect()
 }
 
 /// Runs the study.
@@ -65,13 +58,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         force_imbalance::<3>(name, shape, &mut imbalance)?;
     }
     let mut rigid = Report::new("superposed rotation", &["quantity", "law", "D"]);
-    let lame = Lame::new(150.0, 30.0)?;
-    let laws = [
-        ("neo-Hookean, Ciarlet", Material::from(NeoHookean::ciarlet(lame))),
-        ("neo-Hookean, logarithmic", NeoHookean::logarithmic(lame).into()),
-        ("St. Venant-Kirchhoff", StVenantKirchhoff { lame }.into()),
-    ];
-    for (name, law) in &laws {
+    for (name, law) in &Material::examples(Lame::new(150.0, 30.0)?) {
         superposed_rotation::<2>(name, law, &mut rigid);
         superposed_rotation::<3>(name, law, &mut rigid);
     }

@@ -42,7 +42,7 @@ fn dimension<T: Precision, const D: usize>(report: &mut Report) {
         for (name, law) in &laws() {
             let Errors { energy, stress, .. } = judge::<T, D>(law, h, rounding);
             for (quantity, value) in [("W", energy), ("S", stress)] {
-                let labels = [quantity, T::NAME, SOLVABLE, *name, &D.to_string(), deformation, case];
+                let labels = [quantity, T::NAME, SOLVABLE, name, &D.to_string(), deformation, case];
                 report.push(&labels, value, Bound::AtMost(ROUNDINGS));
             }
         }

@@ -140,7 +140,7 @@ fn no_such_shape(report: &mut Report) {
     let mut at_rest = |shape: Approximation| shape.evaluate(&grid::<2>(), &Vector::repeat(1.3), &mut scratch, &mut support);
     for gamma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let answers = [at_rest(Lme::new(gamma, 1e-6).into()), at_rest(LmeCircle::new(gamma, 1e-6).into())];
-        let expected = |error: &ApproximationError| matches!(error, ApproximationError::Gamma { .. });
+        let expected = |error: &ApproximationError| matches!(error, ApproximationError::Parameter { .. });
         refused(report, "LME, both supports", &format!("gamma = {gamma}"), "Gamma", answers, expected);
     }
     for gamma in [30.0, 1e4] {

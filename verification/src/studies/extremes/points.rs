@@ -1,7 +1,8 @@
 //! Energy and stress at one deformation, in a precision to be judged, in double-double, and by the formulas of textbooks.
 
 use crate::double_double::DoubleDouble;
-use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff, Volumetric};
+use crate::studies::short;
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
@@ -24,13 +25,9 @@ impl Precision for f32 {
 }
 
 /// ν = 0.3; the constants have few digits, so that they are the same in every precision.
-pub(super) fn laws() -> [(&'static str, Material); 3] {
-    let lame = Lame { lambda: 576.0, shear: 384.0 };
-    [
-        ("Ciarlet", NeoHookean::ciarlet(lame).into()),
-        ("logarithmic", NeoHookean::logarithmic(lame).into()),
-        ("St.V.-Kirchhoff", StVenantKirchhoff { lame }.into()),
-    ]
+pub(super) fn laws() -> Vec<(String, Material)> {
+    let named = |(name, law): (&str, Material)| (short(name), law);
+    Material::examples(Lame { lambda: 576.0, shear: 384.0 }).into_iter().map(named).collect()
 }
 
 /// What a rounding of the input is.
@@ -163,28 +160,27 @@ fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tenso
     let f = one + h;
     let c = f.transpose() * f;
     let (lit, d) = (T::lit, T::lit(D as f64));
-    match law {
-        Material::NeoHookean(NeoHookean { lame, volumetric }) => {
-            let (lambda, shear) = (lit(lame.lambda), lit(lame.shear));
-            let det_c = determinant(&c);
-            let ln_j = det_c.ln() * lit(0.5);
-            let c_inverse = inverse(&c);
-            let (u, pressure) = match volumetric {
-                Volumetric::Ciarlet => (
-                    lambda * lit(0.25) * (det_c - T::one()) - lambda * lit(0.5) * ln_j,
-                    lambda * lit(0.5) * (det_c - T::one()),
-                ),
-                Volumetric::Logarithmic => (lambda * lit(0.5) * ln_j * ln_j, lambda * ln_j),
-            };
-            let w = u - shear * ln_j + shear * lit(0.5) * (trace(&c) - d);
-            (w, scaled(&c_inverse, pressure) + scaled(&(one - c_inverse), shear))
+    let det_c = determinant(&c);
+    let ln_j = det_c.ln() * lit(0.5);
+    let (lame, u, pressure) = match law {
+        Material::NeoHookean(NeoHookean { lame, .. }) => {
+            let lambda = lit(lame.lambda);
+            let u = lambda * lit(0.25) * (det_c - T::one()) - lambda * lit(0.5) * ln_j;
+            (lame, u, lambda * lit(0.5) * (det_c - T::one()))
+        }
+        Material::NeoHookeanLogarithmic(NeoHookean { lame, .. }) => {
+            let lambda = lit(lame.lambda);
+            (lame, lambda * lit(0.5) * ln_j * ln_j, lambda * ln_j)
         }
         Material::StVenantKirchhoff(StVenantKirchhoff { lame }) => {
             let (lambda, shear) = (lit(lame.lambda), lit(lame.shear));
             let e = scaled(&(c - one), lit(0.5));
             let tr_e = trace(&e);
             let w = lambda * lit(0.5) * tr_e * tr_e + shear * contract(&e, &e);
-            (w, scaled(&one, lambda * tr_e) + scaled(&e, lit(2.0) * shear))
+            return (w, scaled(&one, lambda * tr_e) + scaled(&e, lit(2.0) * shear));
         }
-    }
+    };
+    let (shear, c_inverse) = (lit(lame.shear), inverse(&c));
+    let w = u - shear * ln_j + shear * lit(0.5) * (trace(&c) - d);
+    (w, scaled(&c_inverse, pressure) + scaled(&(one - c_inverse), shear))
 }

@@ -4,8 +4,8 @@ use super::block::{block, lame};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::studies::StudyError;
-use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
-use bfree::material::{Material, NeoHookean, StVenantKirchhoff};
+use bfree::approximation::{Approximation, ShapeFunction};
+use bfree::material::Material;
 use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
@@ -25,21 +25,11 @@ const QUANTITIES: [&str; 5] = ["tangent product", "residual", "magnitude", "diag
 
 /// Compares a strained, jittered block of `cells`ᴰ cells; half the mass is consistent.
 pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(), StudyError> {
-    let lame = lame()?;
-    let laws = [
-        ("Ciarlet", Material::from(NeoHookean::ciarlet(lame))),
-        ("logarithmic", NeoHookean::logarithmic(lame).into()),
-        ("St. Venant-Kirchhoff", StVenantKirchhoff { lame }.into()),
-    ];
-    let shapes = [
-        ("linear", Approximation::from(Linear)),
-        ("gimp", Gimp::particles_per_axis(2).into()),
-        ("quadratic", Bspline::Quadratic.into()),
-        ("cubic", Bspline::Cubic.into()),
-        ("lme 0.8", Lme::new(0.8, 1e-6).into()),
-        ("lme 3", Lme::new(3.0, 1e-6).into()),
-    ];
-    for (law_name, law) in &laws {
+    // All products; of LME the widest and the paper's.
+    let judged = |(name, shape): &(&str, Approximation)| shape.separable().is_some() && *name != "lme 1.8";
+    let shapes: Vec<_> = Approximation::examples().into_iter().filter(judged).collect();
+    for (law_name, law) in &Material::examples(lame()?) {
+        let law_name = law_name.trim_start_matches("neo-Hookean, ");
         for (shape_name, shape) in &shapes {
             let mut simulation = block::<D>(shape.clone(), Some(law.clone()), cells, 0.24, 0.5)?;
             simulation.grid.spacing *= SPACING;

@@ -1,13 +1,12 @@
-//! Validation: every problem of a scene at once, each with its place, the value found and what is allowed.
+//! What is wrong with the values of a scene: every problem at once, each with its place, the value found and what is allowed.
 
-use super::place::Place;
 use std::fmt::{self, Display};
 
 /// Problems kept; a table of a million wrong rows needs no million messages.
-pub(super) const KEPT: usize = 50;
+pub(crate) const KEPT: usize = 50;
 
 /// Bodies, loads, parts of a shape or probes, at most.
-pub(super) const MOST: usize = 1000;
+pub(crate) const MOST: usize = 1000;
 
 /// Characters shown of a value.
 const SHOWN: usize = 80;
@@ -38,6 +37,39 @@ impl Display for Problem {
     }
 }
 
+/// The place of a problem.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// In the scene's text.
+    Text {
+        /// Line, from 1.
+        line: usize,
+        /// Column in characters, from 1.
+        column: usize,
+        /// The line itself, or the part of a long one around the column.
+        excerpt: String,
+        /// Characters of `excerpt` before the column.
+        indent: usize,
+    },
+    /// In the argument `KEY=JSON` that replaced a value.
+    Override(String),
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text { line, column, excerpt, indent } => {
+                let number = line.to_string();
+                let margin = " ".repeat(number.len());
+                writeln!(f, "{margin}--> line {line}, column {column}")?;
+                writeln!(f, "{number} | {excerpt}")?;
+                write!(f, "{margin} | {}^", " ".repeat(*indent))
+            }
+            Self::Override(argument) => write!(f, "--> in the override {argument}"),
+        }
+    }
+}
+
 /// All problems found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Problems {
@@ -63,7 +95,7 @@ impl Problems {
     }
 
     /// Adds a problem: `value` stands at `path`, but `allowed`.
-    pub(super) fn refuse(&mut self, path: &str, value: impl Display, allowed: impl Display) {
+    pub(crate) fn refuse(&mut self, path: &str, value: impl Display, allowed: impl Display) {
         if self.list.len() == KEPT {
             self.more += 1;
             return;
@@ -74,21 +106,21 @@ impl Problems {
     }
 
     /// Adds a problem unless `ok`.
-    pub(super) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) {
+    pub(crate) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) {
         if !ok {
             self.refuse(path, value, allowed);
         }
     }
 
     /// A number of sensible size.
-    pub(super) fn number(&mut self, path: &str, x: f64) -> bool {
+    pub(crate) fn number(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x);
         self.require(ok, path, Number(x), format_args!("must be finite and at most {LARGEST:e} in size"));
         ok
     }
 
     /// A number of sensible size, > 0.
-    pub(super) fn positive(&mut self, path: &str, x: f64) -> bool {
+    pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x) && x > 1.0 / LARGEST;
         let allowed = if x > 0.0 {
             format!("must lie between {:e} and {LARGEST:e}", 1.0 / LARGEST)
@@ -100,18 +132,19 @@ impl Problems {
     }
 
     /// A number between two, both allowed.
-    pub(super) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) {
+    pub(crate) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) -> bool {
         let ok = x >= min && x <= max;
         self.require(ok, path, Number(x), format_args!("must lie between {} and {}", Number(min), Number(max)));
+        ok
     }
 
     /// A whole number between two, both allowed.
-    pub(super) fn whole(&mut self, path: &str, n: u32, min: u32, max: u32) {
+    pub(crate) fn whole(&mut self, path: &str, n: u32, min: u32, max: u32) {
         self.require((min..=max).contains(&n), path, n, format_args!("must be a whole number from {min} to {max}"));
     }
 
     /// A list of bodies or the like; what is too long is not looked into.
-    pub(super) fn few<'a, T>(&mut self, path: &str, list: &'a [T]) -> &'a [T] {
+    pub(crate) fn few<'a, T>(&mut self, path: &str, list: &'a [T]) -> &'a [T] {
         let ok = list.len() <= MOST;
         self.require(
             ok,
@@ -123,7 +156,7 @@ impl Problems {
     }
 
     /// A vector of one finite number per dimension.
-    pub(super) fn vector(&mut self, path: &str, x: &[f64], dimension: usize) -> bool {
+    pub(crate) fn vector(&mut self, path: &str, x: &[f64], dimension: usize) -> bool {
         let right_length = self.length(path, x.len(), dimension);
         let mut ok = right_length;
         for (k, &component) in x.iter().enumerate().take(3) {
@@ -133,7 +166,7 @@ impl Problems {
     }
 
     /// One entry per dimension.
-    pub(super) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
+    pub(crate) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
         let ok = entries == dimension;
         self.require(
             ok,
@@ -156,12 +189,12 @@ impl Display for Problems {
 }
 
 /// Finite, and small enough to be squared.
-pub(super) fn sensible(x: f64) -> bool {
+pub(crate) fn sensible(x: f64) -> bool {
     x.abs() <= LARGEST
 }
 
 /// A number as a user would write it.
-pub(super) struct Number(pub f64);
+pub(crate) struct Number(pub f64);
 
 impl Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
