@@ -35,7 +35,7 @@ pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
 pub use lme::{Lme, LmeCircle, SMALLEST_TOLERANCE};
 pub use product::{AxisWeights, Separable};
-pub(crate) use product::{Place, check};
+pub(crate) use product::{Place, check, list};
 
 use crate::grid::Grid;
 use crate::tensor::Vector;
@@ -161,7 +161,7 @@ impl<S: Separable> ShapeFunction for S {
     ) -> Result<(), ApproximationError> {
         product::inside(grid, x)?;
         for k in 0..D {
-            self.axis(&grid.axis(k), x[k], &mut scratch.axes[k])?;
+            product::list(self, &grid.axis(k), x[k], &mut scratch.axes[k])?;
         }
         product::product(&scratch.axes, out);
         Ok(())
