@@ -186,19 +186,21 @@ pub struct FailedAttempt {
     pub inaccurate: bool,
     /// Why it failed, on one line.
     pub why: String,
+    /// Iterations of the projection (42).
+    pub projection_iterations: usize,
     /// What Newton's method did; empty if it was not reached.
     pub newton: NewtonHistory,
 }
 
 impl FailedAttempt {
-    fn new(dt: f64, error: &StepError) -> Self {
+    fn new(dt: f64, projection_iterations: usize, error: &StepError) -> Self {
         let newton = match error {
             StepError::Newton(source) | StepError::Loose { source, .. } => (*source.history).clone(),
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
         let inaccurate = matches!(error, StepError::Inaccurate { .. });
-        Self { dt, inaccurate, why: causes::on_one_line(error), newton }
+        Self { dt, inaccurate, why: causes::on_one_line(error), projection_iterations, newton }
     }
 }
 
@@ -317,6 +319,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Errors
     /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
+        self.attempt(&mut 0)
+    }
+
+    /// As [`Self::step`]; a step that fails leaves its iterations of the projection, too.
+    fn attempt(&mut self, projection_iterations: &mut usize) -> Result<StepReport<D>, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
         let alphas = self.settings.alphas(dt);
         let mut watch = Stopwatch::start();
@@ -330,6 +337,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
         let projected = self.project(&supports)?;
+        *projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
 
@@ -356,7 +364,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         update.commit(&mut self.particles, &self.bodies, &supports, dt);
         let passes = supports.passes();
 
-        let projection_iterations = projected.iterations;
         self.workspace.supports = Some(match supports.leaping() {
             Some(order) => {
                 self.rearrange(&order);
@@ -374,7 +381,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             dt,
             active_nodes,
             newton,
-            projection_iterations,
+            projection_iterations: *projection_iterations,
             reactions,
             error,
             seconds: watch,
@@ -405,11 +412,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut failed = Vec::new();
         loop {
             let (time, dt) = (self.clock.time(), self.clock.step());
-            let cause = match self.step() {
+            let mut projection_iterations = 0;
+            let cause = match self.attempt(&mut projection_iterations) {
                 Ok(report) => return Ok(StepReport { failed, ..report }),
                 Err(cause) => cause,
             };
-            failed.push(FailedAttempt::new(dt, &cause));
+            failed.push(FailedAttempt::new(dt, projection_iterations, &cause));
             let mended = match cause {
                 StepError::Newton(_) | StepError::Inaccurate { .. } => true,
                 // A step too long to see a wall.

@@ -33,6 +33,14 @@ pub enum ApproximationError {
         /// Its range.
         allowed: &'static str,
     },
+    /// A family lists more nodes along an axis than its [`Separable::width`](super::Separable::width).
+    #[error("{listed} nodes are listed along an axis by functions that say they reach {allowed} at most")]
+    TooManyNodes {
+        /// Nodes listed.
+        listed: usize,
+        /// The width.
+        allowed: usize,
+    },
     /// The circle of max-ent holds too few nodes to have every particle in their convex hull.
     #[error(
         "max-ent on a circle with γ = {gamma} and tolerance {tolerance:e} leaves particles outside the hull of their \

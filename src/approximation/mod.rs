@@ -36,7 +36,7 @@ pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
 pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport, SMALLEST_TOLERANCE};
 pub use product::{AxisWeights, Separable};
-pub(crate) use product::{Place, check};
+pub(crate) use product::{Place, check, list};
 
 use crate::grid::Grid;
 use crate::problems::Problems;
@@ -165,7 +165,7 @@ impl<S: Separable> ShapeFunction for S {
     ) -> Result<(), ApproximationError> {
         product::inside(grid, x)?;
         for k in 0..D {
-            self.axis(&grid.axis(k), x[k], &mut scratch.axes[k])?;
+            product::list(self, &grid.axis(k), x[k], &mut scratch.axes[k])?;
         }
         product::product(&scratch.axes, out);
         Ok(())

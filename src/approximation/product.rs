@@ -85,6 +85,22 @@ pub trait Separable: Validate + Send + Sync {
     }
 }
 
+/// As [`Separable::axis`], and not longer than [`Separable::width`]: the sweep has no room for more.
+///
+/// # Errors
+/// Those of the list, or its length.
+#[inline]
+pub(crate) fn list<S: Separable + ?Sized>(
+    family: &S,
+    axis: &Axis,
+    x: f64,
+    out: &mut AxisWeights,
+) -> Result<(), ApproximationError> {
+    family.axis(axis, x, out)?;
+    let (listed, allowed) = (out.values.len(), family.width());
+    if listed <= allowed { Ok(()) } else { Err(ApproximationError::TooManyNodes { listed, allowed }) }
+}
+
 /// A coordinate in its cell, in units of the spacing; both distances are accurate at the walls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {

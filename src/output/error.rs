@@ -33,6 +33,14 @@ pub enum OutputError {
         /// The determinant found.
         source: NonPositiveJacobian,
     },
+    /// A particle that does not exist.
+    #[error("there is no particle {particle}; there are {particles}, numbered from 0")]
+    NoParticle {
+        /// The id asked for.
+        particle: usize,
+        /// Number of particles.
+        particles: usize,
+    },
     /// A velocity or an acceleration of bodies without inertia.
     #[error("particles without inertia have no {}", .0.name())]
     Inertia(Field),

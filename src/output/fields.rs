@@ -10,8 +10,7 @@ use crate::tensor::{Deformation, Tensor, Vector};
 const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
 impl Field {
-    /// Appends the components at the particle that lies at the place `particle` in memory (which must exist in the simulation and the
-    /// reference) to `out`.
+    /// Appends the components at the particle `id` to `out`.
     ///
     /// ```
     /// use bfree::{field::Field, output::Reference, tensor::Tensor};
@@ -29,30 +28,45 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// A stress is asked for where det F ≤ 0, or a velocity or acceleration where there is no inertia.
+    /// A particle that does not exist; a reference with another number of particles; a stress where det F ≤ 0; a velocity or
+    /// acceleration where there is no inertia.
     pub fn append<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
-        particle: usize,
+        id: usize,
+        out: &mut Vec<f64>,
+    ) -> Result<(), OutputError> {
+        reference.check(simulation)?;
+        let particles = &simulation.particles;
+        let place = particles.place(id).ok_or(OutputError::NoParticle { particle: id, particles: particles.len() })?;
+        self.append_at(simulation, reference, place, out)
+    }
+
+    /// As [`Self::append`], at the particle that lies at a place in memory.
+    fn append_at<const D: usize, L: Law, A>(
+        self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        place: usize,
         out: &mut Vec<f64>,
     ) -> Result<(), OutputError> {
         let particles = &simulation.particles;
-        let id = particles.id[particle] as usize;
-        let h = || particles.displacement_gradient[particle];
-        let law = || &simulation.bodies[particles.body[particle] as usize].law;
+        let id = particles.id[place] as usize;
+        let h = || particles.displacement_gradient[place];
+        let law = || &simulation.bodies[particles.body[place] as usize].law;
         let stress = || {
-            cauchy_stress(law(), &particles.start(particle, 0.0), h())
+            cauchy_stress(law(), &particles.start(place, 0.0), h())
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
         match self {
-            Self::Position => out.extend(padded(&particles.position[particle])),
+            Self::Position => out.extend(padded(&particles.position[place])),
             Self::Displacement => {
-                out.extend(padded(&(particles.position[particle] - reference.position[id])));
+                out.extend(padded(&(particles.position[place] - reference.position[id])));
             }
-            Self::Velocity => out.extend(padded(particles.velocity.get(particle).ok_or(OutputError::Inertia(self))?)),
+            Self::Velocity => out.extend(padded(particles.velocity.get(place).ok_or(OutputError::Inertia(self))?)),
             Self::Acceleration => {
-                out.extend(padded(particles.acceleration.get(particle).ok_or(OutputError::Inertia(self))?));
+                out.extend(padded(particles.acceleration.get(place).ok_or(OutputError::Inertia(self))?));
             }
             Self::DeformationGradient => {
                 let f = crate::tensor::identity::<f64, 3>() + crate::material::embed(&h());
@@ -69,10 +83,10 @@ impl Field {
             }
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
-            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(particle, 0.0))),
-            Self::Mass => out.push(particles.mass[particle]),
-            Self::Volume => out.push(particles.volume[particle]),
-            Self::Body => out.push(f64::from(particles.body[particle])),
+            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0))),
+            Self::Mass => out.push(particles.mass[place]),
+            Self::Volume => out.push(particles.volume[place]),
+            Self::Body => out.push(f64::from(particles.body[place])),
         }
         Ok(())
     }
@@ -94,17 +108,17 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::append`]; a reference with another number of particles.
+    /// As [`Self::append`].
     pub fn values<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
         reference: &Reference<D>,
     ) -> Result<Vec<f64>, OutputError> {
         reference.check(simulation)?;
-        let particles = simulation.particles.places();
-        let mut out = Vec::with_capacity(particles.len() * self.kind().components().len());
-        for particle in particles {
-            self.append(simulation, reference, particle as usize, &mut out)?;
+        let places = simulation.particles.places();
+        let mut out = Vec::with_capacity(places.len() * self.kind().components().len());
+        for place in places {
+            self.append_at(simulation, reference, place as usize, &mut out)?;
         }
         Ok(out)
     }

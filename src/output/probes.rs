@@ -37,14 +37,14 @@ pub struct Probe<const D: usize> {
 }
 
 impl<const D: usize> Probe<D> {
-    /// Where the particle looked at now lies in memory; `None` if none is near enough.
+    /// The particle looked at now; `None` if none is near enough.
     fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
         let name = || self.name.clone();
         match self.place {
-            Place::Particle(particle) => match particles.place(particle) {
-                Some(place) => Ok(Some(place)),
-                None => Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() }),
-            },
+            Place::Particle(particle) if particle < particles.len() => Ok(Some(particle)),
+            Place::Particle(particle) => {
+                Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
+            }
             Place::Nearest { point, body, within } => match nearest(particles, &point, body) {
                 Some((particle, distance)) => Ok((distance <= within).then_some(particle)),
                 None => Err(OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() }),
@@ -53,8 +53,8 @@ impl<const D: usize> Probe<D> {
     }
 }
 
-/// The place in memory of the particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near
-/// ones, that with the smallest id.
+/// The id of the particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near ones, the
+/// smallest id.
 ///
 /// ```
 /// use bfree::output::nearest;
@@ -63,9 +63,9 @@ impl<const D: usize> Probe<D> {
 /// // The disc's centre is a node; the four particles around it are equally near, and the first of them is taken.
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let particles = scene.build::<2>("scenes".as_ref())?.particles;
-/// let (particle, distance) = nearest(&particles, &Vector::from([2.5, 2.5]), None).ok_or("particles")?;
+/// let (id, distance) = nearest(&particles, &Vector::from([2.5, 2.5]), None).ok_or("particles")?;
 /// assert_eq!(distance, 0.125 * 2_f64.sqrt());
-/// assert_eq!(particles.position[particle], Vector::from([2.375, 2.375]));
+/// assert_eq!(particles.by_id().position[id], Vector::from([2.375, 2.375]));
 /// assert_eq!(nearest(&particles, &Vector::from([2.5, 2.5]), Some(1)), None); // no such body
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -74,13 +74,13 @@ pub fn nearest<const D: usize>(
     point: &Vector<f64, D>,
     body: Option<u32>,
 ) -> Option<(usize, f64)> {
-    let candidates = particles.position.iter().zip(&particles.body).enumerate();
+    let candidates = particles.id.iter().zip(&particles.position).zip(&particles.body);
     candidates
-        .filter(|(_, (_, of))| body.is_none_or(|body| body == **of))
-        .map(|(particle, (x, _))| (particle, (x - point).norm_squared()))
+        .filter(|(_, of)| body.is_none_or(|body| body == **of))
+        .map(|((&id, x), _)| (id as usize, (x - point).norm_squared()))
         .filter(|(_, distance)| distance.is_finite())
-        .min_by(|a, b| a.1.total_cmp(&b.1).then(particles.id[a.0].cmp(&particles.id[b.0])))
-        .map(|(particle, square)| (particle, square.sqrt()))
+        .min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+        .map(|(id, square)| (id, square.sqrt()))
 }
 
 /// Writes `probes.csv`.

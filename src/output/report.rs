@@ -54,9 +54,11 @@ impl Outcome<'_> {
 /// // An attempt that failed did something too.
 /// let newton = step.newton.history.clone();
 /// let before = counts.residual_evaluations;
-/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why: "no equilibrium was found".into(), newton }]);
+/// let why = "no equilibrium was found".into();
+/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton }]);
 /// assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
 /// assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
+/// assert_eq!(counts.projection_iterations, 7); // none by the steps, whose mass is lumped
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,7 +85,7 @@ pub struct Counts {
     pub residual_evaluations: u64,
     /// Products with the tangent.
     pub tangent_products: u64,
-    /// Iterations of the projection onto the nodes, of steps that succeeded.
+    /// Iterations of the projection onto the nodes.
     pub projection_iterations: u64,
 }
 
@@ -103,7 +105,10 @@ impl Counts {
     /// Adds attempts that failed.
     pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
         self.failed_attempts += attempts.len() as u64;
-        attempts.iter().for_each(|attempt| self.add_newton(&attempt.newton));
+        for attempt in attempts {
+            self.projection_iterations += attempt.projection_iterations as u64;
+            self.add_newton(&attempt.newton);
+        }
     }
 
     fn add_newton(&mut self, newton: &NewtonHistory) {
@@ -164,9 +169,11 @@ impl Serialize for Number {
     }
 }
 
-/// What the report says of Newton's method in one step or attempt.
+/// What the report says of the iterations in one step or attempt.
 #[derive(Debug, Serialize)]
 struct NewtonLine {
+    /// Iterations of the projection onto the nodes.
+    projection_iterations: usize,
     /// ‖R‖ at the initial guess and after each iteration.
     newton_residuals: Vec<Number>,
     /// Krylov iterations that gave each Newton iteration.
@@ -178,10 +185,11 @@ struct NewtonLine {
 }
 
 impl NewtonLine {
-    fn new(history: &NewtonHistory) -> Self {
+    fn new(projection_iterations: usize, history: &NewtonHistory) -> Self {
         let iterations = &history.iterations;
         let residuals = history.first_residual.into_iter().chain(iterations.iter().map(|one| one.residual));
         Self {
+            projection_iterations,
             newton_residuals: residuals.map(Number).collect(),
             krylov_iterations: iterations.iter().map(|one| one.krylov.iterations).collect(),
             krylov_residuals: iterations.iter().map(|one| Number(one.krylov.relative_residual)).collect(),
@@ -201,8 +209,10 @@ struct AttemptLine<'a> {
 
 impl<'a> AttemptLine<'a> {
     fn all(attempts: &'a [FailedAttempt]) -> Vec<Self> {
-        let line =
-            |one: &'a FailedAttempt| Self { dt: Number(one.dt), why: &one.why, newton: NewtonLine::new(&one.newton) };
+        let line = |one: &'a FailedAttempt| {
+            let newton = NewtonLine::new(one.projection_iterations, &one.newton);
+            Self { dt: Number(one.dt), why: &one.why, newton }
+        };
         attempts.iter().map(line).collect()
     }
 }
@@ -234,7 +244,7 @@ impl NewtonLog {
         let line = StepLine {
             time: Number(time),
             dt: Number(step.dt),
-            newton: NewtonLine::new(&step.newton.history),
+            newton: NewtonLine::new(step.projection_iterations, &step.newton.history),
             failed_attempts: AttemptLine::all(&step.failed),
         };
         self.0.line(&serde_json::to_string(&line).map_err(json(self.0.path()))?)

@@ -57,13 +57,12 @@ pub fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
         let body = probe.body.as_ref().and_then(body);
         let (At::Particle(x) | At::Point(x)) = &probe.at;
         let point = Vector::<f64, D>::from_iterator(x.iter().copied());
-        let (nearest, distance) = nearest(particles, &point, body)?;
-        let particle = particles.id[nearest] as usize;
+        let (particle, distance) = nearest(particles, &point, body)?;
         let place = match &probe.at {
             At::Particle(_) => Place::Particle(particle),
             At::Point(_) => Place::Nearest { point, body, within: simulation.grid.spacing },
         };
-        let per_cell = scene.bodies.get(particles.body[nearest] as usize)?.particles_per_cell;
+        let per_cell = scene.bodies.get(particles.body[particles.place(particle)?] as usize)?.particles_per_cell;
         let spacing = simulation.grid.spacing / f64::from(per_cell);
         let probe = Probe { name: probe.name.clone(), field: probe.field, place };
         Some(Bound { probe, particle, distance, spacing })

@@ -318,6 +318,28 @@ mod tests {
     }
 
     #[test]
+    fn krylov_vectors_that_nearly_depend_on_each_other_are_orthogonal() {
+        // Hilbert's matrix makes vectors that lie nearly in the span of those before. Made orthogonal once, they have products of up to
+        // 0.03; twice is enough for round-off (Giraud, Langou, Rozložník, van den Eshof, Numer. Math. 101 (2005)).
+        const N: usize = 12;
+        let a = Dense::from_fn(N, |i, j| 1.0 / (1 + i + j) as f64);
+        let mut basis: Vec<Pooled<f64>> = Vec::new();
+        let mut w: Pooled<f64> = a.times(&[1.0; N]).into_iter().collect();
+        for _ in 0..9 {
+            let w_norm = norm(&w);
+            let (_, left) = orthogonalise(&mut w, w_norm, &basis);
+            assert!(left > EXHAUSTED * f64::EPSILON * w_norm, "the space is exhausted after {} vectors", basis.len());
+            let v: Pooled<f64> = w.iter().map(|x| x / left).collect();
+            for before in &basis {
+                let product = dot(before, &v);
+                assert!(product.abs() <= N as f64 * f64::EPSILON, "{product:e} after {} vectors", basis.len());
+            }
+            w = a.times(&v).into_iter().collect();
+            basis.push(v);
+        }
+    }
+
+    #[test]
     fn number_of_distinct_eigenvalues_is_the_number_of_iterations() {
         let a = Dense::from_fn(60, |i, j| if i == j { [1.0, -2.0, 5.0][i % 3] } else { 0.0 });
         let mut x = vec![0.0; 60];

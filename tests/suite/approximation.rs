@@ -1,10 +1,11 @@
 //! What every shape function promises, for every family in 1, 2 and 3 dimensions.
 
 use bfree::approximation::{
-    Approximation, ApproximationError, AxisWeights, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction, Support,
-    Validate,
+    Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, Scratch, Separable,
+    ShapeFunction, Support, Validate,
 };
-use bfree::grid::Grid;
+use bfree::grid::{Axis, Grid};
+use bfree::mechanics::sweep::Supports;
 use bfree::tensor::Vector;
 use proptest::prelude::*;
 
@@ -354,5 +355,37 @@ proptest! {
         prop_assert!(found.values.iter().all(|n| (0.0..=1.0 + 1e-14).contains(n)));
         let error = inconsistency(&grid, &x, &found);
         prop_assert!(error < 1e-12, "{error:e}");
+    }
+}
+
+/// Cubic splines that say they reach no further than quadratic ones.
+struct Understated;
+
+impl Validate for Understated {
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
+}
+
+impl Separable for Understated {
+    fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
+        Bspline::Cubic.axis(axis, x, out)
+    }
+
+    fn width(&self) -> usize {
+        3
+    }
+}
+
+#[test]
+fn a_family_that_lists_more_nodes_than_it_says_is_refused() {
+    let grid = Grid { origin: Vector::zeros(), spacing: H, cells: [8, 8] };
+    // Next to the walls there are no more than three.
+    let positions = [[0.2, 0.3], [0.3, 0.2], [2.1, 2.2], [2.2, 2.1]].map(Vector::from);
+    for supports in [Supports::new, Supports::plain] {
+        assert!(supports(&Understated, &grid, &positions[..2]).is_ok());
+        let error = supports(&Understated, &grid, &positions).map(|_| ()).unwrap_err();
+        assert_eq!((error.particle, &error.source), (2, &ApproximationError::TooManyNodes { listed: 4, allowed: 3 }));
+        assert!(error.source.to_string().contains("4 nodes") && error.source.to_string().contains("reach 3"));
     }
 }

@@ -302,6 +302,45 @@ fn settings_that_make_no_sense_are_refused_with_their_numbers() -> Result<(), Fa
 }
 
 #[test]
+fn particles_are_asked_for_by_id_wherever_they_lie() -> Result<(), Failure> {
+    let start = falling()?;
+    let (reference, mut moved) = (Reference::of(&start), start.clone());
+    moved.rearrange(&(0..64).rev().collect::<Vec<_>>());
+    for id in [0, 17, 63] {
+        let mut position = Vec::new();
+        Field::Position.append(&moved, &reference, id, &mut position)?;
+        let x = start.particles.position[id];
+        assert_eq!(position, [x[0], x[1], 0.0]);
+        assert_eq!(nearest(&moved.particles, &x, None), Some((id, 0.0)));
+    }
+    let missing = Field::Position.append(&moved, &reference, 64, &mut Vec::new());
+    assert!(matches!(missing, Err(OutputError::NoParticle { particle: 64, particles: 64 })), "{missing:?}");
+    let other = Reference::of(&single::<2>(Tensor::zeros())?);
+    let other = Field::Displacement.append(&moved, &other, 3, &mut Vec::new());
+    assert!(matches!(other, Err(OutputError::Reference { reference: 1, particles: 64 })), "{other:?}");
+    Ok(())
+}
+
+#[test]
+fn the_report_shows_the_projection_of_attempts_that_failed() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let mut simulation = falling()?;
+    simulation.settings.lumping = 0.5;
+    simulation.settings.newton.max_iterations = 0;
+    let recorder = Recorder::start(settings(directory.path()), &simulation, Reference::of(&simulation))?;
+    let Err(error) = simulation.advance() else { return Err("no iteration was allowed".into()) };
+    let iterations: Vec<usize> = error.failed.iter().map(|attempt| attempt.projection_iterations).collect();
+    assert!(iterations.len() == 4 && iterations.iter().all(|&n| n > 0), "{iterations:?}");
+    recorder.finish(&simulation, &Map::new(), Outcome::Failed(&error))?;
+    let report: Value = serde_json::from_slice(&std::fs::read(directory.path().join("report.json"))?)?;
+    let attempts = report["failed_attempts"].as_array().ok_or("no attempts")?;
+    let shown: Vec<&Value> = attempts.iter().map(|attempt| &attempt["projection_iterations"]).collect();
+    assert_eq!(shown, iterations.iter().map(|&n| json!(n)).collect::<Vec<_>>().iter().collect::<Vec<_>>());
+    assert_eq!(report["counts"]["projection_iterations"], iterations.iter().sum::<usize>());
+    Ok(())
+}
+
+#[test]
 fn the_nearest_particle_is_looked_for_in_its_body() -> Result<(), Failure> {
     let mut particles = falling()?.particles;
     particles.body[0] = 1;

@@ -5,6 +5,12 @@ use bfree::grid::Grid;
 use bfree::material::{FrozenTangent, Lame, Law, Material};
 use bfree::mechanics::sweep::{Laws, Supports};
 use bfree::mechanics::tangent::{frozen_bytes, has_closed_form};
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::sweep::{Laws, Supports};
+use bfree::mechanics::tangent::frozen_bytes;
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
 use bfree::solver::Precision;
@@ -174,6 +180,84 @@ fn any_number_of_threads_sums_the_same_bits() {
             assert!(same, "{threads} threads");
         }
     }
+}
+
+/// A particle in each of the cells, jittered, and a law.
+fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>, [Body<Material>; 1]), Failure> {
+    let (grid, positions) = regular(cells, 1);
+    let grid = Grid { cells: cells.map(|n| n + 1), ..grid };
+    let (mut random, mut particles) = (Irregular(0), Particles::default());
+    for x in positions {
+        particles.push(x + random.vector() * 0.3, random.vector(), 1.0, 1.0 + 0.5 * random.number(), 0);
+    }
+    let law = Material::from(NeoHookean::ciarlet(Lame::new(2.0, 1.0)?));
+    Ok((grid, particles, [Body { name: "body".into(), law, density: 1.0 }]))
+}
+
+/// What a step computes by sums over blocks.
+fn computed<const D: usize>(
+    supports: &Supports<D>,
+    nodes: &Nodes,
+    particles: &Particles<D>,
+    bodies: &[Body<Material>],
+) -> Result<[(&'static str, Vec<f64>); 8], Failure> {
+    let flat = |field: &[Vector<f64, D>]| field.iter().flat_map(|x| x.iter().copied()).collect::<Vec<_>>();
+    let nodal = Nodal::project(particles, supports, nodes.len(), 1.0)?;
+    let (alphas, load) = (Newmark::default().alphas(1.0), vec![Vector::zeros(); nodes.len()]);
+    let equilibrium = Equilibrium::new(particles, bodies, supports, alphas, 0.5, &nodal, load, vec![], &[]);
+    let u = field::<D>(nodes);
+    let dphi: Vec<_> = u.iter().map(|u| u * 0.02).collect();
+    let mut gathered = vec![0.0; particles.len()];
+    supports.each_particle(&u, |_, value, gradient| value.sum() + gradient.sum(), |p, sum| gathered[p] = sum);
+    let mut product = vec![Vector::zeros(); u.len()];
+    let tangent = equilibrium.tangent(&dphi)?;
+    tangent.product(&u, &mut product);
+    let (energy, magnitude) = equilibrium.potential(&dphi).ok_or("a potential")??;
+    Ok([
+        ("mass", nodal.mass.to_vec()),
+        ("momentum", flat(&nodal.velocity)),
+        ("values", flat(&supports.values(&u))),
+        ("values and gradients", gathered),
+        ("forces", flat(&equilibrium.residual(&dphi, Carry::ALL)?)),
+        ("product with the tangent", flat(&product)),
+        ("diagonal blocks", tangent.diagonal_blocks().iter().flat_map(|block| block.iter().copied()).collect()),
+        ("energies and magnitudes", vec![energy, magnitude, equilibrium.magnitude(&dphi)?]),
+    ])
+}
+
+fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
+    let (grid, particles, bodies) = one_a_cell(cells)?;
+    let (shape, at) = (Approximation::from(Linear), &particles.position);
+    let in_waves = |threads: usize| -> Result<_, Failure> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        pool.install(|| {
+            let (supports, nodes) = Supports::new(&shape, &grid, at).map_err(|error| error.to_string())?;
+            computed(&supports, &nodes, &particles, &bodies).map_err(|error| error.to_string())
+        })
+        .map_err(Failure::from)
+    };
+    let one = in_waves(1)?;
+    let (plain, nodes) = Supports::plain(&shape, &grid, at)?;
+    for ((name, fast), (_, plain)) in one.iter().zip(computed(&plain, &nodes, &particles, &bodies)?) {
+        assert_eq!(fast.len(), plain.len(), "{D}D: {name}");
+        let largest = plain.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let close = fast.iter().zip(&plain).all(|(a, b)| (a - b).abs() <= 1e-12 * largest);
+        assert!(close && largest > 0.0, "{D}D: {name} of the plain sweep differ");
+    }
+    for threads in [2, 5] {
+        for ((name, one), (_, many)) in one.iter().zip(in_waves(threads)?) {
+            let same = one.len() == many.len() && one.iter().zip(&many).all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(same, "{D}D: {name} with {threads} threads differ");
+        }
+    }
+    Ok(())
+}
+
+/// Blocks are 16² or 4³ cells, and a wave has 64 of them: here are 72 and 150.
+#[test]
+fn several_waves_of_blocks_sum_the_same_bits_and_those_of_the_plain_sweep() -> Result<(), Failure> {
+    several_waves([144, 128])?;
+    several_waves([20, 20, 24])
 }
 
 /// What is left of other supports, with other blocks, widths and precision, is not seen.

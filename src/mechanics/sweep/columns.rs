@@ -52,7 +52,7 @@ impl<'a> Family<'a> {
         }
         along.spans.clear();
         for &x in &along.x {
-            self.product.axis(axis, x, &mut along.list)?;
+            approximation::list(self.product, axis, x, &mut along.list)?;
             along.spans.push(span(&along.list));
         }
         Ok(())
@@ -85,7 +85,7 @@ impl<'a> Family<'a> {
         for (lane, i) in range.clone().enumerate() {
             out.spans[lane] = along.spans[i];
             if listed[lane] {
-                self.product.axis(axis, along.x[i], &mut along.list)?;
+                approximation::list(self.product, axis, along.x[i], &mut along.list)?;
                 out.take_list(lane, &along.list);
             }
         }

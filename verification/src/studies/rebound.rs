@@ -8,7 +8,7 @@ use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Carry;
-use bfree::mechanics::time::Alphas;
+use bfree::mechanics::time::{Alphas, Newmark};
 use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{Simulation, StepReport};
 use bfree::solver::newton;
@@ -32,6 +32,9 @@ const RULES: [(&str, [&str; 2]); 2] =
 
 /// The energy before the first impact.
 const ENERGY: f64 = 3.5;
+
+/// Of energies, over 1600 steps of sums of some hundred terms.
+const ROUND_OFF: f64 = 1e-10 * ENERGY;
 
 /// Seconds of the paper's Table 2.
 const TABLE_2: [f64; 3] = [256.32, 265.31, 826.01];
@@ -58,12 +61,18 @@ struct Ledger {
     /// ½ Δv·(M − M_L)Δv, which `transfer` must be: the projection keeps Σ m v_p N, so only the square of Δv is left, and it is
     /// weighed by M on the particles and by M_L on the nodes.
     lumping: f64,
+    /// What `rule` must be, from the end points of the step alone; see [`of_newmark`].
+    predicted: f64,
+    /// What the residual that Newton's method left may do to it, ½ Σ |Δφ·R|.
+    left: f64,
 }
 
 impl Ledger {
     fn add(&mut self, other: &Self) {
         self.transfer += other.transfer;
         self.lumping += other.lumping;
+        self.predicted += other.predicted;
+        self.left += other.left;
         self.supports += other.supports;
         self.rule += other.rule;
     }
@@ -71,6 +80,16 @@ impl Ledger {
     fn total(&self) -> f64 {
         self.transfer + self.supports + self.rule
     }
+}
+
+/// The change of the nodes' kinetic energy by Newmark's rule beyond ½ Δφ·M(a_n + a_{n+1}), δa being the change of a:
+/// (γ−½) Δφ·M δa + Δt² (γ/2−β) δa·M [½ (a_n + a_{n+1}) + (γ−½) δa], of which nothing is left for γ = ½, β = ¼.
+///
+/// It follows from Δφ = Δt v_n + Δt² [(½−β) a_n + β a_{n+1}] and Δv = Δt [(1−γ) a_n + γ a_{n+1}]. With M a_{n+1} = −f_{n+1} the rule as a
+/// whole takes ½ Δφ·(f_n + f_{n+1}) − ΔW less this.
+fn of_newmark(newmark: &Newmark, dt: f64, dphi: &Vector<f64, 2>, a: &Vector<f64, 2>, change: &Vector<f64, 2>) -> f64 {
+    let (half, damping) = (newmark.gamma - 0.5, 0.5 * newmark.gamma - newmark.beta);
+    half * dphi.dot(change) + dt * dt * damping * change.dot(&(a + change * (0.5 + half)))
 }
 
 /// One step of Algorithm 1, as [`Simulation::step`] does it for walls at rest and no loads, with the books kept.
@@ -89,6 +108,9 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let unbalanced = start.residual::<f64>(&at_rest, Carry::ALL)?;
     let supports = 0.5 * unbalanced.iter().zip(&dphi).map(|(r, by)| r.dot(by)).sum::<f64>();
 
+    let residual = equilibrium.residual::<f64>(&dphi, Carry::ALL)?;
+    let (mut forces, mut damping, mut left) = (0.0, 0.0, 0.0);
+
     // ε = 1: the mass is lumped.
     let alphas = prepared.alphas;
     let nodal = &prepared.nodal;
@@ -96,10 +118,19 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let mut change = vec![Vector::zeros(); dphi.len()];
     for node in 0..dphi.len() {
         let (v, a) = (nodal.velocity[node], nodal.acceleration[node]);
-        let mut new = v + alphas.increments(&dphi[node], &v, &a).0;
+        let (change_v, mut change_a) = alphas.increments(&dphi[node], &v, &a);
+        let (mut new, mut free) = (v + change_v, residual[node]);
         for dof in prepared.prescribed.iter().filter(|dof| dof.node == node) {
             new[dof.component] = 0.0;
+            change_a[dof.component] = 0.0;
+            free[dof.component] = 0.0;
         }
+        // f_n = (M a_n + f_n) − M a_n, and the same at the end
+        let f_n = unbalanced[node] - a * nodal.mass[node];
+        let f_end = residual[node] - (a + change_a) * nodal.mass[node];
+        forces += 0.5 * dphi[node].dot(&(f_n + f_end));
+        damping += nodal.mass[node] * of_newmark(&settings.newmark, alphas.dt, &dphi[node], &a, &change_a);
+        left += 0.5 * dphi[node].dot(&free).abs();
         of_nodes += 0.5 * nodal.mass[node] * (new.norm_squared() - v.norm_squared());
         change[node] = new - v;
         lumping -= 0.5 * nodal.mass[node] * change[node].norm_squared();
@@ -111,8 +142,9 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     update.commit(&mut simulation.particles, &prepared.supports);
     simulation.clock.advance();
     let transfer = simulation.particles.kinetic_energy() - kinetic - of_nodes;
-    let rule = of_nodes + simulation.strain_energy() - strain - supports;
-    Ok(Ledger { transfer, supports, rule, lumping })
+    let stored = simulation.strain_energy() - strain;
+    let rule = of_nodes + stored - supports;
+    Ok(Ledger { transfer, supports, rule, lumping, predicted: stored - forces + damping, left })
 }
 
 /// One run with its books.
@@ -174,12 +206,18 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     );
     for ((shape, rule), run) in cases.iter().zip(&runs) {
         let lost = ENERGY - run.total(run.books.len());
-        report.push(&["energy lost, of 3.5", shape.0, rule.0], lost, Bound::Between(0.0, ENERGY));
+        // Passive walls give nothing. How much is lost, theory says: the parts of the books, each by a formula of its own.
+        report.push(&["energy lost, of 3.5", shape.0, rule.0], lost, Bound::AtLeast(0.0));
         let mut sum = Ledger::default();
         run.books.iter().for_each(|entry| sum.add(entry));
-        report.push(&["books: error of the sum", shape.0, rule.0], (sum.total() + lost).abs(), Bound::AtMost(1e-10 * ENERGY));
         let mismatch = (sum.transfer - sum.lumping).abs();
-        report.push(&["transfer - Δv·(M − M_L)Δv/2", shape.0, rule.0], mismatch, Bound::AtMost(1e-10 * ENERGY));
+        report.push(&["transfer - Δv·(M − M_L)Δv/2", shape.0, rule.0], mismatch, Bound::AtMost(ROUND_OFF));
+        let largest = run.books.iter().fold(f64::NEG_INFINITY, |most, entry| most.max(entry.lumping));
+        report.push(&["Δv·(M − M_L)Δv/2 in a step, at most", shape.0, rule.0], largest, Bound::AtMost(ROUND_OFF));
+        let mismatch = (sum.rule - sum.predicted).abs();
+        report.push(&["what the rule takes - its theory", shape.0, rule.0], mismatch, Bound::AtMost(sum.left + ROUND_OFF));
+        let mismatch = (lost + sum.lumping + sum.supports + sum.predicted).abs();
+        report.push(&["energy lost - its theory", shape.0, rule.0], mismatch, Bound::AtMost(sum.left + ROUND_OFF));
         for pair in run.flights().windows(2) {
             let mut sum = Ledger::default();
             run.books[pair[0]..pair[1]].iter().for_each(|entry| sum.add(entry));

@@ -80,7 +80,7 @@ pub(super) struct Cost {
     pub tally: Tally,
     /// CPU seconds of its one thread, without the making of forces and the measuring of errors.
     pub seconds: f64,
-    /// What each evaluation takes.
+    /// What each evaluation takes, as first measured.
     pub units: Units,
     /// The most bytes at one time, by the plan.
     pub bytes: u64,
@@ -88,8 +88,8 @@ pub(super) struct Cost {
 
 impl Cost {
     /// What was evaluated, each times what it takes, in seconds: untouched by what else the machine does.
-    pub fn counted(&self) -> f64 {
-        let Self { tally, units, .. } = self;
+    pub fn counted(&self, units: &Units) -> f64 {
+        let tally = &self.tally;
         units.shapes * tally.steps as f64
             + units.projection * tally.projections as f64
             + units.residual * tally.residuals as f64

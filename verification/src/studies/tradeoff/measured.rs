@@ -1,6 +1,6 @@
 //! Settings with what came of them, and the front of those that nothing beats.
 
-use super::cost::Cost;
+use super::cost::{Cost, Units};
 use super::problem::Problem;
 use super::setting::{Origin, Setting, origin};
 use crate::report::chain;
@@ -18,12 +18,17 @@ pub(super) struct Point {
     pub cost: Cost,
     /// What was counted, in products of one particle with the default functions.
     pub work: f64,
+    /// The least and the greatest work of all that were measured.
+    pub scatter: [f64; 2],
 }
 
 impl Point {
-    /// How far `self` is from being beaten by `other`: the larger of the two ratios of error and work; below 1, `other` is better in both.
-    pub fn beaten(&self, other: &Self) -> f64 {
-        (other.error / self.error).max(other.work / self.work)
+    /// How far `self` is from being dominated by `other`, below 1 if it is: the larger of the two ratios of error and work; that of work
+    /// alone where `other` errs no more. Errors are the same in every run. Work scatters: the greatest of `other` counts, and the least of
+    /// `self`.
+    pub fn dominated(&self, other: &Self) -> f64 {
+        let (error, work) = (other.error / self.error, other.scatter[1] / self.scatter[0]);
+        if error <= 1.0 { work } else { error.max(work) }
     }
 }
 
@@ -52,14 +57,20 @@ impl Measured {
                 Err(why) => failures.push((setting.clone(), chain(&*why))),
             }
         }
+        let mut units: Vec<Vec<Units>> = runs.iter().map(|(.., cost)| vec![cost.units]).collect();
         for _ in 0..ROUNDS {
-            for (setting, _, cost) in &mut runs {
-                cost.units = cost.units.least(&problem.units(setting)?);
+            for ((setting, ..), units) in runs.iter().zip(&mut units) {
+                units.push(problem.units(setting)?);
             }
         }
-        let unit = runs[0].2.units.product_of_one;
-        let point = |(setting, error, cost): (Setting, f64, Cost)| Point { setting, error, work: cost.counted() / unit, cost };
-        let points: Vec<Point> = runs.into_iter().map(point).collect();
+        let least = |units: &[Units]| units.iter().fold(units[0], |least, one| least.least(one));
+        let unit = least(&units[0]).product_of_one;
+        let point = |((setting, error, cost), units): ((Setting, f64, Cost), Vec<Units>)| {
+            let each = || units.iter().map(|units| cost.counted(units) / unit);
+            let scatter = [each().fold(f64::INFINITY, f64::min), each().fold(0.0, f64::max)];
+            Point { setting, error, work: cost.counted(&least(&units)) / unit, cost, scatter }
+        };
+        let points: Vec<Point> = runs.into_iter().zip(units).map(point).collect();
         Ok(Self { problem: problem.name(), smooth: problem.smooth(), base: points[0].clone(), points, failures })
     }
 
@@ -96,7 +107,7 @@ fn front(mut points: Vec<&Point>, price: impl Fn(&Point) -> f64) -> Vec<&Point> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::tradeoff::cost::{Tally, Units};
+    use crate::studies::tradeoff::cost::Tally;
 
     #[test]
     fn the_front_is_what_nothing_beats() {
@@ -105,10 +116,14 @@ mod tests {
             error,
             cost: Cost { tally: Tally::default(), seconds: work, units: Units::default(), bytes: 0 },
             work,
+            scatter: [0.9 * work, 1.1 * work],
         };
         let points = [point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.5), point(2.0, 0.2), point(4.0, 0.1), point(5.0, 0.3)];
         let found: Vec<_> = front(points.iter().collect(), |point| point.work).iter().map(|p| (p.work, p.error)).collect();
         assert_eq!(found, [(1.0, 0.5), (2.0, 0.2), (3.0, 0.1)]);
-        assert!(points[5].beaten(&points[0]) < 1.0 && points[1].beaten(&points[0]) > 1.0);
+        assert!(points[5].dominated(&points[0]) < 1.0 && points[1].dominated(&points[0]) > 1.0);
+        // The same error for less work, by more than the scatter and by less; nothing dominates itself.
+        assert!(points[2].dominated(&points[1]) < 1.0 && point(2.1, 0.5).dominated(&points[2]) > 1.0);
+        assert!(points.iter().all(|point| point.dominated(point) > 1.0));
     }
 }

@@ -18,9 +18,6 @@ use setting::{BASE_LEVEL, COURANT, KNOBS, Origin, design, knobs, one_at_a_time};
 /// What the study shows.
 pub(super) const ABOUT: &str = "speed against accuracy: error, work, seconds and bytes over every knob of a scene, on four problems with known answers";
 
-/// A default is beaten by a setting that is better in error and in work by more than 10 %.
-const SLACK: f64 = 0.9;
-
 fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
     let (plane, space) = ([6.0, 8.0, 12.0, 16.0, 24.0], [3.0, 4.0, 6.0, 8.0, 12.0]);
     Ok(match effort {
@@ -82,19 +79,21 @@ fn base(problems: &[Box<dyn Problem>]) -> String {
     )
 }
 
-/// Whether anything beats the defaults: one knob at a time, and the combinations.
+/// Whether anything dominates the defaults: one knob at a time, and the combinations.
 fn defaults(all: &[Measured]) -> Report {
-    let title = "how far the defaults are from being beaten: the larger ratio of error and work, among what keeps Newton's method quadratic";
+    let title = "the defaults are on the front: how far they are from being dominated in error and work, beyond the scatter of work, by what keeps \
+                 Newton's method quadratic";
     let mut report = Report::new(title, &["knob", "problem", "by"]);
     for measured in all {
         let base = &measured.base;
         let mut least = |what: &str, base: Option<&Point>, chosen: &dyn Fn(&Point) -> bool| {
             let others = measured.points.iter().filter(|point| point.cost.tally.quadratic() && chosen(point));
-            // Defaults that do not come to their end are beaten by all.
-            let beaten = |other: &Point| base.map_or(0.0, |base| base.beaten(other));
-            let nearest = others.min_by(|a, b| beaten(a).total_cmp(&beaten(b)));
+            // Defaults that do not come to their end are dominated by all.
+            let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other));
+            let nearest = others.min_by(|a, b| dominated(a).total_cmp(&dominated(b)));
             if let Some(nearest) = nearest {
-                report.push(&[what, measured.problem, &nearest.setting.name()], beaten(nearest), Bound::AtLeast(SLACK));
+                let by = base.map_or_else(|| nearest.setting.name(), |base| by_how_much(base, nearest));
+                report.push(&[what, measured.problem, &by], dominated(nearest), Bound::AtLeast(1.0));
             }
         };
         for knob in KNOBS {
@@ -102,9 +101,17 @@ fn defaults(all: &[Measured]) -> Report {
         }
         least("combinations", Some(base), &|point| matches!(point.setting.origin, Origin::Design(..)));
         let quadratic = if base.cost.tally.quadratic() { 1.0 } else { 0.0 };
+        let [least, greatest] = base.scatter;
+        report.push(&["scatter of the defaults' work, greatest over least", measured.problem, "-"], greatest / least, Bound::Reported);
         report.push(&["Newton quadratic with the defaults", measured.problem, "-"], quadratic, Bound::AtLeast(1.0));
     }
     report
+}
+
+/// A setting, and its error and work over those of the defaults, the work as it scattered.
+fn by_how_much(base: &Point, other: &Point) -> String {
+    let [least, greatest] = [other.scatter[0] / base.scatter[1], other.scatter[1] / base.scatter[0]];
+    format!("{} (error ×{:.6}, work ×{least:.2} to {greatest:.2})", other.setting.name(), other.error / base.error)
 }
 
 const HEADER: [&str; 8] = ["setting", "error", "work (1e6)", "CPU s", "KiB", "steps", "products / step", "Newton"];
