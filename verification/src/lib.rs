@@ -15,9 +15,11 @@ pub mod double_double;
 pub mod elements;
 pub mod figure;
 pub mod forced;
+pub mod known;
 pub mod manufactured;
 pub mod prepared;
 pub mod random;
+pub mod record;
 pub mod report;
 pub mod riemann;
 pub mod sheet;
@@ -27,4 +29,4 @@ pub mod studies;
 pub mod table;
 
 pub use check::{check_approximation, check_material, check_tangent};
-pub use report::{Bound, Cell, Report};
+pub use report::{Bound, Cell, Report, Verdict};

@@ -7,6 +7,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime};
+use verification::record::{self, Finding, Run};
 use verification::report::chain;
 use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 
@@ -14,9 +15,9 @@ use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
-    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the paper, kept in
-    /// verification/FULL.md, `results` the studies of the paper with their tables and pictures, kept in
-    /// verification/RESULTS.md and verification/results. `tradeoff` with full effort rewrites verification/TRADEOFF.md
+    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the paper: verdicts are
+    /// kept in verification/FULL.md and README.md, tables in target/verification. `results` are the studies of the paper with their
+    /// tables and pictures, kept in verification/RESULTS.md and verification/results. `tradeoff` with full effort rewrites verification/TRADEOFF.md
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
     /// How much each study does; `full` as a study asks for full effort
@@ -64,8 +65,9 @@ fn selected(arguments: &Arguments) -> Result<Vec<(&'static Study, Effort)>, Stri
             name => vec![(STUDIES.iter().find(|study| study.name == name).ok_or_else(|| word.clone())?, effort)],
         };
         for study in named {
-            if !chosen.iter().any(|(one, _)| one.name == study.0.name) {
-                chosen.push(study);
+            match chosen.iter_mut().find(|(one, _)| one.name == study.0.name) {
+                Some((_, effort)) => *effort = study.1.max(*effort),
+                None => chosen.push(study),
             }
         }
     }
@@ -107,18 +109,20 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
 
 fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
-    let mut results = Vec::new();
-    let mut verdicts = Vec::new();
+    // Before hours are spent; and of the tree as it is before the run writes to it.
+    let of_run =
+        if asked_for(arguments, "full") { Some(Run::starting(&root()).map_err(writing("README.md"))?) } else { None };
+    let mut text = Vec::new();
+    let mut findings: Vec<Finding> = Vec::new();
     let mut documents = Vec::new();
     let mut chapters = Vec::new();
-    for (study, effort) in studies {
+    for &(study, effort) in studies {
         let start = Instant::now();
-        let result = (study.run)(effort);
+        let result = study.run(effort);
         let seconds = start.elapsed().as_secs_f64();
-        let passed = matches!(&result, Ok(outcome) if outcome.passed());
-        let before = results.len();
-        print(&mut results, study, &result, seconds).map_err(writing("the results"))?;
-        out.write_all(&results[before..]).map_err(writing("to standard output"))?;
+        let before = text.len();
+        print(&mut text, study, &result, seconds).map_err(writing("the results"))?;
+        out.write_all(&text[before..]).map_err(writing("to standard output"))?;
         if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
             write_files(directory, study.name, outcome)?;
         }
@@ -130,15 +134,17 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
             draw(&kept_folder("tradeoff"), outcome)?;
             keep_tradeoff(&chapter(study, &result, seconds, "tradeoff"))?;
         }
-        documents.push(document(study, &result, passed, seconds));
-        verdicts.push((study.name, passed, seconds));
+        let finding = Finding::of(study.name, &result, seconds);
+        documents.push(document(&finding, &result));
+        findings.push(finding);
     }
-    let passed = verdicts.iter().all(|&(_, passed, _)| passed);
-    let before = results.len();
-    summary(&mut results, &verdicts).map_err(writing("the results"))?;
-    out.write_all(&results[before..]).map_err(writing("to standard output"))?;
-    if asked_for(arguments, "full") {
-        keep(&results)?;
+    let passed = findings.iter().all(|finding| finding.passed);
+    let summary = format!("\n=== verdict ===\n{}", record::summary(&findings));
+    text.extend_from_slice(summary.as_bytes());
+    out.write_all(summary.as_bytes()).map_err(writing("to standard output"))?;
+    if let Some(of_run) = of_run {
+        let tables = of_run.keep(&root(), &target(), &findings, &text).map_err(writing("the record of the run"))?;
+        writeln!(out, "all tables: {}", tables.display()).map_err(writing("to standard output"))?;
     }
     if asked_for(arguments, "results") {
         keep_paper(&chapters)?;
@@ -150,13 +156,14 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
     Ok(passed)
 }
 
-/// Leaves the result of `full` in the repository, with its date and the command that makes it.
-fn keep(results: &[u8]) -> Result<(), Failure> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("FULL.md");
-    let date = humantime::format_rfc3339_seconds(SystemTime::now());
-    let header = format!("# The last full verification\n\n`cargo verify full`, {date}\n\n```text");
-    let text = [header.as_bytes(), results, b"```\n"].concat();
-    fs::write(&path, text).map_err(writing(path.display().to_string()))
+/// Where the repository is.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Where cargo builds: nothing in it belongs to the repository.
+fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
 }
 
 fn asked_for(arguments: &Arguments, word: &str) -> bool {
@@ -184,7 +191,8 @@ fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
     let date = humantime::format_rfc3339_seconds(SystemTime::now());
     let header = format!(
         "# The paper's results, and ours\n\nEvery table and figure of section 4. Written by `cargo verify results`, {date}; nothing is \
-         edited by hand.\n"
+         edited by hand. What is called the paper's or an independent program's is theirs: data in the sources of the studies and in \
+         `verification/reference`, not results of this run.\n"
     );
     fs::write(&path, header + &chapters.concat()).map_err(writing(path.display().to_string()))
 }
@@ -245,23 +253,14 @@ fn print(out: &mut impl Write, study: &Study, result: &Result<Outcome, StudyErro
     writeln!(out, "({seconds:.1} s)")
 }
 
-fn summary(out: &mut impl Write, verdicts: &[(&str, bool, f64)]) -> io::Result<()> {
-    writeln!(out, "\n=== verdict ===")?;
-    for (name, passed, seconds) in verdicts {
-        writeln!(out, "{}  {name:<14} {seconds:8.1} s", if *passed { "PASS" } else { "FAIL" })?;
-    }
-    Ok(())
-}
-
-fn document(study: &Study, result: &Result<Outcome, StudyError>, passed: bool, seconds: f64) -> Value {
+fn document(finding: &Finding, result: &Result<Outcome, StudyError>) -> Value {
+    let Finding { study, passed, counts, seconds, .. } = finding;
     match result {
         Ok(outcome) => json!({
-            "study": study.name, "passed": passed, "seconds": seconds,
+            "study": study, "passed": passed, "counts": counts, "seconds": seconds,
             "reports": outcome.reports, "tables": outcome.tables, "remarks": outcome.remarks,
         }),
-        Err(error) => json!({
-            "study": study.name, "passed": false, "seconds": seconds, "error": chain(error.as_ref()),
-        }),
+        Err(error) => json!({ "study": study, "passed": false, "seconds": seconds, "error": chain(error.as_ref()) }),
     }
 }
 

@@ -1,4 +1,6 @@
 //! What a check hands back: a titled table of cells, each a value, a bound and a verdict.
+//!
+//! Shown is not passed: a cell without a bound is counted apart, and so is one that is known to fail.
 
 use crate::table::{Table, csv_field};
 use serde::{Serialize, Serializer};
@@ -40,7 +42,15 @@ impl Bound {
                     value / high
                 }
             }
-            Self::AtLeast(low) => low / value,
+            Self::AtLeast(low) if value > 0.0 => low / value,
+            // Of what is not positive there is no ratio.
+            Self::AtLeast(low) => {
+                if value >= low {
+                    0.0
+                } else {
+                    f64::INFINITY
+                }
+            }
             Self::Between(low, high) => (2.0 * value - low - high).abs() / (high - low),
             Self::Reported => {
                 if value.is_finite() {
@@ -83,6 +93,39 @@ pub fn short(x: f64) -> String {
     }
 }
 
+/// What the list of known failures says of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Listed {
+    /// The value measured when it was listed.
+    pub value: f64,
+    /// A value that misses the bound so many times further is a new failure.
+    pub factor: f64,
+}
+
+/// What is to be said of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Judged, and within its bound.
+    Met,
+    /// Not judged.
+    Shown,
+    /// Beyond its bound, and on the list of known failures with about this value.
+    Known,
+    /// Beyond its bound; or on the list of known failures and within its bound again, or much worse.
+    Failed,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Met => "ok",
+            Self::Shown => "-",
+            Self::Known => "known failure",
+            Self::Failed => "FAIL",
+        })
+    }
+}
+
 /// One measured value.
 #[derive(Clone, Debug, Serialize)]
 pub struct Cell {
@@ -92,12 +135,46 @@ pub struct Cell {
     pub value: f64,
     /// What it must satisfy.
     pub bound: Bound,
+    /// Its entry in the list of known failures.
+    pub listed: Option<Listed>,
 }
 
 impl Cell {
-    /// Whether the value satisfies the bound.
+    /// The verdict.
+    pub fn verdict(&self) -> Verdict {
+        let holds = self.bound.holds(self.value);
+        match self.listed {
+            None if !holds => Verdict::Failed,
+            None if self.bound == Bound::Reported => Verdict::Shown,
+            None => Verdict::Met,
+            Some(listed) => {
+                let allowed = listed.factor * self.bound.used(listed.value);
+                if !holds && self.bound.used(self.value) <= allowed { Verdict::Known } else { Verdict::Failed }
+            }
+        }
+    }
+
+    /// Whether it does not fail.
     pub fn passed(&self) -> bool {
-        self.bound.holds(self.value)
+        self.verdict() != Verdict::Failed
+    }
+
+    /// Value and bound, and what the list of known failures says.
+    pub fn finding(&self) -> String {
+        let found = format!("{} ({})", short(self.value), self.bound);
+        match self.listed {
+            None => found,
+            Some(listed) => {
+                let said = format!("{found}, known to fail with {}", short(listed.value));
+                match self.verdict() {
+                    Verdict::Failed if self.bound.holds(self.value) => {
+                        format!("{said}, and passes: take it off the list")
+                    }
+                    Verdict::Failed => format!("{said}, and more than {} times worse", short(listed.factor)),
+                    _ => said,
+                }
+            }
+        }
     }
 
     /// The labels in one line.
@@ -106,7 +183,65 @@ impl Cell {
     }
 }
 
-/// How a report prints. Cells that fail are always listed, each by itself.
+/// How many cells there are of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// With a bound, met or not; without known failures.
+    pub judged: usize,
+    /// Without a bound.
+    pub shown: usize,
+    /// Known failures.
+    pub known: usize,
+    /// Of those judged, the ones that fail.
+    pub failed: usize,
+}
+
+impl Counts {
+    fn of<'a>(cells: impl Iterator<Item = &'a Cell>) -> Self {
+        cells.fold(Self::default(), |mut counts, cell| {
+            match cell.verdict() {
+                Verdict::Met => counts.judged += 1,
+                Verdict::Shown => counts.shown += 1,
+                Verdict::Known => counts.known += 1,
+                Verdict::Failed => (counts.judged, counts.failed) = (counts.judged + 1, counts.failed + 1),
+            }
+            counts
+        })
+    }
+}
+
+impl std::iter::Sum for Counts {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            judged: a.judged + b.judged,
+            shown: a.shown + b.shown,
+            known: a.known + b.known,
+            failed: a.failed + b.failed,
+        })
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.failed > 0 {
+            write!(f, "{} of ", self.failed)?;
+        }
+        write!(f, "{} judged", self.judged)?;
+        if self.failed > 0 {
+            write!(f, " failed")?;
+        }
+        if self.shown > 0 {
+            write!(f, ", {} shown", self.shown)?;
+        }
+        match self.known {
+            0 => Ok(()),
+            1 => write!(f, ", 1 known failure"),
+            known => write!(f, ", {known} known failures"),
+        }
+    }
+}
+
+/// How a report prints. Cells that fail, known or not, are always listed, each by itself.
 #[derive(Clone, Debug)]
 enum Layout {
     /// Every cell on a line.
@@ -152,7 +287,14 @@ impl Report {
     /// Adds a cell; there should be one label for each column, and missing ones are empty.
     pub fn push(&mut self, labels: &[&str], value: f64, bound: Bound) {
         let labels = (0..self.columns.len()).map(|k| labels.get(k).map_or_else(String::new, |&l| l.into())).collect();
-        self.cells.push(Cell { labels, value, bound });
+        self.cells.push(Cell { labels, value, bound, listed: None });
+    }
+
+    /// Marks the cells whose labels begin with `labels` as known to fail, and says how many there are.
+    pub fn list_known(&mut self, labels: &[&str], listed: Listed) -> usize {
+        let named =
+            |cell: &&mut Cell| cell.labels.iter().map(String::as_str).take(labels.len()).eq(labels.iter().copied());
+        self.cells.iter_mut().filter(named).map(|cell| cell.listed = Some(listed)).count()
     }
 
     /// Adds a cell that could not be measured, and why: it fails.
@@ -181,27 +323,33 @@ impl Report {
         self.cells.iter().filter(|cell| !cell.passed())
     }
 
-    /// Whether every cell passes, and there is at least one.
+    /// The cells that are known to fail, and do.
+    pub fn known_failures(&self) -> impl Iterator<Item = &Cell> {
+        self.cells.iter().filter(|cell| cell.verdict() == Verdict::Known)
+    }
+
+    /// How many cells are judged, shown, known to fail.
+    pub fn counts(&self) -> Counts {
+        Counts::of(self.cells.iter())
+    }
+
+    /// Whether something is judged, and no cell fails.
     pub fn passed(&self) -> bool {
-        !self.cells.is_empty() && self.failures().next().is_none()
+        let counts = self.counts();
+        counts.judged > 0 && counts.failed == 0
     }
 
-    /// The cell closest to its bound, or furthest beyond it.
+    /// Of the cells that are judged the one closest to its bound, or furthest beyond it.
     pub fn worst(&self) -> Option<&Cell> {
-        worst(self.cells.iter())
+        worst(self.cells.iter().filter(|cell| matches!(cell.verdict(), Verdict::Met | Verdict::Failed)))
     }
 
-    /// One sentence: the verdict, how many cells, and the worst of them.
+    /// One sentence: the verdict, how many cells are judged and how many shown, and the worst of them.
     pub fn verdict(&self) -> String {
-        let failed = self.failures().count();
-        let Some(cell) = self.worst() else { return format!("FAIL  {}: nothing was measured", self.title) };
-        let (name, value, bound) = (cell.name(), short(cell.value), cell.bound);
-        let count = self.cells.len();
-        if failed == 0 {
-            format!("PASS  {}: {count} cells; closest to its bound: {name}: {value} ({bound})", self.title)
-        } else {
-            format!("FAIL  {}: {failed} of {count} cells; worst: {name}: {value} ({bound})", self.title)
-        }
+        let counts = self.counts();
+        let Some(cell) = self.worst() else { return format!("FAIL  {}: nothing is judged; {counts}", self.title) };
+        let (word, place) = if self.passed() { ("PASS", "closest to its bound") } else { ("FAIL", "worst") };
+        format!("{word}  {}: {counts}; {place}: {}: {}", self.title, cell.name(), cell.finding())
     }
 
     /// Every cell as comma-separated values, with a header.
@@ -217,7 +365,7 @@ impl Report {
             for label in &cell.labels {
                 write!(out, "{},", csv_field(label))?;
             }
-            writeln!(out, "{:e},{},{}", cell.value, csv_field(&cell.bound.to_string()), verdict(cell))?;
+            writeln!(out, "{:e},{},{}", cell.value, csv_field(&cell.bound.to_string()), cell.verdict())?;
         }
         Ok(())
     }
@@ -232,7 +380,7 @@ impl Report {
         let header = self.columns.iter().map(String::as_str).chain(["value", "bound", "verdict"]);
         let mut table = Table::new(title, header);
         for cell in cells {
-            let numbers = [short(cell.value), cell.bound.to_string(), verdict(cell).into()];
+            let numbers = [short(cell.value), cell.bound.to_string(), cell.verdict().to_string()];
             table.push(cell.labels.iter().cloned().chain(numbers));
         }
         table
@@ -249,8 +397,11 @@ impl Report {
                 worst(here).map_or_else(
                     || "-".into(),
                     |cell| {
-                        let mark = if cell.passed() { "" } else { " FAIL" };
-                        format!("{} {} {}{mark}", short(cell.value), cell.bound, cell.labels[attained])
+                        let found = format!("{} {} {}", short(cell.value), cell.bound, cell.labels[attained]);
+                        match cell.verdict() {
+                            Verdict::Met | Verdict::Shown => found,
+                            verdict => format!("{found} {verdict}"),
+                        }
                     },
                 )
             });
@@ -261,9 +412,11 @@ impl Report {
 }
 
 /// The cell closest to its bound, the first of equals.
-fn worst<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<&'a Cell> {
+pub(crate) fn worst<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<&'a Cell> {
+    // A known failure that passes again is a failure, however far within its bound.
+    let badness = |cell: &Cell| (cell.verdict() == Verdict::Failed, cell.bound.used(cell.value));
     cells.fold(None, |worst: Option<&Cell>, cell| match worst {
-        Some(worst) if worst.bound.used(worst.value) >= cell.bound.used(cell.value) => Some(worst),
+        Some(worst) if badness(worst) >= badness(cell) => Some(worst),
         _ => Some(cell),
     })
 }
@@ -276,14 +429,6 @@ fn in_order<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
         }
         seen
     })
-}
-
-fn verdict(cell: &Cell) -> &'static str {
-    match (cell.passed(), cell.bound) {
-        (false, _) => "FAIL",
-        (true, Bound::Reported) => "-",
-        (true, _) => "ok",
-    }
 }
 
 /// An error with its causes.
@@ -306,6 +451,9 @@ impl fmt::Display for Report {
                 write!(f, "{}", self.matrix(rows, *column, *attained))?;
                 if self.failures().next().is_some() {
                     write!(f, "{}", self.list("cells that fail", self.failures()))?;
+                }
+                if self.known_failures().next().is_some() {
+                    write!(f, "{}", self.list("known failures", self.known_failures()))?;
                 }
             }
         }
@@ -330,6 +478,48 @@ mod tests {
         assert!(!report.passed());
         assert_eq!(report.worst().map(Cell::name), Some("b".into()));
         assert!(report.verdict().starts_with("FAIL"), "{}", report.verdict());
+    }
+
+    #[test]
+    fn what_is_shown_is_not_passed() {
+        let mut report = Report::new("shown", &["what"]);
+        report.push(&["a"], 1.0, Bound::Reported);
+        assert!(!report.passed());
+        assert_eq!(report.verdict(), "FAIL  shown: nothing is judged; 0 judged, 1 shown");
+        report.push(&["b"], 1.0, Bound::AtMost(2.0));
+        assert!(report.passed());
+        assert_eq!(report.verdict(), "PASS  shown: 1 judged, 1 shown; closest to its bound: b: 1 (<= 2)");
+        report.push(&["c"], 3.0, Bound::AtMost(2.0));
+        assert_eq!(report.verdict(), "FAIL  shown: 1 of 2 judged failed, 1 shown; worst: c: 3 (<= 2)");
+    }
+
+    /// A report of one cell that is met, and one of the value and bound given that is known to fail with 30, or 10 times worse.
+    fn known(value: f64, bound: Bound) -> Report {
+        let mut report = Report::new("known", &["what", "where"]);
+        report.push(&["a", "here"], 1.0, Bound::AtMost(2.0));
+        report.push(&["b", "there"], value, bound);
+        assert_eq!(report.list_known(&["b"], Listed { value: 30.0, factor: 10.0 }), 1);
+        assert_eq!(report.list_known(&["c"], Listed { value: 30.0, factor: 10.0 }), 0);
+        report
+    }
+
+    #[test]
+    fn a_known_failure_is_counted_apart_until_it_passes_or_gets_worse() {
+        let report = known(29.0, Bound::AtMost(2.0));
+        assert!(report.passed());
+        assert_eq!(report.counts(), Counts { judged: 1, shown: 0, known: 1, failed: 0 });
+        assert!(report.to_string().contains("known failure"), "{report}");
+        for (value, words) in [(1.0, "take it off the list"), (301.0, "10 times worse"), (f64::NAN, "10 times worse")] {
+            let report = known(value, Bound::AtMost(2.0));
+            assert!(!report.passed() && report.verdict().contains(words), "{report}");
+        }
+        // From below: 3 is ten times as far from 100 as 30.
+        assert!(known(4.0, Bound::AtLeast(100.0)).passed());
+        for worse in [2.0, 0.0, -1.0, 101.0] {
+            assert!(!known(worse, Bound::AtLeast(100.0)).passed(), "{worse}");
+        }
+        // What is not judged cannot be known to fail.
+        assert!(!known(29.0, Bound::Reported).passed());
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! The studies: one file a study, one list.
 
 use crate::figure::Figure;
-use crate::report::Report;
+use crate::known;
+use crate::report::{Counts, Report};
 use crate::sheet::Sheet;
 use crate::table::Table;
 
 /// How much a study does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effort {
     /// What CI runs: seconds.
     Short,
@@ -34,6 +35,11 @@ impl Outcome {
     pub fn passed(&self) -> bool {
         !self.reports.is_empty() && self.reports.iter().all(Report::passed)
     }
+
+    /// How many cells of all reports are judged, shown, known to fail.
+    pub fn counts(&self) -> Counts {
+        self.reports.iter().map(Report::counts).sum()
+    }
 }
 
 /// Why a study could not be finished: whatever the simulations in it can fail with.
@@ -46,8 +52,19 @@ pub struct Study {
     pub name: &'static str,
     /// What it shows, in a sentence.
     pub about: &'static str,
-    /// Runs it.
-    pub run: fn(&Effort) -> Result<Outcome, StudyError>,
+    run: fn(&Effort) -> Result<Outcome, StudyError>,
+}
+
+impl Study {
+    /// Runs it, and holds what fails against the list of known failures.
+    ///
+    /// # Errors
+    /// Those of the simulations in it.
+    pub fn run(&self, effort: Effort) -> Result<Outcome, StudyError> {
+        let mut outcome = (self.run)(&effort)?;
+        known::mark(known::KNOWN, self.name, effort, &mut outcome.reports);
+        Ok(outcome)
+    }
 }
 
 /// The studies that repeat section 4 of the paper, for `cargo verify results`.

@@ -52,11 +52,32 @@ fn rows(title: &str) -> Report {
 
 /// A row that must be solved: its error against a bound, or why it failed.
 fn solvable<E: Into<StudyError>>(report: &mut Report, what: &str, case: &str, measured: Result<f64, E>, bound: f64) {
-    let labels = [what, case, SOLVABLE];
     match measured {
-        Ok(error) => report.push(&labels, error, Bound::AtMost(bound)),
-        Err(error) => report.push_error(&labels, error.into().as_ref()),
+        Ok(error) => at_most(report, what, case, error, bound),
+        Err(error) => report.push_error(&[what, case, SOLVABLE], error.into().as_ref()),
     }
+}
+
+/// A row that was solved: its error against a bound.
+fn at_most(report: &mut Report, what: &str, case: &str, error: f64, bound: f64) {
+    report.push(&[what, case, SOLVABLE], error, Bound::AtMost(bound));
+}
+
+/// Takes `asked` steps, or as many as can be, with a row for how many; and says how many.
+fn steps<E: Into<StudyError>>(
+    report: &mut Report,
+    what: &str,
+    case: &str,
+    asked: u32,
+    mut step: impl FnMut() -> Result<(), E>,
+) -> u32 {
+    let mut taken = 0;
+    let result = (0..asked).try_for_each(|_| step().map(|()| taken += 1));
+    report.push(&[what, &format!("{case}: steps taken, of {asked}"), SOLVABLE], taken.into(), Bound::AtLeast(asked.into()));
+    if let Err(error) = result {
+        report.note(format!("{what}, {case}: {}", chain(error.into().as_ref())));
+    }
+    taken
 }
 
 /// A row that must be refused with the error named: the value counts answers that are another one.
