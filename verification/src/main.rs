@@ -15,9 +15,10 @@ use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
-    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the paper: verdicts are
-    /// kept in verification/FULL.md and README.md, tables in target/verification. `results` are the studies of the paper with their
-    /// tables and pictures, kept in verification/RESULTS.md and verification/results. `tradeoff` with full effort rewrites verification/TRADEOFF.md
+    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the
+    /// paper: verdicts are kept in verification/FULL.md and README.md, tables in target/verification. `results` are the
+    /// studies of the paper with their tables and pictures, kept in verification/RESULTS.md and verification/results.
+    /// `tradeoff` with full effort rewrites verification/TRADEOFF.md
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
     /// How much each study does; `full` as a study asks for full effort
@@ -190,9 +191,9 @@ fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("RESULTS.md");
     let date = humantime::format_rfc3339_seconds(SystemTime::now());
     let header = format!(
-        "# The paper's results, and ours\n\nEvery table and figure of section 4. Written by `cargo verify results`, {date}; nothing is \
-         edited by hand. What is called the paper's or an independent program's is theirs: data in the sources of the studies and in \
-         `verification/reference`, not results of this run.\n"
+        "# The paper's results, and ours\n\nEvery table and figure of section 4. Written by `cargo verify results`, {date}; \
+         nothing is edited by hand. What is called the paper's or an independent program's is theirs: data in the \
+         sources of the studies and in `verification/reference`, not results of this run.\n"
     );
     fs::write(&path, header + &chapters.concat()).map_err(writing(path.display().to_string()))
 }

@@ -1,4 +1,5 @@
-//! What the last full run leaves in the repository: verification/FULL.md, and two passages of README.md; its tables go elsewhere.
+//! What the last full run leaves in the repository: verification/FULL.md, and two passages of README.md; its tables go
+//! elsewhere.
 
 use crate::known;
 use crate::report::{Counts, Report, chain, worst};
@@ -117,8 +118,8 @@ impl Run {
         Ok(Self { commit: commit(root), machine: machine() })
     }
 
-    /// Leaves the text of the whole run in `target`/verification, whose path is returned, what it came to in verification/FULL.md, and its
-    /// verdict with the list of known failures in README.md.
+    /// Leaves the text of the whole run in `target`/verification, whose path is returned, what it came to in
+    /// verification/FULL.md, and its verdict with the list of known failures in README.md.
     ///
     /// # Errors
     /// Those of reading and writing these files.
@@ -138,7 +139,8 @@ impl Run {
     fn sentence(&self, findings: &[Finding], date: &str) -> String {
         let day = date.split('T').next().unwrap_or(date);
         format!(
-            "The last full verification, `cargo verify full`, {day}, {}: {}. Its verdicts are in [`verification/FULL.md`](verification/FULL.md).\n",
+            "The last full verification, `cargo verify full`, {day}, {}: {}. Its verdicts are in \
+             [`verification/FULL.md`](verification/FULL.md).\n",
             self.commit,
             total(findings)
         )
@@ -170,8 +172,9 @@ impl Run {
             if items.is_empty() { items } else { format!("\n**{title}**\n\n{items}") }
         };
         format!(
-            "# The last full verification\n\n`cargo verify full`, {date}, {}, {}. The studies of the paper run with short effort here; their long sweeps are \
-             in `RESULTS.md`. All tables are in `target/verification/full.txt` where the command was run.\n\n{}.\n\n{}{}{}",
+            "# The last full verification\n\n`cargo verify full`, {date}, {}, {}. The studies of the paper run with short \
+             effort here; their long sweeps are in `RESULTS.md`. All tables are in `target/verification/full.txt` where the \
+             command was run.\n\n{}.\n\n{}{}{}",
             self.commit,
             self.machine,
             total(findings),

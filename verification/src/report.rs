@@ -246,7 +246,8 @@ impl fmt::Display for Counts {
 enum Layout {
     /// Every cell on a line.
     List,
-    /// The worst cell of each place in a matrix: a row for each combination of labels, a column for each label of one kind.
+    /// The worst cell of each place in a matrix: a row for each combination of labels, a column for each label of one
+    /// kind.
     Matrix { rows: Vec<usize>, column: usize, attained: usize },
 }
 
@@ -273,8 +274,9 @@ impl Report {
         }
     }
 
-    /// Prints the worst cell of each place in a matrix, with the label in column `attained` that attains it: rows by the labels in
-    /// `rows`, columns by those in `column` (numbers of columns). What is no column of this report is left out.
+    /// Prints the worst cell of each place in a matrix, with the label in column `attained` that attains it: rows by
+    /// the labels in `rows`, columns by those in `column` (numbers of columns). What is no column of this report is
+    /// left out.
     #[must_use]
     pub fn as_matrix(mut self, rows: &[usize], column: usize, attained: usize) -> Self {
         let known = |column: &usize| *column < self.columns.len();
@@ -493,7 +495,8 @@ mod tests {
         assert_eq!(report.verdict(), "FAIL  shown: 1 of 2 judged failed, 1 shown; worst: c: 3 (<= 2)");
     }
 
-    /// A report of one cell that is met, and one of the value and bound given that is known to fail with 30, or 10 times worse.
+    /// A report of one cell that is met, and one of the value and bound given that is known to fail with 30, or 10
+    /// times worse.
     fn known(value: f64, bound: Bound) -> Report {
         let mut report = Report::new("known", &["what", "where"]);
         report.push(&["a", "here"], 1.0, Bound::AtMost(2.0));

@@ -77,7 +77,8 @@ fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, r
     if exponent <= -3 {
         // Stresses grow to Λ |A| t at most; the change of speed is a few times c |A| t × t c/h.
         let changed = particles.velocity.iter().zip(&start.velocity).map(|(v, v_0)| (v - v_0).norm()).fold(0.0, worse);
-        at_most(report, &what, &format!("{case}: change of velocity"), changed / fastest, 10.0 * waves * waves + ROUNDINGS * f64::EPSILON);
+        let bound = 10.0 * waves * waves + ROUNDINGS * f64::EPSILON;
+        at_most(report, &what, &format!("{case}: change of velocity"), changed / fastest, bound);
     } else if exponent >= 2 {
         // α₁ M Δφ + K Δφ = α₂ M v: a velocity v leaves the strain 4 (v/c) h/(c Δt), some larger where the motion is longer.
         let length = f64::from(2 * cells);

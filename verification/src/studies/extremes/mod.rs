@@ -73,7 +73,8 @@ fn steps<E: Into<StudyError>>(
 ) -> u32 {
     let mut taken = 0;
     let result = (0..asked).try_for_each(|_| step().map(|()| taken += 1));
-    report.push(&[what, &format!("{case}: steps taken, of {asked}"), SOLVABLE], taken.into(), Bound::AtLeast(asked.into()));
+    let labels = [what, &format!("{case}: steps taken, of {asked}"), SOLVABLE];
+    report.push(&labels, taken.into(), Bound::AtLeast(asked.into()));
     if let Err(error) = result {
         report.note(format!("{what}, {case}: {}", chain(error.into().as_ref())));
     }

@@ -257,7 +257,8 @@ impl Study {
     /// How much of its way to the start of the step a run with the same eps throughout has made.
     fn reached(&mut self, case: &Case, label: &str, simulation: &Simulation<2, Material>) {
         let asked = case.start(simulation) as f64 * simulation.clock.nominal();
-        self.runs.push(&[&format!("{}, t={asked:.2}", case.scene), label], simulation.clock.time() / asked, Bound::AtLeast(1.0 - 1e-9));
+        let run = format!("{}, t={asked:.2}", case.scene);
+        self.runs.push(&[&run, label], simulation.clock.time() / asked, Bound::AtLeast(1.0 - 1e-9));
     }
 
     /// A row of condition numbers, at the start of a step.
