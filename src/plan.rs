@@ -289,7 +289,7 @@ fn arrays<const D: usize, L: Law, A>(
     let tiled = supports.closed_bytes(false, false, Precision::Double).is_some();
     let krylov_vectors = match simulation.settings.newton.krylov {
         // The basis; residual, correction, trial and product.
-        Krylov::Gmres { restart } => restart + 5,
+        Krylov::Gmres { restart } => restart as usize + 5,
         Krylov::ConjugateGradient => 5,
     };
     let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };

@@ -300,7 +300,7 @@ impl<const D: usize> Loads<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn dead(&self, t: f64, mass: &[f64], supports: &Supports<D>) -> Pooled<Vector<f64, D>> {
-        let mut force = Pooled::filled(supports.nodes(), Vector::zeros());
+        let mut force: Pooled<Vector<f64, D>> = supports.field();
         if let Some(gravity) = &self.gravity {
             // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
             let b = gravity.acceleration * gravity.curve.value(t);

@@ -10,7 +10,6 @@ use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity};
-use std::sync::OnceLock;
 
 pub use crate::mechanics::point::{Carry, Inadmissible, compose};
 
@@ -61,10 +60,6 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub prescribed: &'a [PrescribedDof],
     /// Σ_J N_J Δφ̂_J at the particles; empty when ε = 1.
     predicted: Pooled<Vector<f64, D>>,
-    /// The preconditioner of the step's linear systems: inverse diagonal blocks of the first tangent that is frozen.
-    pub(super) inverse_blocks: OnceLock<Pooled<Tensor<f64, D>>>,
-    /// The same for systems in single precision.
-    pub(super) single_inverse_blocks: OnceLock<Pooled<Tensor<f32, D>>>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
@@ -85,8 +80,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, lumping) };
         let predicted = if lumping < 1.0 {
             let state = nodal.velocity.iter().zip(&nodal.acceleration);
-            let of_nodes: Pooled<_> = state.map(|(v, a)| alphas.predicted(v, a)).collect();
-            let mut predicted = Pooled::filled(particles.len(), Vector::zeros());
+            let of_nodes = supports.pool().collect(state.map(|(v, a)| alphas.predicted(v, a)));
+            let mut predicted = supports.pool().filled(particles.len(), Vector::zeros());
             supports.each_value(&of_nodes, |p, value| predicted[p] = value);
             predicted
         } else {
@@ -103,8 +98,6 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             pressures,
             prescribed,
             predicted,
-            inverse_blocks: OnceLock::new(),
-            single_inverse_blocks: OnceLock::new(),
         }
     }
 
@@ -234,7 +227,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Pooled<Vector<f64, D>> {
-        let mut force = Pooled::filled(dphi.len(), Vector::zeros());
+        let mut force = self.supports.field();
         self.add_pressure(dphi, Carry::ALL, &mut force);
         force.iter_mut().zip(&self.dead_load).for_each(|(force, dead)| *force = dead - *force);
         force
@@ -278,18 +271,15 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The magnitudes of all contributions to R, summed at each node.
     fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let Alphas { a1, a2, a3, .. } = self.alphas;
-        let mut out: Pooled<Vector<f64, D>> = dphi
-            .iter()
-            .enumerate()
-            .map(|(node, dphi)| {
-                let motion = self.nodal.velocity.get(node).zip(self.nodal.acceleration.get(node));
-                // The whole mass, also for ε < 1: the consistent part is of the same size.
-                let inertia = motion.map_or_else(Vector::zeros, |(v, a)| {
-                    (dphi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * self.nodal.mass[node]
-                });
-                inertia + self.dead_load[node].abs()
-            })
-            .collect();
+        let mut out = self.supports.field();
+        for (node, (out, dphi)) in out.iter_mut().zip(dphi).enumerate() {
+            let motion = self.nodal.velocity.get(node).zip(self.nodal.acceleration.get(node));
+            // The whole mass, also for ε < 1: the consistent part is of the same size.
+            let inertia = motion.map_or_else(Vector::zeros, |(v, a)| {
+                (dphi.abs() * a1 + v.abs() * a2 + a.abs() * a3.abs()) * self.nodal.mass[node]
+            });
+            *out = inertia + self.dead_load[node].abs();
+        }
         match self.supports.force_magnitudes(&self.laws(), dphi, &mut out) {
             Some(done) => done?,
             None => self.supports.assemble_magnitudes(dphi, &mut out, |p, _, g| {

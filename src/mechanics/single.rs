@@ -6,16 +6,16 @@
 use crate::material::{ClosedTangent, FrozenTangent, Law};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::SingleTangents;
-use crate::mechanics::tangent::{FrozenPressure, closed_form, invert_block};
+use crate::mechanics::tangent::{FrozenPressure, closed_form};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Preconditioner, SingleTangent};
+use crate::solver::{DiagonalBlocks, LinearOperator, Linearization};
 use crate::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
 /// K(Δφ)/s in single precision, frozen.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
-/// use bfree::solver::{Precision, SingleTangent};
+/// use bfree::solver::{Linearization, Precision};
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -66,7 +66,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             Some(Err(Some(inadmissible))) => return Err(inadmissible),
             Some(Err(None)) | None => return Ok(None),
         };
-        let lumped = self.lumped_weights().map(|weight| (weight / scale) as f32).collect();
+        let lumped = self.supports.pool().collect(self.lumped_weights().map(|weight| (weight / scale) as f32));
         Ok(Some(Single { equilibrium: self, scale, frozen, pressures: self.frozen_pressures(dphi), lumped }))
     }
 
@@ -86,12 +86,12 @@ impl<const D: usize, L: Law> Single<'_, D, L> {
     /// K_II/s of every active node; a prescribed degree of freedom has the identity's row and column.
     fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut single = Pooled::filled(eq.dead_load.len(), Tensor::zeros());
+        let mut single: Pooled<Tensor<f32, D>> = eq.supports.field();
         for (block, &m) in single.iter_mut().zip(&self.lumped) {
             *block = scaled(&identity::<f32, D>(), m);
         }
         eq.supports.add_single_blocks(&self.frozen, &mut single);
-        let mut blocks: Pooled<Tensor<f64, D>> = single.iter().map(|block| block.map(f64::from)).collect();
+        let mut blocks = eq.supports.pool().collect(single.iter().map(|block| block.map(f64::from)));
         let mut pressure = vec![Tensor::zeros(); if self.pressures.is_empty() { 0 } else { blocks.len() }];
         for point in &self.pressures {
             point.add_blocks(eq.supports, &mut pressure);
@@ -124,18 +124,13 @@ impl<const D: usize, L: Law> LinearOperator<f32> for Single<'_, D, L> {
     }
 }
 
-impl<const D: usize, L: Law> Preconditioner<f32> for Single<'_, D, L> {
-    fn precondition(&self, r: &[f32], z: &mut [f32]) {
-        let (r, z): (&[Vector<f32, D>], &mut [Vector<f32, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        let invert = || self.diagonal_blocks().iter().map(|block| invert_block(block).map(|x| x as f32)).collect();
-        let inverse_blocks: &Pooled<_> = self.equilibrium.single_inverse_blocks.get_or_init(invert);
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
-            *z = inverse * r;
-        }
+impl<const D: usize, L: Law> DiagonalBlocks for Single<'_, D, L> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        Self::diagonal_blocks(self).into_numbers()
     }
 }
 
-impl<const D: usize, L: Law> SingleTangent for Single<'_, D, L> {
+impl<const D: usize, L: Law> Linearization<f32> for Single<'_, D, L> {
     fn scale(&self) -> f64 {
         self.scale
     }

@@ -7,8 +7,8 @@ use crate::mechanics::sweep::{ClosedTangents, Supports};
 use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::scalar::Real;
-use crate::solver::{LinearOperator, NonlinearProblem, Precision, Preconditioner, SingleTangent};
-use crate::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled};
+use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem, Precision};
+use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled};
 use num_dual::Dual64;
 
 /// The terms of the tangent, one for each way Δφ enters the residual.
@@ -332,8 +332,7 @@ impl<const D: usize> FrozenPressure<D> {
     }
 }
 
-/// K(Δφ), frozen: an operator, with d×d diagonal blocks as preconditioner, those of the first tangent frozen in the step: making
-/// them costs as much as a few products, and a step changes them little.
+/// K(Δφ), frozen: an operator, with the d×d blocks on its diagonal.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -398,7 +397,7 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
     /// K_II of every active node; a prescribed degree of freedom has the identity's row and column.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let eq = self.equilibrium;
-        let mut blocks = Pooled::filled(eq.dead_load.len(), Tensor::zeros());
+        let mut blocks: Pooled<Tensor<f64, D>> = eq.supports.field();
         for (block, weight) in blocks.iter_mut().zip(eq.lumped_weights()) {
             *block = scaled(&identity(), weight);
         }
@@ -418,51 +417,20 @@ impl<const D: usize, L: Law> Tangent<'_, D, L> {
     }
 }
 
-/// The inverse of a diagonal block. A block that is singular to round-off (a node no stiffness and no mass reaches)
-/// is replaced by the inverse of its diagonal, or by the identity where that is zero too.
-pub(super) fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
-    // Scale rows to the diagonal first: entries range over many orders of magnitude, and det may underflow.
-    let diagonal = Vector::<f64, D>::from_fn(|i, _| {
-        let d = block[(i, i)].abs();
-        if d > 0.0 && d.is_finite() { d } else { 1.0 }
-    });
-    let unit = Tensor::<f64, D>::from_fn(|i, k| block[(i, k)] / diagonal[i]);
-    let invertible = determinant(&unit).abs() > 1e-12;
-    if invertible {
-        let inverse = inverse(&unit);
-        Tensor::from_fn(|i, k| inverse[(i, k)] / diagonal[k])
-    } else {
-        Tensor::from_fn(|i, k| if i == k { 1.0 / diagonal[i] } else { 0.0 })
-    }
-}
-
 impl<const D: usize, L: Law> LinearOperator for Tangent<'_, D, L> {
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         self.product(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
     }
 }
 
-impl<const D: usize, L: Law> Preconditioner for Tangent<'_, D, L> {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
-        let (r, z): (&[Vector<f64, D>], &mut [Vector<f64, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        let invert = || {
-            let mut blocks = self.diagonal_blocks();
-            blocks.iter_mut().for_each(|block| *block = invert_block(block));
-            blocks
-        };
-        let inverse_blocks: &Pooled<_> = self.equilibrium.inverse_blocks.get_or_init(invert);
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(inverse_blocks) {
-            *z = inverse * r;
-        }
+impl<const D: usize, L: Law> DiagonalBlocks for Tangent<'_, D, L> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        Self::diagonal_blocks(self).into_numbers()
     }
 }
 
 impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     type Inadmissible = Inadmissible;
-    type Tangent<'a>
-        = Tangent<'a, D, L>
-    where
-        Self: 'a;
 
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
         let residual = bytemuck::cast_slice_mut(r);
@@ -483,46 +451,12 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self::potential::<f64>(self, bytemuck::cast_slice(x))
     }
 
-    fn linearize(&self, x: &[f64]) -> Result<Tangent<'_, D, L>, Inadmissible> {
-        self.tangent(bytemuck::cast_slice(x))
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
+        Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
     }
 
-    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn SingleTangent + '_>>, Inadmissible> {
+    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Inadmissible> {
         let single = self.single_tangent(bytemuck::cast_slice(x))?;
-        Ok(single.map(|single| Box::new(single) as Box<dyn SingleTangent>))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_block_is_inverted_at_any_size_of_its_rows() {
-        // A stiff node beside a nearly empty one: as they stand, the determinant underflows.
-        for (large, small) in [(1.0, 1.0), (1e12, 1e-9), (1e-150, 1e-200)] {
-            let block = Tensor::<f64, 3>::new(
-                4.0 * large,
-                large,
-                0.0,
-                small,
-                3.0 * small,
-                -small,
-                0.0,
-                0.5 * large,
-                2.0 * large,
-            );
-            let unit = invert_block(&block) * block;
-            assert!((unit - Tensor::identity()).norm() < 1e-14, "{unit}");
-        }
-    }
-
-    #[test]
-    fn a_singular_block_gives_the_inverse_of_its_diagonal() {
-        let singular = Tensor::<f64, 2>::new(4.0, 8.0, 1.0, 2.0);
-        assert_eq!(invert_block(&singular), Tensor::<f64, 2>::new(0.25, 0.0, 0.0, 0.5));
-        // What nothing reaches stays as it is.
-        let nothing = Tensor::<f64, 2>::new(0.0, 0.0, 0.0, 8.0);
-        assert_eq!(invert_block(&nothing), Tensor::<f64, 2>::new(1.0, 0.0, 0.0, 0.125));
+        Ok(single.map(|single| Box::new(single) as Box<dyn Linearization<f32>>))
     }
 }

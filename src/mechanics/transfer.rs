@@ -8,7 +8,7 @@ use crate::mechanics::sweep::Supports;
 use crate::mechanics::time::Alphas;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
-use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
+use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
 use crate::tensor::Vector;
 
 /// A node lighter than this fraction of the heaviest particle gets no projected velocity: its Δφ comes from the stiffness.
@@ -66,7 +66,7 @@ impl<const D: usize> Nodal<D> {
     ) -> Result<Self, LinearError> {
         let Self { mass, .. } = Self::mass_alone(particles, supports, count);
         let right = |field: &[Vector<f64, D>]| {
-            let mut out = Pooled::filled(count, Vector::zeros());
+            let mut out = supports.pool().filled(count, Vector::zeros());
             supports.spread(&mut out, |p| field[p] * particles.mass[p]);
             out
         };
@@ -93,7 +93,7 @@ impl<const D: usize> Nodal<D> {
 
     /// The lumped mass, and no motion.
     pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let still = Pooled::filled(count, Vector::zeros());
+        let still = supports.pool().filled(count, Vector::zeros());
         Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports, count) }
     }
 
@@ -113,9 +113,9 @@ impl<const D: usize> Nodal<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>, count: usize) -> Self {
-        let mut mass = Pooled::filled(count, Vector::<f64, D>::zeros());
+        let mut mass = supports.pool().filled(count, Vector::<f64, D>::zeros());
         supports.spread(&mut mass, |p| Vector::from_fn(|i, _| if i == 0 { particles.mass[p] } else { 0.0 }));
-        Self { mass: mass.iter().map(|m| m[0]).collect(), ..Self::default() }
+        Self { mass: supports.pool().collect(mass.iter().map(|m| m[0])), ..Self::default() }
     }
 
     /// Whether there is no inertia.
@@ -193,7 +193,7 @@ struct EffectiveMass<'a, const D: usize> {
 
 impl<'a, const D: usize> EffectiveMass<'a, D> {
     fn new(particles: &'a Particles<D>, supports: &'a Supports<D>, mass: &'a [f64], lumping: f64) -> Self {
-        let mut diagonal: Pooled<f64> = mass.iter().map(|m| lumping * m).collect();
+        let mut diagonal = supports.pool().collect(mass.iter().map(|m| lumping * m));
         supports.scatter(&mut diagonal, |p, n, _| (1.0 - lumping) * particles.mass[p] * n * n);
         // Of the least numbers above 0 there is no inverse.
         let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
@@ -203,14 +203,15 @@ impl<'a, const D: usize> EffectiveMass<'a, D> {
 
     /// Overwrites the right-hand side by the solution; from zero, so that a singular M gives the answer of least norm.
     fn solve(&self, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
-        let right: Pooled<_> = field.iter().copied().collect();
+        let right = self.supports.pool().collect(field.iter().copied());
         field.fill(Vector::zeros());
         let settings = ConjugateGradientSettings {
             relative_tolerance: PROJECTION_TOLERANCE,
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        Ok(conjugate_gradient(self, self, right, solution, &settings)?.iterations)
+        let (inverse, pool) = (NodalFactors::<D>(&self.inverse_diagonal), self.supports.pool());
+        Ok(conjugate_gradient(self, &inverse, right, solution, &settings, pool)?.iterations)
     }
 }
 
@@ -220,16 +221,19 @@ impl<const D: usize> LinearOperator for EffectiveMass<'_, D> {
         for ((y, x), m) in y.iter_mut().zip(x).zip(self.mass) {
             *y = x * (self.lumping * m);
         }
-        let mut at_particles = Pooled::filled(self.particles.len(), Vector::zeros());
+        let mut at_particles = self.supports.pool().filled(self.particles.len(), Vector::zeros());
         self.supports.each_value(x, |p, value| at_particles[p] = value);
         self.supports.spread(y, |p| at_particles[p] * ((1.0 - self.lumping) * self.particles.mass[p]));
     }
 }
 
-impl<const D: usize> Preconditioner for EffectiveMass<'_, D> {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
-        for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
-            *z = r * self.inverse_diagonal[k / D];
+/// A factor for each node.
+struct NodalFactors<'a, const D: usize>(&'a [f64]);
+
+impl<const D: usize> LinearOperator for NodalFactors<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        for (k, (y, x)) in y.iter_mut().zip(x).enumerate() {
+            *y = x * self.0[k / D];
         }
     }
 }
@@ -299,8 +303,8 @@ impl<'a, const D: usize> Update<'a, D> {
     ) -> Self {
         let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
         let increments = || state().map(|((dphi, v), a)| alphas.increments(dphi, v, a));
-        let mut delta_velocity: Pooled<_> = increments().map(|both| both.0).collect();
-        let mut delta_acceleration: Pooled<_> = increments().map(|both| both.1).collect();
+        let mut delta_velocity = nodal.velocity.pool().collect(increments().map(|both| both.0));
+        let mut delta_acceleration = nodal.velocity.pool().collect(increments().map(|both| both.1));
         let mut impulses = vec![0.0; prescribed.len()];
         for (dof, impulse) in prescribed.iter().zip(&mut impulses).filter(|_| !nodal.is_static()) {
             let (node, i) = (dof.node, dof.component);

@@ -7,6 +7,7 @@ use bfree::mechanics::sweep::{Laws, Supports};
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
+use bfree::pooled::Pool;
 use bfree::solver::Precision;
 use bfree::tensor::{Tensor, Vector};
 use num_dual::Dual64;
@@ -193,7 +194,9 @@ fn renewal<const D: usize>() {
         let anew = Supports::with_precision(&shape, &grid, &after, Precision::Mixed).unwrap();
         for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
             let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
-            let renewed = Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed).unwrap();
+            let renewed =
+                Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed, &Pool::default())
+                    .unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {

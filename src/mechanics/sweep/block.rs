@@ -63,11 +63,6 @@ impl<X, const L: usize> Groups<X, L> {
         Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, windows, weights, particles }
     }
 
-    /// The particles, group by group.
-    pub(super) fn in_order(&self) -> impl Iterator<Item = u32> {
-        (0..self.len()).flat_map(|group| self.particles(group).iter().copied())
-    }
-
     /// Number of groups.
     pub(super) fn len(&self) -> usize {
         self.windows.len()

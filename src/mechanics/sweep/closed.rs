@@ -8,7 +8,7 @@ use super::tiled::{Tiled, first_error, keep_first};
 use super::waves;
 use crate::material::{ClosedTangent, Law};
 use crate::mechanics::point::Inadmissible;
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use std::ops::Range;
@@ -23,12 +23,12 @@ pub struct SingleTangents<const D: usize>(Numbers<f32, SINGLE_LANES>);
 
 /// For each group its numbers, a row of lanes each.
 #[derive(Clone, Debug)]
-pub(super) struct Numbers<X, const L: usize> {
-    numbers: Vec<[X; L]>,
+pub(super) struct Numbers<X: Number<L>, const L: usize> {
+    numbers: Pooled<[X; L]>,
     pub(super) form: Form,
 }
 
-impl<X, const L: usize> Numbers<X, L> {
+impl<X: Number<L>, const L: usize> Numbers<X, L> {
     #[inline(always)]
     pub(super) fn of_group(&self, group: usize, rows: usize) -> &[[X; L]] {
         &self.numbers[group * rows..(group + 1) * rows]
@@ -89,25 +89,12 @@ fn symmetric<S: Lanes<L>, const D: usize, const L: usize>(s: S, rows: &[[S::X; L
     b
 }
 
-/// The largest arrays of a step leave their memory to the next tangents.
-impl<const D: usize> Drop for ClosedTangents<D> {
-    fn drop(&mut self) {
-        drop(Pooled::from(std::mem::take(&mut self.0.numbers)));
-    }
-}
-
-impl<const D: usize> Drop for SingleTangents<D> {
-    fn drop(&mut self) {
-        drop(Pooled::from(std::mem::take(&mut self.0.numbers)));
-    }
-}
-
 impl<const D: usize> ClosedTangents<D> {
     /// Bytes of all arrays.
     ///
     /// Example: [`super::Supports::closed_tangents`].
     pub fn bytes(&self) -> usize {
-        size_of_val(self.0.numbers.as_slice())
+        size_of_val(&*self.0.numbers)
     }
 }
 
@@ -116,7 +103,7 @@ impl<const D: usize> SingleTangents<D> {
     ///
     /// Example: [`super::Supports::single_tangents`].
     pub fn bytes(&self) -> usize {
-        size_of_val(self.0.numbers.as_slice())
+        size_of_val(&*self.0.numbers)
     }
 }
 
@@ -140,12 +127,10 @@ impl<const D: usize> Tiled<D> {
         field: &[Vector<f64, D>],
         both: bool,
         inertia: Weight<'_>,
+        pool: &Pool,
     ) -> Result<ClosedTangents<D>, Option<Inadmissible>> {
         let form = Form { both, inertia: inertia.is_some() };
-        let array = |rows| Pooled::unspecified(rows, [0.0; LANES]).into_vec();
-        let (numbers, done) = self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, array);
-        let tangents = ClosedTangents(numbers);
-        done.map(|()| tangents)
+        self.frozen(laws, |block| Some(&block.groups), field, form, inertia, 1.0, pool).map(ClosedTangents)
     }
 
     /// As [`Self::closed`], in single precision; `None` if the blocks are not prepared for it.
@@ -156,14 +141,13 @@ impl<const D: usize> Tiled<D> {
         both: bool,
         inertia: Weight<'_>,
         scale: f64,
+        pool: &Pool,
     ) -> Option<Result<SingleTangents<D>, Option<Inadmissible>>> {
         let h = self.unit?;
         let form = Form { both, inertia: inertia.is_some() };
         let factor = 1.0 / (scale * h * h);
-        let array = |rows| Pooled::unspecified(rows, [0.0; SINGLE_LANES]).into_vec();
-        let (numbers, done) = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, array);
-        let tangents = SingleTangents(numbers);
-        Some(done.map(|()| tangents))
+        let numbers = self.frozen(laws, |block| block.single.as_ref(), field, form, inertia, factor, pool);
+        Some(numbers.map(SingleTangents))
     }
 
     /// The numbers of the groups that `groups` picks, tangents times `factor`; the deformation is gathered in double precision.
@@ -176,14 +160,14 @@ impl<const D: usize> Tiled<D> {
         form: Form,
         inertia: Weight<'_>,
         factor: f64,
-        array: impl FnOnce(usize) -> Vec<[X; N]>,
-    ) -> (Numbers<X, N>, Result<(), Option<Inadmissible>>) {
+        pool: &Pool,
+    ) -> Result<Numbers<X, N>, Option<Inadmissible>> {
         let rows = form.rows(D);
         let count: usize = self.blocks.iter().filter_map(&groups).map(Groups::len).sum();
         // What they hold is written over.
-        let mut numbers = array(count * rows);
+        let mut numbers = pool.unspecified(count * rows, [X::zero(); N]);
         let mut chunks = Vec::with_capacity(self.blocks.len());
-        let mut rest = numbers.as_mut_slice();
+        let mut rest = &mut *numbers;
         for block in &self.blocks {
             let (chunk, behind) = rest.split_at_mut(groups(block).map_or(0, Groups::len) * rows);
             chunks.push(chunk);
@@ -225,7 +209,7 @@ impl<const D: usize> Tiled<D> {
             }
             failure.map_or(Ok(()), Err)
         });
-        (Numbers { numbers, form }, first_error(results).map(|_| ()))
+        first_error(results).map(|_| Numbers { numbers, form })
     }
 
     /// `out_I += Σ_p (δP_p) ∇_n N_I + q_p N_I`, the product of the tangents with `field`.

@@ -4,6 +4,7 @@
 //! The operations and their order are the same everywhere; a·b + c is rounded once where the processor has FMA and
 //! twice where it has not, and that is all a result can differ by between processors.
 
+use crate::pooled;
 use crate::scalar::{Arithmetic, Real};
 
 /// Numbers of a vector in double precision.
@@ -39,7 +40,7 @@ pub(super) trait WithLanes<X, const L: usize> {
 }
 
 /// A number whose vectors have `L` lanes.
-pub(super) trait Number<const L: usize>: Real + Send + Sync {
+pub(super) trait Number<const L: usize>: Real + pooled::Number + Sync {
     /// Does it with the widest lanes of this processor.
     fn widest<W: WithLanes<Self, L>>(work: W) -> W::Output;
 }

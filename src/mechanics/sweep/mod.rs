@@ -30,6 +30,7 @@ use crate::material::Law;
 use crate::mechanics::point::Inadmissible;
 use crate::nodes::Nodes;
 use crate::parallel;
+use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
@@ -73,7 +74,7 @@ const WIDEST: usize = 16;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Supports<const D: usize>(Way<D>, Tally);
+pub struct Supports<const D: usize>(Way<D>, Tally, Pool);
 
 #[derive(Clone, Debug)]
 enum Way<const D: usize> {
@@ -146,15 +147,16 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, positions, None, precision)
+        Self::renewed(None, approximation, grid, positions, None, precision, &Pool::default())
     }
 
     /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
     /// particles. What comes out does not depend on them. Nor does it on the places of particles in memory, if `ids` tells them apart:
-    /// sums are taken in the order of cells and ids.
+    /// sums are taken in the order of cells and ids. Their fields are lent from `pool`.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::pooled::Pool;
     /// use bfree::solver::Precision;
     /// use bfree::tensor::Vector;
     ///
@@ -164,7 +166,8 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double)?;
+    /// let pool = Pool::default();
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double, &pool)?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction(nodes.len(), 1);
@@ -181,6 +184,7 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         ids: Option<&[u32]>,
         precision: Precision,
+        pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
@@ -190,11 +194,16 @@ impl<const D: usize> Supports<D> {
                     Way::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
-                Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len())), nodes))
+                Ok((Self(Way::Tiled(tiled), Tally::of(nodes.len()), pool.clone()), nodes))
             }
-            _ => Self::plain(approximation, grid, positions).map_err(|SupportError { particle, source }| {
-                SupportError { particle: ids.map_or(particle, |ids| ids[particle] as usize), source }
-            }),
+            _ => {
+                let by_id = |SupportError { particle, source }| SupportError {
+                    particle: ids.map_or(particle, |ids| ids[particle] as usize),
+                    source,
+                };
+                let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
+                Ok((Self(Way::Plain(plain), Tally::of(nodes.len()), pool.clone()), nodes))
+            }
         }
     }
 
@@ -231,7 +240,7 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
-        Ok((Self(Way::Plain(plain), Tally::of(nodes.len())), nodes))
+        Ok((Self(Way::Plain(plain), Tally::of(nodes.len()), Pool::default()), nodes))
     }
 
     /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
@@ -277,6 +286,16 @@ impl<const D: usize> Supports<D> {
     /// Example: [`Self::passes`].
     pub fn nodes(&self) -> usize {
         self.1.nodes
+    }
+
+    /// Zero on every active node.
+    pub(crate) fn field<T: Element + Zero>(&self) -> Pooled<T> {
+        self.2.filled(self.nodes(), T::zero())
+    }
+
+    /// Where fields are lent from.
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.2
     }
 
     /// How often the methods below have gone through all particles so far.
@@ -652,7 +671,7 @@ impl<const D: usize> Supports<D> {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                Some(tiled.closed(laws, field, both, inertia))
+                Some(tiled.closed(laws, field, both, inertia, &self.2))
             }
         }
     }
@@ -737,7 +756,7 @@ impl<const D: usize> Supports<D> {
             Way::Plain(_) => None,
             Way::Tiled(tiled) => {
                 self.1.pass();
-                tiled.closed_single(laws, field, both, inertia, scale)
+                tiled.closed_single(laws, field, both, inertia, scale, &self.2)
             }
         }
     }

@@ -4,14 +4,14 @@
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
 use super::block::{Block, Groups};
-use super::builder::{block, number};
+use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::diagonal::{Quadratic, pair};
 use super::kernel::{Rows, of_lane, set_lane};
 use super::lanes::LANES;
 use super::laws::Laws;
 use super::of_block;
-use super::order;
+use super::order::{self, Key};
 use super::waves;
 use super::{Inertia, Magnitude, SupportError, infallible, ordered};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
@@ -31,11 +31,16 @@ use std::sync::{Mutex, PoisonError};
 type Kernel = fn(&Groups<f64, LANES>, &[f64], &mut [f64], &of_block::Point<'_>);
 
 /// Shape functions of all particles, by axis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
     /// Slot of each particle, eight for each group: group · 8 + lane.
     slots: Vec<u32>,
+    /// The particles in their order.
+    keys: Vec<Key>,
+    /// What the nodes were numbered by, and what came out: memory for the next step.
+    rows: Vec<Row>,
+    nodes: Nodes,
     /// h, if the blocks are prepared for single precision.
     pub(super) unit: Option<f64>,
 }
@@ -60,13 +65,11 @@ impl<const D: usize> Tiled<D> {
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((id(particle), source));
             SupportError { particle, source }
         };
-        let spare = spare.filter(|spare| spare.particles() == positions.len());
-        let before = spare.as_ref().map(Self::order);
-        let keys = order::sorted(grid, positions, ids, before).map_err(|particle| {
+        let Self { mut blocks, mut slots, keys, mut rows, nodes, .. } = spare.unwrap_or_default();
+        let keys = order::sorted(grid, positions, ids, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
         })?;
-        let (mut blocks, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
         let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
         blocks.resize_with(runs().count(), Block::default);
         let (family, failed) = (Family::new(product), Mutex::new(None));
@@ -88,12 +91,13 @@ impl<const D: usize> Tiled<D> {
                 first_single += groups.len();
             }
         }
-        let nodes = number(grid, &mut blocks);
+        let nodes = number(grid, &mut blocks, &mut rows, nodes.into_spare());
         slots.resize(positions.len(), 0);
         for block in &blocks {
             block.groups.each(|group, lane, p| slots[p] = ((block.groups.first + group) * LANES + lane) as u32);
         }
-        Ok((Self { blocks, slots, unit: single.then_some(grid.spacing) }, nodes))
+        let unit = single.then_some(grid.spacing);
+        Ok((Self { blocks, slots, keys, rows, nodes: nodes.clone(), unit }, nodes))
     }
 
     pub(super) fn particles(&self) -> usize {
@@ -102,18 +106,12 @@ impl<const D: usize> Tiled<D> {
 
     /// The particles, block by block and group by group.
     pub(super) fn order(&self) -> impl Iterator<Item = u32> {
-        self.blocks.iter().flat_map(|block| block.groups.in_order())
+        self.keys.iter().map(|key| key.particle)
     }
 
     /// As if particles had been put in [`Self::order`], for the next step to start from.
     pub(super) fn rearrange(&mut self) {
-        let mut next = 0..;
-        for block in &mut self.blocks {
-            let Groups { windows, particles, .. } = &mut block.groups;
-            for (window, particles) in windows.iter().zip(particles) {
-                particles[..usize::from(window.lanes)].iter_mut().zip(&mut next).for_each(|(p, place)| *p = place);
-            }
-        }
+        self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
     }
 
     /// Number of groups.

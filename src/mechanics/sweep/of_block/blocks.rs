@@ -52,14 +52,14 @@ fn add(groups: &Double, group: usize, from: &Quadratic, buffer: &mut [f64]) {
 }
 
 /// Writes the quadratic form of a tangent in closed form.
-struct OfClosed<'a, const D: usize, X, const L: usize> {
+struct OfClosed<'a, const D: usize, X: Number<L>, const L: usize> {
     groups: &'a Groups<X, L>,
     group: usize,
     frozen: &'a Numbers<X, L>,
     into: &'a mut Quadratic<X, L>,
 }
 
-impl<const D: usize, X: Real, const L: usize> WithLanes<X, L> for OfClosed<'_, D, X, L> {
+impl<const D: usize, X: Number<L>, const L: usize> WithLanes<X, L> for OfClosed<'_, D, X, L> {
     type Output = ();
 
     #[inline(always)]

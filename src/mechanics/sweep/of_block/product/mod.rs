@@ -8,19 +8,18 @@ use crate::material::ClosedTangent;
 use crate::mechanics::sweep::block::Groups;
 use crate::mechanics::sweep::closed::{Form, Numbers};
 use crate::mechanics::sweep::kernel::{Both, OnlyGradient, gather, scatter};
-use crate::mechanics::sweep::lanes::{Lanes, WithLanes};
-use crate::scalar::Real;
+use crate::mechanics::sweep::lanes::{Lanes, Number, WithLanes};
 
 macro_rules! closed_product {
     ($name:ident, $terms:ident, $inertia:expr) => {
-        struct $name<'a, const D: usize, X, const L: usize> {
+        struct $name<'a, const D: usize, X: Number<L>, const L: usize> {
             groups: &'a Groups<X, L>,
             nodal: &'a [X],
             buffer: &'a mut [X],
             frozen: &'a Numbers<X, L>,
         }
 
-        impl<const D: usize, X: Real, const L: usize> WithLanes<X, L> for $name<'_, D, X, L> {
+        impl<const D: usize, X: Number<L>, const L: usize> WithLanes<X, L> for $name<'_, D, X, L> {
             type Output = ();
 
             #[inline(always)]
