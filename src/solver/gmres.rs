@@ -389,7 +389,8 @@ mod tests {
         let settings = GmresSettings { relative_tolerance: 0.0, ..TIGHT };
         let report = gmres(&a, &Identity, &irregular(20), &mut x, &settings).unwrap();
         assert!(report.relative_residual < 1e-15, "{report:?}");
-        assert_eq!(report.products, report.iterations / 2 * 3, "{report:?}");
+        let cycles = report.products - report.iterations;
+        assert!(report.iterations <= 2 * cycles, "{report:?}");
     }
 
     #[test]
