@@ -1,8 +1,8 @@
 //! Active nodes: those some particle lists with N ≠ 0 or ∇N ≠ 0, numbered in the order of the grid.
 
 use crate::grid::Grid;
-use crate::pooled::Pooled;
 use crate::tensor::Vector;
+use std::sync::Arc;
 
 /// The active nodes of one step. Memory goes with the body, not with the box.
 ///
@@ -24,7 +24,7 @@ use crate::tensor::Vector;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Nodes {
     /// Grid numbers of the active nodes, ascending.
-    ids: Pooled<u64>,
+    ids: Arc<Vec<u64>>,
 }
 
 impl Nodes {
@@ -36,12 +36,17 @@ impl Nodes {
         }
         ids.sort_unstable();
         ids.dedup();
-        Self { ids: ids.into() }
+        Self::ascending(ids)
     }
 
     /// From grid numbers that ascend already.
-    pub(crate) fn ascending(ids: Pooled<u64>) -> Self {
-        Self { ids }
+    pub(crate) fn ascending(ids: Vec<u64>) -> Self {
+        Self { ids: Arc::new(ids) }
+    }
+
+    /// The memory of nodes that nobody knows any more.
+    pub(crate) fn into_spare(self) -> Vec<u64> {
+        Arc::try_unwrap(self.ids).unwrap_or_default()
     }
 
     /// Number of active nodes.

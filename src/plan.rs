@@ -284,7 +284,7 @@ fn arrays<const D: usize, L: Law, A>(
     let tiled = supports.is_tiled();
     let krylov_vectors = match simulation.settings.newton.krylov {
         // The basis; residual, correction, trial and product.
-        Krylov::Gmres { restart } => restart + 5,
+        Krylov::Gmres { restart } => restart as usize + 5,
         Krylov::ConjugateGradient => 5,
     };
     let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };

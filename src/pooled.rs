@@ -5,10 +5,8 @@ use crate::parallel::held;
 use bytemuck::Pod;
 use bytemuck::allocation::try_cast_vec;
 use nalgebra::SMatrix;
-use std::any::{Any, TypeId};
-use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 /// Vectors of fewer bytes are no burden to the system's allocator.
 const SMALL: usize = 1 << 14;
@@ -22,210 +20,198 @@ const ROOM: usize = 64;
 /// Numbers are kept in multiples of so many, so that they can become vectors and tensors of 1 to 3 dimensions, and vector lanes.
 const MULTIPLE: usize = 144;
 
-/// Vectors no longer needed, by what they are made of.
-static SPARE: Mutex<BTreeMap<TypeId, Box<dyn Any + Send>>> = Mutex::new(BTreeMap::new());
-
-/// What a pooled vector can be made of.
-pub trait Element: Send + Sized + 'static {
-    /// What its memory is kept as.
-    type Kept: Send + 'static;
-    /// How many of these it takes.
-    const LENGTH: usize;
-    /// Memory to be kept, if it has a length that can be.
-    fn into_kept(vector: Vec<Self>) -> Option<Vec<Self::Kept>>;
-    /// Memory that was kept, if it has a length that can be used.
-    fn from_kept(kept: Vec<Self::Kept>) -> Option<Vec<Self>>;
-}
-
-/// What is kept as it is.
-macro_rules! kept_as_it_is {
-    ($($element:ty),*) => {
-        $(impl Element for $element {
-            type Kept = Self;
-            const LENGTH: usize = 1;
-            fn into_kept(vector: Vec<Self>) -> Option<Vec<Self>> {
-                Some(vector)
-            }
-            fn from_kept(kept: Vec<Self>) -> Option<Vec<Self>> {
-                Some(kept)
-            }
-        })*
-    };
-}
-pub(crate) use kept_as_it_is;
-
-kept_as_it_is!(f64, f32, u64);
-
-/// What is several numbers is kept as numbers, so that each can have the memory of the other.
-macro_rules! kept_as_numbers {
-    ($element:ty, $length:expr, <$(const $constant:ident),*>) => {
-        impl<X: Pod + Send, $(const $constant: usize),*> Element for $element
-        where
-            Self: Pod,
-        {
-            type Kept = X;
-            const LENGTH: usize = $length;
-            fn into_kept(vector: Vec<Self>) -> Option<Vec<X>> {
-                try_cast_vec(vector).ok()
-            }
-            fn from_kept(mut kept: Vec<X>) -> Option<Vec<Self>> {
-                kept.truncate(kept.len() - kept.len() % Self::LENGTH);
-                try_cast_vec(kept).ok()
-            }
-        }
-    };
-}
-
-kept_as_numbers!(SMatrix<X, R, C>, R * C, <const R, const C>);
-kept_as_numbers!([X; N], N, <const N>);
-
-/// Gives all memory that waits back to the system.
-///
-/// Example: [`Pooled`].
-pub fn release() {
-    let all = std::mem::take(&mut *held(&SPARE));
-    drop(all);
-}
-
-/// A vector of anything with room for `count`: the smallest one there is, or a new one in the place of one that has become too small.
-fn taken<T: Element>(count: usize) -> Vec<T> {
-    if count * size_of::<T>() < SMALL {
-        return Vec::with_capacity(count);
-    }
-    let length = count * T::LENGTH;
-    let fits = |one: &Vec<T::Kept>| (length..=TOO_LARGE * length).contains(&one.capacity());
-    let kept = held(&SPARE).get_mut(&TypeId::of::<T::Kept>()).and_then(|list| {
-        let list = list.downcast_mut::<Vec<Vec<T::Kept>>>()?;
-        let smallest = list.iter().enumerate().filter(|(_, one)| fits(one)).min_by_key(|(_, one)| one.capacity());
-        let small = || list.iter().position(|one| one.capacity() < length && length <= TOO_LARGE * one.capacity());
-        let at = smallest.map(|(at, _)| at).or_else(small)?;
-        Some(list.swap_remove(at))
-    });
-    // What is too small goes now that nobody waits.
-    let kept = kept.filter(fits);
-    let anew = || T::from_kept(Vec::with_capacity((length + length / ROOM).next_multiple_of(MULTIPLE)));
-    kept.and_then(T::from_kept).or_else(anew).unwrap_or_else(|| Vec::with_capacity(count))
-}
-
-/// A vector that leaves its memory to the next one.
+/// Where vectors are lent from; a clone lends from the same place. What is lent comes back when it is dropped, and goes with the last
+/// of them.
 ///
 /// ```
-/// use bfree::pooled::Pooled;
+/// use bfree::pooled::Pool;
 ///
-/// let mut ones = Pooled::filled(100_000, 1.0);
+/// let pool = Pool::default();
+/// let mut ones = pool.filled(100_000, 1.0);
 /// ones[7] = 8.0;
 /// let at = ones.as_ptr();
 /// assert_eq!(ones.iter().sum::<f64>(), 100_007.0);
 /// drop(ones);
 /// // A little shorter, and in the same place.
-/// let next: Pooled<f64> = (0..99_990).map(f64::from).collect();
+/// let next = pool.collect((0..99_990).map(f64::from));
 /// assert_eq!((next.len(), next[7], next.as_ptr()), (99_990, 7.0, at));
-/// drop(next);
-/// bfree::pooled::release();
 /// ```
-#[derive(PartialEq)]
-pub struct Pooled<T: Element>(Vec<T>);
+#[derive(Clone, Debug, Default)]
+pub struct Pool(Arc<Mutex<Spare>>);
 
-impl<T: Element> Pooled<T> {
-    /// Empty, with room for `count`.
-    pub fn with_room(count: usize) -> Self {
-        let mut vector = taken(count);
+/// Vectors that nobody has at present.
+#[derive(Debug, Default)]
+pub struct Spare {
+    double: Vec<Vec<f64>>,
+    single: Vec<Vec<f32>>,
+}
+
+/// What memory is kept as.
+pub trait Number: Pod + Send {
+    /// The vectors kept as such.
+    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>>;
+}
+
+impl Number for f64 {
+    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>> {
+        &mut spare.double
+    }
+}
+
+impl Number for f32 {
+    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>> {
+        &mut spare.single
+    }
+}
+
+/// What a pooled vector can be made of: a number, or several side by side, so that each can have the memory of the other.
+pub trait Element: Pod + Send {
+    /// The number.
+    type Number: Number;
+}
+
+impl Element for f64 {
+    type Number = Self;
+}
+
+impl Element for f32 {
+    type Number = Self;
+}
+
+impl<X: Number, const R: usize, const C: usize> Element for SMatrix<X, R, C>
+where
+    Self: Pod,
+{
+    type Number = X;
+}
+
+impl<X: Number, const N: usize> Element for [X; N] {
+    type Number = X;
+}
+
+impl Pool {
+    /// `count` times `value`.
+    pub fn filled<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
+        let mut vector = self.taken(count);
         vector.clear();
-        Self(vector)
+        vector.resize(count, value);
+        Pooled { vector, pool: self.clone() }
     }
 
     /// As many as `count` of whatever there is, or else of `value`: to be written over.
-    pub fn unspecified(count: usize, value: T) -> Self
-    where
-        T: Clone,
-    {
-        let mut vector = taken(count);
+    pub fn unspecified<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
+        let mut vector = self.taken(count);
         vector.resize(count, value);
-        Self(vector)
+        Pooled { vector, pool: self.clone() }
     }
 
-    /// As a vector that keeps its memory to itself, until it is pooled again.
-    pub fn into_vec(mut self) -> Vec<T> {
-        std::mem::take(&mut self.0)
+    /// All items; room is taken for as many as the iterator is sure of.
+    pub fn collect<T: Element>(&self, items: impl IntoIterator<Item = T>) -> Pooled<T> {
+        let items = items.into_iter();
+        let mut vector = self.taken(items.size_hint().0);
+        vector.clear();
+        vector.extend(items);
+        Pooled { vector, pool: self.clone() }
     }
 
-    /// One more.
-    pub fn push(&mut self, value: T) {
-        self.0.push(value);
+    /// A vector of anything with room for `count`: the smallest one there is, or a new one in the place of one that has become too small.
+    fn taken<T: Element>(&self, count: usize) -> Vec<T> {
+        if count * size_of::<T>() < SMALL {
+            return Vec::with_capacity(count);
+        }
+        let numbers = size_of::<T>() / size_of::<T::Number>();
+        let length = count * numbers;
+        let fits = |one: &Vec<T::Number>| (length..=TOO_LARGE * length).contains(&one.capacity());
+        let kept = {
+            let mut spare = held(&self.0);
+            let list = T::Number::of(&mut spare);
+            let smallest = list.iter().enumerate().filter(|(_, one)| fits(one)).min_by_key(|(_, one)| one.capacity());
+            let small = || list.iter().position(|one| one.capacity() < length && length <= TOO_LARGE * one.capacity());
+            smallest.map(|(at, _)| at).or_else(small).map(|at| list.swap_remove(at))
+        };
+        // What is too small goes now that nobody waits.
+        let mut kept = kept
+            .filter(fits)
+            .unwrap_or_else(|| Vec::with_capacity((length + length / ROOM).next_multiple_of(MULTIPLE)));
+        kept.truncate(kept.len() - kept.len() % numbers);
+        try_cast_vec(kept).unwrap_or_else(|_| Vec::with_capacity(count))
+    }
+}
+
+/// A vector on loan from a [`Pool`].
+pub struct Pooled<T: Element> {
+    vector: Vec<T>,
+    pool: Pool,
+}
+
+impl<T: Element> Pooled<T> {
+    /// Where it is from.
+    pub fn pool(&self) -> &Pool {
+        &self.pool
     }
 
-    /// `count` times `value`.
-    pub fn filled(count: usize, value: T) -> Self
+    /// The same as plain numbers.
+    pub fn into_numbers(mut self) -> Pooled<T::Number>
     where
-        T: Clone,
+        T::Number: Element,
     {
-        let mut vector = Self::with_room(count);
-        vector.0.resize(count, value);
-        vector
+        let vector = try_cast_vec(std::mem::take(&mut self.vector)).unwrap_or_default();
+        Pooled { vector, pool: self.pool.clone() }
     }
 }
 
 impl<T: Element> Drop for Pooled<T> {
     fn drop(&mut self) {
-        let vector = std::mem::take(&mut self.0);
+        let vector = std::mem::take(&mut self.vector);
         if vector.capacity() * size_of::<T>() < SMALL {
             return;
         }
-        let Some(kept) = T::into_kept(vector) else { return };
-        let mut spare = held(&SPARE);
-        let list = spare.entry(TypeId::of::<T::Kept>()).or_insert_with(|| Box::new(Vec::<Vec<T::Kept>>::new()));
-        if let Some(list) = list.downcast_mut::<Vec<Vec<T::Kept>>>() {
-            list.push(kept);
+        if let Ok(kept) = try_cast_vec(vector) {
+            T::Number::of(&mut held(&self.pool.0)).push(kept);
         }
     }
 }
 
-impl<T: Eq + Element> Eq for Pooled<T> {}
-
-/// Room is taken for as many as the iterator is sure of.
-impl<T: Element> FromIterator<T> for Pooled<T> {
-    fn from_iter<I: IntoIterator<Item = T>>(items: I) -> Self {
-        let items = items.into_iter();
-        let mut vector = Self::with_room(items.size_hint().0);
-        vector.0.extend(items);
-        vector
+impl<T: Element + PartialEq> PartialEq for Pooled<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.vector == other.vector
     }
 }
 
 impl<T: Element> From<Vec<T>> for Pooled<T> {
     fn from(vector: Vec<T>) -> Self {
-        Self(vector)
+        Self { vector, pool: Pool::default() }
     }
 }
 
 impl<T: Element> Default for Pooled<T> {
     fn default() -> Self {
-        Self(Vec::new())
+        Vec::new().into()
     }
 }
 
-impl<T: Clone + Element> Clone for Pooled<T> {
+impl<T: Element> Clone for Pooled<T> {
     fn clone(&self) -> Self {
-        self.iter().cloned().collect()
+        self.pool.collect(self.iter().copied())
     }
 }
 
-impl<T: std::fmt::Debug + Element> std::fmt::Debug for Pooled<T> {
+impl<T: Element + std::fmt::Debug> std::fmt::Debug for Pooled<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.0.fmt(f)
+        self.vector.fmt(f)
     }
 }
 
 impl<T: Element> Deref for Pooled<T> {
     type Target = [T];
     fn deref(&self) -> &[T] {
-        &self.0
+        &self.vector
     }
 }
 
 impl<T: Element> DerefMut for Pooled<T> {
     fn deref_mut(&mut self) -> &mut [T] {
-        &mut self.0
+        &mut self.vector
     }
 }
 
@@ -233,7 +219,7 @@ impl<'a, T: Element> IntoIterator for &'a Pooled<T> {
     type Item = &'a T;
     type IntoIter = std::slice::Iter<'a, T>;
     fn into_iter(self) -> Self::IntoIter {
-        self.0.iter()
+        self.vector.iter()
     }
 }
 
@@ -241,6 +227,6 @@ impl<'a, T: Element> IntoIterator for &'a mut Pooled<T> {
     type Item = &'a mut T;
     type IntoIter = std::slice::IterMut<'a, T>;
     fn into_iter(self) -> Self::IntoIter {
-        self.0.iter_mut()
+        self.vector.iter_mut()
     }
 }

@@ -17,8 +17,8 @@ use crate::mechanics::transfer::{Nodal, Update, WallUpdate};
 use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
-use crate::pooled::Pooled;
-use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, newton};
+use crate::pooled::{Pool, Pooled};
+use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, Preconditioning, newton};
 use crate::tensor::{Deformation, Vector};
 use std::num::NonZeroU64;
 
@@ -53,6 +53,8 @@ pub struct Settings {
     pub smoothing: Option<Smoothing>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
+    /// What preconditions its linear systems, made anew each step.
+    pub preconditioner: Preconditioning,
     /// The most a step may err, see [`Update::local_error`], in units of the grid spacing: a longer one is taken back and halved, as
     /// often as the clock allows, and it grows back only when its error is small. `None` for steps as given, and without inertia.
     pub error_tolerance: Option<f64>,
@@ -93,6 +95,7 @@ impl Default for Settings {
             wall_update: WallUpdate::default(),
             smoothing: None,
             newton: NewtonSettings::default(),
+            preconditioner: Preconditioning::default(),
             error_tolerance: None,
             check_tangent: None,
         }
@@ -143,10 +146,12 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 }
 
 /// The shape functions of the last step, in whose memory the next one makes its own, and from whose order of particles it starts to
-/// sort. They are no state: a clone has none, no checkpoint holds them, and a step that fails leaves none.
+/// sort, and memory for its vectors. They are no state: a clone has none, no checkpoint holds them, and a step that fails leaves no shape
+/// functions.
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
+    pool: Pool,
 }
 
 impl<const D: usize> Clone for Workspace<D> {
@@ -290,7 +295,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
-        self.workspace = Workspace::default();
+        self.workspace.supports = None;
         self.particles.rearrange(order);
         let mut points = self.loads.surface.iter_mut().flat_map(|load| &mut load.points).peekable();
         if points.peek().is_some() {
@@ -330,9 +335,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         let precision = self.settings.newton.precision;
         let Particles { position, id, .. } = &self.particles;
-        let spare = self.workspace.supports.take();
+        let (spare, pool) = (self.workspace.supports.take(), self.workspace.pool.clone());
         let (supports, nodes) =
-            Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision)?;
+            Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, &pool)?;
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
@@ -342,11 +347,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::Projection, supports.passes());
 
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
-        let mut dphi = self.initial_guess(&nodal, nodes.len(), dt);
+        let mut dphi = self.initial_guess(&supports, &nodal, dt);
         for dof in &prescribed {
             dphi[dof.node][dof.component] = dof.step.increment;
         }
-        let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &self.settings.newton)
+        let (mut preconditioner, x) = (self.settings.preconditioner.anew::<D>(), bytemuck::cast_slice_mut(&mut dphi));
+        let newton = newton(&equilibrium, &mut *preconditioner, x, &self.settings.newton, &pool)
             .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &dphi)?;
@@ -514,8 +520,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    fn initial_guess(&self, nodal: &Nodal<D>, count: usize, dt: f64) -> Pooled<Vector<f64, D>> {
-        let mut dphi = Pooled::filled(count, Vector::zeros());
+    fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
+        let mut dphi: Pooled<Vector<f64, D>> = supports.field();
         if self.settings.initial_guess == InitialGuess::Velocity {
             dphi.iter_mut().zip(&nodal.velocity).for_each(|(dphi, v)| *dphi = v * dt);
         }
@@ -566,7 +572,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
+            let mut residual: Pooled<Vector<f64, D>> = end.step.supports.field();
             end.residual_into::<f64>(dphi, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(impulses) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
@@ -575,10 +581,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }
         }
         // At t_n: a = a_n and Δφ = 0.
-        let at_rest = Pooled::filled(dphi.len(), Vector::zeros());
+        let at_rest: Pooled<Vector<f64, D>> = end.step.supports.field();
         let start = self.equilibrium(end.step.supports, end.step.nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let mut residual = Pooled::filled(dphi.len(), Vector::zeros());
+            let mut residual: Pooled<Vector<f64, D>> = end.step.supports.field();
             start.residual_into::<f64>(&at_rest, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;

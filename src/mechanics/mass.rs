@@ -3,7 +3,7 @@
 use crate::mechanics::sweep::{Supports, Weights};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
-use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, Preconditioner, conjugate_gradient};
+use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
 use crate::tensor::Vector;
 
 /// Below this fraction of the largest particle mass, a node's velocity and acceleration are zero.
@@ -27,7 +27,7 @@ pub struct Mass<'a, const D: usize> {
 
 /// Σ_p m N_I at every active node.
 pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
-    let mut mass = Pooled::filled(supports.nodes(), 0.0);
+    let mut mass = supports.field();
     supports.spread(bytemuck::cast_slice_mut(&mut mass), |p| Vector::from([particles.mass[p]]));
     mass
 }
@@ -51,7 +51,7 @@ impl<const D: usize> Mass<'_, D> {
             *out += u * (factor * (self.lumping * m));
         }
         if self.lumping < 1.0 {
-            let mut at_particles = Pooled::filled(self.particles.len(), Vector::zeros());
+            let mut at_particles = self.supports.pool().filled(self.particles.len(), Vector::zeros());
             self.supports.each_value(u, |p, value| at_particles[p] = value);
             let weight = factor * (1.0 - self.lumping);
             self.supports.spread(out, |p| at_particles[p] * (weight * self.particles.mass[p]));
@@ -68,7 +68,7 @@ impl<const D: usize> Mass<'_, D> {
         fields: [&[Vector<f64, D>]; K],
     ) -> Result<([Pooled<Vector<f64, D>>; K], usize), LinearError> {
         let right = |field: &[Vector<f64, D>]| {
-            let mut out = Pooled::filled(self.lumped.len(), Vector::zeros());
+            let mut out = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
             out
         };
@@ -88,7 +88,7 @@ impl<const D: usize> Mass<'_, D> {
 
     /// 1/M̃_II, zero where there is none.
     fn inverse_diagonal(&self) -> Pooled<f64> {
-        let mut diagonal: Pooled<f64> = self.lumped.iter().map(|m| self.lumping * m).collect();
+        let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
         self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
             Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
         });
@@ -100,14 +100,14 @@ impl<const D: usize> Mass<'_, D> {
 
     /// By conjugate gradients from zero: where M̃ is singular, the solution of least norm.
     fn solve(&self, jacobi: &Jacobi<'_, D>, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
-        let right: Pooled<_> = field.iter().copied().collect();
+        let right = self.supports.pool().collect(field.iter().copied());
         field.fill(Vector::zeros());
         let settings = ConjugateGradientSettings {
             relative_tolerance: PROJECTION_TOLERANCE,
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        Ok(conjugate_gradient(self, jacobi, right, solution, &settings)?.iterations)
+        Ok(conjugate_gradient(self, jacobi, right, solution, &settings, self.supports.pool())?.iterations)
     }
 }
 
@@ -121,8 +121,8 @@ impl<const D: usize> LinearOperator for Mass<'_, D> {
 /// The inverse diagonal of M̃.
 struct Jacobi<'a, const D: usize>(&'a [f64]);
 
-impl<const D: usize> Preconditioner for Jacobi<'_, D> {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+impl<const D: usize> LinearOperator for Jacobi<'_, D> {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
         for (k, (z, r)) in z.iter_mut().zip(r).enumerate() {
             *z = r * self.0[k / D];
         }

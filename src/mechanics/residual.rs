@@ -125,7 +125,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// The sum of the terms of one role.
     pub(crate) fn forces(&self, role: Role, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut force = Pooled::filled(dphi.len(), Vector::zeros());
+        let mut force = self.step.supports.field();
         self.sum_into(|_, of| of == role, Part::Whole, Weights::Signed, dphi, &mut force)?;
         Ok(force)
     }
@@ -154,7 +154,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     }
 
     fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let mut out = Pooled::filled(dphi.len(), Vector::zeros());
+        let mut out = self.step.supports.field();
         self.terms.add_magnitudes_at_nodes(dphi, &mut out);
         self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, dphi, &mut out)?;
         Ok(out)

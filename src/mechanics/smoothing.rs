@@ -118,9 +118,9 @@ impl Smoothing {
         }
         // Seen from the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
-        let velocity: Pooled<_> = particles.velocity.iter().map(|v| v - frame).collect();
+        let velocity = supports.pool().collect(particles.velocity.iter().map(|v| v - frame));
         let mean = nodal_mean(particles, supports, mass, &velocity);
-        let squares: Pooled<_> = velocity.iter().map(|v| Vector::from([v.norm_squared()])).collect();
+        let squares = supports.pool().collect(velocity.iter().map(|v| Vector::from([v.norm_squared()])));
         let mean_square = nodal_mean(particles, supports, mass, &squares);
         let mut at_particles = velocity;
         supports.each_value(&mean, |p, mean| at_particles[p] = mean);
@@ -132,7 +132,7 @@ impl Smoothing {
             // Without a kink 0, for an infinite rate too.
             if kink > 0.0 { -(-self.at_kinks * kink * dt).exp_m1() } else { 0.0 }
         };
-        Some(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share).collect())
+        Some(supports.pool().collect(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share)))
     }
 
     /// −θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I) for a field u of the particles; `mass` is M_L at the active nodes, `at_kinks` are
@@ -150,7 +150,7 @@ impl Smoothing {
     ) -> Pooled<Vector<f64, D>> {
         let theta = self.share(dt);
         // r_j = (I − N M_L⁻¹ Nᵀm)^j u at the particles, and Σ N w = u − r_k.
-        let mut change: Pooled<_> = field.iter().copied().collect();
+        let mut change = supports.pool().collect(field.iter().copied());
         for _ in 0..self.order {
             let smooth = nodal_mean(particles, supports, mass, &change);
             supports.each_value(&smooth, |p, smooth| change[p] -= smooth);
@@ -173,7 +173,7 @@ fn nodal_mean<const C: usize, const D: usize>(
     mass: &[f64],
     field: &[Vector<f64, C>],
 ) -> Pooled<Vector<f64, C>> {
-    let mut out = Pooled::filled(mass.len(), Vector::zeros());
+    let mut out: Pooled<Vector<f64, C>> = supports.field();
     supports.spread(&mut out, |p| field[p] * particles.mass[p]);
     for (w, &m) in out.iter_mut().zip(mass) {
         // A node without mass weighs nothing in what follows either.

@@ -7,10 +7,9 @@ use crate::mechanics::sweep::{At, Flow, Form, LANES, Laned, Laws, Supports};
 use crate::mechanics::terms::{Frozen, Piece, Unit};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, NonlinearProblem, Precision, Preconditioner, SingleTangent};
-use crate::tensor::{Deformation, Tensor, Vector, determinant, inverse};
+use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem, Precision};
+use crate::tensor::{Deformation, Tensor, Vector};
 use num_dual::Dual64;
-use std::sync::OnceLock;
 
 /// K(Δφ), frozen: an operator in double or, divided by a power of two, in single precision.
 ///
@@ -48,7 +47,6 @@ pub struct Tangent<'a, const D: usize, X = f64> {
     prescribed: &'a [PrescribedDof],
     terms: Vec<Box<dyn Frozen<X, D> + 'a>>,
     unit: Unit,
-    inverse_blocks: OnceLock<Pooled<Tensor<f64, D>>>,
 }
 
 impl<X: Laned, const D: usize> Tangent<'_, D, X> {
@@ -70,7 +68,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
 
     /// K_II, over the scale, of every active node; a prescribed degree of freedom has the identity's row and column.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
-        let mut blocks = Pooled::filled(self.supports.nodes(), Tensor::zeros());
+        let mut blocks: Pooled<Tensor<f64, D>> = self.supports.field();
         self.terms.iter().for_each(|term| term.add_blocks_at_nodes(&mut blocks));
         let all: Vec<_> = self.terms.iter().filter_map(|term| term.blocks_at_points()).collect();
         if !all.is_empty() {
@@ -158,7 +156,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     ) -> Result<Tangent<'_, D, X>, Inadmissible> {
         let terms = self.terms.freeze(piece, dphi, unit)?;
         let (supports, prescribed) = (self.step.supports, self.prescribed);
-        Ok(Tangent { supports, prescribed, terms, unit, inverse_blocks: OnceLock::new() })
+        Ok(Tangent { supports, prescribed, terms, unit })
     }
 
     /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.
@@ -241,45 +239,19 @@ pub fn frozen_bytes<const D: usize, L: Law>(
     supports.groups() * form.rows(D) * LANES * number
 }
 
-/// The inverse of a diagonal block. A block that is singular to round-off (a node no stiffness and no mass reaches)
-/// is replaced by the inverse of its diagonal, or by the identity where that is zero too.
-pub(super) fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
-    // Scale rows to the diagonal first: entries range over many orders of magnitude, and det may underflow.
-    let diagonal = Vector::<f64, D>::from_fn(|i, _| {
-        let d = block[(i, i)].abs();
-        if d > 0.0 && d.is_finite() { d } else { 1.0 }
-    });
-    let unit = Tensor::<f64, D>::from_fn(|i, k| block[(i, k)] / diagonal[i]);
-    let invertible = determinant(&unit).abs() > 1e-12;
-    if invertible {
-        let inverse = inverse(&unit);
-        Tensor::from_fn(|i, k| inverse[(i, k)] / diagonal[k])
-    } else {
-        Tensor::from_fn(|i, k| if i == k { 1.0 / diagonal[i] } else { 0.0 })
-    }
-}
-
 impl<X: Laned, const D: usize> LinearOperator<X> for Tangent<'_, D, X> {
     fn apply(&self, x: &[X], y: &mut [X]) {
         self.product(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
     }
 }
 
-impl<X: Laned, const D: usize> Preconditioner<X> for Tangent<'_, D, X> {
-    fn precondition(&self, r: &[X], z: &mut [X]) {
-        let (r, z): (&[Vector<X, D>], &mut [Vector<X, D>]) = (bytemuck::cast_slice(r), bytemuck::cast_slice_mut(z));
-        let invert = || {
-            let mut blocks = self.diagonal_blocks();
-            blocks.iter_mut().for_each(|block| *block = invert_block(block));
-            blocks
-        };
-        for ((z, r), inverse) in z.iter_mut().zip(r).zip(self.inverse_blocks.get_or_init(invert)) {
-            *z = (inverse * r.map(X::value)).map(X::lit);
-        }
+impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        Self::diagonal_blocks(self).into_numbers()
     }
 }
 
-impl<const D: usize> SingleTangent for Tangent<'_, D, f32> {
+impl<const D: usize> Linearization<f32> for Tangent<'_, D, f32> {
     fn scale(&self) -> f64 {
         self.unit.scale
     }
@@ -287,11 +259,6 @@ impl<const D: usize> SingleTangent for Tangent<'_, D, f32> {
 
 impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     type Inadmissible = Inadmissible;
-    type Tangent<'a>
-        = Tangent<'a, D>
-    where
-        Self: 'a;
-
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
         let residual = bytemuck::cast_slice_mut(r);
         self.residual_into::<f64>(bytemuck::cast_slice(x), residual)?;
@@ -311,45 +278,12 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self::potential::<f64>(self, bytemuck::cast_slice(x))
     }
 
-    fn linearize(&self, x: &[f64]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.tangent(bytemuck::cast_slice(x))
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
+        Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
     }
 
-    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn SingleTangent + '_>>, Inadmissible> {
+    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Inadmissible> {
         let single = self.single_tangent(None, bytemuck::cast_slice(x))?;
-        Ok(single.map(|single| Box::new(single) as Box<dyn SingleTangent>))
-    }
-}
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_block_is_inverted_at_any_size_of_its_rows() {
-        // A stiff node beside a nearly empty one: as they stand, the determinant underflows.
-        for (large, small) in [(1.0, 1.0), (1e12, 1e-9), (1e-150, 1e-200)] {
-            let block = Tensor::<f64, 3>::new(
-                4.0 * large,
-                large,
-                0.0,
-                small,
-                3.0 * small,
-                -small,
-                0.0,
-                0.5 * large,
-                2.0 * large,
-            );
-            let unit = invert_block(&block) * block;
-            assert!((unit - Tensor::identity()).norm() < 1e-14, "{unit}");
-        }
-    }
-
-    #[test]
-    fn a_singular_block_gives_the_inverse_of_its_diagonal() {
-        let singular = Tensor::<f64, 2>::new(4.0, 8.0, 1.0, 2.0);
-        assert_eq!(invert_block(&singular), Tensor::<f64, 2>::new(0.25, 0.0, 0.0, 0.5));
-        // What nothing reaches stays as it is.
-        let nothing = Tensor::<f64, 2>::new(0.0, 0.0, 0.0, 8.0);
-        assert_eq!(invert_block(&nothing), Tensor::<f64, 2>::new(1.0, 0.0, 0.0, 0.125));
+        Ok(single.map(|single| Box::new(single) as Box<dyn Linearization<f32>>))
     }
 }

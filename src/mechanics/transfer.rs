@@ -63,7 +63,7 @@ impl<const D: usize> Nodal<D> {
 
     /// The lumped mass, and no motion.
     pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>) -> Self {
-        let still = Pooled::filled(supports.nodes(), Vector::zeros());
+        let still: Pooled<Vector<f64, D>> = supports.field();
         Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports) }
     }
 
@@ -210,8 +210,8 @@ impl<'a, const D: usize> Update<'a, D> {
     ) -> Self {
         let state = || dphi.iter().zip(&nodal.velocity).zip(&nodal.acceleration);
         let increments = || state().map(|((dphi, v), a)| alphas.increments(dphi, v, a));
-        let mut delta_velocity: Pooled<_> = increments().map(|both| both.0).collect();
-        let mut delta_acceleration: Pooled<_> = increments().map(|both| both.1).collect();
+        let mut delta_velocity = nodal.velocity.pool().collect(increments().map(|both| both.0));
+        let mut delta_acceleration = nodal.velocity.pool().collect(increments().map(|both| both.1));
         let mut impulses = vec![0.0; prescribed.len()];
         for (dof, impulse) in prescribed.iter().zip(&mut impulses).filter(|_| !nodal.is_static()) {
             let (node, i) = (dof.node, dof.component);

@@ -3,7 +3,6 @@
 use super::body::Body;
 use super::boundary::{Face, Table};
 use super::particle_file::{self, ParticleFileError};
-use super::solver::{Forcing, Method};
 use super::transfer::Transfer;
 use super::{Problems, Scene, load, scale, time};
 use crate::approximation::{Approximation, Cells};
@@ -18,7 +17,7 @@ use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
 use crate::simulation::{InitialGuess, Settings, Simulation, StepError};
-use crate::solver::{self, NewtonSettings};
+use crate::solver::{NewtonSettings, Preconditioning};
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
 use std::path::Path;
@@ -288,18 +287,13 @@ impl Scene {
             newton: NewtonSettings {
                 relative_tolerance: newton.tolerance,
                 max_iterations: newton.max_iterations as usize,
-                forcing: match krylov.forcing {
-                    Forcing::Fixed(tolerance) => solver::Forcing::Fixed(tolerance),
-                    Forcing::EisenstatWalker => solver::Forcing::EisenstatWalker,
-                },
-                krylov: match &krylov.method {
-                    Method::Gmres(gmres) => solver::Krylov::Gmres { restart: gmres.restart as usize },
-                    Method::ConjugateGradient => solver::Krylov::ConjugateGradient,
-                },
+                forcing: krylov.forcing,
+                krylov: krylov.method,
                 precision: krylov.precision,
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },
+            preconditioner: Preconditioning::default(),
             error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),
             check_tangent: None,
         }

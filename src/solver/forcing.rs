@@ -16,15 +16,21 @@ const FIRST: f64 = 0.5;
 /// The fall in η is limited only while γ η² is above this (Eisenstat and Walker, sec. 2.1).
 const SAFEGUARD: f64 = 0.1;
 
-/// The forcing term η of ‖R + K d‖ ≤ η ‖R‖.
+/// How far each linear problem is solved: η of ‖R + K d‖ ≤ η ‖R‖.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Forcing {
-    /// The same at every iteration, between 0 and 0.9, both excluded. Small values keep Newton's convergence quadratic.
-    Fixed(f64),
-    /// Choice 2 of Eisenstat and Walker (SIAM J. Sci. Comput. 17, 1996) with γ = 0.9, α = 2: loose at first, tighter as the
-    /// residual falls, never tighter than the end of the iteration needs.
+    /// To this relative residual, 1e-15 to 0.9, at every iteration. Small values keep Newton's convergence quadratic.
+    Fixed(#[schemars(range(min = 1e-15, max = 0.9))] f64),
+    /// As far as Newton's progress deserves (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9, α = 2): loose
+    /// at first, tighter as the residual falls, never tighter than the end of the iteration needs.
     EisenstatWalker,
+}
+
+impl Default for Forcing {
+    fn default() -> Self {
+        Self::Fixed(1e-8)
+    }
 }
 
 /// What the forcing term of the next iteration follows from.

@@ -2,10 +2,9 @@
 
 use super::vector::{Entry, axpy, dot, norm, scaled};
 use super::{
-    InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, Preconditioner, checked_norm, finite,
-    true_residual,
+    InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, checked_norm, finite, true_residual,
 };
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 
 /// A second orthogonalisation is made when the first one leaves less than this part of the vector: 1/√2 (Daniel, Gragg,
 /// Kaufman, Stewart 1976).
@@ -53,6 +52,7 @@ impl Default for GmresSettings {
 /// `solution` is overwritten; its former contents do not matter. b = 0 gives x = 0 without iterating.
 ///
 /// ```
+/// use bfree::pooled::Pool;
 /// use bfree::solver::{GmresSettings, Identity, LinearOperator, gmres};
 ///
 /// /// A quarter turn and a stretch: not symmetric, so conjugate gradients would not do.
@@ -65,7 +65,7 @@ impl Default for GmresSettings {
 /// }
 ///
 /// let mut x = [0.0; 2];
-/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default())?;
+/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default(), &Pool::default())?;
 /// // Without rounding, a matrix of order n takes n iterations.
 /// assert!(report.converged() && report.iterations == 2);
 /// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
@@ -74,12 +74,13 @@ impl Default for GmresSettings {
 ///
 /// # Errors
 /// A setting out of range, lengths that differ, NaN or infinity.
-pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
-    operator: &A,
-    preconditioner: &M,
+pub fn gmres<S: Entry>(
+    operator: &dyn LinearOperator<S>,
+    preconditioner: &dyn LinearOperator<S>,
     rhs: &[S],
     solution: &mut [S],
     settings: &GmresSettings,
+    workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
     InvalidSetting::check_restart(settings.restart)?;
@@ -93,10 +94,10 @@ pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Si
     let target = settings.relative_tolerance * b_norm;
     // More than n directions are never independent.
     let mut restart = settings.restart.min(rhs.len());
-    let mut r: Pooled<S> = rhs.iter().copied().collect();
+    let mut r = workspace.collect(rhs.iter().copied());
     let mut r_norm = b_norm;
-    let mut trial = Pooled::filled(rhs.len(), S::zero());
-    let mut correction = Pooled::filled(rhs.len(), S::zero());
+    let mut trial = workspace.filled(rhs.len(), S::zero());
+    let mut correction = workspace.filled(rhs.len(), S::zero());
     loop {
         report.relative_residual = r_norm / b_norm;
         if report.iterations >= settings.max_iterations {
@@ -134,16 +135,17 @@ pub fn gmres<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Si
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the
 /// correction of x and returns the iterations taken and the norm the residual should have then.
-fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>(
-    operator: &A,
-    preconditioner: &M,
-    r: &[S],
+fn cycle<S: Entry>(
+    operator: &dyn LinearOperator<S>,
+    preconditioner: &dyn LinearOperator<S>,
+    r: &Pooled<S>,
     r_norm: f64,
     target: f64,
     length: usize,
     correction: &mut [S],
 ) -> Result<(usize, f64), LinearError> {
-    let mut v = Pooled::filled(r.len(), S::zero());
+    let fresh = || r.pool().filled(r.len(), S::zero());
+    let mut v = fresh();
     scaled(1.0 / r_norm, r, &mut v);
     // Grows by one vector an iteration: what is not needed is not allocated.
     let mut basis: Vec<Pooled<S>> = Vec::new();
@@ -156,9 +158,9 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
         negligible: exhausted_below,
     };
     for iteration in 0..length {
-        let mut w = Pooled::filled(r.len(), S::zero());
+        let mut w = fresh();
         // `correction` holds M⁻¹ v meanwhile.
-        preconditioner.precondition(&v, correction);
+        preconditioner.apply(&v, correction);
         operator.apply(correction, &mut w);
         basis.push(v);
         let w_norm = finite(norm(&w), "the norm of a Krylov vector", iteration)?;
@@ -168,14 +170,14 @@ fn cycle<S: Entry, A: LinearOperator<S> + ?Sized, M: Preconditioner<S> + ?Sized>
         if exhausted || triangle.residual() <= target {
             break;
         }
-        v = Pooled::filled(r.len(), S::zero());
+        v = fresh();
         scaled(1.0 / left, &w, &mut v);
     }
-    let mut sum = Pooled::filled(r.len(), S::zero());
+    let mut sum = fresh();
     for (y, v) in triangle.solve().iter().zip(&basis) {
         axpy(*y, v, &mut sum);
     }
-    preconditioner.precondition(&sum, correction);
+    preconditioner.apply(&sum, correction);
     Ok((basis.len(), triangle.residual()))
 }
 
@@ -265,6 +267,17 @@ mod tests {
     use super::super::{Identity, LinearOutcome};
     use super::*;
 
+    /// In memory of its own.
+    fn gmres(
+        operator: &dyn LinearOperator,
+        preconditioner: &dyn LinearOperator,
+        rhs: &[f64],
+        solution: &mut [f64],
+        settings: &GmresSettings,
+    ) -> Result<LinearReport, LinearError> {
+        super::gmres(operator, preconditioner, rhs, solution, settings, &Pool::default())
+    }
+
     const TIGHT: GmresSettings = GmresSettings { relative_tolerance: 1e-12, max_iterations: 500, restart: 100 };
 
     /// ‖b − A x‖ / ‖b‖, by another road than the solver's.
@@ -293,7 +306,7 @@ mod tests {
             for (preconditioned, report, x) in [false, true].map(|preconditioned| {
                 let mut x = vec![f64::NAN; n];
                 let report = if preconditioned {
-                    gmres(&a, &a, &b, &mut x, &TIGHT)
+                    gmres(&a, &a.jacobi(), &b, &mut x, &TIGHT)
                 } else {
                     gmres(&a, &Identity, &b, &mut x, &TIGHT)
                 };
@@ -346,7 +359,7 @@ mod tests {
         let report = gmres(&a, &Identity, &irregular(60), &mut x, &TIGHT).unwrap();
         assert_eq!((report.outcome, report.iterations), (LinearOutcome::Converged, 3));
         // The exact inverse as preconditioner: one.
-        assert_eq!(gmres(&a, &a, &irregular(60), &mut x, &TIGHT).unwrap().iterations, 1);
+        assert_eq!(gmres(&a, &a.jacobi(), &irregular(60), &mut x, &TIGHT).unwrap().iterations, 1);
     }
 
     #[test]
@@ -355,20 +368,20 @@ mod tests {
         let b = irregular(40);
         let settings = GmresSettings { relative_tolerance: 0.0, max_iterations: 6, restart: 3 };
         let mut twice = vec![0.0; 40];
-        gmres(&a, &a, &b, &mut twice, &settings).unwrap();
+        gmres(&a, &a.jacobi(), &b, &mut twice, &settings).unwrap();
         // By hand: three iterations, then three on the residual.
         let once = GmresSettings { max_iterations: 3, ..settings };
         let (mut x, mut dx) = (vec![0.0; 40], vec![0.0; 40]);
-        gmres(&a, &a, &b, &mut x, &once).unwrap();
+        gmres(&a, &a.jacobi(), &b, &mut x, &once).unwrap();
         let r: Vec<f64> = b.iter().zip(a.times(&x)).map(|(b, ax)| b - ax).collect();
-        gmres(&a, &a, &r, &mut dx, &once).unwrap();
+        gmres(&a, &a.jacobi(), &r, &mut dx, &once).unwrap();
         axpy(1.0, &dx, &mut x);
         assert!(distance(&x, &twice) < 1e-15, "{}", distance(&x, &twice));
         // And with any restart the same solution.
         let mut full = vec![0.0; 40];
-        assert!(gmres(&a, &a, &b, &mut full, &TIGHT).unwrap().converged());
+        assert!(gmres(&a, &a.jacobi(), &b, &mut full, &TIGHT).unwrap().converged());
         for restart in [2, 5, 11] {
-            let report = gmres(&a, &a, &b, &mut x, &GmresSettings { restart, ..TIGHT }).unwrap();
+            let report = gmres(&a, &a.jacobi(), &b, &mut x, &GmresSettings { restart, ..TIGHT }).unwrap();
             assert!(report.converged() && distance(&x, &full) < 1e-11, "{restart} {report:?}");
         }
     }
@@ -388,6 +401,39 @@ mod tests {
         let settings = GmresSettings { restart: 2, max_iterations: 20, ..TIGHT };
         let report = gmres(&shift, &Identity, &b, &mut x, &settings).unwrap();
         assert_eq!((report.outcome, report.iterations), (LinearOutcome::IterationLimit, 20));
+    }
+
+    #[test]
+    fn an_exhausted_space_ends_its_cycle() {
+        // Two eigenvalues, two directions, and behind them nothing but round-off: each cycle ends at the second.
+        let a = Dense::from_fn(20, |i, j| if i == j { [1.0, 3.0][i % 2] } else { 0.0 });
+        let mut x = vec![0.0; 20];
+        let settings = GmresSettings { relative_tolerance: 0.0, ..TIGHT };
+        let report = gmres(&a, &Identity, &irregular(20), &mut x, &settings).unwrap();
+        assert!(report.relative_residual < 1e-15, "{report:?}");
+        let cycles = report.products - report.iterations;
+        assert!(report.iterations <= 2 * cycles, "{report:?}");
+    }
+
+    #[test]
+    fn rotations_solve_the_least_squares_problem() {
+        // A Hessenberg matrix without pattern: what is left of ‖r‖ e₁ is orthogonal to its columns, and as large as the rotations say.
+        let (n, r_norm) = (6, 2.5);
+        let entries = irregular(n * (n + 1));
+        let h = |i: usize, j: usize| if i <= j + 1 { entries[i * n + j] } else { 0.0 };
+        let mut triangle =
+            Triangle { columns: vec![], rotations: vec![], g: vec![], last: r_norm, negligible: f64::EPSILON };
+        for j in 0..n {
+            triangle.push((0..=j).map(|i| h(i, j)).collect(), h(j + 1, j));
+        }
+        let y = triangle.solve();
+        let times_y = |i: usize| (0..n).map(|j| h(i, j) * y[j]).sum::<f64>();
+        let left: Vec<f64> = (0..=n).map(|i| if i == 0 { r_norm - times_y(i) } else { -times_y(i) }).collect();
+        assert!((norm(&left) - triangle.residual()).abs() < 1e-14);
+        for j in 0..n {
+            let along: f64 = (0..=n).map(|i| h(i, j) * left[i]).sum();
+            assert!(along.abs() < 1e-13, "{j} {along}");
+        }
     }
 
     #[test]
@@ -446,7 +492,7 @@ mod tests {
                 self.0.apply(&[x[0], x[1], 0.0], y);
             }
         }
-        let zero_mass = Dense::from_fn(3, |i, j| if i == j && i < 2 { 1.0 } else { 0.0 });
+        let zero_mass = Dense::from_fn(3, |i, j| if i == j { [1.0, 1.0, f64::INFINITY][i] } else { 0.0 });
         assert!(not_finite(gmres(&Ignores(good), &zero_mass, &[1.0, 1.0, 1.0], &mut x, &TIGHT)));
     }
 

@@ -7,6 +7,7 @@ mod conjugate_gradient;
 mod forcing;
 mod gmres;
 mod newton;
+mod preconditioner;
 pub mod vector;
 
 pub use conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
@@ -16,6 +17,7 @@ pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
+pub use preconditioner::{BlockJacobi, DiagonalBlocks, Identity, Preconditioner, Preconditioning};
 
 use vector::Entry;
 
@@ -48,87 +50,46 @@ pub trait LinearOperator<S = f64> {
     fn apply(&self, x: &[S], y: &mut [S]);
 }
 
-/// An approximate inverse M⁻¹, the same linear map at every call.
+/// The derivative of a residual frozen at one x, over a power of two: its product, and what preconditioners are made from.
 ///
 /// ```
-/// use bfree::solver::{GmresSettings, LinearOperator, Preconditioner, gmres};
-///
-/// /// A diagonal matrix, and as preconditioner its inverse.
-/// struct Diagonal(Vec<f64>);
-///
-/// impl LinearOperator for Diagonal {
-///     fn apply(&self, x: &[f64], y: &mut [f64]) {
-///         y.iter_mut().zip(x).zip(&self.0).for_each(|((y, x), a)| *y = a * x);
-///     }
-/// }
-///
-/// impl Preconditioner for Diagonal {
-///     fn precondition(&self, r: &[f64], z: &mut [f64]) {
-///         z.iter_mut().zip(r).zip(&self.0).for_each(|((z, r), a)| *z = r / a);
-///     }
-/// }
-///
-/// // M⁻¹A = I: one iteration, however far apart the entries lie.
-/// let (matrix, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), [0.0; 3]);
-/// let report = gmres(&matrix, &matrix, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default())?;
-/// assert_eq!(report.iterations, 1);
-/// assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15 * exact));
-/// # Ok::<(), bfree::solver::LinearError>(())
-/// ```
-pub trait Preconditioner<S = f64> {
-    /// `z = M⁻¹ r`; `r` and `z` have the order of the operator, and `z` is overwritten.
-    fn precondition(&self, r: &[S], z: &mut [S]);
-}
-
-/// A tangent in single precision, divided by a power of two that keeps its entries near 1, whatever the units.
-///
-/// ```
-/// use bfree::solver::{LinearOperator, Preconditioner, SingleTangent};
+/// use bfree::pooled::Pooled;
+/// use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization};
 ///
 /// /// A stiffness that single precision does not hold: k = 3e40, over 2¹³⁵.
 /// struct Stiff;
 ///
-/// impl Stiff {
-///     fn entry(&self) -> f32 {
-///         (3e40 / self.scale()) as f32
+/// impl DiagonalBlocks for Stiff {
+///     fn diagonal_blocks(&self) -> Pooled<f64> {
+///         vec![3e40 / self.scale()].into()
 ///     }
 /// }
 ///
 /// impl LinearOperator<f32> for Stiff {
 ///     fn apply(&self, x: &[f32], y: &mut [f32]) {
-///         y[0] = self.entry() * x[0];
+///         y[0] = self.diagonal_blocks()[0] as f32 * x[0];
 ///     }
 /// }
 ///
-/// impl Preconditioner<f32> for Stiff {
-///     fn precondition(&self, r: &[f32], z: &mut [f32]) {
-///         z[0] = r[0] / self.entry();
-///     }
-/// }
-///
-/// impl SingleTangent for Stiff {
+/// impl Linearization<f32> for Stiff {
 ///     fn scale(&self) -> f64 {
 ///         2_f64.powi(135)
 ///     }
 /// }
 ///
-/// let (mut y, mut z) = ([0.0], [0.0]);
+/// let mut y = [0.0];
 /// Stiff.apply(&[2.0], &mut y);
-/// Stiff.precondition(&y, &mut z);
-/// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7 && (z[0] - 2.0).abs() < 1e-6);
+/// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7);
 /// ```
-pub trait SingleTangent: LinearOperator<f32> + Preconditioner<f32> {
-    /// That power of two.
+pub trait Linearization<S = f64>: LinearOperator<S> + DiagonalBlocks {
+    /// What it is divided by: in single precision a power of two that keeps entries near 1, whatever the units.
     fn scale(&self) -> f64;
 }
 
-/// No preconditioning: M = I.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Identity;
-
-impl<S: Copy> Preconditioner<S> for Identity {
-    fn precondition(&self, r: &[S], z: &mut [S]) {
-        z.copy_from_slice(r);
+/// In double precision as it is.
+impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
+    fn scale(&self) -> f64 {
+        1.0
     }
 }
 
@@ -136,7 +97,8 @@ impl<S: Copy> Preconditioner<S> for Identity {
 /// between calls.
 ///
 /// ```
-/// use bfree::solver::{LinearOperator, NewtonSettings, NonlinearProblem, Preconditioner, newton};
+/// use bfree::pooled::{Pool, Pooled};
+/// use bfree::solver::{BlockJacobi, DiagonalBlocks, LinearOperator, Linearization, NewtonSettings, NonlinearProblem, newton};
 ///
 /// /// A charge on a spring: Π = ½ x² − ln x for x > 0, so that R = x − 1/x and K = 1 + 1/x².
 /// struct Charge;
@@ -153,9 +115,9 @@ impl<S: Copy> Preconditioner<S> for Identity {
 ///     }
 /// }
 ///
-/// impl Preconditioner for Stiffness {
-///     fn precondition(&self, r: &[f64], z: &mut [f64]) {
-///         z[0] = r[0] / self.0;
+/// impl DiagonalBlocks for Stiffness {
+///     fn diagonal_blocks(&self) -> Pooled<f64> {
+///         vec![self.0].into()
 ///     }
 /// }
 ///
@@ -165,7 +127,6 @@ impl<S: Copy> Preconditioner<S> for Identity {
 ///
 /// impl NonlinearProblem for Charge {
 ///     type Inadmissible = NotPositive;
-///     type Tangent<'a> = Stiffness;
 ///
 ///     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), NotPositive> {
 ///         r[0] = x[0] - 1.0 / admissible(x[0])?;
@@ -180,8 +141,8 @@ impl<S: Copy> Preconditioner<S> for Identity {
 ///         Some(admissible(x[0]).map(|x| (0.5 * x * x - x.ln(), 0.5 * x * x + x.ln().abs())))
 ///     }
 ///
-///     fn linearize(&self, x: &[f64]) -> Result<Stiffness, NotPositive> {
-///         Ok(Stiffness(1.0 + admissible(x[0])?.powi(-2)))
+///     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization>, NotPositive> {
+///         Ok(Box::new(Stiffness(1.0 + admissible(x[0])?.powi(-2))))
 ///     }
 /// }
 ///
@@ -189,17 +150,13 @@ impl<S: Copy> Preconditioner<S> for Identity {
 /// assert!(problem.linearize_single(&[1.0])?.is_none());
 /// // From far away Newton's full step would lead to x < 0; the line search does not.
 /// let mut x = [0.01];
-/// newton(&problem, &mut x, &NewtonSettings::default())?;
+/// newton(&problem, &mut BlockJacobi::<1>::default(), &mut x, &NewtonSettings::default(), &Pool::default())?;
 /// assert!((x[0] - 1.0).abs() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait NonlinearProblem {
     /// Why R has no value somewhere, such as det F ≤ 0 at a particle.
     type Inadmissible: std::error::Error + 'static;
-    /// The derivative frozen at one x, with a preconditioner for it.
-    type Tangent<'a>: LinearOperator + Preconditioner
-    where
-        Self: 'a;
 
     /// `r = R(x)`; `r` is overwritten, and unspecified on error.
     ///
@@ -230,13 +187,13 @@ pub trait NonlinearProblem {
     ///
     /// # Errors
     /// x is not admissible.
-    fn linearize(&self, x: &[f64]) -> Result<Self::Tangent<'_>, Self::Inadmissible>;
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Self::Inadmissible>;
 
     /// The tangent at x in single precision; `None` if there is none.
     ///
     /// # Errors
     /// x is not admissible.
-    fn linearize_single(&self, _x: &[f64]) -> Result<Option<Box<dyn SingleTangent + '_>>, Self::Inadmissible> {
+    fn linearize_single(&self, _x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Self::Inadmissible> {
         Ok(None)
     }
 }
@@ -258,7 +215,8 @@ impl LinearReport {
     /// Whether the tolerance was met.
     ///
     /// ```
-    /// use bfree::solver::{Identity, LinearOperator, LinearOutcome, conjugate_gradient};
+    /// use bfree::pooled::Pool;
+    /// use bfree::solver::{ConjugateGradientSettings, Identity, LinearOperator, LinearOutcome, conjugate_gradient};
     ///
     /// /// A mirror, with the eigenvalues 1 and −1: not positive definite.
     /// struct Mirror;
@@ -269,7 +227,8 @@ impl LinearReport {
     ///     }
     /// }
     ///
-    /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &Default::default())?;
+    /// let settings = ConjugateGradientSettings::default();
+    /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &settings, &Pool::default())?;
     /// assert!(!report.converged());
     /// assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
     /// # Ok::<(), bfree::solver::LinearError>(())
@@ -366,7 +325,7 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
 }
 
 /// `r = b − A x`, and its norm.
-fn true_residual<S: Entry, A: LinearOperator<S> + ?Sized>(operator: &A, rhs: &[S], x: &[S], r: &mut [S]) -> f64 {
+fn true_residual<S: Entry>(operator: &dyn LinearOperator<S>, rhs: &[S], x: &[S], r: &mut [S]) -> f64 {
     operator.apply(x, r);
     vector::xpby(rhs, -1.0, r);
     vector::norm(r)
@@ -376,14 +335,22 @@ fn true_residual<S: Entry, A: LinearOperator<S> + ?Sized>(operator: &A, rhs: &[S
 mod testing {
     //! Dense matrices for the tests of this folder.
 
-    use super::{LinearOperator, Preconditioner};
+    use super::{BlockJacobi, DiagonalBlocks, LinearOperator, Preconditioner};
+    use crate::pooled::Pooled;
 
-    /// A dense matrix by rows, preconditioned by its diagonal.
+    /// A dense matrix by rows.
     pub struct Dense(pub Vec<Vec<f64>>);
 
     impl Dense {
         pub fn from_fn(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
             Self((0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect())
+        }
+
+        /// Its diagonal as preconditioner.
+        pub fn jacobi(&self) -> BlockJacobi<1> {
+            let mut inverse = BlockJacobi::default();
+            inverse.prepare(self);
+            inverse
         }
 
         pub fn times(&self, x: &[f64]) -> Vec<f64> {
@@ -397,11 +364,9 @@ mod testing {
         }
     }
 
-    impl Preconditioner for Dense {
-        fn precondition(&self, r: &[f64], z: &mut [f64]) {
-            for i in 0..z.len() {
-                z[i] = r[i] / self.0[i][i];
-            }
+    impl DiagonalBlocks for Dense {
+        fn diagonal_blocks(&self) -> Pooled<f64> {
+            (0..self.0.len()).map(|i| self.0[i][i]).collect::<Vec<_>>().into()
         }
     }
 

@@ -48,6 +48,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
             error_tolerance: None,
             check_tangent: None,
             newton: NewtonSettings::default(),
+            preconditioner: Default::default(),
         },
         clock: Clock::new(0.01, 3),
         external_work: 0.0,

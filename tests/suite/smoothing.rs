@@ -42,7 +42,7 @@ fn velocity_change<const D: usize>(
     dt: f64,
 ) -> Vec<Vector<f64, D>> {
     let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
-    smoothing.change(particles, supports, mass, at_kinks.as_deref(), &particles.velocity, dt).into_vec()
+    smoothing.change(particles, supports, mass, at_kinks.as_deref(), &particles.velocity, dt).to_vec()
 }
 
 fn keeps_momentum_and_gains_no_energy<const D: usize>() -> Result<(), Failure> {
@@ -151,7 +151,7 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
             let shares = smoothing.shares_at_kinks(&particles, &supports, &nodal.mass, 1e-6);
             let shares = shares.ok_or("limited smoothing has shares")?;
             // Away from the ends of the bar.
-            let inside = places.iter().zip(shares.into_vec()).filter(|(x, _)| (0.2..0.8).contains(*x));
+            let inside = places.iter().zip(shares.to_vec()).filter(|(x, _)| (0.2..0.8).contains(*x));
             Ok(inside.map(|(&x, share)| (x - 0.5, share / (5.0 * 1e-6))).collect())
         };
         let near = |x: f64| x.abs() < 1e-9;

@@ -13,6 +13,7 @@ use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
+use bfree::pooled::Pool;
 use bfree::solver::Precision;
 use bfree::tensor::{Deformation, Tensor, Vector, identity};
 use num_dual::Dual64;
@@ -270,7 +271,9 @@ fn renewal<const D: usize>() {
         let anew = Supports::with_precision(&shape, &grid, &after, Precision::Mixed).unwrap();
         for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
             let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
-            let renewed = Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed).unwrap();
+            let renewed =
+                Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed, &Pool::default())
+                    .unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {

@@ -16,8 +16,9 @@ use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
+use bfree::pooled::Pool;
 use bfree::simulation::StepError;
-use bfree::solver::{NewtonReport, NewtonSettings, newton};
+use bfree::solver::{BlockJacobi, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
 
 /// Quadratic serendipity elements whose corners are every second node of the grid, which must have an even number of cells
@@ -178,10 +179,10 @@ impl<const D: usize, L: Law> Elements<D, L> {
     pub fn step(&mut self) -> Result<NewtonReport, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
         let alphas = self.newmark.alphas(dt);
-        let carried = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
+        let carried: Vec<_> = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
         let nodal = Nodal {
             mass: self.mass.clone().into(),
-            velocity: carried,
+            velocity: carried.into(),
             acceleration: self.acceleration.clone().into(),
             iterations: 0,
         };
@@ -202,7 +203,13 @@ impl<const D: usize, L: Law> Elements<D, L> {
             &prescribed,
         );
         let mut u = self.displacement.clone();
-        let report = newton(&equilibrium, bytemuck::cast_slice_mut(&mut u), &self.newton)?;
+        let report = newton(
+            &equilibrium,
+            &mut BlockJacobi::<2>::default(),
+            bytemuck::cast_slice_mut(&mut u),
+            &self.newton,
+            &Pool::default(),
+        )?;
         for (node, new) in u.iter().enumerate() {
             let (by, v, a) = (new - self.displacement[node], self.velocity[node], self.acceleration[node]);
             let (delta_v, delta_a) = alphas.increments(&by, &v, &a);

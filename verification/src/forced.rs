@@ -7,8 +7,9 @@ use bfree::mechanics::loads::prescribed_dofs;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::{Nodal, Update};
+use bfree::pooled::Pool;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
-use bfree::solver::{NewtonError, NewtonReport, NewtonSettings, newton};
+use bfree::solver::{BlockJacobi, NewtonError, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
 
 /// One step of `simulation` with the force `force(p, t)` per unit mass on the particle that lies at `p` in memory, where it stays, in place of all its loads but the
@@ -21,7 +22,7 @@ pub fn step<const D: usize, L: Law, A: ShapeFunction>(
     force: impl Fn(usize, f64) -> Vector<f64, D> + Sync,
 ) -> Result<NewtonReport, StepError> {
     let solve = |equilibrium: &Equilibrium<'_, D, L>, dphi: &mut [f64], settings: &NewtonSettings| {
-        newton(equilibrium, dphi, settings)
+        newton(equilibrium, &mut BlockJacobi::<D>::default(), dphi, settings, &Pool::default())
     };
     Ok(step_by(simulation, force, solve)?.newton)
 }

@@ -71,11 +71,6 @@ impl Groups {
         Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, ..self }
     }
 
-    /// The particles, group by group.
-    pub(super) fn in_order(&self) -> impl Iterator<Item = u32> {
-        (0..self.len()).flat_map(|group| self.group(group).particles.iter().copied())
-    }
-
     /// Number of groups.
     pub(super) fn len(&self) -> usize {
         self.windows.len()

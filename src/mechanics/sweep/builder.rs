@@ -8,7 +8,6 @@ use super::order::{Key, follows};
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
-use crate::pooled::{Element, Pooled, kept_as_it_is};
 use crate::tensor::Vector;
 use std::ops::Range;
 
@@ -212,7 +211,8 @@ fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -
 }
 
 /// A row of a box along x, by the grid number of the row's node at x = 0.
-struct Row {
+#[derive(Clone, Debug)]
+pub(super) struct Row {
     start: u64,
     x: usize,
     block: usize,
@@ -221,8 +221,6 @@ struct Row {
     /// Its nodes that are active.
     active: u64,
 }
-
-kept_as_it_is!(Row);
 
 impl Row {
     /// The active nodes, counted from the beginning of the row.
@@ -241,8 +239,13 @@ impl Row {
     }
 }
 
-/// Numbers the active nodes in the order of the grid, and gives each block those of its box.
-pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> Nodes {
+/// Numbers the active nodes in the order of the grid, and gives each block those of its box. The arrays `rows` and `ids` are used again.
+pub(super) fn number<const D: usize>(
+    grid: &Grid<D>,
+    blocks: &mut [Block],
+    rows: &mut Vec<Row>,
+    mut ids: Vec<u64>,
+) -> Nodes {
     /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
     fn apart(mut line: &[Row]) -> Vec<&[Row]> {
         let mut parts = Vec::new();
@@ -259,7 +262,8 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> No
         }
         parts
     }
-    let mut rows: Pooled<Row> = Pooled::with_room(blocks.iter().map(|block| block.active.len()).sum());
+    rows.clear();
+    rows.reserve(blocks.iter().map(|block| block.active.len()).sum());
     for (b, block) in blocks.iter().enumerate() {
         let [nx, ny, nz] = block.size;
         for z in 0..nz {
@@ -273,8 +277,7 @@ pub(super) fn number<const D: usize>(grid: &Grid<D>, blocks: &mut [Block]) -> No
         }
     }
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
-    // About as many as there are groups: eight particles have a node.
-    let mut ids = Pooled::with_room(blocks.iter().map(|block| block.groups.len()).sum());
+    ids.clear();
     let mut numbers: Vec<u32> = Vec::new();
     for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {
         let low = same[0].x;

@@ -218,10 +218,12 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
         for z in 0..nz.len() {
             let [value, x, y] = plane::<S, C, W>(s, window, &weights, nodal, origin + z * window.stride[1], width);
             let (nz, dz) = (s.load(&nz[z]), s.load(&dz[z]));
-            for c in 0..C {
-                if with_value {
+            if with_value {
+                for c in 0..C {
                     out.value[c] = s.mul_add(value[c], nz, out.value[c]);
                 }
+            }
+            for c in 0..C {
                 out.gradient[c][0] = s.mul_add(x[c], nz, out.gradient[c][0]);
                 out.gradient[c][1] = s.mul_add(y[c], nz, out.gradient[c][1]);
                 out.gradient[c][2] = s.mul_add(value[c], dz, out.gradient[c][2]);
@@ -342,26 +344,35 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     let mut sums = [[zero; C]; W];
     let sums = &mut sums[..width.min(W)];
     for p in 0..window.lanes.min(LANES) {
+        // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z; which of them there are is asked outside the inner loops.
         let (mut across, mut along) = ([zero; C], [zero; C]);
-        for c in 0..C {
-            // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z
-            if parts.gradient {
+        if parts.gradient {
+            for c in 0..C {
                 for k in 1..D {
                     across[c] = s.mul_add(s.splat(gradient[c][k][p]), pairs.products[k][p], across[c]);
                 }
                 along[c] = s.mul(s.splat(gradient[c][0][p]), pairs.products[0][p]);
             }
-            if parts.value {
+        }
+        if parts.value {
+            for c in 0..C {
                 across[c] = s.mul_add(s.splat(value[c][p]), pairs.products[0][p], across[c]);
             }
+        }
+        if !parts.gradient {
+            for x in 0..sums.len() {
+                let nx = s.splat(n[x][p]);
+                for c in 0..C {
+                    sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
+                }
+            }
+            continue;
         }
         for x in 0..sums.len() {
             let (nx, dx) = (s.splat(n[x][p]), s.splat(dn[x][p]));
             for c in 0..C {
                 sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
-                if parts.gradient {
-                    sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);
-                }
+                sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);
             }
         }
     }

@@ -7,10 +7,11 @@ use super::blocks::{Quadratic, ScatterBlocks};
 use super::kernel::{Gather, Parts, Scatter, Window};
 use super::lanes::{LANES, Widest};
 use super::tangents::{AddTo, Form, Product};
+use crate::pooled;
 use bytemuck::Pod;
 
 /// A number of which fields are gathered and scattered, in double or in single precision.
-pub trait Laned: Widest + Pod + Send + Sync {
+pub trait Laned: Widest + Pod + Send + Sync + pooled::Number {
     /// The weights of all groups of a block.
     fn weights(groups: &Groups) -> &[[Self; LANES]];
 

@@ -42,6 +42,7 @@ use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::parallel::held;
+use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
@@ -88,12 +89,15 @@ pub struct Supports<const D: usize> {
     unit: Option<f64>,
     /// How often the sweeps have gone through all particles.
     passes: AtomicU64,
+    /// Where fields take their memory from.
+    pool: Pool,
 }
 
 impl<const D: usize> Clone for Supports<D> {
     fn clone(&self) -> Self {
-        let Self { way, nodes, unit, .. } = self;
-        Self { way: way.clone(), nodes: *nodes, unit: *unit, passes: AtomicU64::new(self.passes()) }
+        let Self { way, nodes, unit, pool, .. } = self;
+        let passes = AtomicU64::new(self.passes());
+        Self { way: way.clone(), nodes: *nodes, unit: *unit, passes, pool: pool.clone() }
     }
 }
 
@@ -221,7 +225,7 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, positions, None, precision)
+        Self::renewed(None, approximation, grid, positions, None, precision, &Pool::default())
     }
 
     /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
@@ -230,6 +234,7 @@ impl<const D: usize> Supports<D> {
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::pooled::Pool;
     /// use bfree::solver::Precision;
     /// use bfree::tensor::Vector;
     ///
@@ -239,7 +244,7 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double)?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double, &Pool::default())?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction(nodes.len(), 1);
@@ -256,6 +261,7 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         ids: Option<&[u32]>,
         precision: Precision,
+        pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
@@ -265,11 +271,16 @@ impl<const D: usize> Supports<D> {
                     Way::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
-                Ok((Self::of_way(Way::Tiled(tiled), &nodes, single.then_some(grid.spacing)), nodes))
+                Ok((Self::of_way(Way::Tiled(tiled), &nodes, single.then_some(grid.spacing), pool), nodes))
             }
-            _ => Self::plain(approximation, grid, positions).map_err(|SupportError { particle, source }| {
-                SupportError { particle: ids.map_or(particle, |ids| ids[particle] as usize), source }
-            }),
+            _ => {
+                let by_id = |SupportError { particle, source }| SupportError {
+                    particle: ids.map_or(particle, |ids| ids[particle] as usize),
+                    source,
+                };
+                let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
+                Ok((Self::of_way(Way::Plain(plain), &nodes, None, pool), nodes))
+            }
         }
     }
 
@@ -306,11 +317,21 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
-        Ok((Self::of_way(Way::Plain(plain), &nodes, None), nodes))
+        Ok((Self::of_way(Way::Plain(plain), &nodes, None, &Pool::default()), nodes))
     }
 
-    fn of_way(way: Way<D>, nodes: &Nodes, unit: Option<f64>) -> Self {
-        Self { way, nodes: nodes.len(), unit, passes: AtomicU64::new(0) }
+    fn of_way(way: Way<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
+        Self { way, nodes: nodes.len(), unit, passes: AtomicU64::new(0), pool: pool.clone() }
+    }
+
+    /// A nodal field of zeros, one entry for each active node.
+    pub(crate) fn field<T: Element + num_traits::Zero>(&self) -> Pooled<T> {
+        self.pool.filled(self.nodes, T::zero())
+    }
+
+    /// Where fields take their memory from.
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.pool
     }
 
     /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in

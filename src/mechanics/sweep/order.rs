@@ -2,7 +2,6 @@
 
 use crate::grid::Grid;
 use crate::parallel;
-use crate::pooled::{Element, Pooled, kept_as_it_is};
 use crate::tensor::Vector;
 
 /// Edge of a block in cells: in 3D its box of nodes, gathered and scattered, stays in the first-level cache.
@@ -28,17 +27,14 @@ pub(super) struct Key {
     pub(super) particle: u32,
 }
 
-kept_as_it_is!(Key);
-
 /// All particles by block, cell and id, which without `ids` is their place in memory; or the particle of the smallest id that lies in
-/// no cell. Particles come in the order `before`, if there is one for as many, such as that of the last step: the nearer it is, the
-/// sooner they are sorted.
+/// no cell. `keys` may be those of the last step: the nearer their order is, the sooner they are sorted.
 pub(super) fn sorted<const D: usize>(
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
     ids: Option<&[u32]>,
-    before: Option<impl Iterator<Item = u32>>,
-) -> Result<Pooled<Key>, usize> {
+    mut keys: Vec<Key>,
+) -> Result<Vec<Key>, usize> {
     let edge = edge(D);
     let blocks: [u64; D] = std::array::from_fn(|k| u64::from(grid.cells[k]).div_ceil(edge));
     let place = |p: u32| {
@@ -52,10 +48,9 @@ pub(super) fn sorted<const D: usize>(
         Some(block * cells::<D>() + local)
     };
     let key_of = |particle: u32| Key { cell: 0, id: ids.map_or(particle, |ids| ids[particle as usize]), particle };
-    let mut keys = Pooled::filled(positions.len(), key_of(0));
-    match before {
-        Some(order) => keys.iter_mut().zip(order).for_each(|(to, p)| *to = key_of(p)),
-        None => keys.iter_mut().zip(0..).for_each(|(to, p)| *to = key_of(p)),
+    match keys.len() == positions.len() {
+        true => keys.iter_mut().for_each(|key| *key = key_of(key.particle)),
+        false => keys = (0..positions.len() as u32).map(key_of).collect(),
     }
     parallel::for_each(keys.chunks_mut(RUN), |keys| {
         for key in keys {

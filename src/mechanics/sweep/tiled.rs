@@ -5,10 +5,10 @@
 
 use super::SupportError;
 use super::block::Block;
-use super::builder::{block, number};
+use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::lanes::LANES;
-use super::order;
+use super::order::{self, Key};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
@@ -17,11 +17,16 @@ use crate::tensor::Vector;
 use std::sync::{Mutex, PoisonError};
 
 /// Shape functions of all particles, by axis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
     /// Slot of each particle, eight for each group: group · 8 + lane.
     slots: Vec<u32>,
+    /// The particles in their order.
+    keys: Vec<Key>,
+    /// What the nodes were numbered by, and what came out: memory for the next step.
+    rows: Vec<Row>,
+    nodes: Nodes,
 }
 
 impl<const D: usize> Tiled<D> {
@@ -44,13 +49,11 @@ impl<const D: usize> Tiled<D> {
             let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((id(particle), source));
             SupportError { particle, source }
         };
-        let spare = spare.filter(|spare| spare.particles() == positions.len());
-        let before = spare.as_ref().map(Self::order);
-        let keys = order::sorted(grid, positions, ids, before).map_err(|particle| {
+        let Self { mut blocks, mut slots, keys, mut rows, nodes } = spare.unwrap_or_default();
+        let keys = order::sorted(grid, positions, ids, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
         })?;
-        let (mut blocks, mut slots) = spare.map_or_else(Default::default, |spare| (spare.blocks, spare.slots));
         let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
         blocks.resize_with(runs().count(), Block::default);
         let (family, failed) = (Family::new(product), Mutex::new(None));
@@ -68,7 +71,7 @@ impl<const D: usize> Tiled<D> {
             block.groups.first = first;
             first += block.groups.len();
         }
-        let nodes = number(grid, &mut blocks);
+        let nodes = number(grid, &mut blocks, &mut rows, nodes.into_spare());
         slots.resize(positions.len(), 0);
         for block in &blocks {
             for group in (0..block.groups.len()).map(|group| block.groups.group(group)) {
@@ -77,7 +80,7 @@ impl<const D: usize> Tiled<D> {
                 }
             }
         }
-        Ok((Self { blocks, slots }, nodes))
+        Ok((Self { blocks, slots, keys, rows, nodes: nodes.clone() }, nodes))
     }
 
     pub(super) fn particles(&self) -> usize {
@@ -86,18 +89,12 @@ impl<const D: usize> Tiled<D> {
 
     /// The particles, block by block and group by group.
     pub(super) fn order(&self) -> impl Iterator<Item = u32> {
-        self.blocks.iter().flat_map(|block| block.groups.in_order())
+        self.keys.iter().map(|key| key.particle)
     }
 
     /// As if particles had been put in [`Self::order`], for the next step to start from.
     pub(super) fn rearrange(&mut self) {
-        let mut next = 0..;
-        for block in &mut self.blocks {
-            let groups = &mut block.groups;
-            for (window, particles) in groups.windows.iter().zip(&mut groups.particles) {
-                particles[..usize::from(window.lanes)].iter_mut().zip(&mut next).for_each(|(p, place)| *p = place);
-            }
-        }
+        self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
     }
 
     /// Number of groups.

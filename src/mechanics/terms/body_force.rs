@@ -34,7 +34,7 @@ impl<const D: usize> BodyForce<D> {
         if loads.gravity.is_none() && loads.field.is_none() {
             return None;
         }
-        let mut force = Pooled::filled(step.supports.nodes(), Vector::zeros());
+        let mut force: Pooled<Vector<f64, D>> = step.supports.field();
         if let Some(gravity) = &loads.gravity {
             // Σ_p m b N_I = m_I b: gravity is uniform, so the lumped mass already holds the sum.
             let b = gravity.acceleration * gravity.curve.value(step.time);

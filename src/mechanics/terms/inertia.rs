@@ -27,8 +27,8 @@ impl<'a, const D: usize> Inertia<'a, D> {
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
             let state = nodal.velocity.iter().zip(&nodal.acceleration);
-            let of_nodes: Pooled<_> = state.map(|(v, a)| alphas.predicted(v, a)).collect();
-            predicted = Pooled::filled(mass.particles.len(), Vector::zeros());
+            let of_nodes = mass.supports.pool().collect(state.map(|(v, a)| alphas.predicted(v, a)));
+            predicted = mass.supports.pool().filled(mass.particles.len(), Vector::zeros());
             mass.supports.each_value(&of_nodes, |p, value| predicted[p] = value);
         }
         Some(Self { mass, nodal, alphas, predicted })

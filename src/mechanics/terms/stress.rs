@@ -4,7 +4,7 @@ use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, 
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Supports, add_quadratic};
-use crate::pooled::{Element, Pooled};
+use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 
 /// Σ_p V₀ F S F_nᵀ ∇_n N_I
@@ -29,14 +29,11 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         dphi: &[Vector<f64, D>],
         part: Part,
         unit: Unit,
-    ) -> Result<FrozenStress<X>, Inadmissible>
-    where
-        [X; LANES]: Element,
-    {
+    ) -> Result<FrozenStress<X>, Inadmissible>     {
         let form = self.laws.form();
         let count = form.rows(D);
         let factor = 1.0 / (unit.scale * unit.length * unit.length);
-        let mut rows = Pooled::unspecified(self.supports.groups() * count, [X::zero(); LANES]);
+        let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [X::zero(); LANES]);
         let evaluate = self.laws.tangents(part, form, factor);
         let failure = std::sync::Mutex::new(None::<Inadmissible>);
         self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
@@ -129,10 +126,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
 }
 
 /// δσ = 𝔸 : L at all particles, a lane each.
-pub(super) struct FrozenStress<X: Laned>
-where
-    [X; LANES]: Element,
-{
+pub(super) struct FrozenStress<X: Laned> {
     form: Form,
     rows: Pooled<[X; LANES]>,
     /// In which gradients are taken.
@@ -141,10 +135,7 @@ where
     factor: f64,
 }
 
-impl<X: Laned> FrozenStress<X>
-where
-    [X; LANES]: Element,
-{
+impl<X: Laned> FrozenStress<X> {
     pub(super) fn times(self, factor: f64) -> Self {
         Self { factor: factor * self.factor, ..self }
     }
@@ -155,10 +146,7 @@ where
     }
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X>
-where
-    [X; LANES]: Element,
-{
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X> {
     fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
         let factor = X::lit(self.factor);
         Some((

@@ -15,7 +15,7 @@ impl<const D: usize> Traction<D> {
         let mut force = None;
         for load in &step.loads.surface {
             let Pressing::Traction(traction) = load.pressing else { continue };
-            let force = force.get_or_insert_with(|| Pooled::filled(step.supports.nodes(), Vector::zeros()));
+            let force = force.get_or_insert_with(|| step.supports.field::<Vector<f64, D>>());
             let traction = traction * load.curve.value(step.time);
             for point in &load.points {
                 for (node, n, _) in step.supports.of(point.particle) {

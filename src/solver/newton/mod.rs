@@ -12,11 +12,11 @@ pub use failure::{LinearSolverFailure, NewtonError, NewtonFailure};
 pub use report::{Convergence, Merit, NewtonCounts, NewtonHistory, NewtonIteration, NewtonReport};
 pub use settings::{Krylov, NewtonSettings, Precision};
 
-use super::NonlinearProblem;
 use super::forcing::Progress;
 use super::vector::{dot, norm};
-use crate::pooled::Pooled;
-use linear::{SINGLE_TOLERANCE, solve, solve_single};
+use super::{NonlinearProblem, Preconditioner};
+use crate::pooled::Pool;
+use linear::{SINGLE_TOLERANCE, Solved, solve};
 use search::{Search, Step, search};
 
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
@@ -34,7 +34,7 @@ const DIVERGED: f64 = 1e8;
 /// Solves R(x) = 0 from the initial guess `x`.
 ///
 /// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude), the magnitude being that of the initial guess.
-/// 2. K = linearize(x).
+/// 2. K = linearize(x), of which the preconditioner is told.
 /// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`](super::Forcing), at least 1e-5 in single precision. A
 ///    solve that ends early is still used if it is below 0.9.
 /// 4. s = 1.
@@ -52,27 +52,31 @@ const DIVERGED: f64 = 1e8;
 ///
 /// # Errors
 /// See [`NewtonFailure`]; the history so far comes with it.
-pub fn newton<P: NonlinearProblem>(
-    problem: &P,
+pub fn newton<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
+    preconditioner: &mut dyn Preconditioner,
     x: &mut [f64],
     settings: &NewtonSettings,
-) -> Result<NewtonReport, NewtonError<P::Inadmissible>> {
+    workspace: &Pool,
+) -> Result<NewtonReport, NewtonError<E>> {
     let mut history = NewtonHistory::default();
-    match iterate(problem, x, settings, &mut history) {
+    match iterate(problem, preconditioner, x, settings, workspace, &mut history) {
         Ok(convergence) => Ok(NewtonReport { convergence, history }),
         Err(cause) => Err(NewtonError { cause, history: Box::new(history) }),
     }
 }
 
-fn iterate<P: NonlinearProblem>(
-    problem: &P,
+fn iterate<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
+    preconditioner: &mut dyn Preconditioner,
     x: &mut [f64],
     settings: &NewtonSettings,
+    workspace: &Pool,
     history: &mut NewtonHistory,
-) -> Result<Convergence, NewtonFailure<P::Inadmissible>> {
+) -> Result<Convergence, NewtonFailure<E>> {
     settings.check()?;
     let n = x.len();
-    let [mut r, mut d, mut trial, mut r_trial] = std::array::from_fn(|_| Pooled::filled(n, 0.0));
+    let [mut r, mut trial, mut r_trial] = std::array::from_fn(|_| workspace.filled(n, 0.0));
 
     history.counts.residuals += 1;
     problem.residual(x, &mut r).map_err(|source| NewtonFailure::Inadmissible { iteration: 0, source })?;
@@ -89,6 +93,7 @@ fn iterate<P: NonlinearProblem>(
     let mut residual = first;
     let mut progress = None;
     let mut stalled = 0;
+    let mut single = settings.precision == Precision::Mixed;
     loop {
         if residual <= target {
             return Ok(Convergence::Tolerance);
@@ -99,22 +104,24 @@ fn iterate<P: NonlinearProblem>(
         }
         let mut forcing = settings.forcing.next(progress, target / residual);
         let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
+        let tangent = if single { problem.linearize_single(x).map_err(inadmissible)? } else { None };
+        single = tangent.is_some();
         let mut solved = None;
-        if settings.precision == Precision::Mixed
-            && let Some(tangent) = problem.linearize_single(x).map_err(inadmissible)?
-        {
+        if let Some(tangent) = tangent {
             history.counts.linearizations += 1;
+            preconditioner.prepare(&*tangent);
             let reachable = forcing.max(SINGLE_TOLERANCE);
             // What single precision cannot solve, double precision may.
-            solved = solve_single(tangent.as_ref(), &r, &mut d, reachable, settings, &mut history.counts).ok();
+            solved = solve::<f32>(&*tangent, preconditioner, &r, reachable, settings, &mut history.counts).ok();
             forcing = if solved.is_some() { reachable } else { forcing };
         }
-        let (krylov, negative_curvature) = match solved {
+        let Solved { step, krylov, negative_curvature } = match solved {
             Some(solved) => solved,
             None => {
                 history.counts.linearizations += 1;
                 let tangent = problem.linearize(x).map_err(inadmissible)?;
-                match solve(&tangent, &r, &mut d, forcing, settings, &mut history.counts) {
+                preconditioner.prepare(&*tangent);
+                match solve::<f64>(&*tangent, preconditioner, &r, forcing, settings, &mut history.counts) {
                     Ok(solved) => solved,
                     Err(source) => {
                         // What is left of R may be nothing that K could have made.
@@ -128,7 +135,7 @@ fn iterate<P: NonlinearProblem>(
                 }
             }
         };
-        let at = Step { x, d: &d, residual, slope: dot(&r, &d), linear: krylov.relative_residual };
+        let at = Step { x, d: &step, residual, slope: dot(&r, &step), linear: krylov.relative_residual };
         let round_off = ROUND_OFF_MULTIPLE * floor * first_magnitude;
         let searched = search(problem, &at, settings, round_off, &mut trial, &mut r_trial, &mut history.counts);
         let accepted = match searched {

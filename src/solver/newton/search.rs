@@ -57,15 +57,15 @@ pub(super) enum Search<E> {
 }
 
 /// Steps 4 to 6.
-pub(super) fn search<P: NonlinearProblem>(
-    problem: &P,
+pub(super) fn search<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
     at: &Step,
     settings: &NewtonSettings,
     round_off: f64,
     trial: &mut [f64],
     r_trial: &mut [f64],
     counts: &mut NewtonCounts,
-) -> Search<P::Inadmissible> {
+) -> Search<E> {
     let mut failed = Failed { trials: 0, shortest: 1.0, inadmissible: 0, not_finite: 0, last: None };
     let mut potential = PotentialDecrease { start: None };
     let mut length = 1.0;
@@ -109,9 +109,9 @@ struct PotentialDecrease {
 
 impl PotentialDecrease {
     /// Π(x + s d) ≤ Π(x) + c s R·d + round-off, for a predicted decrease −s R·d above that round-off.
-    fn suffices<P: NonlinearProblem>(
+    fn suffices<E: std::error::Error + 'static>(
         &mut self,
-        problem: &P,
+        problem: &dyn NonlinearProblem<Inadmissible = E>,
         at: &Step,
         length: f64,
         trial: &[f64],

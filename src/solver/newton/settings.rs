@@ -5,23 +5,38 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Restart of the GMRES that takes over from conjugate gradients.
-pub(super) const FALLBACK_RESTART: usize = 30;
+pub(super) const FALLBACK_RESTART: u32 = 30;
 
-/// The method for the linear systems of Newton's method.
+/// The Krylov method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(rename = "Method")]
 pub enum Krylov {
     /// Restarted GMRES, for any tangent.
     Gmres {
-        /// Iterations between restarts, at least 1; as many vectors are kept.
-        restart: usize,
+        /// Basis vectors kept before a restart, 1 to 1000. Default 30.
+        #[serde(default = "Krylov::default_restart")]
+        #[schemars(range(min = 1, max = 1000))]
+        restart: u32,
     },
-    /// Conjugate gradients, for symmetric tangents; where one turns out not to be positive definite, GMRES(30) solves
-    /// that system instead.
+    /// Conjugate gradients, for symmetric tangents: not with pressures. Where one turns out not to be positive definite, GMRES(30)
+    /// solves that system instead.
     ConjugateGradient,
 }
 
-/// The numbers of Krylov vectors, tangent products and preconditioner. Everything else is always in double precision.
+impl Krylov {
+    fn default_restart() -> u32 {
+        FALLBACK_RESTART
+    }
+}
+
+impl Default for Krylov {
+    fn default() -> Self {
+        Self::Gmres { restart: FALLBACK_RESTART }
+    }
+}
+
+/// The numbers of Krylov vectors and tangent products. Everything else is always in double precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
@@ -35,8 +50,7 @@ pub enum Precision {
 }
 
 /// Settings of [`newton()`](crate::solver::newton()).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonSettings {
     /// Wanted ‖R‖ over that of the initial guess, in [0, 1).
     pub relative_tolerance: f64,
@@ -57,16 +71,17 @@ pub struct NewtonSettings {
     pub max_halvings: u32,
 }
 
+/// Those of a scene that says nothing.
 impl Default for NewtonSettings {
     fn default() -> Self {
         Self {
-            relative_tolerance: 1e-8,
+            relative_tolerance: 1e-9,
             floor: 4.0,
-            max_iterations: 50,
-            forcing: Forcing::Fixed(1e-8),
-            krylov: Krylov::Gmres { restart: FALLBACK_RESTART },
-            precision: Precision::Double,
-            max_krylov_iterations: 1000,
+            max_iterations: 30,
+            forcing: Forcing::default(),
+            krylov: Krylov::default(),
+            precision: Precision::default(),
+            max_krylov_iterations: 2000,
             max_halvings: 25,
         }
     }
@@ -79,7 +94,7 @@ impl NewtonSettings {
         InvalidSetting::check(floor >= 0.0 && floor.is_finite(), "floor", floor, "finite and at least 0")?;
         self.forcing.check()?;
         if let Krylov::Gmres { restart } = self.krylov {
-            InvalidSetting::check_restart(restart)?;
+            InvalidSetting::check_restart(restart as usize)?;
         }
         let krylov = self.max_krylov_iterations;
         InvalidSetting::check(krylov >= 1, "max_krylov_iterations", krylov as f64, "at least 1")?;

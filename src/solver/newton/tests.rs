@@ -1,7 +1,9 @@
 //! Facts about the iteration on small problems with known answers.
 
 use super::*;
+use crate::pooled::Pooled;
 use crate::solver::testing::Dense;
+use crate::solver::{BlockJacobi, DiagonalBlocks, LinearOperator, Linearization};
 use crate::solver::{Forcing, InvalidSetting, LinearOutcome, NonlinearProblem};
 
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -24,11 +26,6 @@ where
     K: Fn(&[f64]) -> Dense,
 {
     type Inadmissible = Outside;
-    type Tangent<'a>
-        = Dense
-    where
-        Self: 'a;
-
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Outside> {
         r.copy_from_slice(&(self.residual)(x)?);
         Ok(())
@@ -39,8 +36,8 @@ where
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Outside>> {
         (self.potential)(x).map(Ok)
     }
-    fn linearize(&self, x: &[f64]) -> Result<Dense, Outside> {
-        Ok((self.tangent)(x))
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Outside> {
+        Ok(Box::new((self.tangent)(x)))
     }
 }
 
@@ -125,6 +122,15 @@ fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmis
             })
         },
     }
+}
+
+/// With the diagonal as preconditioner.
+fn newton(
+    problem: &impl NonlinearProblem<Inadmissible = Outside>,
+    x: &mut [f64],
+    settings: &NewtonSettings,
+) -> Result<NewtonReport, NewtonError<Outside>> {
+    super::newton(problem, &mut BlockJacobi::<1>::default(), x, settings, &Pool::default())
 }
 
 fn solved(problem: &impl NonlinearProblem<Inadmissible = Outside>, x: &mut [f64]) -> NewtonReport {
@@ -324,6 +330,108 @@ fn failures_are_told_apart() {
 }
 
 #[test]
+fn a_step_must_do_a_part_of_what_it_promises() {
+    // A tangent too stiff: each step takes this part of the residual away. A ten thousandth of what is promised is enough.
+    for (part, enough) in [(1e-3, true), (1e-5, false)] {
+        let error = failure(&scalar(|x| Ok(x - 1.0), |_| 1.0 / part), &mut [0.0], &NewtonSettings::default());
+        assert_eq!(matches!(error.cause, NewtonFailure::Stagnated { .. }), enough, "{error:?}");
+        assert_eq!(matches!(error.cause, NewtonFailure::LineSearchFailed { trials: 26, .. }), !enough, "{error:?}");
+    }
+    // |R| never falls, and Π does so by this part of what its slope R·d promises.
+    for (part, enough) in [(1e-3, true), (1e-5, false)] {
+        let slope = Problem {
+            residual: |_: &[f64]| Ok(vec![-1.0]),
+            magnitude: |_: &[f64]| 1.0,
+            potential: move |x: &[f64]| Some((-part * x[0], part * x[0].abs())),
+            tangent: |_: &[f64]| Dense(vec![vec![1.0]]),
+        };
+        let error = failure(&slope, &mut [0.0], &NewtonSettings::default());
+        let accepted = error.history.iterations.iter().filter(|i| i.merit == Merit::Potential).count();
+        assert_eq!(accepted, if enough { 30 } else { 0 }, "{error:?}");
+    }
+}
+
+/// A problem with its tangent over `scale`, rounded to single precision.
+struct Rounded<P> {
+    problem: P,
+    scale: f64,
+}
+
+struct RoundedTangent<'a> {
+    exact: Box<dyn Linearization + 'a>,
+    scale: f64,
+}
+
+impl<P: NonlinearProblem> NonlinearProblem for Rounded<P> {
+    type Inadmissible = P::Inadmissible;
+
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible> {
+        self.problem.residual(x, r)
+    }
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible> {
+        self.problem.magnitude(x)
+    }
+    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>> {
+        self.problem.potential(x)
+    }
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Self::Inadmissible> {
+        self.problem.linearize(x)
+    }
+    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Self::Inadmissible> {
+        Ok(Some(Box::new(RoundedTangent { exact: self.problem.linearize(x)?, scale: self.scale })))
+    }
+}
+
+impl LinearOperator<f32> for RoundedTangent<'_> {
+    fn apply(&self, x: &[f32], y: &mut [f32]) {
+        let x: Vec<f64> = x.iter().map(|&x| f64::from(x)).collect();
+        let mut exact = vec![0.0; x.len()];
+        self.exact.apply(&x, &mut exact);
+        y.iter_mut().zip(exact).for_each(|(y, exact)| *y = (exact / self.scale) as f32);
+    }
+}
+
+impl DiagonalBlocks for RoundedTangent<'_> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        let mut blocks = self.exact.diagonal_blocks();
+        blocks.iter_mut().for_each(|entry| *entry /= self.scale);
+        blocks
+    }
+}
+
+impl Linearization<f32> for RoundedTangent<'_> {
+    fn scale(&self) -> f64 {
+        self.scale
+    }
+}
+
+#[test]
+fn single_precision_reaches_the_same_solution_in_any_units() {
+    let n = 12;
+    for krylov in [Krylov::Gmres { restart: 12 }, Krylov::ConjugateGradient] {
+        let double = NewtonSettings { krylov, ..NewtonSettings::default() };
+        let mixed = NewtonSettings { precision: Precision::Mixed, ..double };
+        // Single precision holds neither 3e40 nor 3e-50.
+        for force in [1.0, 2.0_f64.powi(134), 2.0_f64.powi(-166)] {
+            let problem = || springs(3.0 * force, 1.0, 1.2 * force, n);
+            let (mut exact, mut u) = (vec![0.0; n], vec![0.0; n]);
+            newton(&problem(), &mut exact, &double).unwrap();
+            let history = newton(&Rounded { problem: problem(), scale: force }, &mut u, &mixed).unwrap().history;
+            assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
+            assert!(history.iterations.iter().all(|i| i.forcing == 1e-5 && i.krylov.relative_residual <= 1e-5));
+            assert_eq!(history.counts.linearizations, history.iterations.len());
+            // Over a scale so large that nothing is left, there is no step in single precision.
+            let mut u = vec![0.0; n];
+            let nothing = Rounded { problem: problem(), scale: 1e100 * force };
+            let history = newton(&nothing, &mut u, &mixed).unwrap().history;
+            assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
+            assert!(history.iterations.iter().all(|i| i.forcing == 1e-8));
+            assert_eq!(history.counts.linearizations, 2 * history.iterations.len());
+        }
+    }
+}
+
+#[test]
 fn round_off_is_convergence_and_other_stagnation_is_not() {
     let settings = NewtonSettings { relative_tolerance: 0.0, ..NewtonSettings::default() };
     // x − 1 with a last step that cannot be taken: |R| never falls below `noise`.
@@ -349,13 +457,4 @@ fn nothing_to_do() {
     // At rest up to round-off: 0.1 + 0.2 − 0.3 of magnitude 0.6.
     let report = solved(&scalar(|_| Ok(0.1 + 0.2 - 0.3), |_| 1.0), &mut [0.0]);
     assert_eq!(report.history.counts.linearizations, 0);
-}
-
-#[test]
-fn settings_are_read_from_json_by_name() {
-    let read = |text| serde_json::from_str::<NewtonSettings>(text);
-    assert_eq!(read("{}").unwrap(), NewtonSettings::default());
-    let settings = read(r#"{"krylov": "conjugate_gradient", "forcing": {"fixed": 1e-3}}"#).unwrap();
-    assert_eq!((settings.krylov, settings.forcing), (Krylov::ConjugateGradient, Forcing::Fixed(1e-3)));
-    assert!(read(r#"{"tolerance": 1e-3}"#).is_err());
 }

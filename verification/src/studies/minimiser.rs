@@ -11,7 +11,8 @@ use argmin::solver::quasinewton::LBFGS;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
 use bfree::simulation::Simulation;
-use bfree::solver::{Forcing, NewtonSettings, NonlinearProblem, newton};
+use bfree::pooled::Pool;
+use bfree::solver::{BlockJacobi, Forcing, NewtonSettings, NonlinearProblem, newton};
 use bfree::tensor::Vector;
 
 /// What the study shows.
@@ -123,10 +124,16 @@ fn case(
     let start: Vec<f64> = bytemuck::cast_slice(&by_newton).to_vec();
     let settings =
         NewtonSettings { relative_tolerance: 1e-14, forcing: Forcing::Fixed(1e-10), ..NewtonSettings::default() };
-    let newton = newton(&equilibrium, bytemuck::cast_slice_mut(&mut by_newton), &settings)?;
+    let newton = newton(
+        &equilibrium,
+        &mut BlockJacobi::<2>::default(),
+        bytemuck::cast_slice_mut(&mut by_newton),
+        &settings,
+        &Pool::default(),
+    )?;
     let by_newton: &[f64] = bytemuck::cast_slice(&by_newton);
 
-    let diagonal = equilibrium.linearize(&start)?.diagonal_blocks();
+    let diagonal = equilibrium.tangent(bytemuck::cast_slice(&start))?.diagonal_blocks();
     let scale: Vec<f64> = diagonal.iter().flat_map(|block| [block[(0, 0)], block[(1, 1)]]).map(|k| k.powf(-0.5)).collect();
     let problem = Potential { equilibrium: &equilibrium, scale: &scale, start: potential(&equilibrium, &start)?.0 };
     let y: Vec<f64> = start.iter().zip(&scale).map(|(x, s)| x / s).collect();
@@ -148,7 +155,7 @@ fn case(
 
     let difference: Vec<f64> = found.iter().zip(by_newton).map(|(a, b)| a - b).collect();
     let mut k_e = vec![0.0; difference.len()];
-    bfree::solver::LinearOperator::apply(&equilibrium.linearize(by_newton)?, &difference, &mut k_e);
+    equilibrium.linearize(by_newton)?.apply(&difference, &mut k_e);
     let energy_norm = bfree::solver::vector::dot(&difference, &k_e).max(0.0).sqrt();
     let (least, magnitude) = potential(&equilibrium, by_newton)?;
     let round_off = round_off(simulation.particles.len() + prepared.nodes.len());

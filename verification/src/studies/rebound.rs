@@ -11,7 +11,8 @@ use bfree::mechanics::residual::Carry;
 use bfree::mechanics::time::{Alphas, Newmark};
 use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{Simulation, StepReport};
-use bfree::solver::newton;
+use bfree::pooled::Pool;
+use bfree::solver::{BlockJacobi, newton};
 use bfree::tensor::Vector;
 use plotters::prelude::SeriesLabelPosition;
 use rayon::prelude::*;
@@ -100,7 +101,13 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let equilibrium = prepared.equilibrium(simulation);
     let mut dphi = vec![Vector::zeros(); prepared.nodes.len()];
     prepared.prescribe(&mut dphi);
-    newton(&equilibrium, bytemuck::cast_slice_mut(&mut dphi), &settings.newton)?;
+    newton(
+        &equilibrium,
+        &mut BlockJacobi::<2>::default(),
+        bytemuck::cast_slice_mut(&mut dphi),
+        &settings.newton,
+        &Pool::default(),
+    )?;
 
     // M̃ a_n + f_n: the residual at Δφ = 0 and a = a_n. Walls at rest do no work.
     let at_rest = vec![Vector::zeros(); dphi.len()];

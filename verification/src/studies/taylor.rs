@@ -9,7 +9,8 @@ use crate::shipped;
 use bfree::mechanics::residual::{Carry, Equilibrium};
 use bfree::simulation::Simulation;
 use bfree::material::Material;
-use bfree::solver::newton;
+use bfree::pooled::Pool;
+use bfree::solver::{BlockJacobi, newton};
 use bfree::tensor::Vector;
 use num_dual::Dual2_64;
 
@@ -79,7 +80,13 @@ impl Study {
         let equilibrium = prepared.equilibrium(&simulation);
         let mut x = vec![Vector::zeros(); prepared.nodes.len()];
         prepared.prescribe(&mut x);
-        newton(&equilibrium, bytemuck::cast_slice_mut(&mut x), &simulation.settings.newton)?;
+        newton(
+            &equilibrium,
+            &mut BlockJacobi::<D>::default(),
+            bytemuck::cast_slice_mut(&mut x),
+            &simulation.settings.newton,
+            &Pool::default(),
+        )?;
         // A deformation of some percent at random, so that no term is at rest.
         let mut random = Random::new(3);
         let size = 0.02 * simulation.grid.spacing;

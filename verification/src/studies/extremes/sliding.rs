@@ -11,7 +11,8 @@ use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::mechanics::tangent::Tangent;
 use bfree::material::Material;
 use bfree::simulation::Simulation;
-use bfree::solver::{GmresSettings, Identity, LinearOperator, NonlinearProblem, Preconditioner, gmres};
+use bfree::pooled::Pool;
+use bfree::solver::{BlockJacobi, GmresSettings, Identity, LinearOperator, NonlinearProblem, Preconditioner, gmres};
 use bfree::tensor::{Tensor, Vector};
 use nalgebra::{DMatrix, SymmetricEigen};
 use plotters::prelude::SeriesLabelPosition;
@@ -146,16 +147,17 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<Solved, St
     let dphi = vec![0.0; 2 * prepared.nodes.len()];
     let mut right = dphi.clone();
     NonlinearProblem::residual(&equilibrium, &dphi, &mut right)?;
-    let tangent = equilibrium.linearize(&dphi)?;
-    let diagonal = Diagonal::new(&tangent);
+    let tangent = equilibrium.tangent(bytemuck::cast_slice(&dphi))?;
+    let (diagonal, mut blocks) = (Diagonal::new(&tangent), BlockJacobi::<2>::default());
+    blocks.prepare(&tangent);
     let settings = GmresSettings { relative_tolerance: TOLERANCE, max_iterations: 10_000, restart: 200 };
-    let iterations = |with: &dyn Preconditioner| -> Result<f64, StudyError> {
+    let iterations = |with: &dyn LinearOperator| -> Result<f64, StudyError> {
         let mut solution = dphi.clone();
-        let report = gmres(&tangent, with, &right, &mut solution, &settings)?;
+        let report = gmres(&tangent, with, &right, &mut solution, &settings, &Pool::default())?;
         // Where the tolerance is not met there is no number of iterations that does.
         Ok(if report.converged() { report.iterations as f64 } else { f64::NAN })
     };
-    let iterations = [iterations(&Identity)?, iterations(&diagonal)?, iterations(&tangent)?];
+    let iterations = [iterations(&Identity)?, iterations(&diagonal)?, iterations(&blocks)?];
     let matrix = dense(&tangent, dphi.len());
     let conditions = Scaling::ALL.map(|scaling| condition(&matrix, scaling));
     Ok(Solved { iterations, conditions })
@@ -170,8 +172,8 @@ impl Diagonal {
     }
 }
 
-impl Preconditioner for Diagonal {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
+impl LinearOperator for Diagonal {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
         for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.0) {
             *z = r * inverse;
         }

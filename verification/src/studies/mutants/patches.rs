@@ -7,13 +7,15 @@ pub(super) enum Check {
     Study(&'static str),
     /// A module of the library's test program, by the beginning of its tests' names.
     Test(&'static str),
+    /// A module of the library's unit tests, likewise.
+    Unit(&'static str),
 }
 
 impl Check {
     /// What it is called on the command line.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Self::Study(name) | Self::Test(name) => name,
+            Self::Study(name) | Self::Test(name) | Self::Unit(name) => name,
         }
     }
 }
@@ -28,9 +30,10 @@ const POINTS: Check = Check::Test("points::");
 const LOADS: Check = Check::Test("loads::");
 const SHAPES: Check = Check::Test("approximation::");
 const SMOOTH: Check = Check::Test("smoothing::");
+const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
-pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH];
+pub(super) const CHECKS: &[Check] = &[TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH, SOLVER];
 
 /// What is to become of a patch.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +79,13 @@ const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
 const MATERIAL: &str = "src/material/mod.rs";
 const TENSOR: &str = "src/tensor.rs";
+const GMRES: &str = "src/solver/gmres.rs";
+const CONJUGATE: &str = "src/solver/conjugate_gradient.rs";
+const VECTORS: &str = "src/solver/vector.rs";
+const FORCING: &str = "src/solver/forcing.rs";
+const SEARCH: &str = "src/solver/newton/search.rs";
+const LINEAR: &str = "src/solver/newton/linear.rs";
+const BLOCKS: &str = "src/solver/preconditioner/block_jacobi.rs";
 
 use Fate::{Equivalent, Killed};
 
@@ -158,7 +168,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "w * contract(a, &l) - a * (l.transpose() * w)",
         "w * contract(a, &l) + a * (l.transpose() * w)",
         Killed(&[TANGENT], &[DYNAMICS])),
-    patch("another limit of singular diagonal blocks", PRODUCT,
+    patch("another limit of singular diagonal blocks", BLOCKS,
         "determinant(&unit).abs() > 1e-12",
         "determinant(&unit).abs() > 1e-9",
         Equivalent("only the preconditioner of ill-shaped blocks")),
@@ -350,4 +360,48 @@ pub(super) const PATCHES: &[Patch] = &[
         "[values[M], values[M + 1]] = [above, below];",
         "[values[M], values[M + 1]] = [below, below];",
         Killed(&[PATCH, SHAPES, POINTS], &[DIGITS])),
+    patch("sign in a Givens rotation", GMRES,
+        "c * diagonal + s * next",
+        "c * diagonal - s * next",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("a restart forgets the solution so far", GMRES,
+        "trial.copy_from_slice(solution);",
+        "trial.fill(S::zero());",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("a cycle that is too short is not followed by a longer one", GMRES,
+        "promised > TOO_SHORT * before",
+        "promised > before",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("an exhausted Krylov space goes on", GMRES,
+        "left <= exhausted_below * w_norm",
+        "left < 0.0",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("the inverse of beta in conjugate gradients", CONJUGATE,
+        "rz_new / rz",
+        "rz / rz_new",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("the first chunk left out of a dot product on several threads", VECTORS,
+        "parallel::map(x.chunks(CHUNK).zip(y.chunks(CHUNK)), |(x, y)| dot_chunk(x, y)).iter().sum()",
+        "parallel::map(x.chunks(CHUNK).zip(y.chunks(CHUNK)), |(x, y)| dot_chunk(x, y)).iter().skip(1).sum()",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("forcing by the ratio of residuals, not its square", FORCING,
+        "GAMMA * last.ratio * last.ratio",
+        "GAMMA * last.ratio",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("any fall of the residual is accepted", SEARCH,
+        "(1.0 - SUFFICIENT * length * (1.0 - at.linear)) * at.residual",
+        "at.residual",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("any fall of the potential is accepted", SEARCH,
+        "start - SUFFICIENT * predicted + round_off",
+        "start + round_off",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("steps of single precision in its own units", LINEAR,
+        "size / tangent.scale()",
+        "size",
+        Killed(&[SOLVER], &[POINTS])),
+    patch("new diagonal blocks at every tangent", BLOCKS,
+        "self.inverse.is_empty()",
+        "true",
+        Killed(&[SOLVER], &[POINTS])),
 ];

@@ -176,14 +176,23 @@ const STUDIES: &str = "verification";
 /// The test program of the library.
 const SUITE: &str = "suite";
 
+/// The program of its unit tests.
+const UNITS: &str = "bfree";
+
 fn build(source: &Path, target: &Path) -> Result<Programs, ShippedFaultError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--locked", "--message-format", "json"]);
-    command.args(["-p", "bfree", "-p", STUDIES, "--bin", STUDIES, "--test", SUITE]);
-    let messages = output(command.arg("--target-dir").arg(target).current_dir(source))?;
-    let artifacts = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let built = |what: &[&str]| {
+        let mut command = Command::new(&cargo);
+        command.args(what).args(["-p", "bfree", "--release", "--locked", "--message-format", "json"]);
+        output(command.arg("--target-dir").arg(target).current_dir(source))
+    };
+    let programs = built(&["build", "-p", STUDIES, "--bin", STUDIES, "--test", SUITE])?;
+    let messages = [programs, built(&["test", "--no-run", "--lib"])?];
+    let artifacts = messages.iter().flat_map(|text| text.lines());
+    let artifacts = artifacts.filter_map(|line| serde_json::from_str::<Value>(line).ok());
     Ok(artifacts
+        // Not the program of the library, which has its name.
+        .filter(|artifact| artifact["profile"]["test"] == true || artifact["target"]["name"] == STUDIES)
         .filter_map(|artifact| {
             let program = artifact["executable"].as_str()?;
             Some((artifact["target"]["name"].as_str()?.to_string(), PathBuf::from(program)))
@@ -217,6 +226,7 @@ fn attempt(programs: &Programs, source: &Path, check: Check, number: usize) -> R
     let (name, arguments): (&'static str, &[&str]) = match check {
         Check::Study(study) => (STUDIES, &[study]),
         Check::Test(module) => (SUITE, &[module, "--quiet"]),
+        Check::Unit(module) => (UNITS, &[module, "--quiet"]),
     };
     let program = programs.get(name).ok_or(ShippedFaultError::NotBuilt { name })?;
     let mut command = Command::new(program);

@@ -1,6 +1,7 @@
 //! Products with the tangent by differences of the residual, as Jacobian-free Newton–Krylov methods make them.
 
-use bfree::solver::{LinearOperator, NonlinearProblem, Preconditioner};
+use bfree::pooled::Pooled;
+use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
 
 /// A problem whose tangent is known through its residual only; the blocks of the exact one precondition it.
 pub(super) struct Difference<'a, P> {
@@ -10,9 +11,9 @@ pub(super) struct Difference<'a, P> {
 }
 
 /// K u ≈ [R(x + δ u/‖u‖) − R(x)] ‖u‖/δ
-pub(super) struct DifferenceTangent<'a, P: NonlinearProblem + 'a> {
+struct DifferenceTangent<'a, P> {
     problem: &'a P,
-    exact: P::Tangent<'a>,
+    exact: Box<dyn Linearization + 'a>,
     length: f64,
     x: Vec<f64>,
     r: Vec<f64>,
@@ -35,18 +36,14 @@ impl<P: NonlinearProblem> LinearOperator for DifferenceTangent<'_, P> {
     }
 }
 
-impl<P: NonlinearProblem> Preconditioner for DifferenceTangent<'_, P> {
-    fn precondition(&self, r: &[f64], z: &mut [f64]) {
-        self.exact.precondition(r, z);
+impl<P> DiagonalBlocks for DifferenceTangent<'_, P> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        self.exact.diagonal_blocks()
     }
 }
 
 impl<P: NonlinearProblem> NonlinearProblem for Difference<'_, P> {
     type Inadmissible = P::Inadmissible;
-    type Tangent<'a>
-        = DifferenceTangent<'a, P>
-    where
-        Self: 'a;
 
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible> {
         self.problem.residual(x, r)
@@ -60,15 +57,10 @@ impl<P: NonlinearProblem> NonlinearProblem for Difference<'_, P> {
         self.problem.potential(x)
     }
 
-    fn linearize(&self, x: &[f64]) -> Result<Self::Tangent<'_>, Self::Inadmissible> {
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Self::Inadmissible> {
         let mut r = vec![0.0; x.len()];
         self.problem.residual(x, &mut r)?;
-        Ok(DifferenceTangent {
-            problem: self.problem,
-            exact: self.problem.linearize(x)?,
-            length: self.length,
-            x: x.to_vec(),
-            r,
-        })
+        let (problem, length, exact) = (self.problem, self.length, self.problem.linearize(x)?);
+        Ok(Box::new(DifferenceTangent { problem, exact, length, x: x.to_vec(), r }))
     }
 }

@@ -11,9 +11,10 @@ use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::material::Material;
+use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, Preconditioner, gmres, newton,
 };
 use bfree::tensor::Vector;
 use difference::Difference;
@@ -184,12 +185,12 @@ impl Study {
                 krylov: Krylov::Gmres { restart: 200 },
                 ..simulation.settings.newton
             };
-            let mut x = start.to_vec();
+            let (mut x, mut blocks, pool) = (start.to_vec(), BlockJacobi::<2>::default(), Pool::default());
             let history = match method.product {
-                Product::Exact => newton(&equilibrium, &mut x, &settings).map(|r| r.history).map_err(|e| (e.cause.to_string(), e.history)),
+                Product::Exact => newton(&equilibrium, &mut blocks, &mut x, &settings, &pool).map(|r| r.history).map_err(|e| (e.cause.to_string(), e.history)),
                 Product::Difference(step) => {
                     let length = step * simulation.grid.spacing;
-                    newton(&Difference { problem: &equilibrium, length }, &mut x, &settings)
+                    newton(&Difference { problem: &equilibrium, length }, &mut blocks, &mut x, &settings, &pool)
                         .map(|r| r.history)
                         .map_err(|e| (e.cause.to_string(), e.history))
                 }
@@ -400,7 +401,7 @@ impl Study {
 const ROUND_OFF: f64 = 64.0;
 
 /// ‖R‖ before and after one full Newton step from `x`, its linear system solved as tightly as possible.
-fn step<P: NonlinearProblem>(problem: &P, mut x: Vec<f64>) -> Result<(f64, f64), StudyError> {
+fn step<E: std::error::Error + 'static>(problem: &dyn NonlinearProblem<Inadmissible = E>, mut x: Vec<f64>) -> Result<(f64, f64), StudyError> {
     let mut r = vec![0.0; x.len()];
     problem.residual(&x, &mut r)?;
     let before = norm(&r);
@@ -409,7 +410,9 @@ fn step<P: NonlinearProblem>(problem: &P, mut x: Vec<f64>) -> Result<(f64, f64),
         let rhs: Vec<f64> = r.iter().map(|r| -r).collect();
         let mut d = vec![0.0; x.len()];
         let settings = GmresSettings { relative_tolerance: 1e-13, restart: 200, max_iterations: 400 };
-        gmres(&tangent, &tangent, &rhs, &mut d, &settings)?;
+        let mut blocks = BlockJacobi::<2>::default();
+        blocks.prepare(&*tangent);
+        gmres(&*tangent, &blocks, &rhs, &mut d, &settings, &Pool::default())?;
         x.iter_mut().zip(d).for_each(|(x, d)| *x += d);
     }
     problem.residual(&x, &mut r)?;

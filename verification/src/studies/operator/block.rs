@@ -65,6 +65,7 @@ pub(super) fn block<const D: usize>(
             smoothing: None,
             error_tolerance: None,
             check_tangent: None,
+            preconditioner: Default::default(),
             newton: NewtonSettings {
                 relative_tolerance: 1e-8,
                 forcing: Forcing::EisenstatWalker,

@@ -9,7 +9,7 @@ use bfree::material::Material;
 use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::solver::{NonlinearProblem, Precision, SingleTangent};
+use bfree::solver::{Linearization, NonlinearProblem, Precision};
 use bfree::tensor::{Tensor, Vector};
 
 const SAME: f64 = 1e-12;

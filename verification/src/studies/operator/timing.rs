@@ -15,6 +15,7 @@ use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::solver::Precision;
 use bfree::plan::Plan;
+use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use std::hint::black_box;
@@ -103,11 +104,11 @@ fn product<const D: usize>(
     // As a step does: in the memory of the last step's, particles having moved, by 0.05 h along each axis.
     let (grid, before) = (&simulation.grid, &simulation.particles.position);
     let after: Vec<_> = before.iter().map(|x| x.add_scalar(0.05 * grid.spacing)).collect();
-    let mut spare = Some(Supports::new(shape, grid, &after)?.0);
+    let (pool, mut spare) = (Pool::default(), Some(Supports::new(shape, grid, &after)?.0));
     let mut turns = [before, &after].into_iter().cycle();
     let shape_functions = best(6, || {
         let positions = turns.next().unwrap_or(before);
-        spare = Supports::renewed(spare.take(), shape, grid, positions, None, Precision::Double).ok().map(|(supports, _)| supports);
+        spare = Supports::renewed(spare.take(), shape, grid, positions, None, Precision::Double, &pool).ok().map(|(supports, _)| supports);
     });
     let times = |s: f64| format!("{:.1}", s / seconds);
     let floor = (work.useful / peak).max(work.bytes / copy);

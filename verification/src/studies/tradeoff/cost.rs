@@ -9,8 +9,9 @@ use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::plan::Plan;
+use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::{NewtonHistory, newton};
+use bfree::solver::{BlockJacobi, NewtonHistory, newton};
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -127,13 +128,14 @@ pub(super) fn drive<const D: usize>(
                 (0..simulation.particles.len()).map(|p| force.map_or(of_gravity, |force| force(p, end))).collect();
             let start = Thread::now();
             let step = forced::step_by(simulation, |p, _| forces[p], |equilibrium, dphi, settings| {
+                let (mut blocks, pool) = (BlockJacobi::<D>::default(), Pool::default());
                 if !setting.assembled {
-                    return newton(equilibrium, dphi, settings);
+                    return newton(equilibrium, &mut blocks, dphi, settings, &pool);
                 }
                 // The pattern had fewer blocks at the start; a body that outgrows it goes on matrix-free.
                 match Pattern::new(equilibrium.supports, equilibrium.nodal.mass.len(), MOST_BLOCKS) {
-                    Ok(pattern) => newton(&Assembled { equilibrium, pattern: &pattern }, dphi, settings),
-                    Err(_) => newton(equilibrium, dphi, settings),
+                    Ok(pattern) => newton(&Assembled { equilibrium, pattern: &pattern }, &mut blocks, dphi, settings, &pool),
+                    Err(_) => newton(equilibrium, &mut blocks, dphi, settings, &pool),
                 }
             })?;
             seconds += start.elapsed();
