@@ -337,17 +337,17 @@ mod tests {
         const N: usize = 12;
         let a = Dense::from_fn(N, |i, j| 1.0 / (1 + i + j) as f64);
         let mut basis: Vec<Pooled<f64>> = Vec::new();
-        let mut w: Pooled<f64> = a.times(&[1.0; N]).into_iter().collect();
+        let mut w: Pooled<f64> = a.times(&[1.0; N]).into();
         for _ in 0..9 {
             let w_norm = norm(&w);
             let (_, left) = orthogonalise(&mut w, w_norm, &basis);
             assert!(left > EXHAUSTED * f64::EPSILON * w_norm, "the space is exhausted after {} vectors", basis.len());
-            let v: Pooled<f64> = w.iter().map(|x| x / left).collect();
+            let v: Pooled<f64> = w.iter().map(|x| x / left).collect::<Vec<_>>().into();
             for before in &basis {
                 let product = dot(before, &v);
                 assert!(product.abs() <= N as f64 * f64::EPSILON, "{product:e} after {} vectors", basis.len());
             }
-            w = a.times(&v).into_iter().collect();
+            w = a.times(&v).into();
             basis.push(v);
         }
     }

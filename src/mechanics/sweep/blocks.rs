@@ -1,7 +1,8 @@
 //! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
 
 use super::kernel::{Pairs, Window, by_tile, tile};
-use super::lanes::{LANES, Lanes, WithLanes};
+use super::lanes::{LANES, Lanes, Rows, WithLanes};
+use crate::scalar::Arithmetic;
 
 /// Pairs (k, l) with k ≤ l of D axes.
 const MOST_PAIRS: usize = 6;
@@ -45,8 +46,9 @@ impl<const D: usize> WithLanes<f64> for ScatterBlocks<'_, D> {
     fn run<S: Lanes<X = f64>>(self, s: S) {
         let Self { window, from, out } = self;
         let rows = window.width[1] * window.width[2];
-        for chunk in 0..rows.div_ceil(LANES) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * LANES);
+        let at_once = <S::Rows as Rows>::COUNT;
+        for chunk in 0..rows.div_ceil(at_once) {
+            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
             let mut start = 0;
             while start < window.width[0] {
                 let tile = tile(window.width[0] - start);
@@ -67,6 +69,7 @@ fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
     out: &mut [f64],
     width: usize,
 ) {
+    let (lanes, s) = (s, s.rows());
     let zero = s.zero();
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
@@ -105,5 +108,5 @@ fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
             sums[x][i] = row[x];
         }
     }
-    pairs.add(s, sums.as_flattened().as_flattened(), start, D * D, out);
+    pairs.add(lanes, sums.as_flattened().as_flattened(), start, D * D, out);
 }

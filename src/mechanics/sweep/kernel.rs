@@ -6,8 +6,8 @@
 //! gather, a lane a particle:  u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z;
 //! scatter, a lane a row (y, z) of the window: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
-use super::lanes::{LANES, Lanes, WithLanes};
-use crate::scalar::Real;
+use super::lanes::{LANES, Lanes, Rows, WithLanes};
+use crate::scalar::{Arithmetic, Real};
 use num_traits::One;
 
 /// The widest window along x of a group of neighbouring cells, and the widest tile that a kernel sums at a time.
@@ -251,8 +251,9 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Scatter<'_, X, C,
         // Fixed lengths, so that no place in them is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
         let rows = window.width[1] * window.width[2];
-        for chunk in 0..rows.div_ceil(LANES) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * LANES);
+        let at_once = <S::Rows as Rows>::COUNT;
+        for chunk in 0..rows.div_ceil(at_once) {
+            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
             let mut start = 0;
             while start < window.width[0] {
                 let tile = tile(window.width[0] - start);
@@ -263,9 +264,9 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Scatter<'_, X, C,
     }
 }
 
-/// Of eight rows (y, z) of a window: N_y N_z, N_y' N_z, N_y N_z', a lane a row, for each particle; and where the rows begin.
+/// Of as many rows (y, z) of a window as fill a register: N_y N_z, N_y' N_z, N_y N_z', a lane a row, for each particle; and where the rows begin.
 pub(super) struct Pairs<S: Lanes, const D: usize> {
-    pub(super) products: [[S::N; LANES]; D],
+    pub(super) products: [[<S::Rows as Arithmetic>::N; LANES]; D],
     places: [usize; LANES],
     count: usize,
 }
@@ -274,7 +275,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
     #[inline(always)]
     pub(super) fn new(s: S, window: &Window<'_, S::X>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
-        let count = (wy * wz - start).min(LANES);
+        let count = (wy * wz - start).min(<S::Rows as Rows>::COUNT);
         let mut products = [[s.zero(); LANES]; D];
         let mut places = [0; LANES];
         let (mut y, mut z) = (start % wy, start / wy);
@@ -300,28 +301,15 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
                 (y, z) = (0, z + 1);
             }
         }
-        for rows in &mut products {
-            *rows = s.transpose(*rows);
-        }
-        Self { products, places, count }
+        Self { products: products.map(|rows| s.rows().columns(rows)), places, count }
     }
 
     /// Adds `sums`, `at` the first entry of each row: from a lane a row to a row after the other. `sums` are the entries of a
-    /// row in their order.
+    /// row in their order, `numbers` for each node.
     #[inline(always)]
-    pub(super) fn add(&self, s: S, sums: &[S::N], at: usize, numbers: usize, out: &mut [S::X]) {
-        for (part, some) in sums.chunks(LANES).enumerate() {
-            let mut rows = [s.zero(); LANES];
-            rows[..some.len()].copy_from_slice(some);
-            let rows = s.transpose(rows);
-            for lane in 0..self.count {
-                let place = (self.places[lane] + at) * numbers + part * LANES;
-                if let Some(slot) = out[place..].first_chunk_mut::<LANES>() {
-                    let sum = s.add(s.load(slot), rows[lane]);
-                    s.store(sum, slot);
-                }
-            }
-        }
+    pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [S::X]) {
+        let places = self.places.map(|place| (place + at) * numbers);
+        s.rows().add_up(sums, &places[..self.count], out);
     }
 }
 
@@ -338,6 +326,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     out: &mut [S::X],
     width: usize,
 ) {
+    let (lanes, s) = (s, s.rows());
     let zero = s.zero();
     let (n, dn) = window.axis(0);
     let (n, dn) = (&n[start..start + width], &dn[start..start + width]);
@@ -376,7 +365,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
             }
         }
     }
-    pairs.add(s, sums.as_flattened(), start, C, out);
+    pairs.add(lanes, sums.as_flattened(), start, C, out);
 }
 
 #[cfg(test)]

@@ -22,8 +22,63 @@ pub trait Lanes: Arithmetic {
     fn div(self, a: Self::N, b: Self::N) -> Self::N;
     /// `then` where a < b, and `otherwise` elsewhere.
     fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N;
-    /// Rows become columns.
-    fn transpose(self, rows: [Self::N; LANES]) -> [Self::N; LANES];
+    /// Vectors of rows of nodes, no wider than the registers are.
+    type Rows: Rows<X = Self::X, Particles = Self::N>;
+    fn rows(self) -> Self::Rows;
+}
+
+/// Arithmetic on rows of nodes, a lane each, with as many as fill one register.
+pub trait Rows: Arithmetic {
+    /// The number in a lane.
+    type X: Real;
+    /// A vector with a lane for each particle.
+    type Particles: Copy;
+    /// Rows of a vector.
+    const COUNT: usize;
+    fn splat(self, x: Self::X) -> Self::N;
+    /// From a vector of particles for each row to a vector of rows for each particle.
+    fn columns(self, rows: [Self::Particles; LANES]) -> [Self::N; LANES];
+    /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row; a vector's length from there is read and written.
+    fn add_up(self, sums: &[Self::N], places: &[usize], out: &mut [Self::X]);
+}
+
+/// Rows that are as many as the particles.
+macro_rules! square {
+    ($s:ty, $number:ty, $this:ident, $transpose:expr) => {
+        impl Rows for $s {
+            type X = $number;
+            type Particles = <Self as Arithmetic>::N;
+            const COUNT: usize = LANES;
+            #[inline(always)]
+            fn splat(self, x: $number) -> Self::N {
+                Lanes::splat(self, x)
+            }
+            #[inline(always)]
+            fn columns($this, rows: [Self::N; LANES]) -> [Self::N; LANES] {
+                $transpose($this, rows)
+            }
+            #[inline(always)]
+            fn add_up(self, sums: &[Self::N], places: &[usize], out: &mut [$number]) {
+                for (part, some) in sums.chunks(LANES).enumerate() {
+                    let mut rows = [self.zero(); LANES];
+                    rows[..some.len()].copy_from_slice(some);
+                    let rows = self.columns(rows);
+                    for (row, &place) in rows.iter().zip(places) {
+                        if let Some(slot) = out[place + part * LANES..].first_chunk_mut::<LANES>() {
+                            let sum = Arithmetic::add(self, self.load(slot), *row);
+                            self.store(sum, slot);
+                        }
+                    }
+                }
+            }
+        }
+    };
+}
+
+/// Rows become columns.
+#[inline(always)]
+fn transposed<X: Copy, const N: usize>(rows: [[X; N]; N]) -> [[X; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
 }
 
 /// Something to be done with the widest lanes there are.
@@ -90,9 +145,10 @@ macro_rules! portable {
             fn store(self, v: Self::N, out: &mut [$number; LANES]) {
                 *out = v;
             }
+            type Rows = Self;
             #[inline(always)]
-            fn transpose(self, rows: [Self::N; LANES]) -> [Self::N; LANES] {
-                std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
+            fn rows(self) -> Self {
+                self
             }
             #[inline(always)]
             fn abs(self, a: Self::N) -> Self::N {
@@ -116,10 +172,12 @@ macro_rules! portable {
 
 portable!(f64);
 portable!(f32);
+square!(Portable<f64>, f64, self, |_, rows| transposed(rows));
+square!(Portable<f32>, f32, self, |_, rows| transposed(rows));
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Arithmetic, LANES, Lanes};
+    use super::{Arithmetic, LANES, Lanes, Rows, transposed};
     use pulp::x86::{V3, V4};
     use pulp::{Simd, cast, f32x8, f64x4, f64x8};
 
@@ -130,7 +188,7 @@ mod x86 {
     /// Vectors of one register.
     macro_rules! whole {
         ($s:ty, $this:ident => $simd:expr, $vector:ty, $number:ty, $family:ident, $fnmadd:ident,
-         $add:ident, $mul:ident, $mul_add:ident, $splat:ident, $abs:ident, $sub:ident, $div:ident, $less:ident, $select:ident, $transpose:path) => {
+         $add:ident, $mul:ident, $mul_add:ident, $splat:ident, $abs:ident, $sub:ident, $div:ident, $less:ident, $select:ident) => {
             impl Arithmetic for $s {
                 type N = $vector;
                 #[inline(always)]
@@ -185,18 +243,21 @@ mod x86 {
                 fn where_less($this, a: $vector, b: $vector, then: $vector, otherwise: $vector) -> $vector {
                     $simd.$select($simd.$less(a, b), then, otherwise)
                 }
+                type Rows = Self;
                 #[inline(always)]
-                fn transpose($this, rows: [$vector; LANES]) -> [$vector; LANES] {
-                    $transpose($simd, rows)
+                fn rows(self) -> Self {
+                    self
                 }
             }
         };
     }
 
     whole!(V4, self => self, f64x8, f64, avx512f, _mm512_fnmadd_pd,
-        add_f64s, mul_f64s, mul_add_f64s, splat_f64s, abs_f64s, sub_f64s, div_f64s, less_than_f64s, select_f64s, transpose_8);
+        add_f64s, mul_f64s, mul_add_f64s, splat_f64s, abs_f64s, sub_f64s, div_f64s, less_than_f64s, select_f64s);
+    square!(V4, f64, self, transpose_8);
     whole!(Single, self => self.0, f32x8, f32, fma, _mm256_fnmadd_ps,
-        add_f32s, mul_f32s, mul_add_f32s, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s, transpose_single);
+        add_f32s, mul_f32s, mul_add_f32s, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s);
+    square!(Single, f32, self, |_, rows: [f32x8; LANES]| transposed(rows.map(cast::<f32x8, [f32; LANES]>)).map(cast));
 
     /// Quarters 0 and 2 of both.
     const EVEN: i32 = 0b10_00_10_00;
@@ -233,10 +294,77 @@ mod x86 {
         ]
     }
 
-    #[inline(always)]
-    fn transpose_single(_: V3, rows: [f32x8; LANES]) -> [f32x8; LANES] {
-        let rows: [[f32; LANES]; LANES] = rows.map(cast);
-        std::array::from_fn(|i| cast(std::array::from_fn::<f32, LANES, _>(|k| rows[k][i])))
+    /// Four rows in one register of AVX2: eight in two would leave no room for their sums.
+    #[derive(Clone, Copy)]
+    pub struct Four(V3);
+
+    impl Arithmetic for Four {
+        type N = f64x4;
+        #[inline(always)]
+        fn add(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.0.add_f64s(a, b)
+        }
+        #[inline(always)]
+        fn mul(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.0.mul_f64s(a, b)
+        }
+        #[inline(always)]
+        fn mul_add(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
+            self.0.mul_add_f64s(a, b, c)
+        }
+        #[inline(always)]
+        fn mul_sub(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
+            cast(self.0.fma._mm256_fnmadd_pd(cast(a), cast(b), cast(c)))
+        }
+        #[inline(always)]
+        fn zero(self) -> f64x4 {
+            self.0.splat_f64s(0.0)
+        }
+    }
+
+    impl Rows for Four {
+        type X = f64;
+        type Particles = [f64x4; 2];
+        const COUNT: usize = 4;
+        #[inline(always)]
+        fn splat(self, x: f64) -> f64x4 {
+            self.0.splat_f64s(x)
+        }
+        #[inline(always)]
+        fn columns(self, rows: [[f64x4; 2]; LANES]) -> [f64x4; LANES] {
+            let half = |i: usize| self.transpose([rows[0][i], rows[1][i], rows[2][i], rows[3][i]]);
+            let ([a, b, c, d], [e, f, g, h]) = (half(0), half(1));
+            [a, b, c, d, e, f, g, h]
+        }
+        #[inline(always)]
+        fn add_up(self, sums: &[f64x4], places: &[usize], out: &mut [f64]) {
+            for (part, some) in sums.chunks(4).enumerate() {
+                let mut rows = [self.zero(); 4];
+                rows[..some.len()].copy_from_slice(some);
+                let rows = self.transpose(rows);
+                for (row, &place) in rows.iter().zip(places) {
+                    if let Some(slot) = out[place + part * 4..].first_chunk_mut::<4>() {
+                        *slot = cast(self.0.add_f64s(cast(*slot), *row));
+                    }
+                }
+            }
+        }
+    }
+
+    impl Four {
+        /// Rows become columns.
+        #[inline(always)]
+        fn transpose(self, [a, b, c, d]: [f64x4; 4]) -> [f64x4; 4] {
+            let x = self.0.avx;
+            let (ab_low, ab_high) = (x._mm256_unpacklo_pd(cast(a), cast(b)), x._mm256_unpackhi_pd(cast(a), cast(b)));
+            let (cd_low, cd_high) = (x._mm256_unpacklo_pd(cast(c), cast(d)), x._mm256_unpackhi_pd(cast(c), cast(d)));
+            [
+                cast(x._mm256_permute2f128_pd::<0x20>(ab_low, cd_low)),
+                cast(x._mm256_permute2f128_pd::<0x20>(ab_high, cd_high)),
+                cast(x._mm256_permute2f128_pd::<0x31>(ab_low, cd_low)),
+                cast(x._mm256_permute2f128_pd::<0x31>(ab_high, cd_high)),
+            ]
+        }
     }
 
     /// Vectors of two registers.
@@ -279,10 +407,10 @@ mod x86 {
         fn store(self, v: Self::N, out: &mut [f64; LANES]) {
             *out = cast(v);
         }
+        type Rows = Four;
         #[inline(always)]
-        fn transpose(self, rows: [Self::N; LANES]) -> [Self::N; LANES] {
-            let rows: [[f64; LANES]; LANES] = rows.map(cast);
-            std::array::from_fn(|i| cast(std::array::from_fn::<f64, LANES, _>(|k| rows[k][i])))
+        fn rows(self) -> Four {
+            Four(self)
         }
         #[inline(always)]
         fn abs(self, a: Self::N) -> Self::N {
@@ -370,8 +498,13 @@ mod tests {
                 }
                 *row = s.load(&numbers);
             }
-            let columns = s.transpose(rows);
-            let (a, b, c) = (rows[1], columns[2], s.splat(X::lit(0.3)));
+            // As many columns as there are rows, one after the other, and back into memory.
+            let r = s.rows();
+            let (columns, count) = (r.columns(rows), <S::Rows as Rows>::COUNT);
+            let mut written = vec![X::zero(); LANES * LANES + LANES];
+            let places: Vec<usize> = (0..count).map(|row| row * LANES).collect();
+            r.add_up(&columns, &places, &mut written);
+            let (a, b, c) = (rows[1], rows[2], s.splat(X::lit(0.3)));
             let results = [
                 s.add(a, b),
                 s.mul(a, b),
@@ -382,8 +515,10 @@ mod tests {
                 s.div(a, b),
                 s.where_less(a, b, c, a),
             ];
-            let mut out = Vec::new();
-            for v in columns.into_iter().chain(results) {
+            let mut out: Vec<[X; LANES]> = written.as_chunks().0[..LANES].to_vec();
+            out.truncate(count);
+            out.resize(LANES, [X::zero(); LANES]);
+            for v in results {
                 let mut numbers = [X::zero(); LANES];
                 s.store(v, &mut numbers);
                 out.push(numbers);
@@ -394,13 +529,15 @@ mod tests {
 
     fn judge<X: Real>(all: Vec<Vec<[X; LANES]>>, epsilon: f64) {
         for results in all {
-            for i in 0..LANES {
+            // Rows become columns and rows again: at least four of them.
+            let rows = if results[4][0].value() == 0.0 { 4 } else { LANES };
+            for i in 0..rows {
                 for k in 0..LANES {
-                    assert_eq!(results[i][k].value(), X::lit(entry(k, i)).value());
+                    assert_eq!(results[i][k].value(), X::lit(entry(i, k)).value());
                 }
             }
             for k in 0..LANES {
-                let (a, b, c) = (entry(1, k), entry(k, 2), 0.3);
+                let (a, b, c) = (entry(1, k), entry(2, k), 0.3);
                 let expected = [a + b, a * b, a * b + c, c - a * b, a.abs(), a - b, a / b, if a < b { c } else { a }];
                 for (result, expected) in results[LANES..].iter().zip(expected) {
                     assert!(

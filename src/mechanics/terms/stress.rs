@@ -29,7 +29,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         dphi: &[Vector<f64, D>],
         part: Part,
         unit: Unit,
-    ) -> Result<FrozenStress<X>, Inadmissible>     {
+    ) -> Result<FrozenStress<X>, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let factor = 1.0 / (unit.scale * unit.length * unit.length);
