@@ -119,11 +119,17 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Gather<'_, X, C, 
             by_tile!(tile, gather_tile::<S, C, D>(s, &window, start, nodal, parts.value, &mut out));
             start += tile;
         }
+        // Loops, not closures: what is not inlined loses the wide instructions.
         if parts.value {
-            value.iter_mut().zip(out.value).for_each(|(row, value)| s.store(value, row));
+            for (c, row) in value.iter_mut().enumerate().take(C) {
+                s.store(out.value[c], row);
+            }
         }
         if parts.gradient {
-            gradient.iter_mut().zip(out.gradient.as_flattened()).for_each(|(row, &slope)| s.store(slope, row));
+            let slopes = out.gradient.as_flattened();
+            for (k, row) in gradient.iter_mut().enumerate().take(C * D) {
+                s.store(slopes[k], row);
+            }
         }
     }
 }
@@ -301,14 +307,22 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
                 (y, z) = (0, z + 1);
             }
         }
-        Self { products: products.map(|rows| s.rows().columns(rows)), places, count }
+        let r = s.rows();
+        let mut columns = [[r.zero(); LANES]; D];
+        for k in 0..D {
+            columns[k] = r.columns(products[k]);
+        }
+        Self { products: columns, places, count }
     }
 
     /// Adds `sums`, `at` the first entry of each row: from a lane a row to a row after the other. `sums` are the entries of a
     /// row in their order, `numbers` for each node.
     #[inline(always)]
     pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [S::X]) {
-        let places = self.places.map(|place| (place + at) * numbers);
+        let mut places = self.places;
+        for place in &mut places {
+            *place = (*place + at) * numbers;
+        }
         s.rows().add_up(sums, &places[..self.count], out);
     }
 }

@@ -77,8 +77,14 @@ macro_rules! square {
 
 /// Rows become columns.
 #[inline(always)]
-fn transposed<X: Copy, const N: usize>(rows: [[X; N]; N]) -> [[X; N]; N] {
-    std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
+fn transposed<S, X: Copy, const N: usize>(_: S, rows: [[X; N]; N]) -> [[X; N]; N] {
+    let mut columns = rows;
+    for i in 0..N {
+        for k in 0..N {
+            columns[i][k] = rows[k][i];
+        }
+    }
+    columns
 }
 
 /// Something to be done with the widest lanes there are.
@@ -172,8 +178,8 @@ macro_rules! portable {
 
 portable!(f64);
 portable!(f32);
-square!(Portable<f64>, f64, self, |_, rows| transposed(rows));
-square!(Portable<f32>, f32, self, |_, rows| transposed(rows));
+square!(Portable<f64>, f64, self, transposed);
+square!(Portable<f32>, f32, self, transposed);
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -257,7 +263,7 @@ mod x86 {
     square!(V4, f64, self, transpose_8);
     whole!(Single, self => self.0, f32x8, f32, fma, _mm256_fnmadd_ps,
         add_f32s, mul_f32s, mul_add_f32s, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s);
-    square!(Single, f32, self, |_, rows: [f32x8; LANES]| transposed(rows.map(cast::<f32x8, [f32; LANES]>)).map(cast));
+    square!(Single, f32, self, transpose_single);
 
     /// Quarters 0 and 2 of both.
     const EVEN: i32 = 0b10_00_10_00;
@@ -292,6 +298,20 @@ mod x86 {
             cast(x._mm512_shuffle_f64x2::<ODD>(b, d)),
             cast(x._mm512_shuffle_f64x2::<ODD>(f, h)),
         ]
+    }
+
+    #[inline(always)]
+    fn transpose_single(s: Single, rows: [f32x8; LANES]) -> [f32x8; LANES] {
+        let mut numbers = [[0.0_f32; LANES]; LANES];
+        for k in 0..LANES {
+            numbers[k] = cast(rows[k]);
+        }
+        let numbers = transposed(s, numbers);
+        let mut columns = rows;
+        for i in 0..LANES {
+            columns[i] = cast(numbers[i]);
+        }
+        columns
     }
 
     /// Four rows in one register of AVX2: eight in two would leave no room for their sums.
@@ -332,8 +352,8 @@ mod x86 {
         }
         #[inline(always)]
         fn columns(self, rows: [[f64x4; 2]; LANES]) -> [f64x4; LANES] {
-            let half = |i: usize| self.transpose([rows[0][i], rows[1][i], rows[2][i], rows[3][i]]);
-            let ([a, b, c, d], [e, f, g, h]) = (half(0), half(1));
+            let [a, b, c, d] = self.transpose([rows[0][0], rows[1][0], rows[2][0], rows[3][0]]);
+            let [e, f, g, h] = self.transpose([rows[0][1], rows[1][1], rows[2][1], rows[3][1]]);
             [a, b, c, d, e, f, g, h]
         }
         #[inline(always)]
