@@ -2,8 +2,14 @@
 
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::Step;
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::{Body, Particles};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -253,14 +259,30 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     let loads = Loads::<2> {
         gravity: Some(Gravity { acceleration: Vector::from([0.0, -8.0]), curve: ramp.clone() }),
         surface: vec![surface(Pressing::Traction(Vector::from([16.0, 0.0]))), surface(Pressing::Pressure(40.0))],
-        prescribed: Vec::new(),
+        ..Loads::default()
     };
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [1, 1] };
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &[Vector::from([0.5, 0.5])])?;
+    let mut particles = Particles::default();
+    particles.push(Vector::from([0.5, 0.5]), Vector::zeros(), 1.0, 3.0, 0);
+    let law = Material::from(NeoHookean::ciarlet(Lame::new(1.0, 1.0)?));
+    let bodies = [Body { name: "body".into(), law, density: 3.0 }];
+    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let (nodal, zero) = (Nodal::at_rest(&particles, &supports), vec![Vector::zeros(); nodes.len()]);
+    let alphas = Newmark::default().alphas(1.0);
     for (t, factor) in [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (9.0, 2.0)] {
         // A particle of mass 3 in the middle of four nodes: a quarter of m b, and of T A, to each.
-        for force in &loads.dead(t, &[0.75; 4], &supports) {
+        let (particles, bodies, supports, nodal) = (&particles, &bodies[..], &supports, &nodal);
+        let forces = |gravity: Option<Gravity<2>>, surface: &[SurfaceLoad<2>]| {
+            let loads = &Loads { gravity, surface: surface.to_vec(), ..Loads::default() };
+            let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: t, dt: 1.0 };
+            Equilibrium::new(step, &[]).external_force(&zero)
+        };
+        for force in &forces(loads.gravity.clone(), &loads.surface[..1])? {
             assert_eq!(*force, Vector::from([0.25 * 16.0 * 0.25, 0.75 * -8.0]) * factor, "t = {t}");
+        }
+        // −p A N on the particle at rest.
+        for force in &forces(None, &loads.surface[1..])? {
+            assert!((force + Vector::from([6.0, 8.0]) * (0.25 * factor)).norm() < 1e-14, "t = {t}");
         }
         let pressures = loads.pressures(t);
         assert_eq!((pressures.len(), pressures[0].particle), (1, 0));
