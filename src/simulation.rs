@@ -603,7 +603,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// The same simulation with other laws, one for each body.
+    /// The same simulation with other laws, one for each body; particles remember what these do at rest.
     ///
     /// ```
     /// use bfree::material::{Energy, FromEnergy};
@@ -629,13 +629,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
         let bodies = self.bodies.iter();
-        let bodies =
-            bodies.map(|body| Body { name: body.name.clone(), law: law(body), density: body.density }).collect();
+        let bodies = bodies
+            .map(|body| Body { name: body.name.clone(), law: law(body), density: body.density })
+            .collect::<Vec<_>>();
+        let mut particles = self.particles;
+        particles.remember_rest(&bodies);
         Simulation {
             grid: self.grid,
             approximation: self.approximation,
             bodies,
-            particles: self.particles,
+            particles,
             loads: self.loads,
             settings: self.settings,
             clock: self.clock,

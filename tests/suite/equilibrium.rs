@@ -247,7 +247,8 @@ fn numbers_without_room_are_found<const D: usize>() -> Result<(), Failure> {
         let mut cloud = cloud::<D>(1.0, Fault::Elasticity, true, factor)?;
         cloud.bodies[0].law.fault = Fault::Elasticity;
         cloud.nodal.mass.iter_mut().for_each(|m| *m *= 1e-60);
-        let found = mismatch(cloud.equilibrium(1.0, &[]).check_tangent(&cloud.increment(), &direction(cloud.nodes(), 1)))?;
+        let found =
+            mismatch(cloud.equilibrium(1.0, &[]).check_tangent(&cloud.increment(), &direction(cloud.nodes(), 1)))?;
         assert_eq!(found.compared, "single precision", "{D}D, {factor:e}: {found}");
     }
     Ok(())
@@ -270,7 +271,8 @@ fn blocks_are_columns<const D: usize>() -> Result<(), Failure> {
             let blocks = tangent.diagonal_blocks();
             for (node, block) in blocks.iter().enumerate() {
                 for i in 0..D {
-                    let (mut unit, mut product) = (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
+                    let (mut unit, mut product) =
+                        (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
                     unit[node][i] = 1.0;
                     tangent.product(&unit, &mut product);
                     let apart = (product[node] - block.column(i)).norm() / block.norm();

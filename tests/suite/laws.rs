@@ -233,7 +233,8 @@ fn compare<const D: usize>() -> Result<(), Failure> {
             let of = |bodies: &[Body<Unknown>], supports: &Supports<D>| {
                 results(&particles, bodies, supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))
             };
-            let in_lanes = results(&particles, &known, &supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))?;
+            let in_lanes =
+                results(&particles, &known, &supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))?;
             assert!(in_lanes == of(&closed, &supports)?, "{case}: in lanes and one by one");
             for bodies in [&closed, &others[0], &others[1]] {
                 let (tiled, plain) = (of(bodies, &supports)?, of(bodies, &plain)?);
@@ -304,7 +305,10 @@ fn fails<L: Law>(
     let step = Step { particles, bodies, loads, supports, nodal, alphas: alphas(), lumping: 1.0, time: 0.0, dt: DT };
     let equilibrium = Equilibrium::new(step, &[]);
     assert_eq!(equilibrium.residual(zero), Err(expected));
-    assert_eq!(equilibrium.residual(&zero.iter().map(|x| x.map(Dual64::from)).collect::<Vec<_>>()).err(), Some(expected));
+    assert_eq!(
+        equilibrium.residual(&zero.iter().map(|x| x.map(Dual64::from)).collect::<Vec<_>>()).err(),
+        Some(expected)
+    );
     assert_eq!(equilibrium.tangent(zero).err(), Some(expected));
     let single = equilibrium.single_tangent(None, zero).map(|single| single.is_some());
     assert_eq!(single, if supports.is_tiled() { Err(expected) } else { Ok(false) });

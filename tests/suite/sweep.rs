@@ -429,8 +429,8 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
     let (plain, nodes) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
     let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
     assert!(positions.len() <= 256, "one block");
-    // An entry is a place in the list of nodes, N and ∇N; particles say where their entries begin.
-    assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + positions.len() + 1));
+    // An entry is a place in the list of nodes, N and ∇N; particles say where they lie in memory and where their entries begin.
+    assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + 2 * positions.len() + 1));
     let many: Vec<_> = positions.iter().cycle().take(600).copied().collect();
     assert_eq!(bytes(&many)?, bytes(&many[..256])? + bytes(&many[256..512])? + bytes(&many[512..])?);
     // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes twice.
