@@ -456,18 +456,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The equilibrium at time `t` on given supports.
     ///
     /// ```
-    /// use bfree::mechanics::{residual::Carry, sweep::Supports, transfer::Nodal};
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
-    /// let nodal = Nodal::project(particles, &supports, nodes.len(), simulation.settings.lumping)?;
+    /// let (supports, _) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, simulation.settings.lumping)?;
     /// let alphas = simulation.settings.newmark.alphas(dt);
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, dt);
     /// // A body in free flight is in equilibrium at Δφ = Δt v.
     /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
-    /// let residual = equilibrium.residual(&dphi, Carry::ALL)?;
+    /// let residual = equilibrium.residual(&dphi)?;
     /// assert!(residual.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt() < 1e-13 * equilibrium.magnitude(&dphi)?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
