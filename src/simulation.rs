@@ -703,8 +703,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(())
     }
 
-    /// Gives the particles the acceleration that the loads present at the start ask for, a₀ = (f_ext − f_int)/m_I on the
-    /// nodes, g̈ where the motion is prescribed. Without it they act half a step late.
+    /// Gives the particles the acceleration that the loads and the damping present at the start ask for, a₀ = (f_ext − f_int − C v₀)/m_I
+    /// on the nodes, g̈ where the motion is prescribed. Without it they act half a step late.
     ///
     /// The lumped mass serves for every ε: it is exact for uniform loads, and of second order in h for others.
     ///
@@ -730,7 +730,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     ///
     /// # Errors
-    /// A particle without shape functions, or with det F ≤ 0.
+    /// A particle without shape functions, or with det F ≤ 0, or, with damping, velocities so large that their projection overflows.
     pub fn set_initial_acceleration(&mut self) -> Result<(), StepError> {
         if self.settings.inertia == Inertia::None {
             return Ok(());
@@ -738,9 +738,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
         let prescribed = self.prescribed(&nodes);
         let mut nodal = Nodal::at_rest(&self.particles, &supports);
-        // Δφ, v_n and a_n are zero, and with them the inertia, whatever α is.
-        let alphas = self.settings.alphas(self.clock.step());
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, self.clock.time());
+        if self.loads.damping.is_some() {
+            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).velocity;
+        }
+        // Δφ and a_n are zero, and with them the inertia; damping acts on v_n.
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, Alphas::START, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
         nodal.accelerate(&self.particles, &unbalanced);
         self.particles.acceleration = supports.values(&nodal.with_prescribed(&prescribed).acceleration);
