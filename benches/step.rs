@@ -3,7 +3,7 @@
 //! One thread; a jittered, strained block with 2^D particles a cell. The study `operator` of the verification compares the same
 //! parts with the limits of the machine.
 
-use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
@@ -61,7 +61,7 @@ fn at_a_step<const D: usize>(
     let (supports, nodes) =
         Supports::with_precision(&simulation.approximation, &simulation.grid, positions, Precision::Mixed)
             .expect("inside the grid");
-    let nodal = Nodal::project(&simulation.particles, &supports, nodes.len(), 1.0).expect("finite velocities");
+    let nodal = Nodal::project(&simulation.particles, &supports, 1.0).expect("finite velocities");
     let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
     let u: Vec<Vector<f64, D>> =
         nodes.positions(&simulation.grid).map(|(_, x)| x.map(|x| 0.01 * (0.7 * x).sin())).collect();
@@ -96,7 +96,7 @@ macro_rules! in_dimension {
                     shape,
                     $cells,
                     |bencher, at, u| {
-                        let tangent = at.single_tangent(u).expect("admissible").expect("prepared");
+                        let tangent = at.single_tangent(None, u).expect("admissible").expect("prepared");
                         let u: Vec<Vector<f32, $dimension>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
                         let mut out = vec![Vector::zeros(); u.len()];
                         bencher.bench_local(|| tangent.product(black_box(&u), &mut out));
@@ -111,7 +111,7 @@ macro_rules! in_dimension {
                     shape,
                     $cells,
                     |bencher, at, u| {
-                        bencher.bench_local(|| at.residual::<f64>(black_box(u), Carry::ALL));
+                        bencher.bench_local(|| at.residual::<f64>(black_box(u)));
                     },
                 );
             }

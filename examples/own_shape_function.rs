@@ -80,6 +80,7 @@ fn stretched(lame: Lame) -> Simulation<1, Material, Mixed> {
         settings: Settings { lumping: 0.02, ..Settings::default() },
         clock: Clock::new(0.01, 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     }
 }

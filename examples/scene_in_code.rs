@@ -49,6 +49,7 @@ pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
         },
         clock: Clock::new(0.01, 10),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     };
     // Gravity acts from t = 0 on.

@@ -16,7 +16,7 @@
 //! | m, V₀ | its mass and its reference volume | [`particles::Particles`] |
 //! | F, H = F − I, J = det F | deformation gradient; H is what is stored, so that small strains lose no digits | [`tensor::Deformation`] |
 //! | E = sym H + ½ HᵀH, C = I + 2E | Green–Lagrange and right Cauchy–Green strain | [`tensor::Deformation::green_lagrange`] |
-//! | W, S = ∂W/∂E, ℂ = ∂S/∂E | energy density, second Piola–Kirchhoff stress, its tangent | [`material::Law`] |
+//! | W, S = ∂W/∂E, ℂ = ∂S/∂E | energy density, second Piola–Kirchhoff stress, its tangent | [`material::Elastic`] |
 //! | P = F S (7) | first Piola–Kirchhoff stress | [`material::first_piola`] |
 //! | Λ, G | Lamé's constants | [`material::Lame`] |
 //! | h | spacing of the grid | [`grid::Grid`] |
@@ -67,6 +67,7 @@
 //!           + Σ_p V₀ F S ∇N_I         internal force
 //!           − Σ_p m b N_I             body force
 //!           − Σ_Γ A T N_I             nominal traction T, or follower pressure T = −p J F⁻ᵀ 𝐍
+//!           + Σ_J (a M̃ + b K_n)_IJ v_J   damping, K_n the material stiffness at the beginning of the step
 //! ```
 //!
 //! Without inertia ([`mechanics::time::Inertia::None`]) there is no M̃, v or a: step 2 falls away, and R is what remains without its first line.
@@ -87,6 +88,7 @@
 //!     + Σ_p V₀ (δF S) ∇N_I            geometric
 //!     + Σ_p V₀ F [ℂ : Fᵀ δF] ∇N_I     material
 //!     + Σ_Γ A p δ(J F⁻ᵀ) 𝐍 N_I        follower pressure
+//!     + α₄ (a M̃ + b K_n) u            damping
 //! ```
 //!
 //! The blocks of K on its diagonal, inverted, are the preconditioner. They are where the tangent is *B-free* (34), (37), (38): second-order
@@ -96,7 +98,10 @@
 //! K_IJ = α₁ M̃_IJ I + Σ_p V₀ { F ℂmat{∇N_I, ∇N_J} Fᵀ + (∇N_I · S ∇N_J) I },      ℂmat{v, b} a = [ℂ : (a ⊗ b)] v
 //! ```
 //!
-//! A law freezes all of this at one state ([`material::FrozenTangent`]). For the paper's law, [`material::NeoHookean::ciarlet`] (39):
+//! Each term freezes its part at one state ([`mechanics::residual::Equilibrium::tangent`]): a law with a closed form as a handful
+//! of numbers ([`material::Elastic::closed`]), any other as the blocks above of all pairs of unit vectors. So the product, too, is
+//! B-free, and the diagonal comes from the numbers that the product applies. For the paper's law,
+//! [`material::NeoHookean::ciarlet`] (39):
 //!
 //! ```text
 //! W = Λ/4 (J² − 1) − (Λ/2 + G) ln J + G tr E          S = Λ/2 (J² − 1) C⁻¹ + G (I − C⁻¹)
@@ -116,10 +121,11 @@
 //! # The tangent is checked, term by term
 //!
 //! The residual is generic over its number type ([`scalar::Real`]). With dual numbers Δφ + ε u it gives the derivative of R in the
-//! direction u, to rounding, from the code that computes R. [`mechanics::residual::Carry`] says which occurrences of Δφ keep
-//! their ε: the F on the left of F S alone gives the geometric term, the F inside S alone the material term
-//! ([`mechanics::tangent::Term`]). So each formula of K is compared with a derivative that knows nothing of it
-//! ([`mechanics::residual::Equilibrium::check_tangent`], and the package `verification`).
+//! direction u, to rounding, from the code that computes R: gather and scatter are linear, so ε is one more field in the sweep
+//! that every step takes. R is a list of terms ([`mechanics::terms`]), and each can be asked alone; of F S the F on the left alone
+//! gives the geometric part, the F inside S alone the material part. These pieces ([`mechanics::terms::Terms::pieces`]) can be
+//! frozen alone, too, and are applied by the product that the solver applies. So each formula of K is compared with a derivative
+//! that knows nothing of it ([`mechanics::residual::Equilibrium::check_tangent`], and the package `verification`).
 //!
 //! # Where to begin
 //!
@@ -127,7 +133,7 @@
 //! |---|---|
 //! | run a scene from JSON | [`scene::read_file`], [`scene::Scene::build`], [`simulation::Simulation::advance`], [`output::Recorder`] |
 //! | continue a run that was killed | [`checkpoint::Checkpoints`], [`checkpoint::restore`], [`output::Recorder::resume`] |
-//! | write a law | [`material::Law`], or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
+//! | write a law | [`material::Elastic`], [`material::Law`] if it remembers something, or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
 //! | write a shape function | [`approximation::ShapeFunction`], or [`approximation::Separable`] for a product |
 //! | see whole programs | the module `examples` |
 //! | follow the loop over particles | [`mechanics::sweep`] |

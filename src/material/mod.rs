@@ -273,7 +273,7 @@ pub trait Elastic: Send + Sync {
     /// By embedding into 3D.
     ///
     /// ```
-    /// use bfree::material::{Lame, Law, StVenantKirchhoff};
+    /// use bfree::material::{Elastic, Lame, StVenantKirchhoff};
     /// use bfree::tensor::{Deformation, Tensor};
     ///
     /// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
@@ -446,7 +446,7 @@ pub(crate) fn piola<L: Law, T: Real, const D: usize>(
 /// `P = F S` (eq. 7), with the F on the left and the H = F − I inside S given separately.
 ///
 /// ```
-/// use bfree::material::{Lame, Law, NeoHookean, first_piola};
+/// use bfree::material::{Elastic, Lame, NeoHookean, first_piola};
 /// use bfree::tensor::{Deformation, Tensor, contract};
 /// use num_dual::Dual64;
 ///

@@ -45,8 +45,8 @@ const ROUND_OFF: f64 = 1e-12;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let particles = &mut simulation.particles;
 /// particles.velocity = direction(particles.len(), 1); // full of what nodes cannot see
-/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-/// let mass = Nodal::at_rest(particles, &supports, nodes.len()).mass;
+/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let mass = Nodal::at_rest(particles, &supports).mass;
 ///
 /// let (smoothing, dt) = (Smoothing::limited(40.0), 0.05);
 /// let at_kinks = smoothing.shares_at_kinks(particles, &supports, &mass, dt);

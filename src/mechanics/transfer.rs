@@ -24,13 +24,13 @@ use crate::tensor::Vector;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let particles = &mut simulation.particles;
 /// particles.velocity = direction(particles.len(), 1);
-/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// let momentum = |nodal: &Nodal<2>| nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum::<Vector<f64, 2>>();
 /// // Mass and momentum are those of the particles, with the lumped mass as with the consistent one.
-/// let rest = Nodal::at_rest(particles, &supports, nodes.len());
+/// let rest = Nodal::at_rest(particles, &supports);
 /// assert!((rest.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-/// let lumped = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
-/// let consistent = Nodal::project(particles, &supports, nodes.len(), 0.1)?;
+/// let lumped = Nodal::project(particles, &supports, 1.0)?;
+/// let consistent = Nodal::project(particles, &supports, 0.1)?;
 /// assert!((momentum(&lumped) - particles.momentum()).norm() < 1e-13);
 /// assert!((momentum(&consistent) - particles.momentum()).norm() < 1e-10);
 /// assert!(lumped.iterations == 0 && consistent.iterations > 0);
@@ -75,11 +75,11 @@ impl<const D: usize> Nodal<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &simulation.particles;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
     /// // The mass is there, and no motion that it could resist.
-    /// let nodal = Nodal::mass_alone(particles, &supports, nodes.len());
+    /// let nodal = Nodal::mass_alone(particles, &supports);
     /// assert!((nodal.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-    /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports, nodes.len()).is_static());
+    /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports).is_static());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
@@ -102,8 +102,8 @@ impl<const D: usize> Nodal<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &simulation.particles;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let mut nodal = Nodal::at_rest(particles, &supports, nodes.len());
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let mut nodal = Nodal::at_rest(particles, &supports);
     /// // An undeformed body under gravity: R_I = −m_I g, and all of it begins to fall.
     /// let g = Vector::from([0.0, -10.0]);
     /// let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| g * -m).collect();
@@ -126,8 +126,8 @@ impl<const D: usize> Nodal<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &simulation.particles;
-    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let projected = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let projected = Nodal::project(particles, &supports, 1.0)?;
     /// // A wall holds the x component of node 3.
     /// let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
     /// let nodal = projected.with_prescribed(&[wall]);
@@ -163,8 +163,8 @@ pub enum WallUpdate {
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let (mut particles, dt) = (simulation.particles.clone(), 0.05);
-/// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-/// let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let nodal = Nodal::project(&particles, &supports, 1.0)?;
 /// // The cylinder flies with v = ½ and meets nothing: Δφ = v Δt at every node.
 /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
 /// let alphas = simulation.settings.newmark.alphas(dt);
@@ -172,7 +172,7 @@ pub enum WallUpdate {
 /// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
 /// assert!(update.impulses().is_empty()); // no walls
 /// assert_eq!(update.leaving(&particles, &supports, &simulation.grid), None);
-/// update.commit(&mut particles, &supports);
+/// update.commit(&mut particles, &simulation.bodies, &supports, dt);
 /// let flown = particles.position[7] - simulation.particles.position[7] - particles.velocity[7] * dt;
 /// assert!(flown.norm() < 1e-14);
 /// assert!((particles.kinetic_energy() / simulation.particles.kinetic_energy() - 1.0).abs() < 1e-12);
@@ -243,7 +243,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, dt) = (&simulation.particles, 0.05);
     /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let (nodal, alphas) = (Nodal::at_rest(particles, &supports, nodes.len()), simulation.settings.newmark.alphas(dt));
+    /// let (nodal, alphas) = (Nodal::at_rest(particles, &supports), simulation.settings.newmark.alphas(dt));
     /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
     /// let (a, beta) = (Vector::from([3.0, 4.0]), simulation.settings.newmark.beta);
     /// let dphi = vec![a * (beta * dt * dt); nodes.len()];

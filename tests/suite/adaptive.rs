@@ -41,6 +41,7 @@ fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
         settings: Settings { lumping: 0.0, error_tolerance: Some(1.0), ..Settings::default() },
         clock: Clock::new(dt, 10),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

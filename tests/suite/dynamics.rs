@@ -43,8 +43,8 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
         particles,
         loads: Loads {
             gravity: Some(Gravity { acceleration: gravity, curve: Curve::constant(1.0) }),
-            surface: Vec::new(),
             prescribed: vec![wall("left", 0), wall("bottom", 1)],
+            ..Loads::default()
         },
         settings: Settings {
             // Tight, so that every iterate is that of a direct solver.
@@ -58,6 +58,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
         },
         clock: Clock::new(number(&reference["dt"]), 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

@@ -3,59 +3,92 @@
 use crate::support::Failure;
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
-use bfree::material::{ClosedTangent, Lame, Law, NeoHookean};
-use bfree::mechanics::check::{CheckError, Compared, Site, TangentMismatch, direction, tangent_bound};
-use bfree::mechanics::loads::{PrescribedDof, PressurePoint};
-use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::material::{ClosedTangent, Elastic, Lame, NeoHookean};
+use bfree::mechanics::check::{CheckError, TangentMismatch, direction, tangent_bound};
+use bfree::mechanics::loads::{Curve, Gravity, Loads, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::tangent::Term;
+use bfree::mechanics::terms::{ForceField, Step};
 use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
-use bfree::solver::NonlinearProblem;
-use bfree::tensor::{Deformation, Tensor, Vector, scaled};
+use bfree::solver::{NonlinearProblem, Precision};
+use bfree::tensor::{Deformation, Tensor, Vector, outer, scaled};
+use std::sync::Arc;
 
-/// What is wrong with a law.
+/// Where a law lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Nothing,
+    /// S is larger than the S of the tangents.
+    Stress,
+    /// The same, of plain numbers alone.
+    PlainStress,
     /// ℂ is larger than ∂S/∂E.
     Elasticity,
-    /// What is frozen is not the tangent.
-    Frozen,
+    /// ℂmat is larger than ℂ.
+    Density,
+    /// The closed form is larger than the tangent.
+    Closed,
 }
 
-/// Ciarlet's law, a millionth of its tangent too much.
+/// Ciarlet's law, with a closed form or without, and a millionth too much where it lies.
 #[derive(Clone, Copy, Debug)]
-struct Faulty(NeoHookean, Fault);
+struct Faulty {
+    law: NeoHookean,
+    fault: Fault,
+    closed: bool,
+    factor: f64,
+}
 
 const EXCESS: f64 = 1.0 + 1e-6;
 
-impl Law for Faulty {
-    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
+impl Faulty {
+    /// The factor on what lies.
+    fn factor(&self, here: Fault) -> f64 {
+        if self.fault == here { self.factor } else { 1.0 }
+    }
+}
 
+impl Elastic for Faulty {
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        self.0.energy(at)
+        Elastic::energy(&self.law, at)
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        self.0.stress(at)
+        let plain = size_of::<T>() == size_of::<f64>();
+        let factor = self.factor(Fault::Stress) * if plain { self.factor(Fault::PlainStress) } else { 1.0 };
+        scaled(&Elastic::stress(&self.law, at), T::lit(factor))
     }
 
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        let factor = if self.1 == Fault::Elasticity { EXCESS } else { 1.0 };
-        scaled(&self.0.elasticity(at, x), T::lit(factor))
+        scaled(&Elastic::elasticity(&self.law, at, x), T::lit(self.factor(Fault::Elasticity)))
     }
 
-    fn freeze<T: Real, const D: usize>(
+    fn tangent_density<T: Real, const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
         at: &Deformation<T, D>,
-        volume: T,
-    ) -> ClosedTangent<T, D> {
-        let factor = if self.1 == Fault::Frozen { EXCESS } else { 1.0 };
-        self.0.freeze(f_n, at, volume * T::lit(factor))
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        // As it follows from ℂ.
+        let mut density = Tensor::<T, D>::zeros();
+        for k in 0..D {
+            let a = Vector::<T, D>::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
+            density.set_column(k, &(Elastic::elasticity(self, at, &outer(&a, b)) * v));
+        }
+        scaled(&density, T::lit(self.factor(Fault::Density)))
+    }
+
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        let closed = Elastic::closed(&self.law, f_n, at, volume * self.factor(Fault::Closed));
+        closed.filter(|_| self.closed)
     }
 }
 
@@ -68,15 +101,17 @@ fn irregular(k: usize) -> f64 {
 struct Cloud<const D: usize> {
     particles: Particles<D>,
     bodies: Vec<Body<Faulty>>,
+    loads: Loads<D>,
     supports: Supports<D>,
     nodal: Nodal<D>,
 }
 
 const SECOND: usize = 7;
 
-fn cloud<const D: usize>(stress: f64, fault: Fault) -> Result<Cloud<D>, Failure> {
+/// A cloud whose second body has a law that lies.
+fn cloud<const D: usize>(stress: f64, fault: Fault, closed: bool, factor: f64) -> Result<Cloud<D>, Failure> {
     let law = NeoHookean::ciarlet(Lame::new(1.5 * stress, stress)?);
-    let body = |fault| Body { name: "part".into(), law: Faulty(law, fault), density: 1.0 };
+    let body = |fault| Body { name: "part".into(), law: Faulty { law, fault, closed, factor }, density: 1.0 };
     let mut particles = Particles::default();
     for p in 0..12 {
         let number = |k: usize| irregular(31 * p + k);
@@ -86,9 +121,21 @@ fn cloud<const D: usize>(stress: f64, fault: Fault) -> Result<Cloud<D>, Failure>
         particles.displacement_gradient[p] = Tensor::from_fn(|i, k| 0.2 * number(9 + D * i + k));
     }
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [3; D] };
-    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
-    Ok(Cloud { particles, bodies: vec![body(Fault::Nothing), body(fault)], supports, nodal })
+    let (supports, _) =
+        Supports::with_precision(&Approximation::from(Linear), &grid, &particles.position, Precision::Mixed)?;
+    let nodal = Nodal::project(&particles, &supports, 1.0)?;
+    let bodies = vec![body(Fault::Nothing), body(fault)];
+    Ok(Cloud { particles, bodies, loads: Loads::default(), supports, nodal })
+}
+
+fn truthful<const D: usize>(stress: f64) -> Result<Cloud<D>, Failure> {
+    cloud(stress, Fault::Nothing, true, 1.0)
+}
+
+/// Follower pressure of p A N = `force` on some particles.
+fn pressures<const D: usize>(particles: &[usize], force: Vector<f64, D>) -> Vec<SurfaceLoad<D>> {
+    let points = particles.iter().map(|&particle| SurfacePoint { particle, normal: force, area: 1.0, offset: 0.0 });
+    vec![SurfaceLoad { pressing: Pressing::Pressure(1.0), curve: Curve::constant(1.0), points: points.collect() }]
 }
 
 impl<const D: usize> Cloud<D> {
@@ -96,20 +143,15 @@ impl<const D: usize> Cloud<D> {
         self.nodal.mass.len()
     }
 
+    fn step(&self, lumping: f64) -> Step<'_, D, Faulty> {
+        let Self { particles, bodies, loads, supports, nodal } = self;
+        let dt = 0.5;
+        let alphas = Newmark::default().alphas(dt);
+        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt }
+    }
+
     fn equilibrium<'a>(&'a self, lumping: f64, prescribed: &'a [PrescribedDof]) -> Equilibrium<'a, D, Faulty> {
-        let alphas = Newmark::default().alphas(0.5);
-        let dead = vec![Vector::zeros(); self.nodes()];
-        Equilibrium::new(
-            &self.particles,
-            &self.bodies,
-            &self.supports,
-            alphas,
-            lumping,
-            &self.nodal,
-            dead,
-            Vec::new(),
-            prescribed,
-        )
+        Equilibrium::new(self.step(lumping), prescribed)
     }
 
     /// A small increment without pattern.
@@ -133,22 +175,58 @@ fn mismatch(result: Result<(), CheckError>) -> Result<TangentMismatch, Failure> 
     }
 }
 
+/// The pieces whose products are not the derivatives of their residuals, by a hundredth of the excess of a law that lies.
+fn wrong_pieces<const D: usize>(
+    equilibrium: &Equilibrium<'_, D, Faulty>,
+    dphi: &[Vector<f64, D>],
+    u: &[Vector<f64, D>],
+) -> Result<Vec<&'static str>, Failure> {
+    let mut wrong = Vec::new();
+    for piece in equilibrium.terms.pieces() {
+        let (mut product, dual) = (vec![Vector::zeros(); u.len()], equilibrium.derivative(piece, dphi, u)?);
+        equilibrium.tangent_of(piece, dphi)?.product(u, &mut product);
+        let apart: Vec<_> = product.iter().zip(&dual).map(|(a, b)| a - b).collect();
+        if norm(&apart) > 0.01 * (EXCESS - 1.0) * norm(&dual) {
+            wrong.push(piece.name);
+        }
+    }
+    Ok(wrong)
+}
+
 fn a_wrong_law_is_found<const D: usize>(stress: f64) -> Result<(), Failure> {
-    let check = |fault| -> Result<_, Failure> {
-        let cloud = cloud::<D>(stress, fault)?;
-        let mut equilibrium = cloud.equilibrium(0.5, &[]);
-        let force = Vector::repeat(0.1 * stress);
-        equilibrium.pressures = vec![PressurePoint { particle: 3, force }];
-        Ok(equilibrium.check_tangent(&cloud.increment(), &direction(cloud.nodes(), 1)))
-    };
-    check(Fault::Nothing)??;
-    for (fault, compared) in [(Fault::Elasticity, Compared::Term(Term::Material)), (Fault::Frozen, Compared::Frozen)] {
-        let found = mismatch(check(fault)?)?;
-        assert_eq!((found.compared, found.site), (compared, Site::Particle(SECOND)), "{D}D, {fault:?}");
-        assert!(found.row < D && found.column < D);
-        // The whole tangent, or its material term, is too large by the same factor in every component.
-        assert!((found.analytic / found.dual / EXCESS - 1.0).abs() < 1e-12, "{found}");
-        assert!((found.analytic - found.dual).abs() > 1e3 * found.bound * found.scale, "{found}");
+    // Where the law of the second body lies, whether it has a closed form, and the pieces that are wrong then: the first is reported.
+    let both: &[&str] = &["stress", "material"];
+    for (fault, closed, wrong) in [
+        (Fault::Nothing, true, &[][..]),
+        (Fault::Nothing, false, &[]),
+        (Fault::Stress, true, both),
+        (Fault::Stress, false, both),
+        // The closed form needs no S, but its parts do.
+        (Fault::PlainStress, true, &["geometric", "material"]),
+        (Fault::PlainStress, false, &["stress", "geometric"]),
+        // No product needs ℂ or ℂmat if there is a closed form.
+        (Fault::Elasticity, true, &[]),
+        (Fault::Elasticity, false, both),
+        (Fault::Density, true, &[]),
+        (Fault::Density, false, both),
+        (Fault::Closed, true, both),
+    ] {
+        let case = format!("{D}D, {fault:?}, closed: {closed}");
+        let mut cloud = cloud::<D>(stress, fault, closed, EXCESS)?;
+        cloud.loads.surface = pressures(&[3], Vector::repeat(0.1 * stress));
+        let (equilibrium, dphi, u) = (cloud.equilibrium(0.5, &[]), cloud.increment(), direction(cloud.nodes(), 1));
+        let names: Vec<_> = equilibrium.terms.pieces().iter().map(|piece| piece.name).collect();
+        assert_eq!(names, ["inertia", "stress", "geometric", "material", "follower pressure"], "{case}");
+        assert_eq!(wrong_pieces(&equilibrium, &dphi, &u)?, wrong, "{case}");
+        let Some(&first) = wrong.first() else {
+            equilibrium.check_tangent(&dphi, &u).map_err(|error| format!("{case}: {error}"))?;
+            continue;
+        };
+        let found = mismatch(equilibrium.check_tangent(&dphi, &u))?;
+        assert_eq!(found.compared, first, "{case}");
+        let seen = |p: usize| cloud.supports.of(p).any(|(node, _, _)| node == found.node);
+        assert!((SECOND..12).any(seen) && found.axis < D, "{case}: {found}");
+        assert!((found.analytic - found.dual).abs() > 1e3 * found.bound * found.scale, "{case}: {found}");
     }
     Ok(())
 }
@@ -163,14 +241,66 @@ fn a_run_that_checks_its_tangent_finds_a_wrong_law_in_every_unit_of_stress() -> 
     Ok(())
 }
 
+fn numbers_without_room_are_found<const D: usize>() -> Result<(), Failure> {
+    // ℂ says how large a tangent in single precision is, and no more if there is a closed form.
+    for factor in [1e60, 1e-60] {
+        let mut cloud = cloud::<D>(1.0, Fault::Elasticity, true, factor)?;
+        cloud.bodies[0].law.fault = Fault::Elasticity;
+        cloud.nodal.mass.iter_mut().for_each(|m| *m *= 1e-60);
+        let found =
+            mismatch(cloud.equilibrium(1.0, &[]).check_tangent(&cloud.increment(), &direction(cloud.nodes(), 1)))?;
+        assert_eq!(found.compared, "single precision", "{D}D, {factor:e}: {found}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_run_that_checks_its_tangent_finds_what_single_precision_cannot_hold() -> Result<(), Failure> {
+    numbers_without_room_are_found::<1>()?;
+    numbers_without_room_are_found::<2>()?;
+    numbers_without_room_are_found::<3>()
+}
+
+fn blocks_are_columns<const D: usize>() -> Result<(), Failure> {
+    for closed in [true, false] {
+        let mut cloud = cloud::<D>(2.0, Fault::Nothing, closed, 1.0)?;
+        cloud.loads.surface = pressures(&[3], Vector::repeat(0.5));
+        for lumping in [1.0, 0.4, 0.0] {
+            let equilibrium = cloud.equilibrium(lumping, &[]);
+            let tangent = equilibrium.tangent(&cloud.increment())?;
+            let blocks = tangent.diagonal_blocks();
+            for (node, block) in blocks.iter().enumerate() {
+                for i in 0..D {
+                    let (mut unit, mut product) =
+                        (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
+                    unit[node][i] = 1.0;
+                    tangent.product(&unit, &mut product);
+                    let apart = (product[node] - block.column(i)).norm() / block.norm();
+                    assert!(apart < 1e-13, "{D}D, closed: {closed}, ε = {lumping}, node {node}: {apart:e}");
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Frozen once, product and blocks share their numbers: no law can make one wrong and not the other.
+#[test]
+fn diagonal_blocks_are_the_columns_of_products_with_unit_vectors() -> Result<(), Failure> {
+    blocks_are_columns::<1>()?;
+    blocks_are_columns::<2>()?;
+    blocks_are_columns::<3>()
+}
+
 #[test]
 fn what_is_not_a_number_is_a_mismatch_at_its_node() -> Result<(), Failure> {
-    let cloud = cloud::<2>(1.0, Fault::Nothing)?;
-    let (dphi, u) = (cloud.increment(), direction(cloud.nodes(), 1));
-    let mut equilibrium = cloud.equilibrium(1.0, &[]);
-    equilibrium.alphas.a1 = f64::NAN;
-    let found = mismatch(equilibrium.check_tangent(&dphi, &u))?;
-    assert_eq!((found.compared, found.site), (Compared::Term(Term::Inertia), Site::Node(0)));
+    for node in [0, 5] {
+        let mut cloud = truthful::<2>(1.0)?;
+        cloud.nodal.mass[node] = f64::NAN;
+        let (dphi, u) = (cloud.increment(), direction(cloud.nodes(), 1));
+        let found = mismatch(cloud.equilibrium(1.0, &[]).check_tangent(&dphi, &u))?;
+        assert_eq!((found.compared, found.node), ("inertia", node), "{found}");
+    }
     Ok(())
 }
 
@@ -218,7 +348,7 @@ fn flat<const D: usize>(field: &[Vector<f64, D>]) -> Vec<f64> {
 
 /// The magnitude over the norm of the residual; Newton's method is told the same one.
 fn share<const D: usize>(equilibrium: &Equilibrium<'_, D, Faulty>, dphi: &[Vector<f64, D>]) -> Result<f64, Failure> {
-    let mut residual = equilibrium.residual::<f64>(dphi, Carry::ALL)?;
+    let mut residual = equilibrium.residual::<f64>(dphi)?;
     equilibrium.clear_prescribed(&mut residual);
     let magnitude = equilibrium.magnitude(dphi)?;
     assert_eq!(NonlinearProblem::magnitude(equilibrium, &flat(dphi))?, magnitude);
@@ -226,23 +356,19 @@ fn share<const D: usize>(equilibrium: &Equilibrium<'_, D, Faulty>, dphi: &[Vecto
 }
 
 fn magnitudes<const D: usize>() -> Result<(), Failure> {
-    let moving = cloud::<D>(3.0, Fault::Nothing)?;
+    let moving = truthful::<D>(3.0)?;
     // Many contributions of both signs: more than what is left of them.
     assert!(share(&moving.equilibrium(1.0, &[]), &moving.increment())? > 1.0);
-    let cloud = moving.at_rest();
+    let mut cloud = moving.at_rest();
     let rest = vec![Vector::zeros(); cloud.nodes()];
     let alone = |what: &str, share: f64| assert!((share - 1.0).abs() < 1e-12, "{D}D, {what} alone: {share}");
-    // Gravity.
-    let mut equilibrium = cloud.equilibrium(1.0, &[]);
-    for (dead, m) in equilibrium.dead_load.iter_mut().zip(&cloud.nodal.mass) {
-        *dead = Vector::from_fn(|k, _| -9.81 * m * (k as f64 + 1.0));
-    }
-    alone("gravity", share(&equilibrium, &rest)?);
-    // Follower pressure on two particles.
-    let mut equilibrium = cloud.equilibrium(1.0, &[]);
-    let force = Vector::from_fn(|k, _| -2.0 - k as f64);
-    equilibrium.pressures = [2, 9].map(|particle| PressurePoint { particle, force }).to_vec();
-    alone("pressure", share(&equilibrium, &rest)?);
+    let acceleration = Vector::from_fn(|k, _| -9.81 * (k as f64 + 1.0));
+    cloud.loads.gravity = Some(Gravity { acceleration, curve: Curve::constant(1.0) });
+    alone("gravity", share(&cloud.equilibrium(1.0, &[]), &rest)?);
+    let surface = pressures(&[2, 9], Vector::from_fn(|k, _| -2.0 - k as f64));
+    cloud.loads = Loads { surface, ..Loads::default() };
+    alone("pressure", share(&cloud.equilibrium(1.0, &[]), &rest)?);
+    cloud.loads = Loads::default();
     // α₁ Δφ: the same Δφ everywhere strains nothing.
     let carried = vec![Vector::repeat(-0.1); cloud.nodes()];
     alone("α₁", share(&cloud.equilibrium(1.0, &[]), &carried)?);
@@ -252,10 +378,9 @@ fn magnitudes<const D: usize>() -> Result<(), Failure> {
             let mut nodal = cloud.nodal.clone();
             let field = if velocity { &mut nodal.velocity } else { &mut nodal.acceleration };
             field.copy_from_slice(&direction(cloud.nodes(), 3));
-            let mut equilibrium = cloud.equilibrium(1.0, &[]);
-            equilibrium.nodal = &nodal;
-            equilibrium.alphas.a3 = a3;
-            alone("v_n or a_n", share(&equilibrium, &rest)?);
+            let mut step = Step { nodal: &nodal, ..cloud.step(1.0) };
+            step.alphas.a3 = a3;
+            alone("v_n or a_n", share(&Equilibrium::new(step, &[]), &rest)?);
         }
     }
     Ok(())
@@ -271,24 +396,27 @@ fn one_contribution_alone_is_as_large_as_the_residual() -> Result<(), Failure> {
 #[test]
 fn the_potential_without_loads_is_a_sum_of_nothing_negative() -> Result<(), Failure> {
     for lumping in [1.0, 0.5, 0.0] {
-        let cloud = cloud::<2>(3.0, Fault::Nothing)?;
-        let mut equilibrium = cloud.equilibrium(lumping, &[]);
+        let mut cloud = truthful::<2>(3.0)?;
         let dphi = cloud.increment();
         let of = |equilibrium: &Equilibrium<'_, 2, Faulty>| equilibrium.potential::<f64>(&dphi).ok_or("no potential");
-        let (potential, magnitude) = of(&equilibrium)??;
+        let (potential, magnitude) = of(&cloud.equilibrium(lumping, &[]))??;
         assert!(potential > 0.0 && (magnitude / potential - 1.0).abs() < 1e-14, "{potential} {magnitude}");
         // A load adds minus its work to the one and the magnitudes of its parts to the other.
-        equilibrium.dead_load.copy_from_slice(&direction(cloud.nodes(), 9));
-        let works: Vec<f64> = equilibrium.dead_load.iter().zip(&dphi).map(|(f, u)| f.dot(u)).collect();
+        let forces = direction::<2>(cloud.particles.len(), 9);
+        cloud.loads.field = Some(ForceField(Arc::new(move |id, _, _| forces[id])));
+        let equilibrium = cloud.equilibrium(lumping, &[]);
+        let force = equilibrium.external_force(&dphi)?;
+        let works: Vec<f64> = force.iter().zip(&dphi).map(|(f, u)| f.dot(u)).collect();
         let (loaded, larger) = of(&equilibrium)??;
         let merit = NonlinearProblem::potential(&equilibrium, &flat(&dphi)).ok_or("no merit")??;
         assert_eq!(merit, (loaded, larger), "what the line search sees");
         let (work, size): (f64, f64) = (works.iter().sum(), works.iter().map(|w| w.abs()).sum());
+        assert!(work.abs() > 1e-3 * potential, "{work}");
         assert!((loaded - (potential - work)).abs() < 1e-13 * potential, "{loaded}");
         assert!((larger - (magnitude + size)).abs() < 1e-13 * magnitude, "{larger}");
         // Under follower pressure there is none.
-        equilibrium.pressures = vec![PressurePoint { particle: 0, force: Vector::zeros() }];
-        assert!(equilibrium.potential::<f64>(&dphi).is_none());
+        cloud.loads.surface = pressures(&[0], Vector::zeros());
+        assert!(cloud.equilibrium(lumping, &[]).potential::<f64>(&dphi).is_none());
     }
     Ok(())
 }

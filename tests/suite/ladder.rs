@@ -3,7 +3,7 @@
 
 use crate::support::{Failure, scene};
 use bfree::field::Field;
-use bfree::material::{ClosedTangent, FrozenMaterial, Lame, Law, Material, NeoHookean};
+use bfree::material::{ClosedTangent, Elastic, Lame, Law, Material, NeoHookean, Start};
 use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::particles::Body;
 use bfree::phases::Phase;
@@ -121,25 +121,19 @@ struct Counting {
     stresses: Arc<AtomicU64>,
 }
 
-impl Law for Counting {
-    type Frozen<T: Real, const D: usize> = ClosedTangent<T, D>;
-
+impl Elastic for Counting {
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         self.energies.fetch_add(1, Ordering::Relaxed);
-        self.law.energy(at)
+        Elastic::energy(&self.law, at)
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
         self.stresses.fetch_add(1, Ordering::Relaxed);
-        self.law.stress(at)
+        Elastic::stress(&self.law, at)
     }
 
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.law.elasticity(at, x)
-    }
-
-    fn freeze<T: Real, const D: usize>(&self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, v: T) -> ClosedTangent<T, D> {
-        self.law.freeze(f_n, at, v)
+        Elastic::elasticity(&self.law, at, x)
     }
 }
 
@@ -151,22 +145,30 @@ struct Asked {
 }
 
 impl Law for Asked {
-    type Frozen<T: Real, const D: usize> = FrozenMaterial<T, D>;
-
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        self.law.energy(at)
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        self.law.energy(at, start)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        self.law.stress(at)
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        self.law.stress(at, start)
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.law.elasticity(at, x)
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        self.law.elasticity(at, start, x)
     }
 
-    fn freeze<T: Real, const D: usize>(&self, f_n: &Tensor<T, D>, at: &Deformation<T, D>, v: T) -> Self::Frozen<T, D> {
-        self.law.freeze(f_n, at, v)
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        self.law.closed(f_n, at, volume)
     }
 
     fn shipped(&self) -> Option<&Material> {

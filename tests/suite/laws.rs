@@ -1,41 +1,64 @@
 //! Laws in vector lanes against the same laws one particle at a time.
 
+use crate::support::{Failure, piola};
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{FrozenTangent, Lame, Law, Material, NonPositiveJacobian, first_piola};
-use bfree::mechanics::residual::{Inadmissible, compose};
-use bfree::mechanics::sweep::{Laws, Supports};
-use bfree::mechanics::tangent::has_closed_form;
+use bfree::material::{ClosedTangent, Lame, Law, Material, NonPositiveJacobian, Start};
+use bfree::mechanics::loads::Loads;
+use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::Step;
+use bfree::mechanics::time::{Alphas, Newmark};
+use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::solver::Precision;
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
+use num_dual::Dual64;
 
-/// A law of the list that the library does not know as such: it takes the plain loop.
-struct Unknown(Material);
+/// A law of the list that the library does not know as such: it takes the plain loop, and without a closed form its tangent is that of
+/// ℂmat.
+#[derive(Clone, Debug)]
+struct Unknown {
+    law: Material,
+    closed: bool,
+}
 
 impl Law for Unknown {
-    type Frozen<T: Real, const D: usize> = <Material as Law>::Frozen<T, D>;
-
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        self.0.energy(at)
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        self.law.energy(at, start)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        self.0.stress(at)
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        self.law.stress(at, start)
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.0.elasticity(at, x)
-    }
-
-    fn freeze<T: Real, const D: usize>(
+    fn elasticity<T: Real, const D: usize>(
         &self,
-        f_n: &Tensor<T, D>,
         at: &Deformation<T, D>,
-        volume: T,
-    ) -> Self::Frozen<T, D> {
-        self.0.freeze(f_n, at, volume)
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        self.law.elasticity(at, start, x)
+    }
+
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        self.law.tangent_density(at, start, v, b)
+    }
+
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        self.law.closed(f_n, at, volume).filter(|_| self.closed)
     }
 }
 
@@ -53,7 +76,9 @@ fn particles<const D: usize>(bodies: u32, regimes: &[(f64, f64)]) -> Particles<D
     for p in 0..5_usize.pow(D as u32) * 3 {
         let x = Vector::from_fn(|k, _| 2.0 + 2.49 * irregular(7 * p + k).abs());
         let volume = 0.1 + 0.05 * irregular(p);
-        particles.push(x, Vector::zeros(), volume, volume, p as u32 % bodies);
+        let vector = |from: usize| Vector::from_fn(|k, _| irregular(13 * p + from + k));
+        particles.push(x, vector(0), volume, volume, p as u32 % bodies);
+        particles.acceleration[p] = vector(5);
         let (j, size) = regimes[p % regimes.len()];
         let stretch = j.powf(1.0 / D as f64) - 1.0;
         particles.displacement_gradient[p] = Tensor::from_fn(|i, k| {
@@ -64,16 +89,8 @@ fn particles<const D: usize>(bodies: u32, regimes: &[(f64, f64)]) -> Particles<D
     particles
 }
 
-/// All laws with a tangent for vector lanes.
 fn materials() -> Vec<Material> {
-    let all = Material::examples(Lame { lambda: 3.0, shear: 2.0 }).into_iter().map(|(_, law)| law);
-    all.filter(|law| has_closed_form::<2, _>(&bodies([law.clone()]))).collect()
-}
-
-/// Whether its tangent has the term b L c.
-fn has_both(law: &Material) -> bool {
-    let at_rest = Deformation::<f64, 2>::new(Tensor::zeros());
-    law.freeze(&identity(), &at_rest, 1.0).closed().is_some_and(|form| form.both.is_some())
+    Material::examples(Lame { lambda: 3.0, shear: 2.0 }).into_iter().map(|(_, law)| law).collect()
 }
 
 fn bodies<L>(laws: impl IntoIterator<Item = L>) -> Vec<Body<L>> {
@@ -84,28 +101,107 @@ fn bits<const D: usize>(field: &[Vector<f64, D>]) -> Vec<u64> {
     field.iter().flatten().map(|x| x.to_bits()).collect()
 }
 
-/// Sum of forces, product of the tangents, and that in single precision.
-type Results<const D: usize> = (Vec<Vector<f64, D>>, Vec<Vector<f64, D>>, Vec<Vector<f32, D>>);
+/// Δt and ε.
+const DT: f64 = 0.5;
+const LUMPING: f64 = 0.3;
 
+fn alphas() -> Alphas {
+    Newmark::default().alphas(DT)
+}
+
+/// What a step computes for its laws.
+#[derive(Debug, PartialEq)]
+struct Results<const D: usize> {
+    residual: Vec<Vector<f64, D>>,
+    product: Vec<Vector<f64, D>>,
+    blocks: Vec<Tensor<f64, D>>,
+    /// The product in single precision and what it is divided by, where the supports have it.
+    single: Option<(Vec<Vector<f32, D>>, f64)>,
+}
+
+/// As in a step; that the tangent is the derivative of the residual is checked on the way.
 fn results<const D: usize, L: Law>(
+    particles: &Particles<D>,
+    bodies: &[Body<L>],
     supports: &Supports<D>,
-    laws: &Laws<'_, D, L>,
     dphi: &[Vector<f64, D>],
     u: &[Vector<f64, D>],
-    both: bool,
-) -> Results<D> {
-    let zeros = vec![Vector::zeros(); u.len()];
-    let inertia = |p: usize, u: &Vector<f64, D>| u * (1.0 + 0.1 * p as f64);
-    let weight = |p: usize| 2.0 + 0.1 * p as f64;
-    let (mut forces, mut product) = (zeros.clone(), zeros.clone());
-    supports.forces(laws, dphi, Some(&inertia), &mut forces).unwrap().unwrap();
-    let tangents = supports.closed_tangents(laws, dphi, both, Some(&weight)).unwrap().unwrap();
-    supports.product(&tangents, u, &mut product);
-    let single = supports.single_tangents(laws, dphi, both, Some(&weight), 4.0).unwrap().unwrap();
-    let u_single: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-    let mut product_single = vec![Vector::zeros(); u.len()];
-    supports.single_product(&single, &u_single, &mut product_single);
-    (forces, product, product_single)
+) -> Result<Results<D>, Failure> {
+    let (nodal, loads) = (Nodal::project(particles, supports, LUMPING)?, Loads::default());
+    let (alphas, lumping) = (alphas(), LUMPING);
+    let step = Step { particles, bodies, loads: &loads, supports, nodal: &nodal, alphas, lumping, time: 0.0, dt: DT };
+    let equilibrium = Equilibrium::new(step, &[]);
+    let residual = equilibrium.residual(dphi)?;
+    let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
+    let real: Vec<_> = equilibrium.residual(&seeded)?.iter().map(|r| r.map(|x| x.re)).collect();
+    assert!(bits(&real) == bits(&residual), "the real part of dual numbers has other bits");
+    equilibrium.check_tangent(dphi, u)?;
+    let tangent = equilibrium.tangent(dphi)?;
+    let mut product = vec![Vector::zeros(); u.len()];
+    tangent.product(u, &mut product);
+    let single = equilibrium.single_tangent(None, dphi)?.map(|single| {
+        let mut product = vec![Vector::zeros(); u.len()];
+        single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut product);
+        (product, single.scale())
+    });
+    Ok(Results { residual, product, blocks: tangent.diagonal_blocks().to_vec(), single })
+}
+
+/// The same by the formulas of one particle, and loops over the entries of every particle.
+fn by_formulas<const D: usize>(
+    particles: &Particles<D>,
+    bodies: &[Body<Unknown>],
+    supports: &Supports<D>,
+    dphi: &[Vector<f64, D>],
+    u: &[Vector<f64, D>],
+) -> Result<[Vec<Vector<f64, D>>; 2], Failure> {
+    let (nodal, alphas) = (Nodal::project(particles, supports, LUMPING)?, alphas());
+    let (mut residual, mut product) = (vec![Vector::zeros(); u.len()], vec![Vector::zeros(); u.len()]);
+    // a = α₁ (Δφ − Δφ̂), and ε of the mass is lumped.
+    let a = |node: usize| (dphi[node] - alphas.predicted(&nodal.velocity[node], &nodal.acceleration[node])) * alphas.a1;
+    for (node, m) in nodal.mass.iter().enumerate() {
+        residual[node] += a(node) * (LUMPING * m);
+        product[node] += u[node] * (alphas.a1 * LUMPING * m);
+    }
+    for p in 0..particles.len() {
+        let law = &bodies[particles.body[p] as usize].law;
+        let (h_n, volume) = (&particles.displacement_gradient[p], particles.volume[p]);
+        let f_n = identity::<f64, D>() + h_n;
+        let at = Deformation::new(compose(&supports.gradient_at(p, dphi), h_n));
+        let l = supports.gradient_at(p, u);
+        // V₀ P F_nᵀ and V₀ δP F_nᵀ, the latter by ℂmat from unit gradients (eqs. 37, 38) if there is no closed form.
+        let sigma = scaled(&(piola(law, at.h)? * f_n.transpose()), volume);
+        let delta = law.closed(&f_n, &at, volume).map_or_else(
+            || {
+                let (unit, stress) = (|k: usize| f_n.row(k).transpose(), law.stress(&at, &Start::NONE));
+                let mut delta = Tensor::zeros();
+                for (k, m) in (0..D).flat_map(|k| (0..D).map(move |m| (k, m))) {
+                    let density = law.tangent_density(&at, &Start::NONE, &unit(k), &unit(m));
+                    let block = at.f * density * at.f.transpose() + identity() * unit(k).dot(&(stress * unit(m)));
+                    let column = block * l.column(m) * volume;
+                    (0..D).for_each(|i| delta[(i, k)] += column[i]);
+                }
+                delta
+            },
+            |closed| closed.apply(&l),
+        );
+        // δP = δF S + F [ℂ : Fᵀ δF] with δF = L F_n is the same, with more rounding.
+        let delta_f = l * f_n;
+        let material = at.f * law.elasticity(&at, &Start::NONE, &(at.f.transpose() * delta_f));
+        let delta_p = delta_f * law.stress(&at, &Start::NONE) + material;
+        let apart = (delta_p * f_n.transpose() * volume - delta).norm() / delta.norm();
+        assert!(apart < 1e-11, "{law:?}, particle {p}: {apart:e}");
+        let mass = (1.0 - LUMPING) * particles.mass[p];
+        let value = |field: &dyn Fn(usize) -> Vector<f64, D>| -> Vector<f64, D> {
+            supports.of(p).map(|(node, n, _)| field(node) * n).sum()
+        };
+        let (of_a, of_u) = (value(&a), value(&|node| u[node] * alphas.a1));
+        for (node, n, grad_n) in supports.of(p) {
+            residual[node] += sigma * grad_n + of_a * (mass * n);
+            product[node] += delta * grad_n + of_u * (mass * n);
+        }
+    }
+    Ok([residual, product])
 }
 
 /// Largest difference over largest value.
@@ -114,92 +210,109 @@ fn difference<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64
     a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, |worst, d| if d <= worst { worst } else { d }) / largest
 }
 
-fn compare<const D: usize>() {
+fn compare<const D: usize>() -> Result<(), Failure> {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [9; D] };
     let lists: Vec<_> = materials().into_iter().map(|law| vec![law]).chain([materials()]).collect();
     let regimes = REGIMES.iter().map(std::slice::from_ref).chain([REGIMES.as_slice()]);
     for (list, regime) in lists.iter().flat_map(|list| regimes.clone().map(move |regime| (list, regime))) {
         let particles = particles::<D>(list.len() as u32, regime);
-        let (known, unknown) = (bodies(list.clone()), bodies(list.iter().cloned().map(Unknown)));
-        let both = list.iter().any(has_both);
+        let unknown = |closed: &dyn Fn(usize) -> bool| {
+            bodies(list.iter().enumerate().map(|(k, law)| Unknown { law: law.clone(), closed: closed(k) }))
+        };
+        // All with closed forms, none, and in turns.
+        let (known, closed) = (bodies(list.clone()), unknown(&|_| true));
+        let others = [unknown(&|_| false), unknown(&|k| k % 2 == 1)];
         for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
             let case = format!("{D}D {list:?} {regime:?} {shape:?}");
-            let (supports, nodes) =
-                Supports::with_precision(&shape, &grid, &particles.position, Precision::Mixed).unwrap();
+            let (supports, nodes) = Supports::with_precision(&shape, &grid, &particles.position, Precision::Mixed)?;
+            let (plain, _) = Supports::plain(&shape, &grid, &particles.position)?;
+            assert!(supports.is_tiled() && !plain.is_tiled());
             let u: Vec<Vector<f64, D>> =
                 (0..nodes.len()).map(|n| Vector::from_fn(|i, _| irregular(5 * n + i))).collect();
             let dphi: Vec<_> = u.iter().map(|u| u * 0.01).collect();
-            let in_lanes = Laws { particles: &particles, bodies: &known };
-            let (forces, product, single) = results(&supports, &in_lanes, &dphi, &u, both);
-            let one_by_one = Laws { particles: &particles, bodies: &unknown };
-            let (same_forces, same_product, same_single) = results(&supports, &one_by_one, &dphi, &u, both);
-            assert!(bits(&forces) == bits(&same_forces) && bits(&product) == bits(&same_product), "{case}");
-            assert!(single == same_single, "{case}");
-            // The formulas written down.
-            let law = |p: usize| &known[particles.body[p] as usize].law;
-            let h_n = |p: usize| &particles.displacement_gradient[p];
-            let f_n = |p: usize| identity::<f64, D>() + h_n(p);
-            let mut expected = vec![Vector::zeros(); u.len()];
-            let at_particle = |p: usize, u: Vector<f64, D>, g: Tensor<f64, D>| {
-                let h = compose(&g, h_n(p));
-                let piola = first_piola(law(p), &(identity::<f64, D>() + h), h)?;
-                Ok::<_, NonPositiveJacobian>((
-                    u * (1.0 + 0.1 * p as f64),
-                    piola * f_n(p).transpose() * particles.volume[p],
-                ))
+            let of = |bodies: &[Body<Unknown>], supports: &Supports<D>| {
+                results(&particles, bodies, supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))
             };
-            supports.assemble(&dphi, &mut expected, at_particle).unwrap();
-            assert!(difference(&forces, &expected) < 1e-14, "{case}");
-            let frozen = supports
-                .interpolate(&dphi, |p, _, g| {
-                    let at = Deformation::new(compose(&g, h_n(p)));
-                    Ok::<_, NonPositiveJacobian>(law(p).freeze(&f_n(p), &at, particles.volume[p]))
-                })
-                .unwrap();
-            expected.fill(Vector::zeros());
-            let at_particle = |p: usize, u: Vector<f64, D>, l: Tensor<f64, D>| {
-                Ok::<_, NonPositiveJacobian>((u * (2.0 + 0.1 * p as f64), frozen[p].apply(&l)))
-            };
-            supports.assemble(&u, &mut expected, at_particle).unwrap();
-            assert!(difference(&product, &expected) < 1e-14, "{case}");
+            let in_lanes =
+                results(&particles, &known, &supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))?;
+            assert!(in_lanes == of(&closed, &supports)?, "{case}: in lanes and one by one");
+            for bodies in [&closed, &others[0], &others[1]] {
+                let (tiled, plain) = (of(bodies, &supports)?, of(bodies, &plain)?);
+                let [residual, product] = by_formulas(&particles, bodies, &supports, &dphi, &u)?;
+                for (name, found, expected, bound) in [
+                    ("residual", &tiled.residual, &residual, 1e-14),
+                    ("product", &tiled.product, &product, 1e-14),
+                    ("residual of the plain sweep", &plain.residual, &tiled.residual, 1e-13),
+                    ("product of the plain sweep", &plain.product, &tiled.product, 1e-13),
+                ] {
+                    let apart = difference(found, expected);
+                    assert!(apart < bound, "{case}: {name}: {apart:e}");
+                }
+                let (single, scale) = tiled.single.ok_or("the supports are prepared for single precision")?;
+                let single: Vec<_> = single.iter().map(|x| x.map(f64::from) * scale).collect();
+                let apart = difference(&single, &tiled.product);
+                assert!(apart < 1e-5, "{case}: single precision: {apart:e}");
+                assert!(plain.single.is_none());
+            }
         }
     }
+    Ok(())
 }
 
 #[test]
-fn a_law_in_lanes_gives_the_bits_of_one_particle_after_the_other() {
-    compare::<1>();
-    compare::<2>();
-    compare::<3>();
+fn a_law_in_lanes_gives_the_bits_of_one_particle_after_the_other() -> Result<(), Failure> {
+    compare::<1>()?;
+    compare::<2>()?;
+    compare::<3>()
 }
 
 #[test]
-fn the_smallest_particle_that_cannot_be_deformed_is_named() {
+fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failure> {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [9; 2] };
-    for law in materials() {
+    for (law, closed) in materials().into_iter().flat_map(|law| [(law.clone(), true), (law, false)]) {
         let mut particles = particles::<2>(1, &REGIMES);
         for (p, det_f) in [(40, -0.5), (17, 0.0), (60, f64::NAN)] {
             particles.displacement_gradient[p] = Tensor::from_diagonal(&Vector::from([det_f - 1.0, 0.0]));
         }
-        let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position).unwrap();
+        let (shape, at) = (Approximation::from(Linear), &particles.position);
+        let (tiled, nodes) = Supports::with_precision(&shape, &grid, at, Precision::Mixed)?;
+        let (plain, _) = Supports::plain(&shape, &grid, at)?;
         let zero = vec![Vector::zeros(); nodes.len()];
-        let bodies = bodies([law]);
-        let laws = Laws { particles: &particles, bodies: &bodies };
+        let (known, unknown, loads) = (bodies([law.clone()]), bodies([Unknown { law, closed }]), Loads::default());
         let expected = Inadmissible { particle: 17, source: NonPositiveJacobian { det_f: 0.0 } };
-        for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let forces = pool.install(|| supports.forces(&laws, &zero, None, &mut zero.clone()));
-            assert_eq!(forces, Some(Err(expected)));
-            let tangents = pool.install(|| supports.closed_tangents(&laws, &zero, true, None));
-            assert_eq!(tangents.map(|tangents| tangents.map(|_| ())), Some(Err(Some(expected))));
+        for (supports, threads) in [(&tiled, 1), (&tiled, 3), (&plain, 1), (&plain, 3)] {
+            let nodal = Nodal::at_rest(&particles, supports);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+            pool.install(|| {
+                fails(&particles, &known, supports, &nodal, &loads, &zero, expected);
+                fails(&particles, &unknown, supports, &nodal, &loads, &zero, expected);
+            });
         }
-        // A tangent that has terms for which there is no room is not cut short.
-        particles.displacement_gradient.fill(Tensor::zeros());
-        let laws = Laws { particles: &particles, bodies: &bodies };
-        let simple = supports.closed_tangents(&laws, &zero, false, None).map(|tangents| tangents.map(|_| ()));
-        let has_room = !has_both(&bodies[0].law);
-        assert_eq!(simple, Some(if has_room { Ok(()) } else { Err(None) }));
     }
+    Ok(())
+}
+
+/// Residual, tangents and potential are refused with the same error.
+fn fails<L: Law>(
+    particles: &Particles<2>,
+    bodies: &[Body<L>],
+    supports: &Supports<2>,
+    nodal: &Nodal<2>,
+    loads: &Loads<2>,
+    zero: &[Vector<f64, 2>],
+    expected: Inadmissible,
+) {
+    let step = Step { particles, bodies, loads, supports, nodal, alphas: alphas(), lumping: 1.0, time: 0.0, dt: DT };
+    let equilibrium = Equilibrium::new(step, &[]);
+    assert_eq!(equilibrium.residual(zero), Err(expected));
+    assert_eq!(
+        equilibrium.residual(&zero.iter().map(|x| x.map(Dual64::from)).collect::<Vec<_>>()).err(),
+        Some(expected)
+    );
+    assert_eq!(equilibrium.tangent(zero).err(), Some(expected));
+    let single = equilibrium.single_tangent(None, zero).map(|single| single.is_some());
+    assert_eq!(single, if supports.is_tiled() { Err(expected) } else { Ok(false) });
+    assert_eq!(equilibrium.potential(zero).map(|found| found.map(|_| ())), Some(Err(expected)));
 }
 
 #[test]

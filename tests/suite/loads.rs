@@ -2,13 +2,20 @@
 
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
+use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::{ForceField, Step};
+use bfree::mechanics::time::Newmark;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::{Body, Particles};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
 use std::path::Path;
+use std::sync::Arc;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -253,19 +260,97 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     let loads = Loads::<2> {
         gravity: Some(Gravity { acceleration: Vector::from([0.0, -8.0]), curve: ramp.clone() }),
         surface: vec![surface(Pressing::Traction(Vector::from([16.0, 0.0]))), surface(Pressing::Pressure(40.0))],
-        prescribed: Vec::new(),
+        ..Loads::default()
     };
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [1, 1] };
-    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &[Vector::from([0.5, 0.5])])?;
+    let mut particles = Particles::default();
+    particles.push(Vector::from([0.5, 0.5]), Vector::zeros(), 1.0, 3.0, 0);
+    let law = Material::from(NeoHookean::ciarlet(Lame::new(1.0, 1.0)?));
+    let bodies = [Body { name: "body".into(), law, density: 3.0 }];
+    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let (nodal, zero) = (Nodal::at_rest(&particles, &supports), vec![Vector::zeros(); nodes.len()]);
+    let alphas = Newmark::default().alphas(1.0);
     for (t, factor) in [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (9.0, 2.0)] {
         // A particle of mass 3 in the middle of four nodes: a quarter of m b, and of T A, to each.
-        for force in &loads.dead(t, &[0.75; 4], &supports) {
+        let (particles, bodies, supports, nodal) = (&particles, &bodies[..], &supports, &nodal);
+        let forces = |gravity: Option<Gravity<2>>, surface: &[SurfaceLoad<2>]| {
+            let loads = &Loads { gravity, surface: surface.to_vec(), ..Loads::default() };
+            let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping: 1.0, time: t, dt: 1.0 };
+            Equilibrium::new(step, &[]).external_force(&zero)
+        };
+        for force in &forces(loads.gravity.clone(), &loads.surface[..1])? {
             assert_eq!(*force, Vector::from([0.25 * 16.0 * 0.25, 0.75 * -8.0]) * factor, "t = {t}");
+        }
+        // −p A N on the particle at rest.
+        for force in &forces(None, &loads.surface[1..])? {
+            assert!((force + Vector::from([6.0, 8.0]) * (0.25 * factor)).norm() < 1e-14, "t = {t}");
         }
         let pressures = loads.pressures(t);
         assert_eq!((pressures.len(), pressures[0].particle), (1, 0));
         // p A N
         assert!((pressures[0].force - Vector::from([6.0, 8.0]) * factor).norm() < 1e-14, "t = {t}");
+    }
+    Ok(())
+}
+
+/// A falling stone, its weight by gravity and by the same field given in code; with inertia and without.
+#[test]
+fn a_uniform_field_is_gravity() -> Result<(), Failure> {
+    let held = json!({"grid": {"size": [2, 2], "spacing": 0.5}, "time": {"inertia": "none", "step": 0.5, "end": 1},
+        "bodies": [{"name": "block", "shape": {"box": {"min": [0, 0], "max": [2, 1]}}, "density": 3,
+                    "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}}],
+        "boundary": {"left": "fixed", "right": "fixed", "bottom": "fixed"}, "gravity": {"acceleration": [0, -9.81]}});
+    for scene in [falling(0.02, 1.0), falling(0.02, 0.5), held] {
+        let mut by_gravity: Simulation<2> = build(&scene)?;
+        let mut by_field = by_gravity.clone();
+        let Some(Gravity { acceleration, curve }) = by_field.loads.gravity.take() else { return Err("gravity".into()) };
+        by_field.loads.field = Some(ForceField(Arc::new(move |_, _, t| acceleration * curve.value(t))));
+        for _ in 0..2 {
+            by_gravity.advance()?;
+            by_field.advance()?;
+        }
+        let (one, other) = (by_gravity.particles.by_id(), by_field.particles.by_id());
+        for (x, y) in one.position.iter().zip(&other.position) {
+            assert!((x - y).norm() < 1e-12, "{x} {y}");
+        }
+        for (g, h) in one.displacement_gradient.iter().zip(&other.displacement_gradient) {
+            assert!((g - h).norm() < 1e-11, "{g} {h}");
+        }
+        let [a, b] = [by_gravity.external_work, by_field.external_work];
+        assert!(a.abs() > 1e-6 && (a - b).abs() < 1e-11 * a.abs(), "{a} {b}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = build(&falling(0.02, 1.0))?;
+    let gravity = simulation.loads.gravity.clone().ok_or("gravity")?;
+    // Who, where and when: not one of the three may be another's.
+    let b = |id: usize, x: &Vector<f64, 2>, t: f64| Vector::from([0.1 * id as f64 + t, x[0] * x[1] - 2.0 * t]);
+    simulation.loads.field = Some(ForceField(Arc::new(b)));
+    let order: Vec<u32> = (0..simulation.particles.len() as u32).rev().collect();
+    simulation.rearrange(&order);
+    let particles = &simulation.particles;
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let nodal = Nodal::project(particles, &supports, 1.0)?;
+    let alphas = simulation.settings.newmark.alphas(0.02);
+    let zero = vec![Vector::zeros(); nodes.len()];
+    for t in [0.0, 0.3] {
+        let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, t);
+        let (force, mut expected) = (equilibrium.external_force(&zero)?, zero.clone());
+        let mut sum = Vector::zeros();
+        for p in 0..particles.len() {
+            let of_particle =
+                (b(particles.id[p] as usize, &particles.position[p], t) + gravity.acceleration) * particles.mass[p];
+            sum += of_particle;
+            supports.of(p).for_each(|(node, n, _)| expected[node] += of_particle * n);
+        }
+        let largest = expected.iter().map(|f| f.norm()).fold(0.0, f64::max);
+        assert!(force.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-14 * largest), "t = {t}");
+        // Σ f_I = Σ m b
+        let total: Vector<f64, 2> = force.iter().sum();
+        assert!((total - sum).norm() < 1e-13 * sum.norm(), "t = {t}: {total} for {sum}");
     }
     Ok(())
 }

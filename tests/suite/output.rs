@@ -52,6 +52,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
         },
         clock: Clock::new(0.01, 3),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

@@ -49,8 +49,8 @@ fn keeps_momentum_and_gains_no_energy<const D: usize>() -> Result<(), Failure> {
     let (grid, particles) = cloud::<D>();
     let scale: f64 = particles.mass.iter().zip(&particles.velocity).map(|(m, v)| m * v.norm()).sum();
     for family in families() {
-        let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+        let (supports, _) = Supports::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &supports, 1.0)?;
         let mut energy_before = 0.0;
         let of_order = |order| [3.0, f64::INFINITY].map(|rate| Smoothing::uniform(order, rate));
         let limited = [3.0, f64::INFINITY].map(Smoothing::limited);
@@ -80,8 +80,8 @@ fn smoothing_keeps_momentum_and_gains_no_energy() -> Result<(), Failure> {
 fn a_common_velocity_is_kept_and_two_half_steps_are_one_step() -> Result<(), Failure> {
     let (grid, mut particles) = cloud::<2>();
     let smoothing = Smoothing::uniform(2, 4.0);
-    let (supports, nodes) = Supports::new(&families()[4], &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    let (supports, _) = Supports::new(&families()[4], &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, 1.0)?;
     // 1 − θ(Δt) is exponential in Δt.
     let left = |dt: f64| 1.0 - smoothing.share(dt);
     assert!((left(0.2) - left(0.1) * left(0.1)).abs() < 1e-15);
@@ -98,7 +98,7 @@ fn a_common_velocity_is_kept_and_two_half_steps_are_one_step() -> Result<(), Fai
 fn many_terms_keep_what_the_nodes_can_represent() -> Result<(), Failure> {
     let (grid, particles) = cloud::<1>();
     let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    let nodal = Nodal::project(&particles, &supports, 1.0)?;
     let field: Vec<_> = nodes.positions(&grid).map(|(_, x)| x.map(|x| (7.0 * x).sin())).collect();
     let represented = supports.values(&field);
     let size = |field: &[Vector<f64, 1>]| field.iter().map(Vector::norm_squared).sum::<f64>().sqrt();
@@ -115,8 +115,8 @@ fn limited_smoothing_sees_neither_the_motion_of_the_frame_nor_its_axes() -> Resu
     let (grid, mut particles) = cloud::<2>();
     let smoothing = Smoothing::limited(4.0);
     for family in families() {
-        let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+        let (supports, _) = Supports::new(&family, &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &supports, 1.0)?;
         let still = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
         let rest = particles.velocity.clone();
         // Seen from a train on other rails: v' = Q v + c.
@@ -143,7 +143,7 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
     let [.., cubic, lme] = families();
     for family in [cubic, lme] {
         let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+        let nodal = Nodal::project(&particles, &supports, 1.0)?;
         let places: Vec<f64> = nodes.positions(&grid).map(|(_, x)| x[0]).collect();
         // min(1, (2q)³), from the shares of a step so short that they are proportional to it.
         let mut strength = |velocity: &dyn Fn(f64) -> f64| -> Result<Vec<(f64, f64)>, Failure> {
@@ -210,8 +210,8 @@ fn with_a_lumped_mass_pic_gives_particles_the_velocity_of_their_nodes() -> Resul
     let mut flip = before.clone();
     flip.settings.smoothing = None;
     flip.step()?;
-    let (supports, nodes) = Supports::new(&before.approximation, &before.grid, &before.particles.position)?;
-    let nodal = Nodal::project(&before.particles, &supports, nodes.len(), 1.0)?;
+    let (supports, _) = Supports::new(&before.approximation, &before.grid, &before.particles.position)?;
+    let nodal = Nodal::project(&before.particles, &supports, 1.0)?;
     let at_start = supports.values(&nodal.velocity);
     let accelerated = supports.values(&nodal.acceleration);
     let largest = accelerated.iter().map(Vector::norm).fold(0.0, f64::max);
@@ -257,8 +257,8 @@ fn a_node_without_mass_does_not_disturb_its_particle() -> Result<(), Failure> {
     let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [3] };
     let mut particles = Particles::default();
     particles.push(Vector::from([1.0]), Vector::from([4.0]), 1.0, 1.0, 0);
-    let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
+    let nodal = Nodal::project(&particles, &supports, 1.0)?;
     assert!(nodal.mass.contains(&0.0) && nodal.velocity.iter().all(|v| v[0] == 0.0 || v[0] == 4.0));
     for smoothing in [Smoothing::uniform(3, f64::INFINITY), Smoothing::limited(f64::INFINITY)] {
         let change = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);

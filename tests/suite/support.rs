@@ -1,7 +1,9 @@
 //! What the tests of whole runs share.
 
+use bfree::material::{Law, NonPositiveJacobian, Start, admissible};
 use bfree::scene;
 use bfree::simulation::Simulation;
+use bfree::tensor::Tensor;
 use std::path::Path;
 
 pub type Failure = Box<dyn std::error::Error>;
@@ -11,6 +13,12 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
+}
+
+/// P = F S of a law that remembers nothing.
+pub fn piola<const D: usize>(law: &impl Law, h: Tensor<f64, D>) -> Result<Tensor<f64, D>, NonPositiveJacobian> {
+    let at = admissible(h)?;
+    Ok(at.f * law.stress(&at, &Start::NONE))
 }
 
 /// The rows of a reference table, without its header.

@@ -29,7 +29,7 @@ fn the_projection_solves_its_equation_for_every_lumping() -> Result<(), Failure>
     for family in families {
         let (supports, nodes) = Supports::new(&family, &GRID(), &particles.position)?;
         for lumping in [1.0, 0.7, 0.1] {
-            let nodal = Nodal::project(&particles, &supports, nodes.len(), lumping)?;
+            let nodal = Nodal::project(&particles, &supports, lumping)?;
             assert_eq!(nodal.iterations > 0, lumping < 1.0);
             for (projected, field) in
                 [(&nodal.velocity, &particles.velocity), (&nodal.acceleration, &particles.acceleration)]
@@ -56,8 +56,8 @@ fn the_projection_solves_its_equation_for_every_lumping() -> Result<(), Failure>
 fn the_iterations_of_both_fields_are_counted() -> Result<(), Failure> {
     let iterations = |velocity, acceleration| -> Result<usize, Failure> {
         let particles = cloud(velocity, acceleration);
-        let (supports, nodes) = Supports::new(&Approximation::from(Linear), &GRID(), &particles.position)?;
-        Ok(Nodal::project(&particles, &supports, nodes.len(), 0.2)?.iterations)
+        let (supports, _) = Supports::new(&Approximation::from(Linear), &GRID(), &particles.position)?;
+        Ok(Nodal::project(&particles, &supports, 0.2)?.iterations)
     };
     let (of_v, of_a) = (iterations(1.0, 0.0)?, iterations(0.0, 1.0)?);
     assert!(of_v > 1 && of_a > 1);
@@ -74,7 +74,7 @@ fn only_a_node_of_next_to_no_mass_gets_no_velocity_in_any_unit_of_mass() -> Resu
             particles.push(Vector::from([1.0 + beyond]), Vector::from([4.0]), 1.0, mass, 0);
             particles.acceleration[0] = Vector::from([-3.0]);
             let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
-            let mut nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+            let mut nodal = Nodal::project(&particles, &supports, 1.0)?;
             // Node 2 carries the share `beyond` of the particle, node 1 the rest.
             let [near, far] = [1, 2].map(|id| nodes.number(id));
             let (near, far) = (near.ok_or("no node 1")?, far.ok_or("no node 2")?);
@@ -99,8 +99,8 @@ fn nodes_with_the_least_mass_there_is_leave_the_projection_finite() -> Result<()
     particles.acceleration[0] = Vector::from([0.0, -2.0, 1.0]);
     let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6; 3] };
     for lumping in [1.0, 0.5, 0.0] {
-        let (supports, nodes) = Supports::new(&Approximation::from(Lme::new(3.0, 1e-6)), &grid, &particles.position)?;
-        let nodal = Nodal::project(&particles, &supports, nodes.len(), lumping)?;
+        let (supports, _) = Supports::new(&Approximation::from(Lme::new(3.0, 1e-6)), &grid, &particles.position)?;
+        let nodal = Nodal::project(&particles, &supports, lumping)?;
         for (projected, field) in
             [(&nodal.velocity, &particles.velocity), (&nodal.acceleration, &particles.acceleration)]
         {

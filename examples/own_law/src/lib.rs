@@ -4,7 +4,7 @@
 //! action ℂ:X of the tangent. The test below is all that is needed to know, by term and by name, that they belong together:
 //! `cargo test --release --package own_law`.
 
-use bfree::material::{FrozenGeneral, Law};
+use bfree::material::Elastic;
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, symmetric, trace};
 
@@ -19,9 +19,7 @@ pub struct Stiffening {
     pub kappa: f64,
 }
 
-impl Law for Stiffening {
-    type Frozen<T: Real, const D: usize> = FrozenGeneral<T, D>;
-
+impl Elastic for Stiffening {
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         let e = at.green_lagrange();
         let tr = trace(&e);
@@ -42,15 +40,6 @@ impl Law for Stiffening {
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
         let volumetric = T::lit(self.lambda) + T::lit(2.0 * self.kappa) * trace(&at.green_lagrange());
         scaled(&identity(), volumetric * trace(x)) + scaled(&symmetric(x), T::lit(2.0 * self.shear))
-    }
-
-    fn freeze<T: Real, const D: usize>(
-        &self,
-        f_n: &Tensor<T, D>,
-        at: &Deformation<T, D>,
-        volume: T,
-    ) -> FrozenGeneral<T, D> {
-        FrozenGeneral::new(self, f_n, at, volume)
     }
 }
 

@@ -215,7 +215,7 @@ impl<const D: usize> Supports<D> {
 
     /// As [`Self::new`], prepared for products in single precision if they are asked for and shape functions are products.
     ///
-    /// Example: [`Self::freeze`].
+    /// Example: [`single_tangent`](crate::mechanics::residual::Equilibrium::single_tangent).
     ///
     /// # Errors
     /// As [`Self::new`].

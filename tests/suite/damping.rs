@@ -1,0 +1,239 @@
+//! Rayleigh damping: what it takes, at which rate, and what it leaves alone.
+
+use crate::support::{Failure, scene};
+use bfree::approximation::{Approximation, Bspline};
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Energy, FromEnergy, Lame, Material, NeoHookean};
+use bfree::mechanics::check::direction;
+use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::Rayleigh;
+use bfree::mechanics::transfer::Nodal;
+use bfree::particles::{Body, Particles};
+use bfree::scalar::Real;
+use bfree::simulation::{Settings, Simulation};
+use bfree::solver::{Forcing, NewtonSettings};
+use bfree::tensor::{Tensor, Vector, contract, trace};
+use num_dual::Dual64;
+use std::f64::consts::PI;
+use std::num::NonZeroU64;
+
+/// Tight, so that what is left is round-off.
+fn tight() -> NewtonSettings {
+    NewtonSettings { relative_tolerance: 1e-13, forcing: Forcing::Fixed(1e-13), ..NewtonSettings::default() }
+}
+
+#[test]
+fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Failure> {
+    for lumping in ["time.lumping=1", "time.lumping=0.4"] {
+        let mut simulation = scene::<2>("rebound.json", &[lumping])?;
+        let (a, dt) = (0.8, simulation.clock.step());
+        simulation.loads.damping = Some(Rayleigh { mass: a, stiffness: 0.0 });
+        simulation.settings.newton = tight();
+        let start = simulation.particles.by_id();
+        simulation.set_initial_acceleration()?;
+        assert!(
+            simulation
+                .particles
+                .acceleration
+                .iter()
+                .zip(&simulation.particles.velocity)
+                .all(|(x, v)| (x + v * a).norm() < 1e-13)
+        );
+        let rate = (1.0 - 0.5 * a * dt) / (1.0 + 0.5 * a * dt);
+        for n in 1..=40 {
+            simulation.advance()?;
+            let left = f64::powi(rate, n);
+            for (v, v_0) in simulation.particles.by_id().velocity.iter().zip(&start.velocity) {
+                assert!((v - v_0 * left).norm() < 1e-12 * v_0.norm(), "{lumping}, step {n}: {v}");
+            }
+            let lost = start.kinetic_energy() * (1.0 - left * left);
+            let found = simulation.dissipated;
+            assert!((found - lost).abs() < 1e-11 * lost, "{lumping}, step {n}: {found} for {lost}");
+        }
+        assert!(simulation.strain_energy() < 1e-20 && simulation.external_work == 0.0);
+    }
+    Ok(())
+}
+
+/// A bar of length 1 between two walls, Λ + 2G = ρ = 1, that begins with the velocity `speed` sin πx: its lowest mode, of ω = π.
+fn bar(dt: f64, damping: Rayleigh, speed: f64) -> Result<Simulation<1>, Failure> {
+    let cells = 16_u32;
+    let h = 1.0 / f64::from(cells);
+    let rate = damping.mass + damping.stiffness * PI * PI;
+    let mut particles = Particles::<1>::default();
+    for p in 0..2 * cells {
+        let x = (f64::from(p) + 0.5) * 0.5 * h;
+        let v = speed * (PI * x).sin();
+        particles.push(Vector::from([x]), Vector::from([v]), 0.5 * h, 0.5 * h, 0);
+        particles.acceleration[p as usize] = Vector::from([-rate * v]);
+    }
+    let wall = |upper| Prescribed {
+        name: "wall".into(),
+        on: Selection::Face { axis: 0, upper },
+        motion: [Some(Motion::Rest)],
+    };
+    let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
+    Ok(Simulation {
+        grid: Grid { origin: Vector::zeros(), spacing: h, cells: [cells] },
+        approximation: Approximation::from(Bspline::Quadratic),
+        bodies: vec![Body { name: "bar".into(), law, density: 1.0 }],
+        particles,
+        loads: Loads { prescribed: vec![wall(false), wall(true)], damping: Some(damping), ..Loads::default() },
+        settings: Settings { lumping: 0.0, newton: tight(), ..Settings::default() },
+        clock: Clock::new(dt, 0),
+        external_work: 0.0,
+        dissipated: 0.0,
+        workspace: Default::default(),
+    })
+}
+
+/// The rate at which the kinetic energy falls from one of its maxima to the next but one: over a whole period.
+fn rate(steps: u32, damping: Rayleigh) -> Result<f64, Failure> {
+    let share = 0.5 * (damping.mass / PI + damping.stiffness * PI);
+    let period = 2.0 / (1.0 - share * share).sqrt();
+    let mut simulation = bar(period / f64::from(steps), damping, 1e-3)?;
+    let before = simulation.particles.kinetic_energy();
+    for _ in 0..steps {
+        simulation.advance()?;
+    }
+    let after = simulation.particles.kinetic_energy();
+    Ok((before / after).ln() / period)
+}
+
+#[test]
+fn the_lowest_mode_of_a_bar_decays_as_theory_says() -> Result<(), Failure> {
+    // ü + (a + b ω²) u̇ + ω² u = 0: amplitudes fall as e^(−(a + b ω²) t/2).
+    for damping in [Rayleigh { mass: 0.0, stiffness: 0.04 }, Rayleigh { mass: 0.3, stiffness: 0.0 }] {
+        let exact = damping.mass + damping.stiffness * PI * PI;
+        let errors = [20, 40, 80].map(|steps| rate(steps, damping).map(|rate| (rate / exact - 1.0).abs()));
+        let [coarse, middle, fine] = errors;
+        println!("{damping:?} {:?}", (&coarse, &middle, &fine));
+        let (coarse, fine) = (coarse?, fine?);
+        assert!(fine < 0.003 && fine < 0.3 * coarse, "{damping:?}: off by {coarse} and {fine}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_stiffness_part_takes_no_momentum() -> Result<(), Failure> {
+    let near = ["bodies.1.shape.ball.center=[5.4, 2.75]", "bodies.0.velocity=[2,0]", "output.probes=[]"];
+    let mut simulation = scene::<2>("collision.json", &near)?;
+    simulation.loads.damping = Some(Rayleigh { mass: 0.0, stiffness: 0.01 });
+    simulation.settings.newton = tight();
+    let before = simulation.particles.momentum();
+    let energy = simulation.particles.kinetic_energy();
+    for _ in 0..30 {
+        simulation.advance()?;
+    }
+    let given = simulation.particles.momentum() - before;
+    assert!(simulation.dissipated > 0.05 * energy, "{}", simulation.dissipated);
+    assert!(given.norm() < 1e-11 * before.norm(), "{given}");
+    Ok(())
+}
+
+/// The largest defect of kinetic + strain + dissipated − work in a bar under gravity, over its energy at the start.
+fn defect(steps: u32) -> Result<[f64; 2], Failure> {
+    let mut simulation = bar(1.0 / f64::from(steps), Rayleigh { mass: 0.2, stiffness: 0.03 }, 0.1)?;
+    let g = Vector::from([0.2]);
+    simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
+    simulation.particles.acceleration.iter_mut().for_each(|a| *a += g);
+    let start = simulation.particles.kinetic_energy();
+    let mut most: f64 = 0.0;
+    for _ in 0..steps {
+        simulation.advance()?;
+        let stored = simulation.particles.kinetic_energy() + simulation.strain_energy();
+        most = most.max((stored + simulation.dissipated - simulation.external_work - start).abs());
+    }
+    Ok([most / start, simulation.dissipated / start])
+}
+
+#[test]
+fn what_damping_takes_is_counted() -> Result<(), Failure> {
+    let [coarse, _] = defect(25)?;
+    let [middle, _] = defect(50)?;
+    let [fine, dissipated] = defect(100)?;
+    println!("{coarse:e} {middle:e} {fine:e}, dissipated {dissipated}");
+    assert!(dissipated > 0.3, "{dissipated}");
+    assert!(fine < 1e-3 && fine < 0.3 * middle && middle < 0.3 * coarse, "{coarse:e} {middle:e} {fine:e}");
+    Ok(())
+}
+
+/// St. Venant and Kirchhoff's solid by its energy alone: without a closed form.
+struct Quadratic;
+
+impl Energy for Quadratic {
+    fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+        T::lit(75.0) * trace(e) * trace(e) + T::lit(30.0) * contract(e, e)
+    }
+}
+
+fn checked<const D: usize>(name: &str, overrides: &[&str]) -> Result<(), Failure> {
+    let damping = [(0.5, 0.0), (0.0, 0.02), (0.5, 0.02)].map(|(mass, stiffness)| Rayleigh { mass, stiffness });
+    for (damping, precision, lumping) in
+        damping.iter().flat_map(|damping| [("double", 0.6), ("mixed", 1.0)].map(|(p, l)| (*damping, p, l)))
+    {
+        let [precision, lumping] =
+            [format!("solver.krylov.precision=\"{precision}\""), format!("time.lumping={lumping}")];
+        let mut simulation = scene::<D>(name, &[overrides, &[&precision, &lumping]].concat())?;
+        simulation.loads.damping = Some(damping);
+        simulation.settings.check_tangent = NonZeroU64::new(1);
+        let mut general = simulation.clone().with_laws(|_| FromEnergy(Quadratic));
+        for _ in 0..10 {
+            simulation.advance()?;
+            general.advance()?;
+        }
+        assert!(simulation.dissipated > 0.0 && general.dissipated > 0.0);
+    }
+    Ok(())
+}
+
+#[test]
+fn the_tangent_of_damping_is_the_derivative_of_its_force() -> Result<(), Failure> {
+    checked::<2>("rebound.json", &["bodies.0.shape.ball.center=[1.4, 2.5]", "bodies.0.velocity=[-3,1]", "output={}"])?;
+    checked::<3>("ball_drop.json", &["output={}"])
+}
+
+#[test]
+fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), Failure> {
+    let mut simulation = scene::<2>("rebound.json", &[])?;
+    simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(0.2, 0.3, -0.1, -0.15));
+    simulation.loads.damping = Some(Rayleigh { mass: 0.0, stiffness: 0.5 });
+    let dt = simulation.clock.step();
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    let positions: Vec<_> = nodes.positions(&simulation.grid).map(|(_, x)| x).collect();
+    let forces = |velocity: &dyn Fn(&Vector<f64, 2>) -> Vector<f64, 2>| -> Result<_, Failure> {
+        let mut nodal = Nodal::at_rest(&simulation.particles, &supports);
+        nodal.velocity.iter_mut().zip(&positions).for_each(|(v, x)| *v = velocity(x));
+        // v_{n+1} = v_n, also of the dual numbers' real part.
+        let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
+        let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+        let pieces = equilibrium.terms.pieces();
+        let piece = pieces.iter().find(|piece| piece.name == "damping").ok_or("no damping")?;
+        let force = equilibrium.residual_of::<f64>(*piece, &dphi)?;
+        Ok(force.iter().map(|f| f.norm()).fold(0.0, f64::max))
+    };
+    let turning = forces(&|x| Vector::from([-(x[1] - 2.5), x[0] - 2.5]))?;
+    let shearing = forces(&|x| Vector::from([x[1] - 2.5, x[0] - 2.5]))?;
+    assert!(shearing > 1.0 && turning < 1e-13 * shearing, "{turning:e} {shearing:e}");
+    Ok(())
+}
+
+#[test]
+fn the_force_of_damping_is_the_gradient_of_its_potential() -> Result<(), Failure> {
+    let mut simulation = scene::<2>("rebound.json", &["time.lumping=0.5"])?;
+    simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(0.2, 0.3, -0.1, -0.15));
+    simulation.loads.damping = Some(Rayleigh { mass: 0.7, stiffness: 0.05 });
+    let dt = simulation.clock.step();
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    let nodal = Nodal::project(&simulation.particles, &supports, 0.5)?;
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    let (dphi, u) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
+    let seeded: Vec<_> = dphi.iter().zip(&u).map(|(x, u)| x.zip_map(u, |x, u| Dual64::new(0.01 * x, u))).collect();
+    let dphi: Vec<_> = dphi.iter().map(|x| x * 0.01).collect();
+    let slope = equilibrium.potential(&seeded).ok_or("all terms have one")??.0.eps;
+    let work: f64 = equilibrium.residual(&dphi)?.iter().zip(&u).map(|(r, u)| r.dot(u)).sum();
+    assert!((slope - work).abs() < 1e-11 * equilibrium.magnitude(&dphi)?, "{slope} {work}");
+    Ok(())
+}

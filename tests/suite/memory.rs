@@ -1,0 +1,250 @@
+//! A law with memory: what its particles remember, and where it must come through.
+
+use crate::support::{Failure, Random, scene};
+use bfree::checkpoint::{Checkpoints, Identity, restore};
+use bfree::material::{Lame, Law, NeoHookean, Remembered, Start};
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::particles::Particles;
+use bfree::scalar::Real;
+use bfree::simulation::Simulation;
+use bfree::tensor::{Deformation, Tensor, contract, scaled};
+use serde_json::Value;
+use std::num::NonZeroU64;
+
+/// Ciarlet's solid that softens by the strain energy W it has met: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ, so
+/// that it takes about the time τ. It remembers κ, and for the test how long it has been there. A solid that does not soften remembers
+/// nothing.
+#[derive(Clone, Copy, Debug)]
+struct Softening {
+    solid: NeoHookean,
+    softens: bool,
+}
+
+const LIMIT: f64 = 2.0;
+const TIME: f64 = 0.05;
+const NAMES: [Remembered; 2] =
+    [Remembered { name: "energy met", at_rest: 0.0 }, Remembered { name: "age", at_rest: 3.0 }];
+
+impl Softening {
+    fn undamaged<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        Law::energy(&self.solid, at, &Start::NONE)
+    }
+
+    /// κ' and dκ'/dW.
+    fn met<T: Real>(&self, energy: T, start: &Start<'_>) -> (T, f64) {
+        if !self.softens {
+            return (T::zero(), 0.0);
+        }
+        let (met, rate) = (start.memory[0], start.dt / (TIME + start.dt));
+        if energy.value() > met {
+            (T::lit(met) + (energy - T::lit(met)) * T::lit(rate), rate)
+        } else {
+            (T::lit(met), 0.0)
+        }
+    }
+
+    fn factor<T: Real>(met: T) -> T {
+        (-met / T::lit(LIMIT)).exp()
+    }
+}
+
+impl Law for Softening {
+    fn memory(&self) -> &[Remembered] {
+        if self.softens { &NAMES } else { &[] }
+    }
+
+    /// ∫ e^(−κ'(W)/k) dW
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        let energy = self.undamaged(at);
+        let (met, rate) = self.met(energy, start);
+        if rate == 0.0 {
+            return energy * Self::factor(met);
+        }
+        let before = start.memory[0];
+        let sum = Self::factor(T::lit(before)) - Self::factor(met);
+        T::lit(before * Self::factor(before)) + sum * T::lit(LIMIT / rate)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        let (met, _) = self.met(self.undamaged(at), start);
+        scaled(&Law::stress(&self.solid, at, &Start::NONE), Self::factor(met))
+    }
+
+    /// ℂ:X = e^(−κ'/k) [ℂ₀:X − (dκ'/dW)/k (S₀:X) S₀]
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        let (met, rate) = self.met(self.undamaged(at), start);
+        let stress = Law::stress(&self.solid, at, &Start::NONE);
+        let softer = scaled(&stress, T::lit(rate / LIMIT) * contract(&stress, x));
+        scaled(&(Law::elasticity(&self.solid, at, &Start::NONE, x) - softer), Self::factor(met))
+    }
+
+    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+        if self.softens {
+            next[0] = self.met(self.undamaged(at), start).0;
+            next[1] = start.memory[1] + start.dt;
+        }
+    }
+}
+
+/// Two discs side by side that run into each other at once; the soft one softens.
+fn collision(overrides: &[&str]) -> Result<Simulation<2, Softening>, Failure> {
+    let near = ["bodies.1.shape.ball.center=[5.4, 2.75]", "output.probes=[]"];
+    let solids =
+        [Lame::from_young_poisson(100.0, 0.3)?, Lame::from_young_poisson(1000.0, 0.3)?].map(NeoHookean::ciarlet);
+    let plain = scene::<2>("collision.json", &[&near[..], overrides].concat())?;
+    Ok(plain.with_laws(|body| {
+        let softens = body.name == "soft";
+        Softening { solid: solids[usize::from(!softens)], softens }
+    }))
+}
+
+const STEPS: usize = 30;
+
+/// What each particle remembers.
+fn remembered(particles: &Particles<2>) -> Vec<[f64; 2]> {
+    (0..particles.len()).map(|p| std::array::from_fn(|i| particles.start(p, 0.0).memory[i])).collect()
+}
+
+#[test]
+fn particles_remember_at_the_end_of_every_step_what_their_law_says() -> Result<(), Failure> {
+    let mut simulation = collision(&[])?;
+    let at_rest = |particles: &Particles<2>| {
+        particles.body.iter().map(|&body| if body == 0 { [0.0, 3.0] } else { [0.0; 2] }).collect::<Vec<_>>()
+    };
+    assert_eq!(remembered(&simulation.particles), at_rest(&simulation.particles));
+    let mut expected = remembered(&simulation.particles.by_id());
+    for _ in 0..STEPS {
+        let report = simulation.advance()?;
+        let particles = simulation.particles.by_id();
+        for p in 0..particles.len() {
+            if particles.body[p] == 0 {
+                let energy = simulation.bodies[0].law.undamaged(&Deformation::new(particles.displacement_gradient[p]));
+                let [met, age] = expected[p];
+                let grown = met + (energy - met) * (report.dt / (TIME + report.dt));
+                expected[p] = [if energy > met { grown } else { met }, age + report.dt];
+            }
+        }
+        assert_eq!(remembered(&particles), expected);
+    }
+    let most = expected.iter().map(|[met, _]| *met).fold(0.0, f64::max);
+    assert!(most > 0.1 * LIMIT, "the test is meant to see softening: {most}");
+    // It acts on the motion: without it the discs part with other velocities.
+    let mut elastic = collision(&[])?.with_laws(|body| Softening { softens: false, ..body.law });
+    assert!(elastic.particles.memory.is_empty());
+    for _ in 0..STEPS {
+        elastic.advance()?;
+    }
+    let parted = elastic.particles.momentum() - simulation.particles.momentum();
+    let (with, without) = (simulation.particles.by_id(), elastic.particles.by_id());
+    let apart = with.velocity.iter().zip(&without.velocity).map(|(a, b)| (a - b).norm());
+    assert!(apart.fold(0.0, f64::max) > 0.01 && parted.norm() < 1e-6);
+    Ok(())
+}
+
+#[test]
+fn the_tangent_of_a_law_with_memory_is_the_derivative_of_its_residual() -> Result<(), Failure> {
+    for precision in ["double", "mixed"] {
+        for step in [0.02, 0.005] {
+            let [precision, step] = [format!("solver.krylov.precision=\"{precision}\""), format!("time.step={step}")];
+            let mut simulation = collision(&[&precision, &step])?;
+            simulation.settings.check_tangent = NonZeroU64::new(1);
+            for _ in 0..STEPS {
+                simulation.advance()?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_restart_knows_what_particles_remember() -> Result<(), Failure> {
+    let (folder, start) = (tempfile::tempdir()?, collision(&[])?);
+    let identity = Identity::new(Value::Null, &start.particles);
+    let settings = OutputSettings {
+        directory: folder.path().to_owned(),
+        fields: vec![],
+        snapshot_every: None,
+        probes: vec![],
+        end_time: 1.0,
+        audience: Audience::Nobody,
+    };
+    let mut simulation = start.clone();
+    let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+    for _ in 0..STEPS / 2 {
+        simulation.advance()?;
+    }
+    Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None)
+        .write(&simulation, &mut recorder)?;
+    let mut continued = start.clone();
+    restore(folder.path(), &identity, &mut continued)?;
+    assert!(continued.particles.memory.iter().any(|x| *x > 0.0) && continued.particles == simulation.particles);
+    for _ in 0..STEPS / 2 {
+        simulation.advance()?;
+        continued.advance()?;
+    }
+    assert_eq!(continued.particles, simulation.particles);
+    // The same scene with laws that remember nothing is another run.
+    let mut forgetful = start.with_laws(|body| Softening { softens: false, ..body.law });
+    let refused = restore(folder.path(), &identity, &mut forgetful).err().ok_or("another law")?;
+    assert!(bfree::causes::on_one_line(&refused).contains("of memory instead of 0"), "{refused:?}");
+    Ok(())
+}
+
+#[test]
+fn a_step_that_fails_is_forgotten() -> Result<(), Failure> {
+    let mut simulation = collision(&["bodies.0.velocity=[4,0]"])?;
+    let (mut failed, body) = (0, simulation.particles.by_id().body);
+    simulation.settings.newton.max_iterations = 3;
+    while simulation.clock.time() < 0.4 {
+        let before = simulation.clone();
+        if simulation.step().is_err() {
+            assert_eq!(simulation.particles, before.particles);
+            failed += simulation.advance()?.failed.len();
+        }
+        // Of an attempt that failed, no Δt is counted.
+        for ([_, age], body) in remembered(&simulation.particles.by_id()).iter().zip(&body) {
+            let expected = if *body == 0 { 3.0 + simulation.clock.time() } else { 0.0 };
+            assert!((age - expected).abs() < 1e-13, "{age} at t = {}", simulation.clock.time());
+        }
+    }
+    assert!(failed > 0, "the test is meant to see steps that fail");
+    Ok(())
+}
+
+#[test]
+fn memory_follows_its_particle_wherever_it_lies() -> Result<(), Failure> {
+    let mut one = collision(&[])?;
+    let (mut random, mut other) = (Random(9), one.clone());
+    for _ in 0..STEPS / 6 {
+        let mut order: Vec<u32> = (0..other.particles.len() as u32).collect();
+        for last in (1..order.len()).rev() {
+            order.swap(last, random.below(last as u64 + 1) as usize);
+        }
+        let before = other.particles.by_id();
+        other.rearrange(&order);
+        assert_eq!(other.particles.by_id(), before);
+        for _ in 0..6 {
+            one.advance()?;
+            other.advance()?;
+        }
+        assert_eq!(one.particles.by_id(), other.particles.by_id());
+    }
+    assert!(one.particles.memory.iter().any(|x| *x > 0.0));
+    Ok(())
+}
+
+#[test]
+fn what_remembers_nothing_has_no_memory() -> Result<(), Failure> {
+    let mut simulation = scene::<2>("rebound.json", &[])?;
+    for _ in 0..2 {
+        simulation.advance()?;
+        assert_eq!((simulation.particles.memory.len(), simulation.particles.remembered), (0, 0));
+        assert!(simulation.particles.start(0, 1.0).memory.is_empty());
+    }
+    Ok(())
+}
