@@ -3,12 +3,12 @@
 use bfree::approximation::{Approximation, Linear, Lme, ShapeFunction};
 use bfree::grid::Grid;
 use bfree::material::{FrozenTangent, Lame, Law, Material};
-use bfree::mechanics::sweep::{Laws, Supports};
-use bfree::mechanics::tangent::{frozen_bytes, has_closed_form};
 use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
 use bfree::mechanics::residual::{Carry, Equilibrium};
 use bfree::mechanics::sweep::{Laws, Supports};
+use bfree::mechanics::sweep::{Laws, Supports};
 use bfree::mechanics::tangent::frozen_bytes;
+use bfree::mechanics::tangent::{frozen_bytes, has_closed_form};
 use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;

@@ -53,8 +53,8 @@ pub(super) fn block<const D: usize>(
         particles,
         loads: Loads {
             gravity: Some(Gravity { acceleration, curve: Curve::constant(1.0) }),
-            surface: Vec::new(),
             prescribed: vec![floor],
+            ..Loads::default()
         },
         settings: Settings {
             inertia: Inertia::Newmark,
@@ -74,6 +74,7 @@ pub(super) fn block<const D: usize>(
         },
         clock: Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

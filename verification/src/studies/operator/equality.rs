@@ -6,10 +6,9 @@ use crate::report::{Bound, Report};
 use crate::studies::StudyError;
 use bfree::approximation::{Approximation, ShapeFunction};
 use bfree::material::Material;
-use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::solver::{NonlinearProblem, Precision, SingleTangent};
+use bfree::solver::{NonlinearProblem, Precision};
 use bfree::tensor::{Tensor, Vector};
 
 const SAME: f64 = 1e-12;
@@ -47,7 +46,7 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
             let dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * (0.01 * SPACING)).collect();
             let u: Vec<Vector<f64, D>> = random.field(count);
             let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
-                let nodal = Nodal::project(&simulation.particles, supports, count, 0.5)?;
+                let nodal = Nodal::project(&simulation.particles, supports, 0.5)?;
                 let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
                 let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
                 let tangent = equilibrium.tangent(&dphi)?;
@@ -56,7 +55,7 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
                 let flat = |field: &[Vector<f64, D>]| bytemuck::cast_slice(field).to_vec();
                 Ok([
                     flat(&product),
-                    flat(&equilibrium.residual::<f64>(&dphi, Carry::ALL)?),
+                    flat(&equilibrium.residual::<f64>(&dphi)?),
                     vec![NonlinearProblem::magnitude(&equilibrium, bytemuck::cast_slice(&dphi))?],
                     tangent.diagonal_blocks().iter().flat_map(|block| block.iter().copied().collect::<Vec<_>>()).collect(),
                     flat(&nodal.velocity),
@@ -67,10 +66,10 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
                 report.push(&[quantity, &D.to_string(), law_name, shape_name], difference(a, b), Bound::AtMost(SAME));
             }
             let (single, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
-            let nodal = Nodal::project(&simulation.particles, &single, count, 0.5)?;
+            let nodal = Nodal::project(&simulation.particles, &single, 0.5)?;
             let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
             let equilibrium = simulation.equilibrium(&single, &nodal, &prescribed, alphas, 0.1);
-            let product = equilibrium.single_tangent(&dphi)?.map_or_else(Vec::new, |tangent| {
+            let product = equilibrium.single_tangent(None, &dphi)?.map_or_else(Vec::new, |tangent| {
                 let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
                 let mut out = vec![Vector::zeros(); count];
                 tangent.product(&u, &mut out);

@@ -10,7 +10,6 @@ use crate::shipped;
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
-use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::solver::Precision;
@@ -91,7 +90,7 @@ fn product<const D: usize>(
     let mut out = vec![Vector::zeros(); u.len()];
     let seconds = best(15, || tangent.product(&u, &mut out));
     let on_two = two.install(|| best(15, || tangent.product(&u, &mut out)));
-    let in_single = match equilibrium.single_tangent(&u)? {
+    let in_single = match equilibrium.single_tangent(None, &u)? {
         Some(single) => {
             let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
             let mut out = vec![Vector::zeros(); u.len()];
@@ -121,7 +120,7 @@ fn product<const D: usize>(
         format!("{:.0} %", 100.0 * work.padded / seconds / peak),
         format!("{:.2} x", seconds / on_two),
         format!("{:.2} x", seconds / in_single),
-        times(best(5, || equilibrium.residual::<f64>(&u, Carry::ALL))),
+        times(best(5, || equilibrium.residual::<f64>(&u))),
         times(best(5, || equilibrium.tangent(&u).map(|_| ()))),
         times(shape_functions),
     ]);
@@ -148,7 +147,8 @@ fn matrices(copy: f64, read: f64) -> Result<Table, StudyError> {
         let mut out = vec![Vector::zeros(); count];
         let by_matrix = best(9, || matrix.product(&u, &mut out));
         let free = best(9, || tangent.product(&u, &mut out));
-        let bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, 1.0, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let bytes = prepared.supports.bytes() + frozen;
         table.push([
             name.into(),
             simulation.particles.len().to_string(),

@@ -63,7 +63,7 @@ impl Work {
             work.padded += 2.0 * (LANES * (gather(width, D) + point(D)) + lanes * scatter(rows, width[0], D)) as f64;
         }
         let field = prepared.nodes.len() * size_of::<Vector<f64, D>>();
-        let frozen = frozen_bytes(&simulation.bodies, &prepared.supports, simulation.settings.lumping, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
         work.bytes = (prepared.supports.bytes() + frozen + 2 * field) as f64;
         Ok(work)
     }
