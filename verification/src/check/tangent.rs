@@ -115,18 +115,25 @@ pub(crate) fn measure<const D: usize, L: Law>(
         })
         .collect();
     let mut measured = Vec::new();
+    // Of the last whole term, whose parts follow it.
+    let mut of_term = [0.0; DIRECTIONS];
     for piece in equilibrium.terms.pieces() {
         let frozen = equilibrium.tangent_of(piece, dphi)?;
         let single = equilibrium.single_tangent(Some(piece), dphi)?;
         let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
         let mut products = Vec::new();
-        for u in &directions {
+        for (u, of_term) in directions.iter().zip(&mut of_term) {
             let mut dual = equilibrium.derivative(piece, dphi, u)?;
             equilibrium.clear_prescribed(&mut dual);
             let analytic = product(&frozen, u);
             let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
             worst = worse(worst, relative(&analytic, &dual, scale));
+            if piece.name == piece.term {
+                *of_term = scale;
+            }
             if let Some(single) = &single {
+                // A part is what is left of the rounded numbers of its term.
+                let scale = scale.max(*of_term);
                 worst_in_single = worse(worst_in_single, relative(&product_in_single(single, u), &dual, scale));
             }
             products.push(analytic);
