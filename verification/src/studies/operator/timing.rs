@@ -1,6 +1,6 @@
 //! Rates and seconds: tables, no verdicts. All times are the best of several, on one thread unless said otherwise.
 
-use super::block::block;
+use super::block::{General, block};
 use super::machine::{copy_bandwidth, peak, read_bandwidth};
 use super::work::Work;
 use crate::baseline::{BFree, Pattern, assemble};
@@ -10,11 +10,13 @@ use crate::shipped;
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
+use bfree::material::{Law, Material};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
-use bfree::solver::Precision;
+use bfree::particles::Body;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
+use bfree::solver::Precision;
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
@@ -63,23 +65,27 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
     );
     for (name, shape) in shapes() {
         for jitter in [0.1, 0.24] {
-            product::<2>(&mut table, name, &shape, 160, jitter, [peak, copy], two)?;
-            product::<3>(&mut table, name, &shape, 32, jitter, [peak, copy], two)?;
+            product::<2, _>(&mut table, name, block(shape.clone(), None, 160, jitter, 1.0)?, jitter, [peak, copy], two)?;
+            product::<3, _>(&mut table, name, block(shape.clone(), None, 32, jitter, 1.0)?, jitter, [peak, copy], two)?;
         }
+        let name = format!("{name}, no closed form");
+        let general = |body: &Body<Material>| General(body.law.clone());
+        let (plane, space) = (block(shape.clone(), None, 160, 0.1, 1.0)?, block(shape, None, 32, 0.1, 1.0)?);
+        product::<2, _>(&mut table, &name, plane.with_laws(general), 0.1, [peak, copy], two)?;
+        product::<3, _>(&mut table, &name, space.with_laws(general), 0.1, [peak, copy], two)?;
     }
     Ok(table)
 }
 
-fn product<const D: usize>(
+fn product<const D: usize, L: Law>(
     table: &mut Table,
     name: &str,
-    shape: &Approximation,
-    cells: u32,
+    mut simulation: Simulation<D, L>,
     jitter: f64,
     [peak, copy]: [f64; 2],
     two: &rayon::ThreadPool,
 ) -> Result<(), StudyError> {
-    let mut simulation = block::<D>(shape.clone(), None, cells, jitter, 1.0)?;
+    let shape = &simulation.approximation.clone();
     let work = Work::of(&simulation, &Prepared::new(&simulation)?)?;
     simulation.settings.newton.precision = Precision::Mixed;
     let prepared = Prepared::new(&simulation)?;
