@@ -132,8 +132,8 @@ pub(crate) fn measure<const D: usize, L: Law>(
                 *of_term = scale;
             }
             if let Some(single) = &single {
-                // A part is what is left of the rounded numbers of its term.
-                let scale = scale.max(*of_term);
+                // In 1D the rounded numbers of a part may cancel: where J is large, those of the material one.
+                let scale = if D == 1 { scale.max(*of_term) } else { scale };
                 worst_in_single = worse(worst_in_single, relative(&product_in_single(single, u), &dual, scale));
             }
             products.push(analytic);

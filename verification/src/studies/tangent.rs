@@ -78,7 +78,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     report.note("k(F) = |F| |1/F| / 3 of the 3x3 F, the largest of all particles. In 1D there is no rotation ('-').");
     report.note("Follower pressure: on part of the surface only (open), so u.Kw differs from w.Ku in 2D and 3D; in 1D cof F = 1 and its tangent is zero.");
     report.note("Pieces are frozen alone and applied by the solver's product, in vector lanes and ('plain') one particle after the other.");
-    report.note("f32: the product in single precision; that of a part is relative to the larger of the part's and its term's.");
+    report.note("f32: the product in single precision; in 1D, where its numbers may cancel, that of a part is relative to its term.");
     report.note("eps = 0.3, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.");
     Ok(Outcome { reports: vec![report], ..Outcome::default() })
 }

@@ -256,7 +256,7 @@ const BY_DENSITY: &[Mutant] = &[(
     ciarlet,
     Fault::NoPotential,
     &[
-        red(S, ALL).except(TINY_WORK),
+        red(S, ALL),
         red("tangent symmetric", PLANE_AND_SPACE),
     ],
 )];
