@@ -12,6 +12,7 @@ use bfree::material::{Law, admissible};
 use bfree::mechanics::loads::{Loads, prescribed_dofs};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::Step;
 use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
@@ -147,8 +148,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
             }
         }
         let (supports, nodes) = Supports::new(&Serendipity, &grid, &points.position)?;
-        let mut mass = vec![0.0; nodes.len()];
-        supports.scatter(&mut mass, |p, n, _| points.mass[p] * n);
+        let mass = Nodal::mass_alone(&points, &supports).mass.to_vec();
         let zero = vec![Vector::zeros(); nodes.len()];
         Ok(Self {
             grid,
@@ -189,19 +189,10 @@ impl<const D: usize, L: Law> Elements<D, L> {
         // Walls at rest alone: u = 0 there, whatever was carried.
         let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, t, dt);
         let nodal = nodal.with_prescribed(&prescribed);
-        let dead_load = self.loads.dead(t + dt, &self.mass, &self.supports);
-        let lumping = 0.0;
-        let equilibrium = Equilibrium::new(
-            &self.points,
-            &self.bodies,
-            &self.supports,
-            alphas,
-            lumping,
-            &nodal,
-            dead_load,
-            Vec::new(),
-            &prescribed,
-        );
+        let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);
+        let (nodal, lumping, time) = (&nodal, 0.0, t + dt);
+        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt };
+        let equilibrium = Equilibrium::new(step, &prescribed);
         let mut u = self.displacement.clone();
         let report = newton(
             &equilibrium,
@@ -239,7 +230,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let parts = self.supports.interpolate(&self.displacement, |p, _, g| {
             let at = admissible(g).map_err(|source| Inadmissible { particle: p, source })?;
             let body = &self.bodies[self.points.body[p] as usize];
-            Ok::<_, Inadmissible>(self.points.volume[p] * body.law.energy(&at))
+            Ok::<_, Inadmissible>(self.points.volume[p] * body.law.energy(&at, &self.points.start(p, 0.0)))
         })?;
         let kinetic =
             self.point_velocity().into_iter().zip(&self.points.mass).map(|(v, m)| 0.5 * m * (v - frame).norm_squared());

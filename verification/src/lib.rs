@@ -14,7 +14,6 @@ mod check;
 pub mod double_double;
 pub mod elements;
 pub mod figure;
-pub mod forced;
 pub mod known;
 pub mod manufactured;
 pub mod prepared;
@@ -28,5 +27,5 @@ pub mod start;
 pub mod studies;
 pub mod table;
 
-pub use check::{check_approximation, check_material, check_tangent};
+pub use check::{check_approximation, check_material, check_material_from, check_tangent};
 pub use report::{Bound, Cell, Report, Verdict};

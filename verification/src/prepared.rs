@@ -8,7 +8,7 @@ use bfree::mechanics::sweep::{SupportError, Supports};
 use bfree::mechanics::time::Alphas;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
-use bfree::simulation::{Simulation, StepError};
+use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::tensor::Vector;
 
 /// The ingredients of the equilibrium of the coming step.
@@ -49,6 +49,16 @@ impl<const D: usize> Prepared<D> {
         simulation: &'a Simulation<D, L, A>,
     ) -> Equilibrium<'a, D, L> {
         simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, self.alphas, self.end)
+    }
+
+    /// Where the step's Newton method starts.
+    pub fn initial_guess<L: Law, A: ShapeFunction>(&self, simulation: &Simulation<D, L, A>) -> Vec<Vector<f64, D>> {
+        let mut dphi = vec![Vector::zeros(); self.nodes.len()];
+        if simulation.settings.initial_guess == InitialGuess::Velocity {
+            dphi.iter_mut().zip(&self.nodal.velocity).for_each(|(dphi, v)| *dphi = v * simulation.clock.step());
+        }
+        self.prescribe(&mut dphi);
+        dphi
     }
 
     /// Puts the prescribed increments into Δφ.

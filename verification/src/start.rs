@@ -18,8 +18,8 @@ pub fn velocity_by_masses<const D: usize, L: Law, A: ShapeFunction>(
 ) -> Result<(), StepError> {
     let particles = &mut simulation.particles;
     particles.velocity = particles.position.iter().map(velocity).collect();
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    let nodal = Nodal::project(particles, &supports, nodes.len(), 1.0)?;
+    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    let nodal = Nodal::project(particles, &supports, 1.0)?;
     particles.velocity = supports.values(&nodal.velocity);
     Ok(())
 }

@@ -16,25 +16,26 @@ pub use direct::{DirectError, solve};
 pub use problem::Assembled;
 pub use voigt::Voigt;
 
-use bfree::material::{Law, admissible};
+use bfree::material::{Law, Start, admissible};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
 /// A way to the D×D block that two nodes share at one particle, geometric and material stiffness together.
 pub trait Stiffness<const D: usize> {
-    /// The blocks of all pairs of nodes of a particle with reference volume `volume` at the state `at`, from the nodes'
+    /// The blocks of all pairs of nodes of a particle with reference volume `volume` that comes from `start` to the state `at`, from the nodes'
     /// gradients in the reference configuration: `add(I, J, K_IJ)`, I and J numbering `gradients`.
     fn blocks<L: Law>(
         &self,
         law: &L,
         at: &Deformation<f64, D>,
+        start: &Start<'_>,
         volume: f64,
         gradients: &[Vector<f64, D>],
         add: impl FnMut(usize, usize, Tensor<f64, D>),
     );
 }
 
-/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure is left out.
+/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure and damping are left out.
 ///
 /// # Errors
 /// The first particle with det F ≤ 0.
@@ -44,7 +45,7 @@ pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
     pattern: &'p Pattern,
     stiffness: &S,
 ) -> Result<BlockMatrix<'p, D>, Inadmissible> {
-    let eq = equilibrium;
+    let eq = equilibrium.step;
     let mut matrix = BlockMatrix::zeros(pattern);
     for (node, &m) in eq.nodal.mass.iter().enumerate() {
         matrix.add(node, node, &scaled(&identity(), eq.alphas.a1 * eq.lumping * m));
@@ -65,7 +66,8 @@ pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
             gradients.push(f_n_t * grad_n);
         }
         let mass = eq.alphas.a1 * (1.0 - eq.lumping) * eq.particles.mass[p];
-        stiffness.blocks(eq.law(p), &at, eq.particles.volume[p], &gradients, |i, j, block| {
+        let (start, volume) = (eq.particles.start(p, eq.dt), eq.particles.volume[p]);
+        stiffness.blocks(eq.law(p), &at, &start, volume, &gradients, |i, j, block| {
             let inertia = mass * values[i] * values[j];
             matrix.add(nodes[i], nodes[j], &(block + scaled(&identity(), inertia)));
         });

@@ -1,48 +1,98 @@
-//! A law against itself: energy, stress, elasticity, tangent density and frozen tangent must be derivatives of each other.
+//! A law against itself: energy, stress, elasticity, tangent density and closed tangent must be derivatives of each other.
 
 use super::regime::{Regime, condition, rotation, round_off};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{FrozenTangent, Law, NonPositiveJacobian, admissible, first_piola};
-use bfree::tensor::{Deformation, Tensor, contract, identity, inverse, outer};
+use bfree::material::{Law, NonPositiveJacobian, Start, admissible};
+use bfree::tensor::{Deformation, Tensor, contract, identity, inverse, outer, scaled};
 use num_dual::Dual64;
 
 /// Deformations tried in each regime.
 const TRIES: usize = 8;
 
-/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20.
+/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20; a law with memory in a step of length 1
+/// from rest.
 ///
-/// Every derivative is compared with dual numbers through the function it is the derivative of: S with W, ℂ with S, the frozen
-/// product with P; the blocks with the product; and S must not see a rotation. Labels are (quantity, D, regime).
+/// Every derivative is compared with dual numbers through the function it is the derivative of: S with W, ℂ with S, the closed form of
+/// the tangent, where there is one, with P; its blocks with its product; and S must not see a rotation. Labels are (quantity, D, regime).
 pub fn check_material<L: Law>(law: &L) -> Report {
+    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
+    let start = Start { dt: 1.0, memory: &memory };
     let mut report = Report::new("material law", &["quantity", "D", "regime"]);
-    dimension::<L, 1>(law, &mut report);
-    dimension::<L, 2>(law, &mut report);
-    dimension::<L, 3>(law, &mut report);
+    at_rest::<L, 1>(law, &start, &mut report);
+    at_rest::<L, 2>(law, &start, &mut report);
+    at_rest::<L, 3>(law, &start, &mut report);
+    dimensions(law, &start, &mut report);
     report
 }
 
-fn dimension<L: Law, const D: usize>(law: &L, report: &mut Report) {
+/// As [`check_material`], of a law with memory in a step that starts with `start`: all but that there is nothing at rest.
+///
+/// ```
+/// use bfree::material::{Law, Remembered, Start};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Deformation, Tensor, contract, symmetric};
+///
+/// /// S = 2G (1 − d) E with a damage d of the steps before.
+/// struct Damaged;
+///
+/// impl Law for Damaged {
+///     fn memory(&self) -> &[Remembered] {
+///         &[Remembered { name: "damage", at_rest: 0.0 }]
+///     }
+///     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+///         let e = at.green_lagrange();
+///         contract(&e, &e) * T::lit(1.0 - start.memory[0])
+///     }
+///     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+///         at.green_lagrange().map(|e| e * T::lit(2.0 * (1.0 - start.memory[0])))
+///     }
+///     fn elasticity<T: Real, const D: usize>(
+///         &self, _: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
+///     ) -> Tensor<T, D> {
+///         symmetric(x).map(|x| x * T::lit(2.0 * (1.0 - start.memory[0])))
+///     }
+/// }
+///
+/// let report = verification::check_material_from(&Damaged, &Start { dt: 0.1, memory: &[0.25] });
+/// assert!(report.passed(), "{report}");
+/// ```
+pub fn check_material_from<L: Law>(law: &L, start: &Start<'_>) -> Report {
+    let mut report = Report::new("material law from a given start", &["quantity", "D", "regime"]);
+    dimensions(law, start, &mut report);
+    report
+}
+
+fn dimensions<L: Law>(law: &L, start: &Start<'_>, report: &mut Report) {
+    dimension::<L, 1>(law, start, report);
+    dimension::<L, 2>(law, start, report);
+    dimension::<L, 3>(law, start, report);
+}
+
+fn dimension<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Report) {
     let name = D.to_string();
-    at_rest::<L, D>(law, report);
     for regime in Regime::GENERAL {
         if !regime.exists(D) {
             continue;
         }
         let mut random = Random::new(41);
-        let mut worst = [Worst::default(); QUANTITIES.len()];
+        let mut worst: [Option<Worst>; QUANTITIES.len()] = [None; QUANTITIES.len()];
         for _ in 0..TRIES {
-            match quantities::<L, D>(law, regime.displacement_gradient(&mut random), &mut random) {
+            match quantities::<L, D>(law, start, regime.displacement_gradient(&mut random), &mut random) {
                 Ok((values, bound)) => {
                     for (worst, value) in worst.iter_mut().zip(values) {
-                        worst.take(value, bound);
+                        if let Some(value) = value {
+                            worst.get_or_insert_default().take(value, bound);
+                        }
                     }
                 }
                 Err(error) => report.push_error(&["admissibility", &name, regime.name()], &error),
             }
         }
         for (quantity, worst) in QUANTITIES.iter().zip(worst) {
-            report.push(&[quantity, &name, regime.name()], worst.value, Bound::AtMost(worst.bound));
+            if let Some(Worst { value, bound }) = worst {
+                report.push(&[quantity, &name, regime.name()], value, Bound::AtMost(bound));
+            }
         }
     }
 }
@@ -65,12 +115,12 @@ impl Worst {
 }
 
 /// No stress and no energy at F = I.
-fn at_rest<L: Law, const D: usize>(law: &L, report: &mut Report) {
+fn at_rest<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Report) {
     let at = Deformation::<f64, D>::new(Tensor::zeros());
-    let stiffness = law.elasticity(&at, &identity()).norm();
+    let stiffness = law.elasticity(&at, start, &identity()).norm();
     let bound = Bound::AtMost(round_off(1.0));
-    report.push(&["S = 0", &D.to_string(), "F=I"], law.stress(&at).norm() / stiffness, bound);
-    report.push(&["W = 0", &D.to_string(), "F=I"], law.energy(&at).abs() / stiffness, bound);
+    report.push(&["S = 0", &D.to_string(), "F=I"], law.stress(&at, start).norm() / stiffness, bound);
+    report.push(&["W = 0", &D.to_string(), "F=I"], law.energy(&at, start).abs() / stiffness, bound);
 }
 
 const QUANTITIES: [&str; 9] = [
@@ -85,54 +135,68 @@ const QUANTITIES: [&str; 9] = [
     "S as embedded in 3D",
 ];
 
-/// Relative errors of all [`QUANTITIES`] at one deformation, and their common bound.
+/// Relative errors of all [`QUANTITIES`] that the law has at one deformation, and their common bound.
 fn quantities<L: Law, const D: usize>(
     law: &L,
+    start: &Start<'_>,
     h: Tensor<f64, D>,
     random: &mut Random,
-) -> Result<([f64; QUANTITIES.len()], f64), NonPositiveJacobian> {
+) -> Result<([Option<f64>; QUANTITIES.len()], f64), NonPositiveJacobian> {
     let at = admissible(h)?;
     let f = at.f;
-    let stress = law.stress(&at);
-    let piola = first_piola(law, &f, h)?;
+    let stress = law.stress(&at, start);
     let (volume, l, m) = (random.between(0.5, 2.0), random.tensor::<D>(), random.tensor::<D>());
     let (a, v, b) = (random.vector::<D>(), random.vector::<D>(), random.vector::<D>());
 
     // F = ΔF F_n with a ΔF of its own, so that the pull-back by F_n shows.
     let f_n = inverse(&(identity::<f64, D>() + random.tensor() * (0.3 / D as f64))) * f;
     let delta_f = l * f_n;
-    let seeded = h.zip_map(&delta_f, Dual64::new);
-    let dual_at = admissible(seeded)?;
-    let dual_stress = law.stress(&dual_at).map(|s| s.eps);
-    let dual_piola = first_piola(law, &dual_at.f, seeded)?.map(|s| s.eps);
+    let dual_at = admissible(h.zip_map(&delta_f, Dual64::new))?;
+    let dual_stress = law.stress(&dual_at, start);
+    let dual_piola = (dual_at.f * dual_stress).map(|s| s.eps);
+    let dual_stress = dual_stress.map(|s| s.eps);
 
-    let elasticity = law.elasticity(&at, &(f.transpose() * delta_f));
+    let elasticity = law.elasticity(&at, start, &(f.transpose() * delta_f));
     // Round-off in F alone changes S by eps times this; near F = I that is more than eps times S.
-    let stiffness = law.elasticity(&at, &(f.transpose() * f)).norm();
+    let stiffness = law.elasticity(&at, start, &(f.transpose() * f)).norm();
 
-    let density = law.tangent_density(&at, &v, &b);
-    let by_elasticity = law.elasticity(&at, &outer(&a, &b)) * v;
+    let density = law.tangent_density(&at, start, &v, &b);
+    let by_elasticity = law.elasticity(&at, start, &outer(&a, &b)) * v;
 
-    let frozen = law.freeze(&f_n, &at, volume);
-    let (product, other) = (frozen.apply(&l), frozen.apply(&m));
+    let energy = (law.energy(&dual_at, start).eps - contract(&(f * stress), &delta_f)).abs();
+    let work = (f * stress).norm() * delta_f.norm() + dual_piola.norm();
+
+    let closed = law.closed(&f_n, &at, volume);
+    // V₀ (δF S + F [ℂ : Fᵀ δF]) F_nᵀ where there is no closed form
+    let product = |l: &Tensor<f64, D>| match &closed {
+        Some(closed) => closed.apply(l),
+        None => {
+            let delta_f = l * f_n;
+            let material = f * law.elasticity(&at, start, &(f.transpose() * delta_f));
+            scaled(&((delta_f * stress + material) * f_n.transpose()), volume)
+        }
+    };
     let expected = dual_piola * f_n.transpose() * volume;
-    let block = frozen.block(&v, &b);
-    let by_product = frozen.apply(&outer(&a, &b)) * v;
+    let by_blocks = closed.as_ref().map(|closed| {
+        let (block, by_product) = (closed.block(&v, &b), closed.apply(&outer(&a, &b)) * v);
+        (block * a - by_product).norm() / (block.norm() * a.norm())
+    });
+    let (of_l, of_m) = (product(&l), product(&m));
+    let asymmetry = (contract(&of_l, &m) - contract(&of_m, &l)).abs() / (of_l.norm() * m.norm());
 
-    let turned = law.stress(&Deformation::new(rotation::<D>(random) * f - identity::<f64, D>()));
-    let embedded = law.stress(&Deformation::new(upper_left::<D, 3>(&h)));
+    let turned = law.stress(&Deformation::new(rotation::<D>(random) * f - identity::<f64, D>()), start);
+    let embedded = law.stress(&Deformation::new(upper_left::<D, 3>(&h)), start);
 
     let values = [
-        (law.energy(&dual_at).eps - contract(&piola, &delta_f)).abs()
-            / (piola.norm() * delta_f.norm() + dual_piola.norm()),
-        (elasticity - dual_stress).norm() / dual_stress.norm(),
-        (density * a - by_elasticity).norm() / (density.norm() * a.norm()),
-        (product - expected).norm() / expected.norm(),
-        (block * a - by_product).norm() / (block.norm() * a.norm()),
-        (stress - stress.transpose()).norm() / (stress.norm() + stiffness),
-        (contract(&product, &m) - contract(&other, &l)).abs() / (product.norm() * m.norm()),
-        (turned - stress).norm() / (stress.norm() + stiffness),
-        (upper_left::<3, D>(&embedded) - stress).norm() / (stress.norm() + stiffness),
+        law.has_potential().then_some(energy / work),
+        Some((elasticity - dual_stress).norm() / dual_stress.norm()),
+        Some((density * a - by_elasticity).norm() / (density.norm() * a.norm())),
+        closed.as_ref().map(|_| (of_l - expected).norm() / expected.norm()),
+        by_blocks,
+        Some((stress - stress.transpose()).norm() / (stress.norm() + stiffness)),
+        law.is_symmetric().then_some(asymmetry),
+        Some((turned - stress).norm() / (stress.norm() + stiffness)),
+        Some((upper_left::<3, D>(&embedded) - stress).norm() / (stress.norm() + stiffness)),
     ];
     // The pull-back goes through F_n too.
     Ok((values, round_off(condition(&f).max(condition(&f_n)))))

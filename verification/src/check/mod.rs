@@ -6,5 +6,5 @@ pub(crate) mod regime;
 pub(crate) mod tangent;
 
 pub use approximation::check_approximation;
-pub use material::check_material;
+pub use material::{check_material, check_material_from};
 pub use tangent::check_tangent;

@@ -1,4 +1,4 @@
-//! The tangent of a whole step against dual numbers, term by term.
+//! The tangent of a whole step against dual numbers, piece by piece, through the products that the solver applies.
 
 use super::regime::{condition, round_off};
 use crate::prepared::Prepared;
@@ -6,10 +6,11 @@ use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
-use bfree::mechanics::residual::{Carry, Equilibrium, Inadmissible, compose};
-use bfree::mechanics::tangent::Term;
+use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
+use bfree::mechanics::tangent::Tangent;
+use bfree::mechanics::terms::Piece;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Vector, identity};
+use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 
 /// Random directions at each state.
@@ -21,19 +22,19 @@ const BLOCKS: usize = 24;
 /// Halvings of an increment until it is admissible.
 const HALVINGS: u32 = 30;
 
-/// Name of a term in reports.
-pub(crate) fn term_name(term: Term) -> &'static str {
-    match term {
-        Term::Inertia => "inertia",
-        Term::Geometric => "geometric",
-        Term::Material => "material",
-        Term::Pressure => "follower pressure",
-    }
-}
+/// The relative difference allowed to a product in single precision.
+const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
 
-/// Checks the tangent of the coming step of a simulation: every term and the whole product against dual numbers through the
-/// residual, the blocks of the preconditioner against the product, and, where every load has a potential, symmetry and the
-/// residual against the gradient of the potential. Labels are (quantity, Δφ).
+/// What is added to the name of a piece whose product is in single precision.
+pub(crate) const IN_SINGLE: &str = ", f32";
+
+/// The piece whose contributions cancel in 1D, and which has no symmetric tangent.
+const PRESSURE: &str = "follower pressure";
+
+/// Checks the tangent of the coming step of a simulation: every piece of it, frozen alone, and the whole, by the product that the solver
+/// applies, against dual numbers through the residual, in single precision too where the simulation uses it; the blocks of the
+/// preconditioner against the product; and, where they exist, symmetry and the residual against the gradient of the potential. Labels
+/// are (quantity, Δφ).
 ///
 /// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle is crushed.
 pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Report {
@@ -60,14 +61,14 @@ pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simu
     for (name, mut dphi) in increments {
         prepared.prescribe(&mut dphi);
         let mut halvings = 0;
-        while halvings < HALVINGS && equilibrium.residual::<f64>(&dphi, Carry::ALL).is_err() {
+        while halvings < HALVINGS && equilibrium.residual::<f64>(&dphi).is_err() {
             dphi.iter_mut().for_each(|x| *x *= 0.5);
             halvings += 1;
         }
         match measure(&equilibrium, &dphi, simulation.grid.spacing, &mut random) {
             Ok(measured) => {
                 for Measured { quantity, value, bound } in measured {
-                    report.push(&[quantity, name], value, bound);
+                    report.push(&[&quantity, name], value, bound);
                 }
             }
             Err(error) => report.push_error(&["residual", name], &error),
@@ -78,13 +79,25 @@ pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simu
 
 /// One measured value.
 pub(crate) struct Measured {
-    pub quantity: &'static str,
+    pub quantity: String,
     pub value: f64,
     pub bound: Bound,
 }
 
+impl Measured {
+    fn new(quantity: impl Into<String>, value: f64, bound: Bound) -> Self {
+        Self { quantity: quantity.into(), value, bound }
+    }
+}
+
 /// The name of the asymmetry of the follower pressure.
 pub(crate) const PRESSURE_ASYMMETRY: &str = "pressure: u.Kw - w.Ku";
+
+/// The symmetry of the whole.
+pub(crate) const SYMMETRY: &str = "u.Kw - w.Ku";
+
+/// The residual against the potential.
+pub(crate) const POTENTIAL: &str = "dual(Pi) - R.u";
 
 /// Everything that can be asked of the tangent at one Δφ.
 pub(crate) fn measure<const D: usize, L: Law>(
@@ -94,87 +107,156 @@ pub(crate) fn measure<const D: usize, L: Law>(
     random: &mut Random,
 ) -> Result<Vec<Measured>, Inadmissible> {
     let bound = Bound::AtMost(round_off(worst_condition(equilibrium, dphi)));
-    let tangent = equilibrium.tangent(dphi)?;
-    let with_pressure = !equilibrium.pressures.is_empty();
-    let directions: Vec<Vec<Vector<f64, D>>> = (0..DIRECTIONS)
+    let directions: Vec<Field<D>> = (0..DIRECTIONS)
         .map(|_| {
             let mut u = random.field(dphi.len());
             equilibrium.clear_prescribed(&mut u);
             u
         })
         .collect();
-    let product = |u: &[Vector<f64, D>]| {
-        let mut out = vec![Vector::zeros(); u.len()];
-        tangent.product(u, &mut out);
-        out
-    };
     let mut measured = Vec::new();
-
-    for term in Term::ALL {
-        if term == Term::Pressure && !with_pressure {
-            continue;
-        }
-        let mut value: f64 = 0.0;
-        for u in &directions {
-            let analytic = equilibrium.product(term, dphi, u)?;
-            let mut scale = norm(&analytic);
-            if term == Term::Pressure && D == 1 {
-                // cof F = 1: the pressure is a dead load and its two parts cancel.
-                scale = equilibrium.pressures.iter().map(|p| p.force.norm()).sum::<f64>() * norm(u) / spacing;
+    // Of the last whole term, whose parts follow it.
+    let mut of_term = [0.0; DIRECTIONS];
+    for piece in equilibrium.terms.pieces() {
+        let frozen = equilibrium.tangent_of(piece, dphi)?;
+        let single = equilibrium.single_tangent(Some(piece), dphi)?;
+        let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
+        let mut products = Vec::new();
+        for (u, of_term) in directions.iter().zip(&mut of_term) {
+            let mut dual = equilibrium.derivative(piece, dphi, u)?;
+            equilibrium.clear_prescribed(&mut dual);
+            let analytic = product(&frozen, u);
+            let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
+            worst = worse(worst, relative(&analytic, &dual, scale));
+            if piece.name == piece.term {
+                *of_term = scale;
             }
-            value = worse(value, relative(&analytic, &equilibrium.dual_product(term, dphi, u)?, scale));
+            if let Some(single) = &single {
+                // In 1D the rounded numbers of a part may cancel: where J is large, those of the material one.
+                let scale = if D == 1 { scale.max(*of_term) } else { scale };
+                worst_in_single = worse(worst_in_single, relative(&product_in_single(single, u), &dual, scale));
+            }
+            products.push(analytic);
         }
-        measured.push(Measured { quantity: term_name(term), value, bound });
+        measured.push(Measured::new(piece.name, worst, bound));
+        if single.is_some() {
+            measured.push(Measured::new(format!("{}{IN_SINGLE}", piece.name), worst_in_single, Bound::AtMost(SINGLE)));
+        }
+        if piece.name == PRESSURE && D > 1 {
+            measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(&directions, &products), Bound::Reported));
+        }
     }
 
-    let mut value: f64 = 0.0;
+    let tangent = equilibrium.tangent(dphi)?;
+    let single = equilibrium.single_tangent(None, dphi)?;
+    let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
     for u in &directions {
-        let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-        let residual = equilibrium.residual(&seeded, Carry::ALL)?;
-        let mut dual: Vec<_> = residual.iter().map(|r| r.map(|x| x.eps)).collect();
+        let residual = equilibrium.residual(&seeded(dphi, u))?;
+        let mut dual: Field<D> = residual.iter().map(|r| r.map(|x| x.eps)).collect();
         equilibrium.clear_prescribed(&mut dual);
-        let frozen = product(u);
-        value = worse(value, relative(&frozen, &dual, norm(&frozen)));
-    }
-    measured.push(Measured { quantity: "whole product", value, bound });
-
-    let blocks = tangent.diagonal_blocks();
-    let mut value: f64 = 0.0;
-    for node in (0..dphi.len()).step_by(dphi.len().div_ceil(BLOCKS).max(1)) {
-        let held = |i: usize| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == i);
-        for k in (0..D).filter(|&k| !held(k)) {
-            let mut unit = vec![Vector::zeros(); dphi.len()];
-            unit[node][k] = 1.0;
-            let difference = product(&unit)[node] - blocks[node].column(k);
-            let size = blocks[node].norm();
-            value = worse(value, if difference.norm() == 0.0 { 0.0 } else { difference.norm() / size });
+        let analytic = product(&tangent, u);
+        worst = worse(worst, relative(&analytic, &dual, norm(&analytic)));
+        if let Some(single) = &single {
+            let rough = product_in_single(single, u);
+            worst_in_single = worse(worst_in_single, relative(&rough, &dual, norm(&analytic)));
         }
     }
-    measured.push(Measured { quantity: "diagonal blocks", value, bound });
-
-    if with_pressure {
-        if D > 1 {
-            let products = directions.iter().map(|u| equilibrium.product(Term::Pressure, dphi, u));
-            let value = asymmetry(&directions, &products.collect::<Result<Vec<_>, _>>()?);
-            measured.push(Measured { quantity: PRESSURE_ASYMMETRY, value, bound: Bound::Reported });
-        }
-        return Ok(measured);
+    measured.push(Measured::new("whole product", worst, bound));
+    let columns = columns(equilibrium, &tangent, dphi.len());
+    measured.push(Measured::new("diagonal blocks", apart(&tangent.diagonal_blocks(), &columns), bound));
+    if let Some(single) = &single {
+        measured.push(Measured::new(format!("whole product{IN_SINGLE}"), worst_in_single, Bound::AtMost(SINGLE)));
+        let blocks: Vec<_> = single.diagonal_blocks().iter().map(|block| block * single.scale()).collect();
+        let value = apart(&free_rows(equilibrium, blocks), &columns);
+        measured.push(Measured::new(format!("diagonal blocks{IN_SINGLE}"), value, Bound::AtMost(SINGLE)));
     }
-    let products: Vec<_> = directions.iter().map(|u| product(u)).collect();
-    measured.push(Measured { quantity: "u.Kw - w.Ku", value: asymmetry(&directions, &products), bound });
 
-    let residual = equilibrium.residual::<f64>(dphi, Carry::ALL)?;
-    let scale = equilibrium.magnitude(dphi)?;
-    let mut value: f64 = 0.0;
+    if equilibrium.is_symmetric() {
+        let products: Vec<_> = directions.iter().map(|u| product(&tangent, u)).collect();
+        measured.push(Measured::new(SYMMETRY, asymmetry(&directions, &products), bound));
+    }
+    let residual = equilibrium.residual::<f64>(dphi)?;
+    let size = equilibrium.magnitude(dphi)?;
+    let mut value: Option<f64> = None;
     for u in &directions {
-        let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect();
-        if let Some(potential) = equilibrium.potential(&seeded) {
+        if let Some(potential) = equilibrium.potential(&seeded(dphi, u)) {
             let difference = (potential?.0.eps - dot(&residual, u)).abs();
-            value = worse(value, if difference == 0.0 { 0.0 } else { difference / (scale * norm(u)) });
+            let relative = if difference == 0.0 { 0.0 } else { difference / (size * norm(u)) };
+            value = Some(worse(value.unwrap_or(0.0), relative));
         }
     }
-    measured.push(Measured { quantity: "dual(Pi) - R.u", value, bound });
+    measured.extend(value.map(|value| Measured::new(POTENTIAL, value, bound)));
     Ok(measured)
+}
+
+type Field<const D: usize> = Vec<Vector<f64, D>>;
+
+fn product<const D: usize>(tangent: &Tangent<'_, D>, u: &[Vector<f64, D>]) -> Field<D> {
+    let mut out = vec![Vector::zeros(); u.len()];
+    tangent.product(u, &mut out);
+    out
+}
+
+fn product_in_single<const D: usize>(tangent: &Tangent<'_, D, f32>, u: &[Vector<f64, D>]) -> Field<D> {
+    let u: Vec<_> = u.iter().map(|u| u.map(|x| x as f32)).collect();
+    let mut out = vec![Vector::zeros(); u.len()];
+    tangent.product(&u, &mut out);
+    out.iter().map(|x| x.map(f64::from) * tangent.scale()).collect()
+}
+
+/// What differences of a product are relative to: its norm. In 1D cof F = 1: a pressure is a dead load, the two parts of its tangent
+/// cancel, and each is of the size of the force times that of the gradients of u.
+fn scale<const D: usize, L: Law>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    piece: Piece,
+    dphi: &[Vector<f64, D>],
+    product: f64,
+    gradient: f64,
+) -> Result<f64, Inadmissible> {
+    if piece.name == PRESSURE && D == 1 {
+        return Ok(norm(&equilibrium.residual_of::<f64>(piece, dphi)?) * gradient);
+    }
+    Ok(product)
+}
+
+/// The blocks of a scaled tangent, with the identity's rows of prescribed degrees of freedom unscaled again.
+fn free_rows<const D: usize, L>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    mut blocks: Vec<Tensor<f64, D>>,
+) -> Vec<Tensor<f64, D>> {
+    equilibrium.prescribed.iter().for_each(|dof| blocks[dof.node][(dof.component, dof.component)] = 1.0);
+    blocks
+}
+
+/// Columns (node, component, K_II e_k) of some diagonal blocks, by products with unit vectors.
+fn columns<const D: usize, L>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    tangent: &Tangent<'_, D>,
+    nodes: usize,
+) -> Vec<(usize, usize, Vector<f64, D>)> {
+    let held = |node, k| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == k);
+    let mut columns = Vec::new();
+    for node in (0..nodes).step_by(nodes.div_ceil(BLOCKS).max(1)) {
+        for k in (0..D).filter(|&k| !held(node, k)) {
+            let mut unit = vec![Vector::zeros(); nodes];
+            unit[node][k] = 1.0;
+            columns.push((node, k, product(tangent, &unit)[node]));
+        }
+    }
+    columns
+}
+
+/// The largest relative difference of blocks from their columns.
+fn apart<const D: usize>(blocks: &[Tensor<f64, D>], columns: &[(usize, usize, Vector<f64, D>)]) -> f64 {
+    columns.iter().fold(0.0, |value, (node, k, column)| {
+        let difference = (column - blocks[*node].column(*k)).norm();
+        worse(value, if difference == 0.0 { 0.0 } else { difference / blocks[*node].norm() })
+    })
+}
+
+/// Δφ + ε u
+fn seeded<const D: usize>(dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Vec<Vector<Dual64, D>> {
+    dphi.iter().zip(u).map(|(x, d)| x.zip_map(d, Dual64::new)).collect()
 }
 
 /// |u·Kw − w·Ku| / (‖u‖ ‖Kw‖), the largest of all pairs of directions.
@@ -198,9 +280,9 @@ fn worse(a: f64, b: f64) -> f64 {
 
 /// The largest κ(F) of all particles.
 fn worst_condition<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, dphi: &[Vector<f64, D>]) -> f64 {
-    let particles = equilibrium.particles;
+    let particles = equilibrium.step.particles;
     (0..particles.len()).fold(1.0, |worst: f64, p| {
-        let g = equilibrium.supports.gradient_at(p, dphi);
+        let g = equilibrium.step.supports.gradient_at(p, dphi);
         worst.max(condition(&(identity::<f64, D>() + compose(&g, &particles.displacement_gradient[p]))))
     })
 }

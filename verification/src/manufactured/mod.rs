@@ -8,10 +8,12 @@ mod vortex;
 pub use axis_aligned::AxisAligned;
 pub use vortex::Vortex;
 
-use bfree::material::Law;
+use bfree::material::{Law, Start};
+use bfree::mechanics::terms::ForceField;
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, identity};
 use num_dual::{Dual, Dual2_64, Dual64};
+use std::sync::Arc;
 
 /// A motion x = φ(X, t) given by its displacement, generic over the number type.
 pub trait Motion<const D: usize>: Sync {
@@ -67,10 +69,20 @@ pub fn body_force<M: Motion<D>, L: Law, const D: usize>(
         // (DIV P)_i = Σ_k ∂P_ik/∂X_k
         let seeded = Vector::<Dual64, D>::from_fn(|i, _| Dual64::new(x[i], f64::from(i == k)));
         let at = Deformation::new(gradient(motion, &seeded, t));
-        let piola = (identity::<Dual64, D>() + at.h) * law.stress(&at);
+        let piola = (identity::<Dual64, D>() + at.h) * law.stress(&at, &Start::NONE);
         divergence += piola.column(k).map(|p| p.eps);
     }
     acceleration - divergence / density
+}
+
+/// The same as a load of a simulation whose particle `id` has the reference position `reference[id]`.
+pub fn force_field<M: Motion<D> + Send + 'static, L: Law + 'static, const D: usize>(
+    motion: M,
+    law: L,
+    density: f64,
+    reference: Vec<Vector<f64, D>>,
+) -> ForceField<D> {
+    ForceField(Arc::new(move |id, _, t| body_force(&motion, &law, density, &reference[id], t)))
 }
 
 #[cfg(test)]
@@ -111,7 +123,7 @@ mod tests {
         let (x, t, e) = (Vector::from([0.31, -0.44]), 0.61, 1e-5);
         let piola = |x: Vector<f64, 2>| {
             let at = Deformation::new(state(&motion, &x, t).displacement_gradient);
-            at.f * law.stress(&at)
+            at.f * law.stress(&at, &Start::NONE)
         };
         let mut divergence = Vector::<f64, 2>::zeros();
         for k in 0..2 {

@@ -73,7 +73,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
     let loads = Loads {
         gravity: Some(Gravity { acceleration: gravity, curve: Curve::constant(FACTORS[0]) }),
         surface: vec![SurfaceLoad { pressing: Pressing::Traction(traction), curve: Curve::constant(FACTORS[1]), points }],
-        prescribed: Vec::new(),
+        ..Loads::default()
     };
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?));
     Ok(Simulation {
@@ -94,6 +94,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
         },
         clock: Clock::new(STEP, 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

@@ -11,7 +11,7 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material};
 use bfree::mechanics::loads::{Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::solver::Precision;
 use bfree::particles::{Body, Particles};
@@ -127,8 +127,8 @@ impl Study {
         self.report.push(&["product, matrix - matrix-free", &case], difference, Bound::AtMost(ENTRIES));
 
         let particles = simulation.particles.len();
-        let lumping = simulation.settings.lumping;
-        let free_bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, lumping, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let free_bytes = prepared.supports.bytes() + frozen;
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");
         let (spent, saved) = (pattern_seconds + b_free_seconds - freeze_seconds, free_seconds - matrix_seconds);
@@ -163,7 +163,7 @@ impl Study {
         dphi: &[Vector<f64, D>],
         matrix: &BlockMatrix<'_, D>,
     ) -> Result<(), StudyError> {
-        let mut right = equilibrium.residual::<f64>(dphi, Carry::ALL)?;
+        let mut right = equilibrium.residual::<f64>(dphi)?;
         equilibrium.clear_prescribed(&mut right);
         let right: &[f64] = bytemuck::cast_slice(&right);
         let (tangent, mut blocks, pool) = (equilibrium.tangent(dphi)?, BlockJacobi::<D>::default(), Pool::default());
@@ -299,10 +299,11 @@ fn strained_block<const D: usize>(approximation: Approximation, law: Material, c
         approximation,
         bodies: vec![Body { name: "block".into(), law, density: 1.0 }],
         particles,
-        loads: Loads { gravity: None, surface: Vec::new(), prescribed: vec![floor] },
+        loads: Loads { prescribed: vec![floor], ..Loads::default() },
         settings: Settings { lumping: 0.5, ..Settings::default() },
         clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     }
 }

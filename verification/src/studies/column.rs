@@ -7,7 +7,7 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
 use crate::shipped;
 use crate::table::Table;
-use bfree::material::{Material, first_piola};
+use bfree::material::{Law, Material, Start, admissible};
 use bfree::simulation::Simulation;
 use bfree::tensor::Tensor;
 
@@ -40,8 +40,8 @@ struct Errors {
 /// λ with P(λ) = `stress`, by bisection.
 fn stretch(law: &Material, stress: f64) -> f64 {
     let piola = |stretch: f64| {
-        let (f, h) = (Tensor::<f64, 1>::new(stretch), Tensor::<f64, 1>::new(stretch - 1.0));
-        first_piola(law, &f, h).map_or(f64::NAN, |p| p[0])
+        let at = admissible(Tensor::<f64, 1>::new(stretch - 1.0));
+        at.map_or(f64::NAN, |at| stretch * law.stress(&at, &Start::NONE)[0])
     };
     let (mut low, mut high) = (0.01, 10.0);
     while high - low > 1e-15 * high {
@@ -79,9 +79,8 @@ fn column(shape: &str, cells: u32, steps: u32) -> Result<Errors, StudyError> {
     let carried = |x: f64| -density * g * (height - x);
     let (mut squares, mut top) = (0.0, 0);
     for (p, x) in start.iter().enumerate() {
-        let gradient = particles.displacement_gradient[p];
-        let f = Tensor::identity() + gradient;
-        let piola = first_piola(law, &f, gradient)?;
+        let at = admissible(particles.displacement_gradient[p])?;
+        let piola = at.f * law.stress(&at, &Start::NONE);
         squares += ((piola[(1, 1)] - carried(x[1])) / (density * g * height)).powi(2);
         if x[1] > start[top][1] {
             top = p;

@@ -6,7 +6,7 @@
 use super::{Effort, Outcome, StudyError, short};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{Lame, Law, Material};
+use bfree::material::{Lame, Law, Material, Start};
 use bfree::tensor::{Deformation, Tensor, contract, symmetric};
 
 /// What the study shows.
@@ -37,10 +37,10 @@ fn linear<const D: usize>(name: &str, law: &Material, report: &mut Report) {
     for _ in 0..20 {
         let at = Deformation::new(random.tensor::<D>() * STRAIN);
         let strain = symmetric(&at.h);
-        let expected = law.elasticity(&at_rest, &strain);
+        let expected = law.elasticity(&at_rest, &Start::NONE, &strain);
         let work = 0.5 * contract(&expected, &strain);
-        stress = worse(stress, (law.stress(&at) - expected).norm() / expected.norm());
-        energy = worse(energy, (law.energy(&at) - work).abs() / work);
+        stress = worse(stress, (law.stress(&at, &Start::NONE) - expected).norm() / expected.norm());
+        energy = worse(energy, (law.energy(&at, &Start::NONE) - work).abs() / work);
     }
     let dimension = D.to_string();
     report.push(&["S = C:E", name, &dimension], stress, Bound::AtMost(LINEAR));

@@ -2,8 +2,7 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::figure::{Axis, Figure, Line};
-use crate::forced;
-use crate::manufactured::{AxisAligned, Motion, Vortex, body_force, state};
+use crate::manufactured::{AxisAligned, Motion, Vortex, force_field, state};
 use crate::report::{Bound, Report};
 use crate::table::Table;
 use bfree::approximation::Approximation;
@@ -63,7 +62,7 @@ struct Errors {
 }
 
 /// A motion of a body in a box.
-trait Problem: Motion<2> + Copy {
+trait Problem: Motion<2> + Copy + Send + 'static {
     /// The box, in cells of edge `h`.
     fn grid(&self, h: f64) -> Grid<2>;
     /// Whether there is matter at the reference position `x`.
@@ -100,7 +99,7 @@ impl Problem for Vortex {
     }
 }
 
-/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles, and their reference positions.
+/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles in the order of their ids, and their reference positions.
 fn simulate<P: Problem>(
     problem: &P,
     shape: &Approximation,
@@ -144,7 +143,11 @@ fn simulate<P: Problem>(
         approximation: shape.clone(),
         bodies: vec![Body { name: "body".into(), law: law.clone(), density }],
         particles,
-        loads: Loads { gravity: None, surface: Vec::new(), prescribed },
+        loads: Loads {
+            prescribed,
+            field: Some(force_field(*problem, law, density, reference.clone())),
+            ..Loads::default()
+        },
         settings: Settings {
             lumping,
             wall_update: WallUpdate::Consistent,
@@ -153,11 +156,13 @@ fn simulate<P: Problem>(
         },
         clock: Clock::new(1.0 / f64::from(steps), 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     };
     for _ in 0..steps {
-        forced::step(&mut simulation, |p, t| body_force(problem, &law, density, &reference[p], t))?;
+        simulation.step()?;
     }
+    simulation.particles = simulation.particles.by_id();
     Ok((simulation, reference))
 }
 

@@ -8,10 +8,11 @@ use crate::table::Table;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean};
+use bfree::material::{Lame, Law, Material, NeoHookean, Start};
 use bfree::mechanics::loads::Loads;
-use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::terms::Step;
 use bfree::mechanics::time::{Alphas, Newmark};
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
@@ -129,12 +130,13 @@ fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut
     let (shift, centre) = (random.vector::<D>() * 0.3, grid.position([CELLS / 2; D]));
     let map = |x: &Vector<f64, D>| stretch * (x - centre) + shift;
     let dphi: Vec<_> = nodes.positions(&grid).map(|(_, x)| map(&x)).collect();
-    let nodal = Nodal::project(&particles, &supports, nodes.len(), 1.0)?;
+    let nodal = Nodal::project(&particles, &supports, 1.0)?;
     let dt = 0.1;
     let alphas: Alphas = Newmark::default().alphas(dt);
     let update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Consistent, &dphi);
     let mut after = particles.clone();
-    update.commit(&mut after, &supports);
+    let bodies: [Body<Material>; 0] = [];
+    update.commit(&mut after, &bodies, &supports, dt);
     let (mut position, mut strain): (f64, f64) = (0.0, 0.0);
     for p in 0..particles.len() {
         let x = &particles.position[p];
@@ -236,7 +238,7 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
     let law = Material::from(NeoHookean::ciarlet(Lame::new(150.0, 30.0)?));
     let h = Random::new(37).tensor::<D>() * 0.3;
     let at = Deformation::new(h);
-    let stress = volume * (at.f * law.stress(&at) * at.f.transpose()).norm();
+    let stress = volume * (at.f * law.stress(&at, &Start::NONE) * at.f.transpose()).norm();
     let bodies = [Body { name: "patch".into(), law, density: 1.0 }];
     for (layout, label) in Layout::ALL {
         let mut particles = Particles::default();
@@ -244,12 +246,15 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
         particles.displacement_gradient.fill(h);
         let (supports, nodes) = Supports::new(shape, &grid, &particles.position)?;
         let (at_rest, nodal) = (vec![Vector::zeros(); nodes.len()], Nodal::default());
-        let load = at_rest.clone();
-        let equilibrium =
-            Equilibrium::new(&particles, &bodies, &supports, Alphas::NONE, 1.0, &nodal, load, vec![], &[]);
-        let force = equilibrium.residual::<f64>(&at_rest, Carry::ALL)?;
+        let (particles, bodies, supports, loads) = (&particles, &bodies, &supports, &Loads::default());
+        let (nodal, alphas, lumping, time, dt) = (&nodal, Alphas::NONE, 1.0, 0.0, 0.0);
+        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt };
+        let equilibrium = Equilibrium::new(step, &[]);
+        let force = equilibrium.residual::<f64>(&at_rest)?;
         let mut size = vec![0.0; nodes.len()];
-        supports.scatter(&mut size, |_, _, grad_n| grad_n.norm() * stress);
+        for p in 0..particles.len() {
+            supports.of(p).for_each(|(node, _, grad_n)| size[node] += grad_n.norm() * stress);
+        }
         let inner = nodes.positions(&grid).map(|(index, _)| index.iter().all(|i| judged.contains(i)));
         let worst = (force.iter().zip(&size).zip(inner).filter(|(_, inner)| *inner))
             .fold(0.0, |worst, ((f, s), _)| worse(worst, f.norm() / s));
@@ -271,14 +276,14 @@ fn superposed_rotation<const D: usize>(name: &str, law: &Material, report: &mut 
         }
         let (at, turned) = (deformation(&f), deformation(&(q * f)));
         // Round-off of F changes S by eps times this.
-        let stiffness = law.elasticity(&at, &(f.transpose() * f)).norm();
-        let (w, s) = (law.energy(&at), law.stress(&at));
-        energy = worse(energy, (law.energy(&turned) - w).abs() / (w.abs() + s.norm()));
-        stress = worse(stress, (law.stress(&turned) - s).norm() / (s.norm() + stiffness));
+        let stiffness = law.elasticity(&at, &Start::NONE, &(f.transpose() * f)).norm();
+        let (w, s) = (law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
+        energy = worse(energy, (law.energy(&turned, &Start::NONE) - w).abs() / (w.abs() + s.norm()));
+        stress = worse(stress, (law.stress(&turned, &Start::NONE) - s).norm() / (s.norm() + stiffness));
         let rigid = deformation(&q);
-        let stiffness = law.elasticity(&rigid, &identity()).norm();
-        resting_energy = worse(resting_energy, law.energy(&rigid).abs() / stiffness);
-        resting_stress = worse(resting_stress, law.stress(&rigid).norm() / stiffness);
+        let stiffness = law.elasticity(&rigid, &Start::NONE, &identity()).norm();
+        resting_energy = worse(resting_energy, law.energy(&rigid, &Start::NONE).abs() / stiffness);
+        resting_stress = worse(resting_stress, law.stress(&rigid, &Start::NONE).norm() / stiffness);
     }
     let dimension = D.to_string();
     let bound = Bound::AtMost(MOMENTUM);
@@ -333,6 +338,7 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
         },
         clock: Clock::new(dt, 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

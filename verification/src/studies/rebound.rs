@@ -7,7 +7,6 @@ use crate::report::{Bound, Report, chain};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
 use crate::table::Table;
-use bfree::mechanics::residual::Carry;
 use bfree::mechanics::time::{Alphas, Newmark};
 use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{Simulation, StepReport};
@@ -97,7 +96,7 @@ fn of_newmark(newmark: &Newmark, dt: f64, dphi: &Vector<f64, 2>, a: &Vector<f64,
 fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let prepared = Prepared::new(simulation)?;
     let (settings, particles) = (&simulation.settings, &simulation.particles);
-    let projected = Nodal::project(particles, &prepared.supports, prepared.nodes.len(), settings.lumping)?;
+    let projected = Nodal::project(particles, &prepared.supports, settings.lumping)?;
     let equilibrium = prepared.equilibrium(simulation);
     let mut dphi = vec![Vector::zeros(); prepared.nodes.len()];
     prepared.prescribe(&mut dphi);
@@ -112,10 +111,10 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     // M̃ a_n + f_n: the residual at Δφ = 0 and a = a_n. Walls at rest do no work.
     let at_rest = vec![Vector::zeros(); dphi.len()];
     let start = simulation.equilibrium(&prepared.supports, &prepared.nodal, &prepared.prescribed, Alphas::START, prepared.end);
-    let unbalanced = start.residual::<f64>(&at_rest, Carry::ALL)?;
+    let unbalanced = start.residual::<f64>(&at_rest)?;
     let supports = 0.5 * unbalanced.iter().zip(&dphi).map(|(r, by)| r.dot(by)).sum::<f64>();
 
-    let residual = equilibrium.residual::<f64>(&dphi, Carry::ALL)?;
+    let residual = equilibrium.residual::<f64>(&dphi)?;
     let (mut forces, mut damping, mut left) = (0.0, 0.0, 0.0);
 
     // ε = 1: the mass is lumped.
@@ -146,7 +145,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     lumping += at_particles.iter().zip(&particles.mass).map(|(dv, m)| 0.5 * m * dv.norm_squared()).sum::<f64>();
     let update = Update::new(&alphas, &projected, nodal, &prepared.prescribed, settings.wall_update, &dphi);
     let (kinetic, strain) = (particles.kinetic_energy(), simulation.strain_energy());
-    update.commit(&mut simulation.particles, &prepared.supports);
+    update.commit(&mut simulation.particles, &simulation.bodies, &prepared.supports, alphas.dt);
     simulation.clock.advance();
     let transfer = simulation.particles.kinetic_energy() - kinetic - of_nodes;
     let stored = simulation.strain_energy() - strain;

@@ -6,7 +6,7 @@ use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::shipped;
-use bfree::mechanics::residual::{Carry, Equilibrium};
+use bfree::mechanics::residual::Equilibrium;
 use bfree::simulation::Simulation;
 use bfree::material::Material;
 use bfree::pooled::Pool;
@@ -153,12 +153,12 @@ fn remainders<const D: usize>(
         equilibrium.clear_prescribed(&mut field);
         field
     };
-    let r = free(equilibrium.residual::<f64>(x, Carry::ALL)?);
+    let r = free(equilibrium.residual::<f64>(x)?);
     let mut k_u = vec![Vector::zeros(); x.len()];
     equilibrium.tangent(x)?.product(u, &mut k_u);
     // R(x + s u) = R + s R' + s²/2 R'': x + ε u with ε² kept.
     let seeded: Vec<_> = x.iter().zip(u).map(|(x, u)| x.zip_map(u, |x, u| Dual2_64::new(x, u, 0.0))).collect();
-    let second = equilibrium.residual(&seeded, Carry::ALL)?.iter().map(|r| r.map(|x| x.v2)).collect();
+    let second = equilibrium.residual(&seeded)?.iter().map(|r| r.map(|x| x.v2)).collect();
     let second = free(second);
     let (r_u, u_k_u) = (dot(&r, u), dot(u, &k_u));
     let potential = equilibrium.potential::<f64>(x).transpose()?;
@@ -174,7 +174,7 @@ fn remainders<const D: usize>(
             lists[0].push(Point { s, remainder: first.abs(), floor });
             lists[1].push(Point { s, remainder: (first - 0.5 * s * s * u_k_u).abs(), floor });
         }
-        let r_moved = free(equilibrium.residual::<f64>(&moved, Carry::ALL)?);
+        let r_moved = free(equilibrium.residual::<f64>(&moved)?);
         let floor = f64::EPSILON * equilibrium.magnitude(&moved)?;
         let of = |factor: f64| {
             let all = r_moved.iter().zip(&r).zip(k_u.iter().zip(&second));

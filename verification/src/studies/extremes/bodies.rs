@@ -90,6 +90,7 @@ pub(super) fn simulation<const D: usize>(
         settings: settings(1.0),
         clock: Clock::new(dt, 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     }
 }

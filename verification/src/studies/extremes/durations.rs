@@ -4,7 +4,7 @@ use super::bodies::{self, PLAIN, fill, simulation, sliding, stir, sum_of_momenta
 use super::{Effort, Outcome, Report, StudyError, at_most, refused, rows, solvable, steps, worse};
 use bfree::approximation::{Approximation, Gimp, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{Lame, LameError, Law};
+use bfree::material::{Lame, LameError, Law, Start};
 use bfree::particles::Particles;
 use bfree::scene;
 use bfree::simulation::Simulation;
@@ -115,7 +115,7 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     let speed = particles.velocity.iter().map(Vector::norm).fold(0.0, worse) / sound;
     let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);
     let at = Deformation::new(strain);
-    let stress = bodies::body(PLAIN, 1.0).law.stress(&at).norm() / PLAIN.p_wave_modulus();
+    let stress = bodies::body(PLAIN, 1.0).law.stress(&at, &Start::NONE).norm() / PLAIN.p_wave_modulus();
     // Each step adds a rounding of the stresses, at random: a sum that grows with the root of their number, and its sum with another.
     let bound = ROUNDINGS * f64::EPSILON * stress * f64::from(steps).sqrt();
     solvable(report, &what, "speed over that of sound", rested.map(|()| speed), bound);

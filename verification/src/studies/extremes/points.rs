@@ -2,7 +2,7 @@
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
-use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff};
+use bfree::material::{Lame, Law, Material, NeoHookean, StVenantKirchhoff, Start};
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
@@ -88,13 +88,13 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
     let h = given.map(T::value);
     let at = Deformation::new(given);
     let exact_at = Deformation::new(h.map(DoubleDouble::from));
-    let (exact_w, exact_s) = (law.energy(&exact_at), law.stress(&exact_at));
+    let (exact_w, exact_s) = (law.energy(&exact_at, &Start::NONE), law.stress(&exact_at, &Start::NONE));
     let error = |w: T, s: Tensor<T, D>| {
         let w = (DoubleDouble::from(w.value()) - exact_w).magnitude();
         let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s.value()) - exact).magnitude()).norm();
         (w, s)
     };
-    let (energy, stress) = error(law.energy(&at), law.stress(&at));
+    let (energy, stress) = error(law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
     let (naive_w, naive_s) = naive(law, &given);
     let (naive_energy, naive_stress) = error(naive_w, naive_s);
 
@@ -102,7 +102,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
     let (w, s) = (exact_w.magnitude(), exact_s.map(DoubleDouble::value));
     let piola = near.f * s;
     let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
-    let response = |i: usize, k: usize| law.elasticity(&near, &(near.f.transpose() * outer(&unit(i), &unit(k)))).norm();
+    let response = |i: usize, k: usize| law.elasticity(&near, &Start::NONE, &(near.f.transpose() * outer(&unit(i), &unit(k)))).norm();
     let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
     let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
     let (change_w, change_s) = match rounding {
@@ -110,7 +110,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
         Rounding::Products => {
             // δF = F δJ/(D J) is a change of volume alone.
             let volume = permanent(&near.f.abs()) / (D as f64 * near.jacobian);
-            let response = law.elasticity(&near, &(near.f.transpose() * near.f)).norm();
+            let response = law.elasticity(&near, &Start::NONE, &(near.f.transpose() * near.f)).norm();
             let change_w = piola.norm() * h.norm() + contract(&piola, &near.f).abs() * volume;
             (change_w, stiffness * h.norm() + response * volume)
         }
@@ -134,7 +134,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
 pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f64 {
     let h = h.map(DoubleDouble::from);
     let at = Deformation::new(h);
-    let (w, s) = (law.energy(&at), law.stress(&at));
+    let (w, s) = (law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
     let (naive_w, naive_s) = naive(law, &h);
     let stress = s.zip_map(&naive_s, |a, b| (a - b).magnitude()).norm() / s.map(DoubleDouble::magnitude).norm();
     super::worse((w - naive_w).abs().magnitude() / w.magnitude(), stress)

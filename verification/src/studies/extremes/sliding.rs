@@ -9,7 +9,6 @@ use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::mechanics::tangent::Tangent;
-use bfree::material::Material;
 use bfree::simulation::Simulation;
 use bfree::pooled::Pool;
 use bfree::solver::{BlockJacobi, GmresSettings, Identity, LinearOperator, NonlinearProblem, Preconditioner, gmres};
@@ -167,7 +166,7 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<Solved, St
 struct Diagonal(Vec<f64>);
 
 impl Diagonal {
-    fn new(tangent: &Tangent<'_, 2, Material>) -> Self {
+    fn new(tangent: &Tangent<'_, 2>) -> Self {
         Self(tangent.diagonal_blocks().iter().flat_map(|block| [block[(0, 0)].recip(), block[(1, 1)].recip()]).collect())
     }
 }

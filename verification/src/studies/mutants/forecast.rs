@@ -36,7 +36,7 @@ impl Red {
 /// The report of the study: one cell for each fault, the number of cells that are not as foretold.
 pub(super) fn report() -> Report {
     Report::new(
-        "faults in laws, shape functions and terms: cells whose colour is not the one foretold",
+        "faults in laws and shape functions: cells whose colour is not the one foretold",
         &["fault", "killed by", "red cells", "of", "in"],
     )
 }

@@ -368,7 +368,7 @@ impl Study {
             lines.push(Line { name: name.into(), points: pairs });
         }
         self.figures.push(Figure {
-            name: format!("newton-step-{}-t{}-eps{}", case.scene, case.end, equilibrium.lumping),
+            name: format!("newton-step-{}-t{}-eps{}", case.scene, case.end, equilibrium.step.lumping),
             title: format!("{}, eps = {label}: residual after one Newton step over residual before", case.name),
             x: Axis::logarithmic("|R| before"),
             y: Axis::logarithmic("|R| after"),

@@ -5,18 +5,46 @@ use crate::studies::StudyError;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Material, NeoHookean};
+use bfree::material::{Elastic, Lame, Law, Material, NeoHookean, Start};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::mechanics::time::{Inertia, Newmark};
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
+use bfree::scalar::Real;
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, Krylov, NewtonSettings};
-use bfree::tensor::Vector;
+use bfree::tensor::{Deformation, Tensor, Vector};
 
 /// E = 1000, ν = 0.3, ρ = 1, h = 1.
 pub(super) fn lame() -> Result<Lame, StudyError> {
     Ok(Lame::from_young_poisson(1000.0, 0.3)?)
+}
+
+/// A law without its closed form: frozen from ℂmat, block by block.
+#[derive(Clone, Debug)]
+pub(super) struct General(pub Material);
+
+impl Elastic for General {
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        self.0.energy(at, &Start::NONE)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        self.0.stress(at, &Start::NONE)
+    }
+
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        self.0.elasticity(at, &Start::NONE, x)
+    }
+
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        self.0.tangent_density(at, &Start::NONE, v, b)
+    }
 }
 
 /// `cells`ᴰ cells on a sliding floor; `jitter` is the largest displacement of a particle along an axis, in cells.
@@ -53,8 +81,8 @@ pub(super) fn block<const D: usize>(
         particles,
         loads: Loads {
             gravity: Some(Gravity { acceleration, curve: Curve::constant(1.0) }),
-            surface: Vec::new(),
             prescribed: vec![floor],
+            ..Loads::default()
         },
         settings: Settings {
             inertia: Inertia::Newmark,
@@ -75,6 +103,7 @@ pub(super) fn block<const D: usize>(
         },
         clock: Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0),
         external_work: 0.0,
+        dissipated: 0.0,
         workspace: Default::default(),
     })
 }

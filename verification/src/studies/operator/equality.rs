@@ -1,15 +1,15 @@
 //! The same answer from the fast and the plain sweep, for every law, shape function and D.
 
-use super::block::{block, lame};
+use super::block::{General, block, lame};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::studies::StudyError;
 use bfree::approximation::{Approximation, ShapeFunction};
-use bfree::material::Material;
-use bfree::mechanics::residual::Carry;
+use bfree::material::{Law, Material};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::solver::{Linearization, NonlinearProblem, Precision};
+use bfree::simulation::Simulation;
+use bfree::solver::{NonlinearProblem, Precision};
 use bfree::tensor::{Tensor, Vector};
 
 const SAME: f64 = 1e-12;
@@ -39,47 +39,62 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
                 *h = Tensor::from_fn(|_, _| 0.15 * random.signed());
                 *v = random.vector();
             }
-            let (grid, positions) = (&simulation.grid, &simulation.particles.position);
-            let (fast, nodes) = Supports::new(shape, grid, positions)?;
-            let (plain, _) = Supports::plain(shape, grid, positions)?;
-            let prescribed = simulation.prescribed(&nodes);
-            let count = nodes.len();
-            let dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * (0.01 * SPACING)).collect();
-            let u: Vec<Vector<f64, D>> = random.field(count);
-            let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
-                let nodal = Nodal::project(&simulation.particles, supports, count, 0.5)?;
-                let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
-                let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
-                let tangent = equilibrium.tangent(&dphi)?;
-                let mut product = vec![Vector::zeros(); count];
-                tangent.product(&u, &mut product);
-                let flat = |field: &[Vector<f64, D>]| bytemuck::cast_slice(field).to_vec();
-                Ok([
-                    flat(&product),
-                    flat(&equilibrium.residual::<f64>(&dphi, Carry::ALL)?),
-                    vec![NonlinearProblem::magnitude(&equilibrium, bytemuck::cast_slice(&dphi))?],
-                    tangent.diagonal_blocks().iter().flat_map(|block| block.iter().copied().collect::<Vec<_>>()).collect(),
-                    flat(&nodal.velocity),
-                ])
-            };
-            let (a, b) = (by(&fast)?, by(&plain)?);
-            for (quantity, (a, b)) in QUANTITIES.iter().zip(a.iter().zip(&b)) {
-                report.push(&[quantity, &D.to_string(), law_name, shape_name], difference(a, b), Bound::AtMost(SAME));
-            }
-            let (single, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
-            let nodal = Nodal::project(&simulation.particles, &single, count, 0.5)?;
-            let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
-            let equilibrium = simulation.equilibrium(&single, &nodal, &prescribed, alphas, 0.1);
-            let product = equilibrium.single_tangent(&dphi)?.map_or_else(Vec::new, |tangent| {
-                let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-                let mut out = vec![Vector::zeros(); count];
-                tangent.product(&u, &mut out);
-                out.iter().flatten().map(|&x| f64::from(x) * tangent.scale()).collect()
-            });
-            let cell = ["product in single precision", &D.to_string(), law_name, shape_name];
-            report.push(&cell, difference(&product, &b[0]), Bound::AtMost(SAME_IN_SINGLE));
+            compare(&simulation, random.clone(), law_name, shape_name, report)?;
+            let general = simulation.with_laws(|body| General(body.law.clone()));
+            compare(&general, random, &format!("{law_name}, no closed form"), shape_name, report)?;
         }
     }
+    Ok(())
+}
+
+/// Compares the two sweeps on a block.
+fn compare<const D: usize, L: Law>(
+    simulation: &Simulation<D, L>,
+    mut random: Random,
+    law_name: &str,
+    shape_name: &str,
+    report: &mut Report,
+) -> Result<(), StudyError> {
+    let shape = &simulation.approximation;
+    let (grid, positions) = (&simulation.grid, &simulation.particles.position);
+    let (fast, nodes) = Supports::new(shape, grid, positions)?;
+    let (plain, _) = Supports::plain(shape, grid, positions)?;
+    let prescribed = simulation.prescribed(&nodes);
+    let count = nodes.len();
+    let dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * (0.01 * SPACING)).collect();
+    let u: Vec<Vector<f64, D>> = random.field(count);
+    let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
+        let nodal = Nodal::project(&simulation.particles, supports, 0.5)?;
+        let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
+        let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
+        let tangent = equilibrium.tangent(&dphi)?;
+        let mut product = vec![Vector::zeros(); count];
+        tangent.product(&u, &mut product);
+        let flat = |field: &[Vector<f64, D>]| bytemuck::cast_slice(field).to_vec();
+        Ok([
+            flat(&product),
+            flat(&equilibrium.residual::<f64>(&dphi)?),
+            vec![NonlinearProblem::magnitude(&equilibrium, bytemuck::cast_slice(&dphi))?],
+            tangent.diagonal_blocks().iter().flat_map(|block| block.iter().copied().collect::<Vec<_>>()).collect(),
+            flat(&nodal.velocity),
+        ])
+    };
+    let (a, b) = (by(&fast)?, by(&plain)?);
+    for (quantity, (a, b)) in QUANTITIES.iter().zip(a.iter().zip(&b)) {
+        report.push(&[quantity, &D.to_string(), law_name, shape_name], difference(a, b), Bound::AtMost(SAME));
+    }
+    let (single, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
+    let nodal = Nodal::project(&simulation.particles, &single, 0.5)?;
+    let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
+    let equilibrium = simulation.equilibrium(&single, &nodal, &prescribed, alphas, 0.1);
+    let product = equilibrium.single_tangent(None, &dphi)?.map_or_else(Vec::new, |tangent| {
+        let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
+        let mut out = vec![Vector::zeros(); count];
+        tangent.product(&u, &mut out);
+        out.iter().flatten().map(|&x| f64::from(x) * tangent.scale()).collect()
+    });
+    let cell = ["product in single precision", &D.to_string(), law_name, shape_name];
+    report.push(&cell, difference(&product, &b[0]), Bound::AtMost(SAME_IN_SINGLE));
     Ok(())
 }
 

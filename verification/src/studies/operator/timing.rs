@@ -1,6 +1,6 @@
 //! Rates and seconds: tables, no verdicts. All times are the best of several, on one thread unless said otherwise.
 
-use super::block::block;
+use super::block::{General, block};
 use super::machine::{copy_bandwidth, peak, read_bandwidth};
 use super::work::Work;
 use crate::baseline::{BFree, Pattern, assemble};
@@ -10,13 +10,14 @@ use crate::shipped;
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
-use bfree::mechanics::residual::Carry;
+use bfree::material::{Law, Material};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::tangent::frozen_bytes;
-use bfree::solver::Precision;
+use bfree::particles::Body;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
+use bfree::solver::Precision;
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
@@ -65,23 +66,27 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
     );
     for (name, shape) in shapes() {
         for jitter in [0.1, 0.24] {
-            product::<2>(&mut table, name, &shape, 160, jitter, [peak, copy], two)?;
-            product::<3>(&mut table, name, &shape, 32, jitter, [peak, copy], two)?;
+            product::<2, _>(&mut table, name, block(shape.clone(), None, 160, jitter, 1.0)?, jitter, [peak, copy], two)?;
+            product::<3, _>(&mut table, name, block(shape.clone(), None, 32, jitter, 1.0)?, jitter, [peak, copy], two)?;
         }
+        let name = format!("{name}, no closed form");
+        let general = |body: &Body<Material>| General(body.law.clone());
+        let (plane, space) = (block(shape.clone(), None, 160, 0.1, 1.0)?, block(shape, None, 32, 0.1, 1.0)?);
+        product::<2, _>(&mut table, &name, plane.with_laws(general), 0.1, [peak, copy], two)?;
+        product::<3, _>(&mut table, &name, space.with_laws(general), 0.1, [peak, copy], two)?;
     }
     Ok(table)
 }
 
-fn product<const D: usize>(
+fn product<const D: usize, L: Law>(
     table: &mut Table,
     name: &str,
-    shape: &Approximation,
-    cells: u32,
+    mut simulation: Simulation<D, L>,
     jitter: f64,
     [peak, copy]: [f64; 2],
     two: &rayon::ThreadPool,
 ) -> Result<(), StudyError> {
-    let mut simulation = block::<D>(shape.clone(), None, cells, jitter, 1.0)?;
+    let shape = &simulation.approximation.clone();
     let work = Work::of(&simulation, &Prepared::new(&simulation)?)?;
     simulation.settings.newton.precision = Precision::Mixed;
     let prepared = Prepared::new(&simulation)?;
@@ -92,7 +97,7 @@ fn product<const D: usize>(
     let mut out = vec![Vector::zeros(); u.len()];
     let seconds = best(15, || tangent.product(&u, &mut out));
     let on_two = two.install(|| best(15, || tangent.product(&u, &mut out)));
-    let in_single = match equilibrium.single_tangent(&u)? {
+    let in_single = match equilibrium.single_tangent(None, &u)? {
         Some(single) => {
             let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
             let mut out = vec![Vector::zeros(); u.len()];
@@ -122,7 +127,7 @@ fn product<const D: usize>(
         format!("{:.0} %", 100.0 * work.padded / seconds / peak),
         format!("{:.2} x", seconds / on_two),
         format!("{:.2} x", seconds / in_single),
-        times(best(5, || equilibrium.residual::<f64>(&u, Carry::ALL))),
+        times(best(5, || equilibrium.residual::<f64>(&u))),
         times(best(5, || equilibrium.tangent(&u).map(|_| ()))),
         times(shape_functions),
     ]);
@@ -149,7 +154,8 @@ fn matrices(copy: f64, read: f64) -> Result<Table, StudyError> {
         let mut out = vec![Vector::zeros(); count];
         let by_matrix = best(9, || matrix.product(&u, &mut out));
         let free = best(9, || tangent.product(&u, &mut out));
-        let bytes = prepared.supports.bytes() + frozen_bytes(&simulation.bodies, &prepared.supports, 1.0, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let bytes = prepared.supports.bytes() + frozen;
         table.push([
             name.into(),
             simulation.particles.len().to_string(),

@@ -5,10 +5,11 @@ use crate::prepared::Prepared;
 use crate::studies::StudyError;
 use crate::table::Table;
 use bfree::approximation::{Approximation, AxisWeights, Linear, Lme, ShapeFunction};
+use bfree::material::Law;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::solver::Precision;
 use bfree::simulation::Simulation;
-use bfree::tensor::Vector;
+use bfree::tensor::{Deformation, Tensor, Vector, identity};
 
 /// What one product does, summed over all particles.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,17 +39,19 @@ fn scatter(rows: usize, x: usize, d: usize) -> usize {
     rows * (products + d * d + 2 * d * x)
 }
 
-/// Those of the closed tangent of a neo-Hookean solid.
-fn point(d: usize) -> usize {
-    d * d * (3 * d + 3) + 1
+/// Those of the closed tangent of a neo-Hookean solid, or of one without a closed form.
+fn point(d: usize, closed: bool) -> usize {
+    if closed { d * d * (3 * d + 3) + 1 } else { d.pow(4) }
 }
 
 impl Work {
     /// Of the product on the given supports.
-    pub(super) fn of<const D: usize>(simulation: &Simulation<D>, prepared: &Prepared<D>) -> Result<Self, StudyError> {
+    pub(super) fn of<const D: usize, L: Law>(simulation: &Simulation<D, L>, prepared: &Prepared<D>) -> Result<Self, StudyError> {
         const LANES: usize = 8;
         let mut work = Self::default();
         let mut axis = AxisWeights::default();
+        let rest = Deformation::<f64, D>::new(Tensor::zeros());
+        let closed = simulation.bodies.iter().all(|body| body.law.closed(&identity(), &rest, 1.0).is_some());
         let Some(product) = simulation.approximation.separable() else { return Ok(work) };
         for x in &simulation.particles.position {
             let mut width = [1; 3];
@@ -56,14 +59,14 @@ impl Work {
                 product.axis(&simulation.grid.axis(k), x[k], &mut axis)?;
                 width[k] = axis.values.len();
             }
-            work.useful += 2.0 * (gather(width, D) + point(D) + scatter(width[1] * width[2], width[0], D)) as f64;
+            work.useful += 2.0 * (gather(width, D) + point(D, closed) + scatter(width[1] * width[2], width[0], D)) as f64;
         }
         for (width, lanes) in prepared.supports.windows() {
             let rows = (width[1] * width[2]).next_multiple_of(LANES);
-            work.padded += 2.0 * (LANES * (gather(width, D) + point(D)) + lanes * scatter(rows, width[0], D)) as f64;
+            work.padded += 2.0 * (LANES * (gather(width, D) + point(D, closed)) + lanes * scatter(rows, width[0], D)) as f64;
         }
         let field = prepared.nodes.len() * size_of::<Vector<f64, D>>();
-        let frozen = frozen_bytes(&simulation.bodies, &prepared.supports, simulation.settings.lumping, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
         work.bytes = (prepared.supports.bytes() + frozen + 2 * field) as f64;
         Ok(work)
     }

@@ -212,9 +212,9 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     let particles = simulation.particles.by_id();
     let mut carrier = particles.clone();
     carrier.acceleration = reference.iter().map(|&x| Vector::from([x])).collect();
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &carrier.position)?;
-    let lumped = Nodal::project(&carrier, &supports, nodes.len(), 1.0)?;
-    let effective = Nodal::project(&particles, &supports, nodes.len(), method.lumping)?;
+    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &carrier.position)?;
+    let lumped = Nodal::project(&carrier, &supports, 1.0)?;
+    let effective = Nodal::project(&particles, &supports, method.lumping)?;
     let at_nodes = lumped.acceleration.iter().zip(&effective.velocity).map(|(x, v)| (x[0], h, v[0]));
     let inside = |x: f64| (x - MIDDLE).abs() < inner - ENDS;
     let nodal = distance(&exact, at_nodes.filter(|node| inside(node.0)));

@@ -2,18 +2,19 @@
 
 use super::setting::Setting;
 use crate::baseline::{Assembled, BFree, Pattern, assemble};
-use crate::forced;
 use crate::prepared::{Prepared, arranged};
 use crate::studies::StudyError;
-use bfree::mechanics::residual::Carry;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
+use bfree::mechanics::terms::ForceField;
+use bfree::phases::Phase;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
 use bfree::solver::{BlockJacobi, NewtonHistory, newton};
 use bfree::tensor::Vector;
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The most blocks assembled: 0.4 GB in 3D.
@@ -99,51 +100,75 @@ impl Cost {
     }
 }
 
-/// The force of a manufactured solution per unit mass, on a particle at a time.
-pub(super) type Force<'a, const D: usize> = &'a (dyn Fn(usize, f64) -> Vector<f64, D> + Sync);
-
 /// Takes `steps` steps of the nominal length, and shows the simulation to `watch` after each.
 pub(super) fn drive<const D: usize>(
     simulation: &mut Simulation<D>,
     setting: &Setting,
     steps: u64,
-    force: Option<Force<'_, D>>,
     mut watch: impl FnMut(&Simulation<D>) -> Result<(), StudyError>,
 ) -> Result<Cost, StudyError> {
     let (units, bytes) = Units::of(simulation, setting.assembled)?;
     let mut tally = Tally::default();
     let mut seconds = 0.0;
+    let field = simulation.loads.field.take();
     while simulation.clock.nominal_steps() < steps {
-        if force.is_none() && !setting.assembled {
-            let start = Thread::now();
-            let report = simulation.advance()?;
-            seconds += start.elapsed();
-            report.failed.iter().for_each(|attempt| tally.add_newton(&attempt.newton));
-            tally.add(&report.newton.history, report.projection_iterations);
-        } else {
-            let end = simulation.clock.time() + simulation.clock.step();
-            let gravity = simulation.loads.gravity.clone();
-            let of_gravity = gravity.map_or_else(Vector::zeros, |g| g.acceleration * g.curve.value(end));
-            let forces: Vec<_> =
-                (0..simulation.particles.len()).map(|p| force.map_or(of_gravity, |force| force(p, end))).collect();
-            let start = Thread::now();
-            let step = forced::step_by(simulation, |p, _| forces[p], |equilibrium, dphi, settings| {
-                let (mut blocks, pool) = (BlockJacobi::<D>::default(), Pool::default());
-                if !setting.assembled {
-                    return newton(equilibrium, &mut blocks, dphi, settings, &pool);
-                }
-                // The pattern had fewer blocks at the start; a body that outgrows it goes on matrix-free.
-                match Pattern::new(equilibrium.supports, equilibrium.nodal.mass.len(), MOST_BLOCKS) {
-                    Ok(pattern) => newton(&Assembled { equilibrium, pattern: &pattern }, &mut blocks, dphi, settings, &pool),
-                    Err(_) => newton(equilibrium, &mut blocks, dphi, settings, &pool),
-                }
-            })?;
-            seconds += start.elapsed();
-            tally.add(&step.newton.history, step.projection_iterations);
+        simulation.loads.field = field.as_ref().map(|field| tabulated(field, simulation));
+        let assembled = if setting.assembled { Some(assembled(simulation)?) } else { None };
+        let start = Thread::now();
+        let report = if assembled.is_some() { simulation.step()? } else { simulation.advance()? };
+        let elapsed = start.elapsed();
+        report.failed.iter().for_each(|attempt| tally.add_newton(&attempt.newton));
+        match assembled {
+            // The run's own, but for Newton's method.
+            Some((newton, by_matrix)) => {
+                let phases = report.seconds.seconds();
+                let own = phases[Phase::Newton as usize] / phases.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+                seconds += elapsed * (1.0 - own) + by_matrix;
+                tally.add(&newton, report.projection_iterations);
+            }
+            None => {
+                seconds += elapsed;
+                tally.add(&report.newton.history, report.projection_iterations);
+            }
         }
         watch(simulation)?;
     }
+    simulation.loads.field = field;
     Ok(Cost { tally, seconds, units, bytes })
+}
+
+/// A force field with its values of the coming step made beforehand, so that they cost the step nothing.
+fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) -> ForceField<D> {
+    let (t, dt) = (simulation.clock.time(), simulation.clock.step());
+    let particles = simulation.particles.by_id();
+    let at = |t: f64| -> (f64, Vec<Vector<f64, D>>) {
+        (t, particles.position.iter().enumerate().map(|(id, x)| field.0(id, x, t)).collect())
+    };
+    let (tables, field) = ([at(t), at(t + dt)], field.clone());
+    ForceField(Arc::new(move |id, x, t| match tables.iter().find(|(time, _)| *time == t) {
+        Some((_, table)) => table[id],
+        None => field.0(id, x, t),
+    }))
+}
+
+/// The equilibrium of the coming step once more, beside the run, by a tangent that is assembled: what Newton's method does, and the
+/// seconds that it takes. Both solutions meet the same tolerance; the run goes on from its own.
+fn assembled<const D: usize>(simulation: &Simulation<D>) -> Result<(NewtonHistory, f64), StudyError> {
+    let prepared = Prepared::new(simulation)?;
+    let equilibrium = prepared.equilibrium(simulation);
+    let mut dphi = prepared.initial_guess(simulation);
+    let x = bytemuck::cast_slice_mut(&mut dphi);
+    let settings = &simulation.settings.newton;
+    let start = Thread::now();
+    // The pattern had fewer blocks at the start; a body that outgrows it goes on matrix-free.
+    let (mut blocks, pool) = (BlockJacobi::<D>::default(), Pool::default());
+    let report = match Pattern::new(&prepared.supports, prepared.nodes.len(), MOST_BLOCKS) {
+        Ok(pattern) => {
+            newton(&Assembled { equilibrium: &equilibrium, pattern: &pattern }, &mut blocks, x, settings, &pool)?
+        }
+        Err(_) => newton(&equilibrium, &mut blocks, x, settings, &pool)?,
+    };
+    Ok((report.history, start.elapsed()))
 }
 
 /// Seconds of one evaluation of each kind, at the start of a run.
@@ -185,8 +210,8 @@ impl Units {
         let mut out = vec![Vector::zeros(); count];
         let shapes =
             best(|| Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision).map(drop));
-        let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, count, lumping).map(drop));
-        let residual = best(|| equilibrium.residual::<f64>(&dphi, Carry::ALL).map(drop));
+        let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, lumping).map(drop));
+        let residual = best(|| equilibrium.residual::<f64>(&dphi).map(drop));
         let mut bytes = Plan::of(simulation)?.bytes();
         let (linearization, product) = if assembled {
             let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
@@ -201,11 +226,11 @@ impl Units {
             (made, best(|| matrix.product(&u, &mut out)))
         } else {
             let free = best(|| equilibrium.tangent(&dphi).map(drop));
-            match equilibrium.single_tangent(&dphi)? {
+            match equilibrium.single_tangent(None, &dphi)? {
                 Some(single) => {
                     let u: Vec<Vector<f32, D>> = vec![Vector::repeat(1e-3); count];
                     let mut out = vec![Vector::zeros(); count];
-                    let made = best(|| equilibrium.single_tangent(&dphi).map(drop));
+                    let made = best(|| equilibrium.single_tangent(None, &dphi).map(drop));
                     (made, best(|| single.product(&u, &mut out)))
                 }
                 None => {

@@ -112,7 +112,7 @@ impl Problem for Compaction {
         let steps = steps(scene);
         let every = (steps / SAMPLES).max(1);
         let sums = RefCell::new((0.0, 0.0));
-        let cost = drive(&mut simulation, setting, steps, None, |now| {
+        let cost = drive(&mut simulation, setting, steps, |now| {
             let done = now.clock.nominal_steps();
             if !(now.clock.on_nominal() && done.is_multiple_of(every)) {
                 return Ok(());

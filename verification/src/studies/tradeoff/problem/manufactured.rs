@@ -1,14 +1,13 @@
 //! Large strain along the axes of a square or a cube, under the body force that makes it a solution.
 
 use super::{LEVELS, Problem, steps};
-use crate::manufactured::{AxisAligned, body_force, state};
+use crate::manufactured::{AxisAligned, force_field, state};
 use crate::studies::StudyError;
 use crate::studies::tradeoff::cost::{Cost, Units, drive};
 use crate::studies::tradeoff::setting::Setting;
 use bfree::material::Lame;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -82,8 +81,8 @@ impl<const D: usize> Problem for Manufactured<D> {
         let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
         let law = simulation.bodies.first().ok_or("a scene without a body")?.law.clone();
-        let force = |p: usize, t: f64| -> Vector<f64, D> { body_force(&motion, &law, 1.0, &reference[p], t) };
-        let cost = drive(&mut simulation, setting, steps(scene), Some(&force), |_| Ok(()))?;
+        simulation.loads.field = Some(force_field(motion, law, 1.0, reference.clone()));
+        let cost = drive(&mut simulation, setting, steps(scene), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
         for (x, found) in reference.iter().zip(&simulation.particles.by_id().position) {
             let exact = state(&motion, x, simulation.clock.time()).position;

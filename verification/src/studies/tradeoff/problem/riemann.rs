@@ -93,7 +93,7 @@ impl Problem for Bar {
         let exact = system.solve(side(JUMP), side(0.0))?;
         let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
-        let cost = drive(&mut simulation, setting, steps(scene), None, |_| Ok(()))?;
+        let cost = drive(&mut simulation, setting, steps(scene), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
         for (x, v) in reference.iter().zip(&simulation.particles.by_id().velocity) {
             let place = x[0] - MIDDLE;
