@@ -120,13 +120,18 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             tangent.product(&u, &mut out);
             out
         };
-        let mut whole = vec![Vector::zeros(); u.len()];
+        let (mut whole, mut of_term) = (vec![Vector::zeros(); u.len()], 0.0);
         for piece in self.terms.pieces() {
             let mut dual = self.derivative(piece, dphi, &u)?;
             self.clear_prescribed(&mut dual);
             let analytic = product(&self.tangent_of(piece, dphi)?);
             // Where all that a piece does cancels, as what pressure does in 1D, its contributions say what round-off is.
-            let scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
+            let mut scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
+            if piece.part == Part::Whole {
+                of_term = scale;
+            }
+            // A part may be what two larger numbers leave: the whole less the other part.
+            scale = scale.max(of_term);
             compare(piece.name, &analytic, &dual, bound, scale)?;
             if piece.part == Part::Whole {
                 whole.iter_mut().zip(&dual).for_each(|(sum, x)| *sum += x);

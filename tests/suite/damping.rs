@@ -26,7 +26,8 @@ fn tight() -> NewtonSettings {
 
 #[test]
 fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Failure> {
-    for lumping in ["time.lumping=1", "time.lumping=0.4"] {
+    // A mass that is not lumped is inverted to a tolerance of 1e-12, twice a step.
+    for (lumping, bound) in [("time.lumping=1", 1e-12), ("time.lumping=0.4", 80.0 * 1e-12)] {
         let mut simulation = scene::<2>("rebound.json", &[lumping])?;
         let (a, dt) = (0.8, simulation.clock.step());
         simulation.loads.damping = Some(Rayleigh { mass: a, stiffness: 0.0 });
@@ -46,28 +47,33 @@ fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Fai
             simulation.advance()?;
             let left = f64::powi(rate, n);
             for (v, v_0) in simulation.particles.by_id().velocity.iter().zip(&start.velocity) {
-                assert!((v - v_0 * left).norm() < 1e-12 * v_0.norm(), "{lumping}, step {n}: {v}");
+                assert!((v - v_0 * left).norm() < bound * v_0.norm(), "{lumping}, step {n}: {v}");
             }
             let lost = start.kinetic_energy() * (1.0 - left * left);
             let found = simulation.dissipated;
-            assert!((found - lost).abs() < 1e-11 * lost, "{lumping}, step {n}: {found} for {lost}");
+            assert!((found - lost).abs() < 10.0 * bound * lost, "{lumping}, step {n}: {found} for {lost}");
         }
         assert!(simulation.strain_energy() < 1e-20 && simulation.external_work == 0.0);
     }
     Ok(())
 }
 
-/// A bar of length 1 between two walls, Λ + 2G = ρ = 1, that begins with the velocity `speed` sin πx: its lowest mode, of ω = π.
-fn bar(dt: f64, damping: Rayleigh, speed: f64) -> Result<Simulation<1>, Failure> {
-    let cells = 16_u32;
-    let h = 1.0 / f64::from(cells);
+/// A bar of Λ + 2G = ρ = 1 and length 1 in its lowest mode, of ω = π: at the beginning it has the velocity `speed` times its shape.
+/// Between two walls that is sin πx; a free bar has cos πx, and flies.
+fn bar(dt: f64, damping: Rayleigh, speed: f64, free: bool) -> Result<Simulation<1>, Failure> {
+    const CELLS: u32 = 32;
+    let h = 1.0 / f64::from(CELLS);
+    // The cells left and right of the bar.
+    let beside = if free { 8 } else { 0 };
+    let start = f64::from(beside) * h;
     let rate = damping.mass + damping.stiffness * PI * PI;
     let mut particles = Particles::<1>::default();
-    for p in 0..2 * cells {
+    for p in 0..2 * CELLS {
         let x = (f64::from(p) + 0.5) * 0.5 * h;
-        let v = speed * (PI * x).sin();
-        particles.push(Vector::from([x]), Vector::from([v]), 0.5 * h, 0.5 * h, 0);
-        particles.acceleration[p as usize] = Vector::from([-rate * v]);
+        let v = speed * if free { (PI * x).cos() } else { (PI * x).sin() };
+        let uniform = if free { 0.5 * speed } else { 0.0 };
+        particles.push(Vector::from([start + x]), Vector::from([v + uniform]), 0.5 * h, 0.5 * h, 0);
+        particles.acceleration[p as usize] = Vector::from([-rate * v - damping.mass * uniform]);
     }
     let wall = |upper| Prescribed {
         name: "wall".into(),
@@ -75,12 +81,13 @@ fn bar(dt: f64, damping: Rayleigh, speed: f64) -> Result<Simulation<1>, Failure>
         motion: [Some(Motion::Rest)],
     };
     let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
+    let prescribed = if free { vec![] } else { vec![wall(false), wall(true)] };
     Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: h, cells: [cells] },
+        grid: Grid { origin: Vector::zeros(), spacing: h, cells: [CELLS + 2 * beside] },
         approximation: Approximation::from(Bspline::Quadratic),
         bodies: vec![Body { name: "bar".into(), law, density: 1.0 }],
         particles,
-        loads: Loads { prescribed: vec![wall(false), wall(true)], damping: Some(damping), ..Loads::default() },
+        loads: Loads { prescribed, damping: Some(damping), ..Loads::default() },
         settings: Settings { lumping: 0.0, newton: tight(), ..Settings::default() },
         clock: Clock::new(dt, 0),
         external_work: 0.0,
@@ -93,7 +100,7 @@ fn bar(dt: f64, damping: Rayleigh, speed: f64) -> Result<Simulation<1>, Failure>
 fn rate(steps: u32, damping: Rayleigh) -> Result<f64, Failure> {
     let share = 0.5 * (damping.mass / PI + damping.stiffness * PI);
     let period = 2.0 / (1.0 - share * share).sqrt();
-    let mut simulation = bar(period / f64::from(steps), damping, 1e-3)?;
+    let mut simulation = bar(period / f64::from(steps), damping, 1e-3, false)?;
     let before = simulation.particles.kinetic_energy();
     for _ in 0..steps {
         simulation.advance()?;
@@ -107,11 +114,10 @@ fn the_lowest_mode_of_a_bar_decays_as_theory_says() -> Result<(), Failure> {
     // ü + (a + b ω²) u̇ + ω² u = 0: amplitudes fall as e^(−(a + b ω²) t/2).
     for damping in [Rayleigh { mass: 0.0, stiffness: 0.04 }, Rayleigh { mass: 0.3, stiffness: 0.0 }] {
         let exact = damping.mass + damping.stiffness * PI * PI;
-        let errors = [20, 40, 80].map(|steps| rate(steps, damping).map(|rate| (rate / exact - 1.0).abs()));
-        let [coarse, middle, fine] = errors;
-        println!("{damping:?} {:?}", (&coarse, &middle, &fine));
+        let [coarse, fine] = [40, 160].map(|steps| rate(steps, damping).map(|rate| (rate / exact - 1.0).abs()));
         let (coarse, fine) = (coarse?, fine?);
-        assert!(fine < 0.003 && fine < 0.3 * coarse, "{damping:?}: off by {coarse} and {fine}");
+        // A quarter of the step, a sixteenth of the error, until that of 32 cells is left.
+        assert!(coarse < 1e-2 && fine < 1e-3 && fine < 0.15 * coarse, "{damping:?}: off by {coarse:e} and {fine:e}");
     }
     Ok(())
 }
@@ -133,10 +139,11 @@ fn the_stiffness_part_takes_no_momentum() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The largest defect of kinetic + strain + dissipated − work in a bar under gravity, over its energy at the start.
-fn defect(steps: u32) -> Result<[f64; 2], Failure> {
-    let mut simulation = bar(1.0 / f64::from(steps), Rayleigh { mass: 0.2, stiffness: 0.03 }, 0.1)?;
-    let g = Vector::from([0.2]);
+/// The largest defect of kinetic + strain + dissipated − work in a free bar under gravity, over its energy at the start; and what was
+/// dissipated.
+fn defect(steps: u32, damping: Rayleigh, speed: f64) -> Result<[f64; 2], Failure> {
+    let mut simulation = bar(1.0 / f64::from(steps), damping, speed, true)?;
+    let g = Vector::from([-0.5 * speed]);
     simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
     simulation.particles.acceleration.iter_mut().for_each(|a| *a += g);
     let start = simulation.particles.kinetic_energy();
@@ -146,17 +153,28 @@ fn defect(steps: u32) -> Result<[f64; 2], Failure> {
         let stored = simulation.particles.kinetic_energy() + simulation.strain_energy();
         most = most.max((stored + simulation.dissipated - simulation.external_work - start).abs());
     }
+    assert!(simulation.external_work.abs() > 1e-2 * start);
     Ok([most / start, simulation.dissipated / start])
 }
 
 #[test]
 fn what_damping_takes_is_counted() -> Result<(), Failure> {
-    let [coarse, _] = defect(25)?;
-    let [middle, _] = defect(50)?;
-    let [fine, dissipated] = defect(100)?;
-    println!("{coarse:e} {middle:e} {fine:e}, dissipated {dissipated}");
-    assert!(dissipated > 0.3, "{dissipated}");
-    assert!(fine < 1e-3 && fine < 0.3 * middle && middle < 0.3 * coarse, "{coarse:e} {middle:e} {fine:e}");
+    let mass = Rayleigh { mass: 0.3, stiffness: 0.0 };
+    let orders = |damping, speed| -> Result<[f64; 3], Failure> {
+        let [coarse, middle, fine] = [50, 100, 200].map(|steps| defect(steps, damping, speed));
+        let ([coarse, _], [middle, _], [fine, dissipated]) = (coarse?, middle?, fine?);
+        assert!(dissipated > 0.1, "{damping:?}: {dissipated}");
+        Ok([coarse, middle, fine])
+    };
+    // The trapezoidal rule is of second order.
+    let [coarse, middle, fine] = orders(mass, 1e-3)?;
+    assert!(coarse < 1e-6 && middle < 0.3 * coarse && fine < 0.3 * middle, "{coarse:e} {middle:e} {fine:e}");
+    // K_n changes from step to step with the strain: of first order, and the less the smaller the motion.
+    let stiffness = Rayleigh { mass: 0.0, stiffness: 0.04 };
+    let [coarse, middle, fine] = orders(stiffness, 1e-3)?;
+    assert!(coarse < 1e-5 && middle < 0.6 * coarse && fine < 0.6 * middle, "{coarse:e} {middle:e} {fine:e}");
+    let [large, ..] = orders(stiffness, 1e-2)?;
+    assert!(coarse < 0.12 * large, "{coarse:e} {large:e}");
     Ok(())
 }
 
@@ -191,7 +209,7 @@ fn checked<const D: usize>(name: &str, overrides: &[&str]) -> Result<(), Failure
 
 #[test]
 fn the_tangent_of_damping_is_the_derivative_of_its_force() -> Result<(), Failure> {
-    checked::<2>("rebound.json", &["bodies.0.shape.ball.center=[1.4, 2.5]", "bodies.0.velocity=[-3,1]", "output={}"])?;
+    checked::<2>("rebound.json", &["bodies.0.shape.ball.center=[1.6, 2.5]", "bodies.0.velocity=[-3,1]", "output={}"])?;
     checked::<3>("ball_drop.json", &["output={}"])
 }
 

@@ -117,8 +117,9 @@ pub(crate) fn add_quadratic<X: Laned>(
     factor: f64,
     into: &mut Quadratic,
 ) {
-    let rows: Vec<[f64; LANES]> = rows.iter().map(|row| row.map(X::value)).collect();
-    let rows = rows.as_slice();
+    let mut plain = [[0.0; LANES]; Form::General.rows(3)];
+    plain.iter_mut().zip(rows).for_each(|(to, from)| *to = from.map(X::value));
+    let rows = &plain[..rows.len()];
     match dimension {
         1 => f64::widest(AddTo::<1> { form, rows, factor, into }),
         2 => f64::widest(AddTo::<2> { form, rows, factor, into }),

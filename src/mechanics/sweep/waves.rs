@@ -12,6 +12,7 @@ use super::lanes::LANES;
 use super::tiled::Tiled;
 use super::{Flow, Point};
 use crate::parallel;
+use crate::scalar::Real;
 use crate::tensor::Tensor;
 use num_traits::Zero;
 
@@ -48,7 +49,9 @@ impl<const D: usize> Tiled<D> {
         // The buffer of a field is a vector longer than its nodes.
         let length = |block: &Block| block.box_nodes() * C + LANES;
         let work = |block: &Block, nodal: &mut Vec<X>, buffer: &mut [X]| {
-            let (mut at, mut sums) = (vec![At::<X, C, D>::zero(); fields], vec![At::<X, C, D>::zero(); fields]);
+            let (mut few, mut few_sums) = ([At::<X, C, D>::zero(); FEW], [At::<X, C, D>::zero(); FEW]);
+            let (mut many, mut many_sums) = (Vec::new(), Vec::new());
+            let (at, sums) = (room(&mut few, &mut many, fields), room(&mut few_sums, &mut many_sums, fields));
             let boxed = block.box_nodes() * C;
             if let Some(field) = field {
                 gather_boxes::<X, C>(block, field, fields, nodal);
@@ -62,7 +65,7 @@ impl<const D: usize> Tiled<D> {
                     }
                 }
                 sums.iter_mut().for_each(|sums| sums.clear(flow.scatter));
-                point(block.groups.group(group), &at, &mut sums);
+                point(block.groups.group(group), at, sums);
                 if let Some(changed) = flow.weights.changed() {
                     weights.clear();
                     weights.extend(window.weights.iter().map(|row| row.map(changed)));
@@ -205,6 +208,22 @@ impl<const D: usize> Tiled<D> {
     }
 }
 
+/// Fields that a block has room for without allocating: those of a dual number.
+const FEW: usize = 2;
+
+/// Zeros for so many fields.
+fn room<'a, X: Real, const C: usize, const D: usize>(
+    few: &'a mut [At<X, C, D>; FEW],
+    many: &'a mut Vec<At<X, C, D>>,
+    fields: usize,
+) -> &'a mut [At<X, C, D>] {
+    if fields <= FEW {
+        return &mut few[..fields];
+    }
+    many.resize(fields, At::zero());
+    many
+}
+
 /// The boxes of the fields, one after the other.
 fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
     let boxed = block.box_nodes() * C;
@@ -224,12 +243,13 @@ fn gathered<const C: usize, const D: usize>(
     mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
 ) {
     gather_boxes::<f64, C>(block, field, fields, nodal);
-    let mut at = vec![At::<f64, C, D>::zero(); fields];
+    let (mut few, mut many) = ([At::<f64, C, D>::zero(); FEW], Vec::new());
+    let at = room(&mut few, &mut many, fields);
     for group in 0..block.groups.len() {
         let window = block.groups.window(group, &block.groups.weights);
         for (at, nodal) in at.iter_mut().zip(nodal.chunks(block.box_nodes() * C)) {
             f64::gather(C, window, nodal, parts, &mut at.value, at.gradient.as_flattened_mut());
         }
-        visit(block.groups.group(group), &at);
+        visit(block.groups.group(group), at);
     }
 }
