@@ -5,6 +5,7 @@ use crate::material::Law;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
+use crate::mechanics::terms::Rayleigh;
 use crate::mechanics::time::{Inertia, Newmark};
 use crate::particles::Particles;
 use crate::simulation::{Settings, Simulation};
@@ -238,6 +239,14 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
             "follower pressure",
             pressures > 0,
             &format!("{pressures} loaded particles; makes the tangent unsymmetric"),
+        ),
+        term(
+            "damping",
+            moves && loads.damping.is_some(),
+            &loads.damping.map_or_else(
+                || "only with damping".into(),
+                |Rayleigh { mass, stiffness }| format!("{mass} M + {stiffness} K; two passes more a residual"),
+            ),
         ),
         term("prescribed nodes", !loads.prescribed.is_empty(), &format!("{} conditions", loads.prescribed.len())),
         term("work of moving walls", moving, "only where a prescribed motion does not rest"),

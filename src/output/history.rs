@@ -21,6 +21,8 @@ pub struct Energies {
     pub external: f64,
     /// Kinetic and strain energy.
     pub total: f64,
+    /// What damping has taken since the start.
+    pub dissipated: f64,
     /// total − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
     pub balance: f64,
 }
@@ -50,8 +52,8 @@ impl Energies {
         reference: &Reference<D>,
     ) -> Self {
         let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
-        let (external, total) = (simulation.external_work, kinetic + strain);
-        Self { kinetic, strain, external, total, balance: total - reference.energy - external }
+        let (external, total, dissipated) = (simulation.external_work, kinetic + strain, simulation.dissipated);
+        Self { kinetic, strain, external, dissipated, total, balance: total + dissipated - reference.energy - external }
     }
 }
 
@@ -74,7 +76,7 @@ pub struct Cost {
 /// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
 /// let path = folder.path().join("history.csv");
-/// let mut history = History::open(path.clone(), 2, None)?;
+/// let mut history = History::open(path.clone(), 2, false, None)?;
 /// let energies = history.write(&simulation, &Reference::of(&simulation), Cost::default())?;
 /// history.flush()?;
 /// // The same bits come back from the file.
@@ -85,19 +87,24 @@ pub struct Cost {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct History(Table);
+pub struct History {
+    table: Table,
+    damped: bool,
+}
 
 impl History {
     /// Creates the file, with the header for `dimension` components of momentum; or continues one whose first `kept` bytes are good.
     ///
     /// # Errors
     /// The system refuses, or the file to be continued has other columns.
-    pub fn open(path: PathBuf, dimension: usize, kept: Option<u64>) -> Result<Self, OutputError> {
-        let fixed = ["step", "time", "dt", "kinetic", "strain", "external", "total", "balance"];
+    pub fn open(path: PathBuf, dimension: usize, damped: bool, kept: Option<u64>) -> Result<Self, OutputError> {
+        let fixed = ["step", "time", "dt", "kinetic", "strain", "external"];
         let mut columns: Vec<String> = fixed.map(str::to_owned).into();
+        columns.extend(damped.then(|| "dissipated".into()));
+        columns.extend(["total", "balance"].map(str::to_owned));
         columns.extend(AXES.iter().take(dimension).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
-        Ok(Self(Table::open(path, &columns, kept)?))
+        Ok(Self { table: Table::open(path, &columns, kept)?, damped })
     }
 
     /// Appends the present state; returns its energies.
@@ -114,11 +121,13 @@ impl History {
         let mut row = Row::default();
         row.push(simulation.clock.steps());
         row.extend([simulation.clock.time(), cost.dt]);
-        row.extend([energies.kinetic, energies.strain, energies.external, energies.total, energies.balance]);
+        row.extend([energies.kinetic, energies.strain, energies.external]);
+        row.extend(self.damped.then_some(energies.dissipated));
+        row.extend([energies.total, energies.balance]);
         row.extend(simulation.particles.momentum().iter().copied());
         row.push(cost.newton);
         row.push(cost.krylov);
-        self.0.row(&row)?;
+        self.table.row(&row)?;
         Ok(energies)
     }
 
@@ -127,11 +136,11 @@ impl History {
     /// # Errors
     /// The system refuses.
     pub fn flush(&mut self) -> Result<(), OutputError> {
-        self.0.flush()
+        self.table.flush()
     }
 
     /// Puts all rows on the disk; the name of the file, and its bytes.
     pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.0.mark()
+        self.table.mark()
     }
 }

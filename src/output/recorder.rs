@@ -175,7 +175,7 @@ impl<const D: usize> Recorder<D> {
         let loads = &simulation.loads;
         let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
         Ok(Self {
-            history: History::open(at("history.csv"), D, kept("history.csv"))?,
+            history: History::open(at("history.csv"), D, simulation.loads.damping.is_some(), kept("history.csv"))?,
             reactions: match loads.prescribed.is_empty() {
                 true => None,
                 false => Some(Reactions::open(at("reactions.csv"), loads, kept("reactions.csv"))?),

@@ -33,7 +33,8 @@ impl<const D: usize> Reference<D> {
         let particles = &simulation.particles;
         Self {
             position: particles.places().iter().map(|&p| particles.position[p as usize]).collect(),
-            energy: particles.kinetic_energy() + simulation.strain_energy() - simulation.external_work,
+            energy: particles.kinetic_energy() + simulation.strain_energy() + simulation.dissipated
+                - simulation.external_work,
             momentum: particles.momentum(),
         }
     }

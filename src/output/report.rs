@@ -304,11 +304,10 @@ impl Report<'_> {
 
     fn head(&self, path: &Path) -> Result<Map<String, Value>, OutputError> {
         let value = |number| serde_json::to_value(Number(number)).map_err(json(path));
-        let Energies { kinetic, strain, external, total, balance } = self.energies;
+        let Energies { kinetic, strain, external, dissipated, total, balance } = self.energies;
         let mut energies = Map::new();
-        for (name, x) in
-            [("kinetic", kinetic), ("strain", strain), ("external", external), ("total", total), ("balance", balance)]
-        {
+        let all = [("kinetic", kinetic), ("strain", strain), ("external", external), ("dissipated", dissipated)];
+        for (name, x) in all.into_iter().chain([("total", total), ("balance", balance)]) {
             energies.insert(name.to_owned(), value(x)?);
         }
         let mut seconds = Map::new();

@@ -300,7 +300,7 @@ impl Scene {
     }
 
     fn loads<const D: usize>(&self, grid: &Grid<D>, particles: &Particles<D>) -> Result<Loads<D>, BuildError> {
-        let mut loads = Loads::default();
+        let mut loads = Loads { damping: self.damping, ..Loads::default() };
         if let Some(gravity) = &self.gravity {
             loads.gravity = Some(Gravity {
                 acceleration: vector("gravity.acceleration", &gravity.acceleration)?,

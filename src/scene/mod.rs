@@ -30,6 +30,7 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
+use crate::mechanics::terms::Rayleigh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -70,6 +71,8 @@ pub struct Scene {
     pub prescribed: Vec<boundary::Prescribed>,
     /// The acceleration of gravity. Default: none.
     pub gravity: Option<load::Gravity>,
+    /// Rayleigh damping, a M + b K. Default: none.
+    pub damping: Option<Rayleigh>,
     /// Forces on surfaces.
     #[serde(default)]
     pub tractions: Vec<load::Traction>,
@@ -166,6 +169,9 @@ impl Scene {
         if let Some(gravity) = &self.gravity {
             gravity.check(&mut problems, dimension);
         }
+        if let Some(damping) = &self.damping {
+            damping.check(&mut problems);
+        }
         for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
             traction.check(&mut problems, &format!("tractions[{i}]"), &self.bodies, dimension);
         }
@@ -214,6 +220,7 @@ impl Scene {
             refuse(&format!("bodies[{i}].velocity"), &time::word(velocity));
         }
         self.initial_velocity.iter().for_each(|_| refuse("initial_velocity", "a velocity"));
+        self.damping.iter().for_each(|_| refuse("damping", "a damping"));
         self.output.of_inertia().for_each(|(path, value)| refuse(&path, &value));
     }
 

@@ -8,6 +8,7 @@ use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::sweep::{Flow, Laned, Number};
 use crate::mechanics::time::Alphas;
+use crate::problems::Problems;
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,15 @@ pub struct Rayleigh {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub stiffness: f64,
+}
+
+impl Rayleigh {
+    /// What is wrong with them in a scene.
+    pub(crate) fn check(&self, problems: &mut Problems) {
+        for (key, value) in [("damping.mass", self.mass), ("damping.stiffness", self.stiffness)] {
+            problems.between(key, value, 0.0, f64::MAX);
+        }
+    }
 }
 
 /// (a M̃ + b K_n) v; not there without inertia.
