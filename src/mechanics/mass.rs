@@ -25,6 +25,9 @@ pub struct Mass<'a, const D: usize> {
     pub lumping: f64,
 }
 
+/// K nodal fields.
+pub type Projected<const K: usize, const D: usize> = [Pooled<Vector<f64, D>>; K];
+
 /// Σ_p m N_I at every active node.
 pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
     let mut mass = supports.field();
@@ -66,7 +69,7 @@ impl<const D: usize> Mass<'_, D> {
     pub fn project<const K: usize>(
         &self,
         fields: [&[Vector<f64, D>]; K],
-    ) -> Result<([Pooled<Vector<f64, D>>; K], usize), LinearError> {
+    ) -> Result<(Projected<K, D>, usize), LinearError> {
         let right = |field: &[Vector<f64, D>]| {
             let mut out = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);

@@ -340,7 +340,14 @@ mod tests {
     #[test]
     fn the_lines_of_every_step_end_in_the_report_and_nothing_becomes_null() -> Result<(), Box<dyn std::error::Error>> {
         let directory = tempfile::tempdir()?;
-        let energies = Energies { kinetic: f64::NAN, strain: 0.1, external: 0.0, total: f64::INFINITY, balance: 0.0 };
+        let energies = Energies {
+            kinetic: f64::NAN,
+            strain: 0.1,
+            external: 0.0,
+            dissipated: 0.0,
+            total: f64::INFINITY,
+            balance: 0.0,
+        };
         let settings = serde_json::json!({"nested": {"deep": {}}});
         let report = Report {
             asked: &Map::from_iter([("settings".to_owned(), settings.clone())]),

@@ -135,7 +135,8 @@ mod tests {
     use super::*;
 
     fn step(number: u64) -> Watched {
-        let energies = Energies { kinetic: 2.0, strain: 1.0, external: -1.0, total: 3.0, balance: -0.5 };
+        let energies =
+            Energies { kinetic: 2.0, strain: 1.0, external: -1.0, dissipated: 0.0, total: 3.0, balance: -0.5 };
         let cost = Cost { dt: 0.1, newton: 3, krylov: 30 };
         Watched { time: 0.1 * number as f64, step: number, energies, cost, failed: 0, error: None, newton_limit: 30 }
     }
@@ -172,8 +173,14 @@ mod tests {
     #[test]
     fn numbers_that_are_none_leave_it_able_to_be_saved() {
         let mut watch = Watch::default();
-        let nan =
-            Energies { kinetic: f64::NAN, strain: f64::INFINITY, external: 0.0, total: f64::NAN, balance: f64::NAN };
+        let nan = Energies {
+            kinetic: f64::NAN,
+            strain: f64::INFINITY,
+            external: 0.0,
+            dissipated: 0.0,
+            total: f64::NAN,
+            balance: f64::NAN,
+        };
         watch.see(&Watched { energies: nan, ..step(1) });
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);

@@ -172,6 +172,15 @@ impl Weights {
 /// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.
 type Point<'a, X, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<X, C, D>], &mut [At<X, C, D>]) + Sync + 'a;
 
+/// `(particle, what was gathered of every field, lane)`: what becomes of it there.
+type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync + 'a;
+
+/// `(group, what was gathered, rows)`: fills the rows of a group.
+pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync + 'a;
+
+/// As [`Point`], of one field.
+pub(crate) type Linear<'a, X, const D: usize> = dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a;
+
 impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
     fn clear(&mut self, parts: Parts) {
         if parts.value {
@@ -481,13 +490,7 @@ impl<const D: usize> Supports<D> {
     }
 
     /// As [`Self::sweep`], for D plain numbers a node in either precision: what a product with a tangent is.
-    pub(crate) fn product<X: Laned>(
-        &self,
-        field: &[X],
-        flow: Flow,
-        out: &mut [X],
-        point: &(dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync),
-    ) {
+    pub(crate) fn product<X: Laned>(&self, field: &[X], flow: Flow, out: &mut [X], point: &Linear<'_, X, D>) {
         self.pass();
         let point = |group: Group<'_>, at: &[At<X, D, D>], sums: &mut [At<X, D, D>]| point(group, &at[0], &mut sums[0]);
         either!(self, way => way.sweep::<X, D>(1, Some(field), flow, out, &point));
@@ -499,7 +502,7 @@ impl<const D: usize> Supports<D> {
         field: &[Vector<f64, D>],
         count: usize,
         rows: &mut [Y],
-        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
+        fill: &Fill<'_, Y, D>,
     ) {
         self.pass();
         either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));

@@ -5,7 +5,7 @@ use super::block::Group;
 use super::blocks::{Quadratic, pair};
 use super::kernel::{At, Parts};
 use super::lanes::LANES;
-use super::{Flow, Point, SupportError};
+use super::{Fill, Flow, Point, SupportError, Visit};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
@@ -168,7 +168,7 @@ impl<const D: usize> Plain<D> {
         fields: usize,
         field: &[f64],
         _: Parts,
-        point: &(dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync),
+        point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
         let parts = parallel::map(0..self.blocks.len(), |b| {
@@ -184,13 +184,7 @@ impl<const D: usize> Plain<D> {
         parts.into_iter().flatten().enumerate().for_each(|(p, result)| take(p, result));
     }
 
-    pub(super) fn fill_rows<Y: Send>(
-        &self,
-        field: &[f64],
-        count: usize,
-        rows: &mut [Y],
-        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
-    ) {
+    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
         parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), |(b, rows)| {
             for (group, rows) in self.groups_of(b).zip(rows.chunks_mut(count)) {
                 let mut at = [At::zero()];

@@ -10,7 +10,7 @@ use super::kernel::{At, Parts, Window};
 use super::laned::{self, Laned};
 use super::lanes::LANES;
 use super::tiled::Tiled;
-use super::{Flow, Point};
+use super::{Fill, Flow, Point, Visit};
 use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::Tensor;
@@ -149,7 +149,7 @@ impl<const D: usize> Tiled<D> {
         fields: usize,
         field: &[f64],
         parts: Parts,
-        point: &(dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync),
+        point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
         let gather = |nodal: &mut Vec<f64>, block: &Block, take: &mut dyn FnMut(usize, R)| {
@@ -176,13 +176,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// `fill(group, what was gathered, rows)` of every group, each with `count` rows of its own.
-    pub(super) fn fill_rows<Y: Send>(
-        &self,
-        field: &[f64],
-        count: usize,
-        rows: &mut [Y],
-        fill: &(dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync),
-    ) {
+    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = rows;
         for block in &self.blocks {

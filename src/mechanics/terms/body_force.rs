@@ -8,9 +8,12 @@ use crate::tensor::Vector;
 use std::fmt::{Debug, Formatter};
 use std::sync::Arc;
 
-/// A force per mass, `(id of the particle, its position x_n, t)`. It acts where particles are at the beginning of a step.
+/// A force per mass, `(id of the particle, its position x_n, t)`.
+pub type Field<const D: usize> = dyn Fn(usize, &Vector<f64, D>, f64) -> Vector<f64, D> + Send + Sync;
+
+/// A force per mass that varies. It acts where particles are at the beginning of a step.
 #[derive(Clone)]
-pub struct ForceField<const D: usize>(pub Arc<dyn Fn(usize, &Vector<f64, D>, f64) -> Vector<f64, D> + Send + Sync>);
+pub struct ForceField<const D: usize>(pub Arc<Field<D>>);
 
 impl<const D: usize> Debug for ForceField<D> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
