@@ -6,7 +6,8 @@ use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::solver::{LinearOperator, NonlinearProblem, Preconditioner};
 use bfree::tensor::{Tensor, Vector, identity, inverse};
 
-/// An equilibrium whose tangent is assembled anew at every linearisation, on a given pattern; without follower pressure and damping.
+/// An equilibrium whose tangent is assembled anew at every linearisation, on a given pattern; without follower pressure
+/// and damping.
 #[derive(Clone, Copy)]
 pub struct Assembled<'a, const D: usize, L> {
     /// The equilibrium of the step.
