@@ -1,6 +1,7 @@
 //! The tangent as a matrix, the way most programs have it: to be compared with the matrix-free product.
 //!
-//! Two assemblies of the same blocks from the same supports: [`assemble`] with `b_free` (eqs. 34, 38) or `voigt` (BᵀDB).
+//! Two assemblies of the same blocks from the same supports: [`assemble`] with `b_free` (eqs. 34, 38) or `voigt`
+//! (BᵀDB).
 
 mod b_free;
 mod blocks;
@@ -22,8 +23,9 @@ use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
 /// A way to the D×D block that two nodes share at one particle, geometric and material stiffness together.
 pub trait Stiffness<const D: usize> {
-    /// The blocks of all pairs of nodes of a particle with reference volume `volume` that comes from `start` to the state `at`, from the nodes'
-    /// gradients in the reference configuration: `add(I, J, K_IJ)`, I and J numbering `gradients`.
+    /// The blocks of all pairs of nodes of a particle with reference volume `volume` that comes from `start` to the
+    /// state `at`, from the nodes' gradients in the reference configuration: `add(I, J, K_IJ)`, I and J numbering
+    /// `gradients`.
     fn blocks<L: Law>(
         &self,
         law: &L,
@@ -35,7 +37,8 @@ pub trait Stiffness<const D: usize> {
     );
 }
 
-/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure and damping are left out.
+/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure and damping are left
+/// out.
 ///
 /// # Errors
 /// The first particle with det F ≤ 0.

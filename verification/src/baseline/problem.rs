@@ -7,7 +7,8 @@ use bfree::pooled::Pooled;
 use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
 use bfree::tensor::{Tensor, Vector};
 
-/// An equilibrium whose tangent is assembled anew at every linearisation, on a given pattern; without follower pressure and damping.
+/// An equilibrium whose tangent is assembled anew at every linearisation, on a given pattern; without follower pressure
+/// and damping.
 #[derive(Clone, Copy)]
 pub struct Assembled<'a, const D: usize, L> {
     /// The equilibrium of the step.

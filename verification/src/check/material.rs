@@ -1,4 +1,5 @@
-//! A law against itself: energy, stress, elasticity, tangent density and closed tangent must be derivatives of each other.
+//! A law against itself: energy, stress, elasticity, tangent density and closed tangent must be derivatives of each
+//! other.
 
 use super::regime::{Regime, condition, rotation, round_off};
 use crate::random::Random;
@@ -10,11 +11,12 @@ use num_dual::Dual64;
 /// Deformations tried in each regime.
 const TRIES: usize = 8;
 
-/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20; a law with memory in a step of length 1
-/// from rest.
+/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20; a law with memory in
+/// a step of length 1 from rest.
 ///
-/// Every derivative is compared with dual numbers through the function it is the derivative of: S with W, ℂ with S, the closed form of
-/// the tangent, where there is one, with P; its blocks with its product; and S must not see a rotation. Labels are (quantity, D, regime).
+/// Every derivative is compared with dual numbers through the function it is the derivative of: S with W, ℂ with S, the
+/// closed form of the tangent, where there is one, with P; its blocks with its product; and S must not see a rotation.
+/// Labels are (quantity, D, regime).
 pub fn check_material<L: Law>(law: &L) -> Report {
     let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
     let start = Start { dt: 1.0, memory: &memory };
@@ -26,7 +28,8 @@ pub fn check_material<L: Law>(law: &L) -> Report {
     report
 }
 
-/// As [`check_material`], of a law with memory in a step that starts with `start`: all but that there is nothing at rest.
+/// As [`check_material`], of a law with memory in a step that starts with `start`: all but that there is nothing at
+/// rest.
 ///
 /// ```
 /// use bfree::material::{Law, Remembered, Start};

@@ -31,10 +31,10 @@ pub(crate) const IN_SINGLE: &str = ", f32";
 /// The piece whose contributions cancel in 1D, and which has no symmetric tangent.
 const PRESSURE: &str = "follower pressure";
 
-/// Checks the tangent of the coming step of a simulation: every piece of it, frozen alone, and the whole, by the product that the solver
-/// applies, against dual numbers through the residual, in single precision too where the simulation uses it; the blocks of the
-/// preconditioner against the product; and, where they exist, symmetry and the residual against the gradient of the potential. Labels
-/// are (quantity, Δφ).
+/// Checks the tangent of the coming step of a simulation: every piece of it, frozen alone, and the whole, by the
+/// product that the solver applies, against dual numbers through the residual, in single precision too where the
+/// simulation uses it; the blocks of the preconditioner against the product; and, where they exist, symmetry and the
+/// residual against the gradient of the potential. Labels are (quantity, Δφ).
 ///
 /// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle is crushed.
 pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Report {
@@ -204,8 +204,8 @@ fn product_in_single<const D: usize>(tangent: &Tangent<'_, D, f32>, u: &[Vector<
     out.iter().map(|x| x.map(f64::from) * tangent.scale()).collect()
 }
 
-/// What differences of a product are relative to: its norm. In 1D cof F = 1: a pressure is a dead load, the two parts of its tangent
-/// cancel, and each is of the size of the force times that of the gradients of u.
+/// What differences of a product are relative to: its norm. In 1D cof F = 1: a pressure is a dead load, the two parts
+/// of its tangent cancel, and each is of the size of the force times that of the gradients of u.
 fn scale<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     piece: Piece,

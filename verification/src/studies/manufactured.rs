@@ -27,18 +27,18 @@ const STEP_OVER_SPACING: f64 = 0.4;
 
 /// The least order in space of the position error where ∇N is continuously differentiable.
 ///
-/// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not fall with h
-/// (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1, once the
-/// interpolation error, of order 2, is below it. Of that 1, 0.8 is asked for.
+/// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not
+/// fall with h (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1,
+/// once the interpolation error, of order 2, is below it. Of that 1, 0.8 is asked for.
 const ORDER: f64 = 0.8;
 
 /// One family.
 struct Family {
     name: &'static str,
     shape: Approximation,
-    /// Whether ∇N is continuously differentiable, to rounding. Where it jumps or has kinks (LME of a large γ̂ is nearly linear), that
-    /// number is large and changes as particles cross faces: it shakes the grid, undamped and more often the finer it is, and nothing is
-    /// promised.
+    /// Whether ∇N is continuously differentiable, to rounding. Where it jumps or has kinks (LME of a large γ̂ is nearly
+    /// linear), that number is large and changes as particles cross faces: it shakes the grid, undamped and more often
+    /// the finer it is, and nothing is promised.
     smooth: bool,
 }
 
@@ -99,7 +99,8 @@ impl Problem for Vortex {
     }
 }
 
-/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles in the order of their ids, and their reference positions.
+/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles in the order of their ids, and their
+/// reference positions.
 fn simulate<P: Problem>(
     problem: &P,
     shape: &Approximation,
@@ -328,7 +329,8 @@ fn time<P: Problem>(
             if let (Some(first), Some(last), true) = (differences.first(), differences.last(), differences.len() > 1) {
                 let overall = order(first[0], last[0], 2.0_f64.powi(differences.len() as i32 - 1));
                 let label = format!("order in time, position, eps = {lumping}");
-                // Projected anew in every step, Newmark's rule has no order to promise; on nodes that stay the study `order` judges it.
+                // Projected anew in every step, Newmark's rule has no order to promise; on nodes that stay the study
+                // `order` judges it.
                 report.push(&[&label, family.name, motion], overall, Bound::Reported);
             }
         }

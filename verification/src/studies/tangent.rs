@@ -1,5 +1,5 @@
-//! Every piece of the tangent against dual numbers, by the product that the solver applies: every law × every shape function × both ways
-//! of the sweep × both precisions × D = 1, 2, 3 × every regime.
+//! Every piece of the tangent against dual numbers, by the product that the solver applies: every law × every shape
+//! function × both ways of the sweep × both precisions × D = 1, 2, 3 × every regime.
 
 use super::{Effort, Outcome, StudyError, short};
 use crate::check::regime::Regime;
@@ -63,7 +63,8 @@ fn shapes() -> Vec<(&'static str, Approximation)> {
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let columns = ["quantity", "law", "D", "regime", "shape function"];
     let mut report = Report::new(
-        "tangent: |K u - dual(R) u| / |K u|, worst shape function of each place, bound min(64 eps k(F)^2, 1e-10), f32: 64 eps of it",
+        "tangent: |K u - dual(R) u| / |K u|, worst shape function of each place, bound min(64 eps k(F)^2, 1e-10), \
+         f32: 64 eps of it",
         &columns,
     )
     .as_matrix(&[0, 2, 1], 3, 4);
@@ -77,9 +78,17 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     }
     report.note("k(F) = |F| |1/F| / 3 of the 3x3 F, the largest of all particles. In 1D there is no rotation ('-').");
     report.note("Follower pressure: on part of the surface only (open), so u.Kw differs from w.Ku in 2D and 3D; in 1D cof F = 1 and its tangent is zero.");
-    report.note("Pieces are frozen alone and applied by the solver's product, in vector lanes and ('plain') one particle after the other.");
-    report.note("f32: the product in single precision; in 1D, where its numbers may cancel, that of a part is relative to its term.");
-    report.note("eps = 0.3, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.");
+    report.note(
+        "Pieces are frozen alone and applied by the solver's product, in vector lanes and ('plain') one particle after \
+         the other.",
+    );
+    report.note(
+        "f32: the product in single precision; in 1D, where its numbers may cancel, that of a part is relative to its \
+         term.",
+    );
+    report.note(
+        "eps = 0.3, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.",
+    );
     Ok(Outcome { reports: vec![report], ..Outcome::default() })
 }
 
@@ -128,7 +137,8 @@ fn dimension<const D: usize, L: Law + Clone>(
                         }
                         let asymmetric = measured.quantity == PRESSURE_ASYMMETRY;
                         let bound = if asymmetric { Bound::AtLeast(1e-3) } else { measured.bound };
-                        report.push(&[&measured.quantity, name, &D.to_string(), regime.name(), way], measured.value, bound);
+                        let labels: [&str; 5] = [&measured.quantity, name, &D.to_string(), regime.name(), way];
+                        report.push(&labels, measured.value, bound);
                     }
                 }
             }
@@ -137,8 +147,9 @@ fn dimension<const D: usize, L: Law + Clone>(
     Ok(())
 }
 
-/// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, damped, under gravity and under
-/// pressure on part of their surface, for products in both precisions. Speeds and step are such that inertia is as large as stiffness.
+/// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, damped, under
+/// gravity and under pressure on part of their surface, for products in both precisions. Speeds and step are such that
+/// inertia is as large as stiffness.
 pub(super) fn cloud<const D: usize, L: Law>(
     law: L,
     approximation: Approximation,

@@ -62,7 +62,8 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     let mut exact = Tensor::<f64, D>::zeros();
     exact[(D - 1, D - 1)] = strain;
     let at = Deformation::new(exact);
-    let force = (at.f * simulation.bodies[0].law.stress(&at, &Start::NONE))[(D - 1, D - 1)] * f64::from(CELLS).powi(D as i32 - 1);
+    let piola = at.f * simulation.bodies[0].law.stress(&at, &Start::NONE);
+    let force = piola[(D - 1, D - 1)] * f64::from(CELLS).powi(D as i32 - 1);
     let what = format!("confined compression, {name}, D = {D}");
     let case = format!("nu = {poisson}");
     let stepped = simulation.step();
@@ -151,7 +152,8 @@ fn series(soft: &Material, stiff: &Material, sum: f64) -> (f64, f64) {
         let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
         (at.f * law.stress(&at, &Start::NONE))[0]
     };
-    let modulus = |law: &Material| law.elasticity(&Deformation::new(Tensor::<f64, 1>::zeros()), &Start::NONE, &Tensor::from_element(1.0))[0];
+    let rest = Deformation::new(Tensor::<f64, 1>::zeros());
+    let modulus = |law: &Material| law.elasticity(&rest, &Start::NONE, &Tensor::from_element(1.0))[0];
     let slope = modulus(soft) + modulus(stiff);
     let mut in_stiff = 0.0;
     // Contracts by the relative change of the moduli, a few tenths.

@@ -102,7 +102,10 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
     let (w, s) = (exact_w.magnitude(), exact_s.map(DoubleDouble::value));
     let piola = near.f * s;
     let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
-    let response = |i: usize, k: usize| law.elasticity(&near, &Start::NONE, &(near.f.transpose() * outer(&unit(i), &unit(k)))).norm();
+    let response = |i: usize, k: usize| {
+        let strain = near.f.transpose() * outer(&unit(i), &unit(k));
+        law.elasticity(&near, &Start::NONE, &strain).norm()
+    };
     let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
     let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
     let (change_w, change_s) = match rounding {

@@ -288,7 +288,8 @@ macro_rules! material_in_both {
     };
 }
 
-/// Some of the faults in a whole step, with the cells of [`check_tangent`] that must turn red; a law with a closed form is applied by it.
+/// Some of the faults in a whole step, with the cells of [`check_tangent`] that must turn red; a law with a closed form
+/// is applied by it.
 const IN_A_STEP: &[Mutant] = &[
     ("W 1% too large, in a step", ciarlet, Fault::EnergyFactor, &[red("dual(Pi) - R.u", INCREMENTS)]),
     (
@@ -330,7 +331,8 @@ pub(super) fn judge(report: &mut Report) -> Result<(), StudyError> {
     for (list, general) in [(IN_A_STEP, false), (IN_A_STEP_BY_DENSITY, true)] {
         for &(name, law, fault, forecast) in list {
             let wrong = Wrong { right: law(lame), lame, fault, general };
-            let mut simulation = cloud::<2, _>(wrong, Bspline::Quadratic.into(), Regime::Moderate, &mut Random::new(3))?;
+            let (shape, mut random) = (Bspline::Quadratic.into(), Random::new(3));
+            let mut simulation = cloud::<2, _>(wrong, shape, Regime::Moderate, &mut random)?;
             simulation.loads.surface.clear();
             compare(report, name, "check_tangent", &check_tangent(&simulation), forecast);
         }

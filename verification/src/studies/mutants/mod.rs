@@ -1,8 +1,8 @@
 //! Faults put in on purpose: each must turn exactly the cells red that are written down beside it.
 //!
-//! Wrong laws and wrong shape functions are made here and judged by the public checks, cell by cell. Full effort also patches the files
-//! under `src/`, those of the terms and of the sweep among them, in a copy of the workspace, and runs the copy's own checks (see
-//! [`schemata`]).
+//! Wrong laws and wrong shape functions are made here and judged by the public checks, cell by cell. Full effort also
+//! patches the files under `src/`, those of the terms and of the sweep among them, in a copy of the workspace, and runs
+//! the copy's own checks (see [`schemata`]).
 
 mod forecast;
 mod laws;

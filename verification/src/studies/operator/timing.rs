@@ -66,8 +66,9 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
     );
     for (name, shape) in shapes() {
         for jitter in [0.1, 0.24] {
-            product::<2, _>(&mut table, name, block(shape.clone(), None, 160, jitter, 1.0)?, jitter, [peak, copy], two)?;
-            product::<3, _>(&mut table, name, block(shape.clone(), None, 32, jitter, 1.0)?, jitter, [peak, copy], two)?;
+            let (plane, space) = (shape.clone(), shape.clone());
+            product::<2, _>(&mut table, name, block(plane, None, 160, jitter, 1.0)?, jitter, [peak, copy], two)?;
+            product::<3, _>(&mut table, name, block(space, None, 32, jitter, 1.0)?, jitter, [peak, copy], two)?;
         }
         let name = format!("{name}, no closed form");
         let general = |body: &Body<Material>| General(body.law.clone());

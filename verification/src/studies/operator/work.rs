@@ -46,12 +46,16 @@ fn point(d: usize, closed: bool) -> usize {
 
 impl Work {
     /// Of the product on the given supports.
-    pub(super) fn of<const D: usize, L: Law>(simulation: &Simulation<D, L>, prepared: &Prepared<D>) -> Result<Self, StudyError> {
+    pub(super) fn of<const D: usize, L: Law>(
+        simulation: &Simulation<D, L>,
+        prepared: &Prepared<D>,
+    ) -> Result<Self, StudyError> {
         const LANES: usize = 8;
         let mut work = Self::default();
         let mut axis = AxisWeights::default();
         let rest = Deformation::<f64, D>::new(Tensor::zeros());
         let closed = simulation.bodies.iter().all(|body| body.law.closed(&identity(), &rest, 1.0).is_some());
+        let point = point(D, closed);
         let Some(product) = simulation.approximation.separable() else { return Ok(work) };
         for x in &simulation.particles.position {
             let mut width = [1; 3];
@@ -59,11 +63,11 @@ impl Work {
                 product.axis(&simulation.grid.axis(k), x[k], &mut axis)?;
                 width[k] = axis.values.len();
             }
-            work.useful += 2.0 * (gather(width, D) + point(D, closed) + scatter(width[1] * width[2], width[0], D)) as f64;
+            work.useful += 2.0 * (gather(width, D) + point + scatter(width[1] * width[2], width[0], D)) as f64;
         }
         for (width, lanes) in prepared.supports.windows() {
             let rows = (width[1] * width[2]).next_multiple_of(LANES);
-            work.padded += 2.0 * (LANES * (gather(width, D) + point(D, closed)) + lanes * scatter(rows, width[0], D)) as f64;
+            work.padded += 2.0 * (LANES * (gather(width, D) + point) + lanes * scatter(rows, width[0], D)) as f64;
         }
         let field = prepared.nodes.len() * size_of::<Vector<f64, D>>();
         let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);

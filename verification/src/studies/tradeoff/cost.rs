@@ -20,8 +20,8 @@ use std::time::{Duration, Instant};
 /// The most blocks assembled: 0.4 GB in 3D.
 const MOST_BLOCKS: usize = 5_000_000;
 
-/// An iteration keeps Newton's method quadratic if the linear solver leaves at most this part of what is left: the rest is the second
-/// order of Newton's own step.
+/// An iteration keeps Newton's method quadratic if the linear solver leaves at most this part of what is left: the rest
+/// is the second order of Newton's own step.
 const LINEAR_SHARE: f64 = 0.5;
 
 /// … and a run does, if this part of its iterations does, the last of each step left out.
@@ -151,8 +151,8 @@ fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) 
     }))
 }
 
-/// The equilibrium of the coming step once more, beside the run, by a tangent that is assembled: what Newton's method does, and the
-/// seconds that it takes. Both solutions meet the same tolerance; the run goes on from its own.
+/// The equilibrium of the coming step once more, beside the run, by a tangent that is assembled: what Newton's method
+/// does, and the seconds that it takes. Both solutions meet the same tolerance; the run goes on from its own.
 fn assembled<const D: usize>(simulation: &Simulation<D>) -> Result<(NewtonHistory, f64), StudyError> {
     let prepared = Prepared::new(simulation)?;
     let equilibrium = prepared.equilibrium(simulation);
