@@ -126,6 +126,7 @@ fn results<const D: usize, L: Law>(
     supports: &Supports<D>,
     dphi: &[Vector<f64, D>],
     u: &[Vector<f64, D>],
+    divides: bool,
 ) -> Result<Results<D>, Failure> {
     let (nodal, loads) = (Nodal::project(particles, supports, LUMPING)?, Loads::default());
     let (alphas, lumping) = (alphas(), LUMPING);
@@ -134,7 +135,9 @@ fn results<const D: usize, L: Law>(
     let residual = equilibrium.residual(dphi)?;
     let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
     let real: Vec<_> = equilibrium.residual(&seeded)?.iter().map(|r| r.map(|x| x.re)).collect();
-    assert!(bits(&real) == bits(&residual), "the real part of dual numbers has other bits");
+    // A quotient of dual numbers is a product with the reciprocal: rounded twice, where a law divides.
+    let (same, apart) = (bits(&real) == bits(&residual), difference(&real, &residual));
+    assert!(same || divides && apart < 1e-14, "the real part of dual numbers: {apart:e}");
     equilibrium.check_tangent(dphi, u)?;
     let tangent = equilibrium.tangent(dphi)?;
     let mut product = vec![Vector::zeros(); u.len()];
@@ -216,6 +219,8 @@ fn compare<const D: usize>() -> Result<(), Failure> {
     let regimes = REGIMES.iter().map(std::slice::from_ref).chain([REGIMES.as_slice()]);
     for (list, regime) in lists.iter().flat_map(|list| regimes.clone().map(move |regime| (list, regime))) {
         let particles = particles::<D>(list.len() as u32, regime);
+        // In its ln J.
+        let divides = list.iter().any(|law| matches!(law, Material::NeoHookeanLogarithmic(_)));
         let unknown = |closed: &dyn Fn(usize) -> bool| {
             bodies(list.iter().enumerate().map(|(k, law)| Unknown { law: law.clone(), closed: closed(k) }))
         };
@@ -231,10 +236,10 @@ fn compare<const D: usize>() -> Result<(), Failure> {
                 (0..nodes.len()).map(|n| Vector::from_fn(|i, _| irregular(5 * n + i))).collect();
             let dphi: Vec<_> = u.iter().map(|u| u * 0.01).collect();
             let of = |bodies: &[Body<Unknown>], supports: &Supports<D>| {
-                results(&particles, bodies, supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))
+                results(&particles, bodies, supports, &dphi, &u, divides).map_err(|error| format!("{case}: {error}"))
             };
-            let in_lanes =
-                results(&particles, &known, &supports, &dphi, &u).map_err(|error| format!("{case}: {error}"))?;
+            let in_lanes = results(&particles, &known, &supports, &dphi, &u, divides)
+                .map_err(|error| format!("{case}: {error}"))?;
             assert!(in_lanes == of(&closed, &supports)?, "{case}: in lanes and one by one");
             for bodies in [&closed, &others[0], &others[1]] {
                 let (tiled, plain) = (of(bodies, &supports)?, of(bodies, &plain)?);
