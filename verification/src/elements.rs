@@ -196,7 +196,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let mut u = self.displacement.clone();
         let report = newton(
             &equilibrium,
-            &mut BlockJacobi::<2>::default(),
+            &mut BlockJacobi::<D>::default(),
             bytemuck::cast_slice_mut(&mut u),
             &self.newton,
             &Pool::default(),
