@@ -247,7 +247,7 @@ impl<const D: usize> Supports<D> {
     /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double, &Pool::default())?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
-    /// let field = direction(nodes.len(), 1);
+    /// let field = direction::<2>(nodes.len(), 1);
     /// assert_eq!(renewed.values(&field), anew.values(&field));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -299,7 +299,7 @@ impl<const D: usize> Supports<D> {
     /// let (fast, nodes) = Supports::new(&lme, &grid, &positions)?;
     /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;
     /// assert_eq!(nodes, same_nodes);
-    /// let field = direction(nodes.len(), 1);
+    /// let field = direction::<2>(nodes.len(), 1);
     /// let apart = fast.values(&field).into_iter().zip(plain.values(&field)).map(|(a, b)| (a - b).norm());
     /// assert!(apart.fold(0.0, f64::max) < 1e-14);
     /// // The fast one keeps functions of one coordinate, not N and ∇N of every node; and particles that share their nodes together.
@@ -389,7 +389,7 @@ impl<const D: usize> Supports<D> {
     /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
     /// assert_eq!(supports.nodes(), nodes.len());
     /// let before = supports.passes();
-    /// supports.values(&direction(nodes.len(), 1));
+    /// supports.values(&direction::<2>(nodes.len(), 1));
     /// assert_eq!(supports.passes(), before + 1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -620,7 +620,7 @@ impl<const D: usize> Supports<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// let field = direction(nodes.len(), 1);
+    /// let field = direction::<2>(nodes.len(), 1);
     /// let (values, mut visited) = (supports.values(&field), 0);
     /// supports.each_value(&field, |p, value| {
     ///     assert_eq!(value, values[p]);
