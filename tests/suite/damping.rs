@@ -58,8 +58,8 @@ fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Fai
     Ok(())
 }
 
-/// A bar of Λ + 2G = ρ = 1 and length 1 in its lowest mode, of ω = π: at the beginning it has the velocity `speed` times its shape.
-/// Between two walls that is sin πx; a free bar has cos πx, and flies.
+/// A bar of Λ + 2G = ρ = 1 and length 1 in its lowest mode, of ω = π: at the beginning it has the velocity `speed`
+/// times its shape. Between two walls that is sin πx; a free bar has cos πx, and flies.
 fn bar(dt: f64, damping: Rayleigh, speed: f64, free: bool) -> Result<Simulation<1>, Failure> {
     const CELLS: u32 = 32;
     let h = 1.0 / f64::from(CELLS);
@@ -139,8 +139,8 @@ fn the_stiffness_part_takes_no_momentum() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The largest defect of kinetic + strain + dissipated − work in a free bar under gravity, over its energy at the start; and what was
-/// dissipated.
+/// The largest defect of kinetic + strain + dissipated − work in a free bar under gravity, over its energy at the
+/// start; and what was dissipated.
 fn defect(steps: u32, damping: Rayleigh, speed: f64) -> Result<[f64; 2], Failure> {
     let mut simulation = bar(1.0 / f64::from(steps), damping, speed, true)?;
     let g = Vector::from([-0.5 * speed]);

@@ -175,7 +175,8 @@ fn mismatch(result: Result<(), CheckError>) -> Result<TangentMismatch, Failure> 
     }
 }
 
-/// The pieces whose products are not the derivatives of their residuals, by a hundredth of the excess of a law that lies.
+/// The pieces whose products are not the derivatives of their residuals, by a hundredth of the excess of a law that
+/// lies.
 fn wrong_pieces<const D: usize>(
     equilibrium: &Equilibrium<'_, D, Faulty>,
     dphi: &[Vector<f64, D>],
@@ -196,7 +197,8 @@ fn wrong_pieces<const D: usize>(
 }
 
 fn a_wrong_law_is_found<const D: usize>(stress: f64) -> Result<(), Failure> {
-    // Where the law of the second body lies, whether it has a closed form, and the pieces that are wrong then: the first is reported.
+    // Where the law of the second body lies, whether it has a closed form, and the pieces that are wrong then: the
+    // first is reported.
     let both: &[&str] = &["stress", "material"];
     for (fault, closed, wrong) in [
         (Fault::Nothing, true, &[][..]),

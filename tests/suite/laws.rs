@@ -16,8 +16,8 @@ use bfree::solver::Precision;
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 use num_dual::Dual64;
 
-/// A law of the list that the library does not know as such: it takes the plain loop, and without a closed form its tangent is that of
-/// ℂmat.
+/// A law of the list that the library does not know as such: it takes the plain loop, and without a closed form its
+/// tangent is that of ℂmat.
 #[derive(Clone, Debug)]
 struct Unknown {
     law: Material,

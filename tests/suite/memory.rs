@@ -11,9 +11,9 @@ use bfree::tensor::{Deformation, Tensor, contract, scaled};
 use serde_json::Value;
 use std::num::NonZeroU64;
 
-/// Ciarlet's solid that softens by the strain energy W it has met: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ, so
-/// that it takes about the time τ. It remembers κ, and for the test how long it has been there. A solid that does not soften remembers
-/// nothing.
+/// Ciarlet's solid that softens by the strain energy W it has met: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt)
+/// where W > κ, so that it takes about the time τ. It remembers κ, and for the test how long it has been there. A solid
+/// that does not soften remembers nothing.
 #[derive(Clone, Copy, Debug)]
 struct Softening {
     solid: NeoHookean,

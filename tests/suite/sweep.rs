@@ -200,9 +200,9 @@ fn compare<const D: usize>() {
         // A dual number is two fields through the same kernels.
         let seeded: Vec<Vector<Dual64, D>> = u.iter().map(|u| u.map(|x| Dual64::new(x, 0.5 - x))).collect();
         let duals = |supports: &Supports<D>| {
-            let mut out = vec![Vector::<Dual64, D>::zeros(); u.len()];
+            // Also where something is there already.
+            let (mut out, mut real) = (seeded.clone(), u.clone());
             supports.assemble(&seeded, &mut out, square).unwrap();
-            let mut real = zeros.clone();
             supports.assemble(&u, &mut real, square).unwrap();
             let same = out.iter().flatten().zip(real.iter().flatten()).all(|(a, b)| a.re.to_bits() == b.to_bits());
             assert!(same, "{D}D {shape:?}: the real part of dual numbers");
@@ -407,8 +407,8 @@ fn a_regular_layout_fills_the_vector_lanes() {
     assert_eq!(windows([6, 5, 4], 2), [([2, 2, 2], 8, 120)]);
     assert_eq!(windows([32, 20], 2), [([3, 2, 1], 8, 320)]);
     assert_eq!(windows([64], 2), [([5, 1, 1], 8, 16)]);
-    // One a cell: no more cells side by side than six nodes hold, and none from another block (32 cells in 1D, 16 in 2D,
-    // 4 in 3D) or another row.
+    // One a cell: no more cells side by side than six nodes hold, and none from another block (32 cells in 1D, 16 in
+    // 2D, 4 in 3D) or another row.
     assert_eq!(windows([64], 1), [([3, 1, 1], 2, 2), ([6, 1, 1], 5, 12)]);
     assert_eq!(windows([32, 3], 1), [([2, 2, 1], 1, 6), ([6, 2, 1], 5, 18)]);
     assert_eq!(windows([8, 2, 2], 1), [([5, 2, 2], 4, 8)]);
@@ -432,7 +432,8 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
     let (plain, nodes) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
     let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
     assert!(positions.len() <= 256, "one block");
-    // An entry is a place in the list of nodes, N and ∇N; particles say where they lie in memory and where their entries begin.
+    // An entry is a place in the list of nodes, N and ∇N; particles say where they lie in memory and where their
+    // entries begin.
     assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + 2 * positions.len() + 1));
     let many: Vec<_> = positions.iter().cycle().take(600).copied().collect();
     assert_eq!(bytes(&many)?, bytes(&many[..256])? + bytes(&many[256..512])? + bytes(&many[512..])?);

@@ -68,10 +68,10 @@ pub trait Number: Real + Send + Sync {
 
     /// Lets `add` add to a nodal field as plain numbers.
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {
-        let mut sums = vec![0.0; nodal.len() * C * Self::FIELDS];
+        let mut sums = Self::flat(nodal).into_owned();
         add(&mut sums);
         for (x, sums) in nodal.iter_mut().zip(sums.chunks(C * Self::FIELDS)) {
-            *x += Vector::from_fn(|c, _| Self::from_fields(|i| sums[i * C + c]));
+            *x = Vector::from_fn(|c, _| Self::from_fields(|i| sums[i * C + c]));
         }
     }
 }
