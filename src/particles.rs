@@ -139,6 +139,13 @@ impl<const D: usize> Particles<D> {
         Start { dt, memory: &self.memory[p * self.remembered..(p + 1) * self.remembered] }
     }
 
+    /// As [`Self::remember_rest`], of laws that remember more than there is room for: those of bodies put together in code.
+    pub(crate) fn remember<L: Law>(&mut self, bodies: &[Body<L>]) {
+        if bodies.iter().any(|body| body.law.memory().len() > self.remembered) {
+            self.remember_rest(bodies);
+        }
+    }
+
     /// Gives every particle the memory that its law has at rest.
     pub fn remember_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.remembered = bodies.iter().map(|body| body.law.memory().len()).max().unwrap_or(0);

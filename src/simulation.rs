@@ -329,6 +329,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// As [`Self::step`]; a step that fails leaves its iterations of the projection, too.
     fn attempt(&mut self, projection_iterations: &mut usize) -> Result<StepReport<D>, StepError> {
+        self.particles.remember(&self.bodies);
         let (t, dt) = (self.clock.time(), self.clock.step());
         let alphas = self.settings.alphas(dt);
         let mut watch = Stopwatch::start();
