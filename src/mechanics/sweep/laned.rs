@@ -15,7 +15,7 @@ pub trait Laned: Widest + Pod + Send + Sync + pooled::Number {
     /// The weights of all groups of a block.
     fn weights(groups: &Groups) -> &[[Self; LANES]];
 
-    /// Values and gradients of `components` numbers a node, 1 or as many as axes, from a box; see [`Gather`].
+    /// Values and gradients of `components` numbers a node, 1 or as many as axes, from a box.
     fn gather(
         components: usize,
         window: Window<'_, Self>,
@@ -25,7 +25,7 @@ pub trait Laned: Widest + Pod + Send + Sync + pooled::Number {
         gradient: &mut [[Self; LANES]],
     );
 
-    /// Adds values and gradients to a box; see [`Scatter`].
+    /// Adds values and gradients to a box.
     fn scatter(
         components: usize,
         window: Window<'_, Self>,
@@ -35,7 +35,7 @@ pub trait Laned: Widest + Pod + Send + Sync + pooled::Number {
         out: &mut [Self],
     );
 
-    /// Adds the product of a group's tangents with its gradients; see [`Product`].
+    /// Adds the product of a group's tangents with its gradients.
     fn product(form: Form, dimension: usize, rows: &[[Self; LANES]], l: &[[Self; LANES]], out: &mut [[Self; LANES]]);
 }
 
