@@ -1,6 +1,6 @@
 //! Body forces −Σ_p m b N_I: gravity, and fields b(x, t) given in code.
 
-use super::{Role, Step, Sum, Term, dead_energy, subtract_dead};
+use super::{Role, Step, Sum, Term, dead_load};
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::pooled::Pooled;
@@ -52,19 +52,4 @@ impl<const D: usize> BodyForce<D> {
     }
 }
 
-impl<const D: usize> Term<D> for BodyForce<D> {
-    const NAME: &'static str = "body force";
-    const ROLE: Role = Role::Loads;
-
-    fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        subtract_dead(&self.0, out);
-    }
-
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        Some(Ok(dead_energy(&self.0, dphi)))
-    }
-
-    fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        out.iter_mut().zip(&self.0).for_each(|(out, force)| *out += force.abs());
-    }
-}
+dead_load!(BodyForce, "body force");

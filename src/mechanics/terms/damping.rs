@@ -55,10 +55,7 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     /// The material part of the stiffness at Δφ = 0.
     fn stiffness<X: Laned>(step: &Step<'a, D, L>, unit: Unit) -> Result<FrozenStress<X>, Inadmissible> {
         let at_rest = vec![Vector::zeros(); step.supports.nodes()];
-        match Stress::of(step) {
-            Some(stress) => stress.frozen(&at_rest, Part::Material, unit),
-            None => unreachable!("every step has stresses"),
-        }
+        Stress::new(step).frozen(&at_rest, Part::Material, unit)
     }
 }
 

@@ -310,18 +310,32 @@ terms! {
     pressure: Pressure<'a, D>,
 }
 
-/// −Σ f_I · Δφ_I of a dead load f.
-fn dead_energy<T: Number, const D: usize>(force: &[Vector<f64, D>], dphi: &[Vector<T, D>]) -> Sum<T> {
-    let (mut sum, mut magnitude) = (T::zero(), 0.0);
-    for (force, dphi) in force.iter().zip(dphi) {
-        let work = force.map(T::lit).dot(dphi);
-        sum -= work;
-        magnitude += work.value().abs();
-    }
-    (sum, magnitude)
+/// A dead load is a term by the force it puts on the nodes: −f, with the energy −f·Δφ and no tangent.
+macro_rules! dead_load {
+    ($load:ident, $name:literal) => {
+        impl<const D: usize> Term<D> for $load<D> {
+            const NAME: &'static str = $name;
+            const ROLE: Role = Role::Loads;
+
+            fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+                out.iter_mut().zip(&self.0).for_each(|(out, force)| *out -= force.map(T::lit));
+            }
+
+            fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+                let (mut sum, mut magnitude) = (T::zero(), 0.0);
+                for (force, dphi) in self.0.iter().zip(dphi) {
+                    let work = force.map(T::lit).dot(dphi);
+                    sum -= work;
+                    magnitude += work.value().abs();
+                }
+                Some(Ok((sum, magnitude)))
+            }
+
+            fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+                out.iter_mut().zip(&self.0).for_each(|(out, force)| *out += force.abs());
+            }
+        }
+    };
 }
 
-/// `out_I −= f_I` of a dead load f.
-fn subtract_dead<T: Number, const D: usize>(force: &[Vector<f64, D>], out: &mut [Vector<T, D>]) {
-    out.iter_mut().zip(force).for_each(|(out, force)| *out -= force.map(T::lit));
-}
+use dead_load;

@@ -15,8 +15,12 @@ pub struct Stress<'a, const D: usize, L> {
 
 impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
+        Some(Self::new(step))
+    }
+
+    pub(super) fn new(step: &Step<'a, D, L>) -> Self {
         let Step { particles, bodies, dt, supports, .. } = *step;
-        Some(Self { laws: Laws { particles, bodies, dt }, supports })
+        Self { laws: Laws { particles, bodies, dt }, supports }
     }
 
     fn law(&self, p: usize) -> &L {

@@ -1,6 +1,6 @@
 //! Nominal tractions −Σ_Γ T N_I A, dead loads on the particles of a surface.
 
-use super::{Role, Step, Sum, Term, dead_energy, subtract_dead};
+use super::{Role, Step, Sum, Term, dead_load};
 use crate::mechanics::loads::Pressing;
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
@@ -27,19 +27,4 @@ impl<const D: usize> Traction<D> {
     }
 }
 
-impl<const D: usize> Term<D> for Traction<D> {
-    const NAME: &'static str = "traction";
-    const ROLE: Role = Role::Loads;
-
-    fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        subtract_dead(&self.0, out);
-    }
-
-    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        Some(Ok(dead_energy(&self.0, dphi)))
-    }
-
-    fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        out.iter_mut().zip(&self.0).for_each(|(out, force)| *out += force.abs());
-    }
-}
+dead_load!(Traction, "traction");
