@@ -62,7 +62,7 @@ fn at_a_step<const D: usize>(
         Supports::with_precision(&simulation.approximation, &simulation.grid, positions, Precision::Mixed)
             .expect("inside the grid");
     let nodal = Nodal::project(&simulation.particles, &supports, 1.0).expect("finite velocities");
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     let u: Vec<Vector<f64, D>> =
         nodes.positions(&simulation.grid).map(|(_, x)| x.map(|x| 0.01 * (0.7 * x).sin())).collect();
     work(bencher, &equilibrium, &u);

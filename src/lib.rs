@@ -25,7 +25,7 @@
 //! | γ̂, β̂ = γ̂/h² | locality of the max-ent functions | [`approximation::Lme`] |
 //! | Δφ | motion of the nodes over the step: the unknowns | [`mechanics::residual`] |
 //! | M̃ = (1−ε) M + ε lumped(M) (41) | mass matrix, between consistent (ε = 0) and lumped (ε = 1) | [`simulation::Settings::lumping`] |
-//! | β, γ; α₁ … α₆ (19) | Newmark's parameters, and the factors that follow from them and Δt | [`mechanics::time`] |
+//! | β, γ; α₁ … α₆ (19) | Newmark's parameters, and the factors that follow from them and Δt | [`mechanics::schemes`] |
 //! | R(Δφ) | residual of the nodal equilibrium | [`mechanics::residual::Equilibrium`] |
 //! | K(Δφ) | its derivative, the tangent | [`mechanics::tangent::Tangent`] |
 //! | Π(Δφ) | incremental potential, ∂Π/∂Δφ = R | [`mechanics::residual::Equilibrium::potential`] |
@@ -70,7 +70,7 @@
 //!           + Σ_J (a M̃ + b K_n)_IJ v_J   damping, K_n the material stiffness at the beginning of the step
 //! ```
 //!
-//! Without inertia ([`mechanics::time::Inertia::None`]) there is no M̃, v or a: step 2 falls away, and R is what remains without its first line.
+//! Without inertia ([`mechanics::schemes::Statics`]) there is no M̃, v or a: step 2 falls away, and R is what remains without its first line.
 //!
 //! Where every load has a potential, R is the gradient of
 //!

@@ -6,7 +6,6 @@ use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::Rayleigh;
-use crate::mechanics::time::{Inertia, Newmark};
 use crate::particles::Particles;
 use crate::simulation::{Settings, Simulation};
 use crate::solver::{Krylov, Precision};
@@ -196,8 +195,8 @@ impl Plan {
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
     let term = |name, used, why: &str| TermUse { name, used, why: why.into() };
     let (loads, settings) = (&simulation.loads, &simulation.settings);
-    let Settings { lumping, newmark: Newmark { beta, gamma }, .. } = *settings;
-    let moves = settings.inertia == Inertia::Newmark;
+    let Settings { lumping, scheme, .. } = settings;
+    let (lumping, moves) = (*lumping, scheme.has_inertia());
     let still = "time.inertia is \"none\": load steps, each to its equilibrium";
     let of_motion = |why: String| if moves { why } else { still.into() };
     let surface = |pressure: bool| {
@@ -207,11 +206,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     let (tractions, pressures) = (surface(false), surface(true));
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
     vec![
-        term(
-            "inertia, lumped",
-            moves && lumping > 0.0,
-            &of_motion(format!("time.lumping = {lumping}, Newmark β = {beta}, γ = {gamma}")),
-        ),
+        term("inertia, lumped", moves && lumping > 0.0, &of_motion(format!("time.lumping = {lumping}, {scheme}"))),
         term(
             "inertia, consistent",
             moves && lumping < 1.0,
@@ -285,7 +280,7 @@ fn arrays<const D: usize, L: Law, A>(
 ) -> Vec<ArrayUse> {
     let (vector, tensor) = (size_of::<Vector<f64, D>>(), size_of::<Tensor<f64, D>>());
     let particles = simulation.particles.len();
-    let moves = simulation.settings.inertia == Inertia::Newmark;
+    let moves = simulation.settings.scheme.has_inertia();
     let weighs = moves || simulation.loads.gravity.is_some();
     let lumping = if moves { simulation.settings.lumping } else { 1.0 };
     let consistent = moves && lumping < 1.0;

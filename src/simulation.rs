@@ -9,10 +9,10 @@ use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::rigid::{Loose, loose};
+use crate::mechanics::schemes::{Alphas, Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::{self, Role};
-use crate::mechanics::time::{Alphas, Inertia, Newmark};
 use crate::mechanics::transfer::{Nodal, Update, WallUpdate};
 use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
@@ -21,6 +21,7 @@ use crate::pooled::{Pool, Pooled};
 use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, Preconditioning, newton};
 use crate::tensor::{Deformation, Vector};
 use std::num::NonZeroU64;
+use std::sync::Arc;
 
 /// Where Newton starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,13 +37,11 @@ pub enum InitialGuess {
 const ROOM: f64 = 0.1;
 
 /// How a step is taken.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Settings {
-    /// Whether there is inertia. Without it, neither Newmark's constants nor lumping, walls in the update, smoothing or any velocity
-    /// means anything, and none of them is looked at.
-    pub inertia: Inertia,
-    /// β and γ.
-    pub newmark: Newmark,
+    /// The time scheme. If it has no inertia, neither lumping nor walls in the update, smoothing or any velocity means anything, and none of
+    /// them is looked at.
+    pub scheme: Arc<dyn Scheme>,
     /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
     pub lumping: f64,
     /// Where Newton starts.
@@ -62,34 +61,11 @@ pub struct Settings {
     pub check_tangent: Option<NonZeroU64>,
 }
 
-impl Settings {
-    /// The α-parameters of a step of length `dt`.
-    ///
-    /// ```
-    /// use bfree::mechanics::time::Inertia;
-    /// use bfree::simulation::Settings;
-    ///
-    /// // v = α₄ Δφ + (1 − α₄ Δt) vₙ + α₆ aₙ: twice the mean velocity less the last, by the trapezoidal rule; nothing without inertia.
-    /// let settings = Settings::default();
-    /// let alphas = settings.alphas(0.5);
-    /// assert_eq!((alphas.a4, 1.0 - alphas.a4 * alphas.dt, alphas.a6), (2.0 / 0.5, -1.0, 0.0));
-    /// let alphas = Settings { inertia: Inertia::None, ..settings }.alphas(0.5);
-    /// assert_eq!((alphas.a1, alphas.a4), (0.0, 0.0));
-    /// ```
-    pub fn alphas(&self, dt: f64) -> Alphas {
-        match self.inertia {
-            Inertia::Newmark => self.newmark.alphas(dt),
-            Inertia::None => Alphas::NONE,
-        }
-    }
-}
-
 impl Default for Settings {
     /// The trapezoidal rule with a lumped mass, Newton from Δφ = 0, walls as in the paper.
     fn default() -> Self {
         Self {
-            inertia: Inertia::default(),
-            newmark: Newmark::default(),
+            scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
@@ -331,7 +307,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn attempt(&mut self, projection_iterations: &mut usize) -> Result<StepReport<D>, StepError> {
         self.particles.remember(&self.bodies);
         let (t, dt) = (self.clock.time(), self.clock.step());
-        let alphas = self.settings.alphas(dt);
+        let scheme = &*self.settings.scheme;
         let mut watch = Stopwatch::start();
 
         let precision = self.settings.newton.precision;
@@ -347,19 +323,22 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
 
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, alphas, t + dt);
-        let mut dphi = self.initial_guess(&supports, &nodal, dt);
+        // To t_n + θ Δt, where forces are in balance; for θ = 1 that is the end.
+        let theta = scheme.instant();
+        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, scheme.balance(dt), t + theta * dt);
+        let mut dphi = self.initial_guess(&supports, &nodal, theta * dt);
         for dof in &prescribed {
-            dphi[dof.node][dof.component] = dof.step.increment;
+            dphi[dof.node][dof.component] = theta * dof.step.increment;
         }
         let (mut preconditioner, x) = (self.settings.preconditioner.anew::<D>(), bytemuck::cast_slice_mut(&mut dphi));
         let newton = newton(&equilibrium, &mut *preconditioner, x, &self.settings.newton, &pool)
             .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &dphi)?;
+        dphi.iter_mut().for_each(|dphi| *dphi /= theta);
 
-        let walls = self.settings.wall_update;
-        let mut update = Update::new(&alphas, &projected, &nodal, &prescribed, walls, &dphi);
+        let (end, walls) = (scheme.end(dt), self.settings.wall_update);
+        let mut update = Update::new(&end, &projected, &nodal, &prescribed, walls, &dphi);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         if let Some(smoothing) = &self.settings.smoothing {
             update.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
@@ -367,7 +346,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
+        let at_end = (theta < 1.0).then(|| self.equilibrium(&supports, &nodal, &prescribed, end, t + dt));
+        let at_end = at_end.as_ref().unwrap_or(&equilibrium);
+        if theta < 1.0 {
+            // Nothing has asked yet whether this end is possible.
+            at_end.forces(Role::Stores, &dphi)?;
+        }
+        let (reactions, work, dissipated) = self.reactions_and_work(at_end, t, dt, &dphi, update.impulses())?;
         update.commit(&mut self.particles, &self.bodies, &supports, dt);
         let passes = supports.passes();
 
@@ -429,6 +414,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 StepError::Newton(_) | StepError::Inaccurate { .. } => true,
                 // A step too long to see a wall.
                 StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
+                // In balance before its end, and inside out there.
+                StepError::Inadmissible(_) => self.settings.scheme.instant() < 1.0,
                 _ => false,
             };
             if !(mended && self.clock.halve()) {
@@ -470,7 +457,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
     /// let (supports, _) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, simulation.settings.lumping)?;
-    /// let alphas = simulation.settings.newmark.alphas(dt);
+    /// let alphas = simulation.settings.scheme.end(dt);
     /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, dt);
     /// // A body in free flight is in equilibrium at Δφ = Δt v.
     /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
@@ -487,9 +474,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         t: f64,
     ) -> Equilibrium<'a, D, L> {
         let Self { particles, bodies, loads, settings, .. } = self;
-        // Without inertia nothing is weighed, and nothing is consistent.
-        let (alphas, lumping) = if nodal.is_static() { (Alphas::NONE, 1.0) } else { (alphas, settings.lumping) };
-        let dt = self.clock.step();
+        // Without inertia nothing is consistent.
+        let lumping = if nodal.is_static() { 1.0 } else { settings.lumping };
+        // At t_n, too, laws are asked about a step.
+        let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
         Equilibrium::new(
             terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt },
             prescribed,
@@ -514,11 +502,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Errors
     /// Particle velocities so large that the projection overflows.
     pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
-        match self.settings.inertia {
-            Inertia::Newmark => Nodal::project(&self.particles, supports, self.settings.lumping),
-            Inertia::None if self.loads.gravity.is_some() => Ok(Nodal::mass_alone(&self.particles, supports)),
-            Inertia::None => Ok(Nodal::default()),
+        if self.settings.scheme.has_inertia() {
+            return Nodal::project(&self.particles, supports, self.settings.lumping);
         }
+        let weighs = self.loads.gravity.is_some();
+        Ok(if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() })
     }
 
     fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
@@ -552,7 +540,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         newton: &NewtonReport,
     ) -> Result<Option<f64>, StepError> {
         let Some(tolerance) = self.settings.error_tolerance else { return Ok(None) };
-        let error = update.local_error(&self.particles, supports, self.settings.newmark.beta, dt) / self.grid.spacing;
+        let error = update.local_error(&self.particles, supports, self.settings.scheme.error_constant(), dt);
+        let error = error / self.grid.spacing;
         // Not a number is no small error.
         if (error.is_nan() || error > tolerance) && self.clock.can_halve() {
             return Err(StepError::Inaccurate { error, tolerance, newton: Box::new(newton.history.clone()) });
@@ -739,7 +728,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Errors
     /// A particle without shape functions, or with det F ≤ 0, or, with damping, velocities so large that their projection overflows.
     pub fn set_initial_acceleration(&mut self) -> Result<(), StepError> {
-        if self.settings.inertia == Inertia::None {
+        if !self.settings.scheme.has_inertia() {
             return Ok(());
         }
         let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;

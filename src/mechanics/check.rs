@@ -99,7 +99,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     /// let u = direction::<2>(nodes.len(), 2);
     /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
     /// equilibrium.check_tangent(&dphi, &u)?;

@@ -15,13 +15,13 @@ pub use crate::mechanics::point::{Inadmissible, compose};
 /// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
 ///
 /// ```
-/// use bfree::mechanics::{loads::{Curve, Gravity}, sweep::Supports, transfer::Nodal};
+/// use bfree::mechanics::{loads::{Curve, Gravity}, schemes::Newmark, sweep::Supports, transfer::Nodal};
 /// use bfree::tensor::Vector;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// // Dropped: what Δφ = β Δt² g makes of a = α₁ Δφ is g, and all forces are in balance.
-/// let (newmark, dt, g) = (simulation.settings.newmark, 0.05, Vector::from([0.0, -10.0]));
+/// let (newmark, dt, g) = (Newmark::default(), 0.05, Vector::from([0.0, -10.0]));
 /// simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
 /// let particles = &simulation.particles;
 /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
@@ -171,7 +171,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     /// // R = ∂Π/∂Δφ: along any u, the derivative of Π by dual numbers is R·u.
     /// let u = direction::<2>(nodes.len(), 2);
     /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();

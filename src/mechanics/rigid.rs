@@ -44,7 +44,7 @@ impl Display for Loose {
 /// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
 ///     let (supports, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
 ///     let (nodal, prescribed, dt) = (of.project(&supports)?, of.prescribed(&nodes), of.clock.step());
-///     let equilibrium = of.equilibrium(&supports, &nodal, &prescribed, of.settings.alphas(dt), dt);
+///     let equilibrium = of.equilibrium(&supports, &nodal, &prescribed, of.settings.scheme.end(dt), dt);
 ///     Ok(loose(&of.grid, &equilibrium, &nodes))
 /// };
 /// assert_eq!(found(&simulation)?, None);

@@ -22,7 +22,7 @@ use num_dual::Dual64;
 /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
 /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
 /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+/// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
 /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
 /// let tangent = equilibrium.tangent(&dphi)?;
 /// let times = |u: &[Vector<f64, 2>]| {
@@ -123,7 +123,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let (approximation, positions) = (&simulation.approximation, &particles.position);
     /// let (supports, nodes) = Supports::with_precision(approximation, grid, positions, Precision::Mixed)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     /// let (dphi, u) = (vec![Vector::zeros(); nodes.len()], direction::<2>(nodes.len(), 2));
     /// // s (K/s) u in single precision is K u to about 1e-6.
     /// let single = equilibrium.single_tangent(None, &dphi)?.ok_or("prepared for it")?;
@@ -186,7 +186,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
     /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
     /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     /// let dphi: Vec<_> = direction::<2>(nodes.len(), 1).iter().map(|x| x * 0.01).collect();
     /// let u = direction::<2>(nodes.len(), 2);
     /// for piece in equilibrium.terms.pieces() {

@@ -5,9 +5,9 @@ use crate::material::{Law, Start, admissible_or_rest};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::mass::{Mass, is_light, lumped};
 use crate::mechanics::residual::compose;
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
-use crate::mechanics::time::Alphas;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::LinearError;
@@ -167,7 +167,7 @@ pub enum WallUpdate {
 /// let nodal = Nodal::project(&particles, &supports, 1.0)?;
 /// // The cylinder flies with v = ½ and meets nothing: Δφ = v Δt at every node.
 /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
-/// let alphas = simulation.settings.newmark.alphas(dt);
+/// let alphas = simulation.settings.scheme.end(dt);
 /// let mut update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
 /// update.smooth(&Smoothing::limited(40.0), &particles, &supports, &nodal.mass, dt);
 /// assert!(update.impulses().is_empty()); // no walls
@@ -231,34 +231,34 @@ impl<'a, const D: usize> Update<'a, D> {
         Self { dphi, delta_velocity, delta_acceleration, impulses, smoothed: None }
     }
 
-    /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it: what Newmark's step differs from Taylor's series
-    /// with a third derivative ȧ = Δa/Δt, e = (β − 1/6) Δt² Δa. The root of its mean square over the mass; exact to leading order in
+    /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it for Newmark's step: what it differs from Taylor's
+    /// series with a third derivative ȧ = Δa/Δt, e = c Δt² Δa with the `constant` c = β − 1/6 of the scheme. The root of its mean square over the mass; exact to leading order in
     /// Δt. Where a resting wall leaves the particles' acceleration alone, it counts as none; nor does smoothing count.
     ///
     /// ```
-    /// use bfree::mechanics::{sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
+    /// use bfree::mechanics::{schemes::Newmark, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
     /// use bfree::tensor::Vector;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (particles, dt) = (&simulation.particles, 0.05);
     /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// let (nodal, alphas) = (Nodal::at_rest(particles, &supports), simulation.settings.newmark.alphas(dt));
+    /// let (nodal, newmark) = (Nodal::at_rest(particles, &supports), Newmark::default());
     /// // From rest to the acceleration a within the step: Δφ = β Δt² a, and a third derivative a/Δt.
-    /// let (a, beta) = (Vector::from([3.0, 4.0]), simulation.settings.newmark.beta);
+    /// let (a, Newmark { beta, .. }) = (Vector::from([3.0, 4.0]), newmark);
     /// let dphi = vec![a * (beta * dt * dt); nodes.len()];
-    /// let update = Update::new(&alphas, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
-    /// let error = update.local_error(particles, &supports, beta, dt);
+    /// let update = Update::new(&newmark.alphas(dt), &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+    /// let error = update.local_error(particles, &supports, beta - 1.0 / 6.0, dt);
     /// assert!((error / ((beta - 1.0 / 6.0) * dt * dt * a.norm()) - 1.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, beta: f64, dt: f64) -> f64 {
+    pub fn local_error(&self, particles: &Particles<D>, supports: &Supports<D>, constant: f64, dt: f64) -> f64 {
         let mass = &particles.mass;
         let mut squares = 0.0;
         if !self.delta_acceleration.is_empty() {
             supports.each_value(&self.delta_acceleration, |p, a| squares += mass[p] * a.norm_squared());
         }
-        (beta - 1.0 / 6.0).abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
+        constant.abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
     }
 
     /// Adds to v and a of the particles what `smoothing` makes of them as they are; `mass` is the lumped one of the nodes.

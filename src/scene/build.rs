@@ -12,7 +12,6 @@ use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::smoothing::Smoothing;
-use crate::mechanics::time::Inertia;
 use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
@@ -264,11 +263,7 @@ impl Scene {
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
         Settings {
-            inertia: match self.time.inertia {
-                time::Inertia::Newmark => Inertia::Newmark,
-                time::Inertia::None => Inertia::None,
-            },
-            newmark: self.time.newmark(),
+            scheme: self.time.inertia.scheme(self.time.newmark()),
             lumping: self.time.lumping(),
             initial_guess: match self.time.initial_guess.unwrap_or_default() {
                 time::InitialGuess::Zero => InitialGuess::Zero,
@@ -420,9 +415,10 @@ impl Scene {
     ) -> Result<(), BuildError> {
         let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
             let mass = body.density * volume;
-            match self.time.inertia {
-                time::Inertia::Newmark => particles.push(x, velocity, volume, mass, number),
-                time::Inertia::None => particles.push_without_inertia(x, volume, mass, number),
+            if self.time.inertia.has_inertia() {
+                particles.push(x, velocity, volume, mass, number)
+            } else {
+                particles.push_without_inertia(x, volume, mass, number)
             }
         };
         let common = match &body.velocity {
@@ -450,10 +446,11 @@ impl Scene {
             })?;
             if read.velocities.is_some() {
                 let file = place.display().to_string();
-                match self.time.inertia {
-                    time::Inertia::None => return Err(BuildError::VelocityWithoutInertia { path, file }),
-                    _ if self.initial_velocity.is_some() => return Err(BuildError::TwoVelocities { path, file }),
-                    time::Inertia::Newmark => {}
+                if !self.time.inertia.has_inertia() {
+                    return Err(BuildError::VelocityWithoutInertia { path, file });
+                }
+                if self.initial_velocity.is_some() {
+                    return Err(BuildError::TwoVelocities { path, file });
                 }
             }
             means.make_room(&path, particles, read.positions.len())?;

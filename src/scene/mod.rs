@@ -202,7 +202,7 @@ impl Scene {
         }
         self.solver.check(&mut problems, !self.pressures.is_empty());
         self.output.check(&mut problems, &self.bodies, &self.grid);
-        if self.time.inertia == time::Inertia::None {
+        if !self.time.inertia.has_inertia() {
             self.refuse_inertia(&mut problems);
         }
         problems
@@ -227,7 +227,7 @@ impl Scene {
     /// Gives every key its value, of those that mean something.
     fn complete(mut self) -> Self {
         self.time.complete();
-        if self.time.inertia == time::Inertia::Newmark {
+        if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
         }
         self.output.fields = Some(self.output.fields(self.time.inertia));

@@ -69,7 +69,7 @@ impl Output {
     pub fn fields(&self, inertia: Inertia) -> Vec<Field> {
         self.fields.clone().unwrap_or_else(|| {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
-            fields.retain(|field| inertia == Inertia::Newmark || !field.needs_inertia());
+            fields.retain(|field| inertia.has_inertia() || !field.needs_inertia());
             fields
         })
     }

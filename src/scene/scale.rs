@@ -20,7 +20,7 @@ type Quantity = (&'static str, f64, f64, f64);
 
 /// Refuses a simulation whose masses, volumes, forces or energies are not representable.
 pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Result<(), BuildError> {
-    let alphas = simulation.settings.alphas(simulation.clock.nominal());
+    let alphas = simulation.settings.scheme.end(simulation.clock.nominal());
     let (particles, h) = (&simulation.particles, simulation.grid.spacing);
     let mut heaviest: f64 = 0.0;
     for (i, body) in simulation.bodies.iter().enumerate() {

@@ -1,7 +1,9 @@
 //! Time stepping.
 
 use crate::clock::MAX_HALVINGS;
-use crate::mechanics::time::Newmark;
+pub use crate::mechanics::schemes::Parameters as Inertia;
+
+use crate::mechanics::schemes::Newmark;
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,10 +25,10 @@ pub struct Time {
     /// end, and whatever speaks of velocities or of the mass matrix is refused.
     #[serde(default)]
     pub inertia: Inertia,
-    /// Newmark's β (no unit), > 0, with 2β ≥ γ. Default 0.25, the trapezoidal rule.
+    /// Newmark's β (no unit), > 0, with 2β ≥ γ; of no other method. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
-    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps. Default 0.5.
+    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps; of no other method. Default 0.5.
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.
@@ -49,22 +51,11 @@ pub struct Time {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// The most that the displacement may err in one step, in grid spacings: (β − 1/6) Δt² |Δa| (Zienkiewicz and Xie), the root of the
+    /// The most that the displacement may err in one step, in grid spacings: (β − 1/6) Δt² |Δa| (Zienkiewicz and Xie; Newmark's method), the root of the
     /// mean square over the mass, > 0 and at most 1. A step that errs more is taken back and halved; after one that errs a tenth of
     /// it, the next is twice as long. The time at the end of each whole `step` is met.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub tolerance: f64,
-}
-
-/// Whether the bodies have inertia.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Inertia {
-    /// Dynamics, by Newmark's method.
-    #[default]
-    Newmark,
-    /// Quasi-statics: time only says which loads act and how far prescribed motions have come.
-    None,
 }
 
 /// Where Newton's iteration of a step starts.
@@ -97,7 +88,7 @@ impl Time {
     /// β and γ.
     ///
     /// ```
-    /// use bfree::mechanics::time::Newmark;
+    /// use bfree::mechanics::schemes::Newmark;
     /// use bfree::scene::time::Time;
     ///
     /// // A scene that says nothing of them gets the trapezoidal rule and a lumped mass.
@@ -123,7 +114,10 @@ impl Time {
     pub(super) fn complete(&mut self) {
         if self.inertia == Inertia::Newmark {
             let Newmark { beta, gamma } = self.newmark();
-            (self.beta, self.gamma, self.lumping) = (Some(beta), Some(gamma), Some(self.lumping()));
+            (self.beta, self.gamma) = (Some(beta), Some(gamma));
+        }
+        if self.inertia.has_inertia() {
+            self.lumping = Some(self.lumping());
             self.initial_guess.get_or_insert_default();
             self.wall_update.get_or_insert_default();
         }
@@ -187,6 +181,12 @@ impl Time {
                 &step,
                 format_args!("reaching the end at {end} takes {steps:e} steps; at most {MAX_STEPS:e} are allowed"),
             );
+        }
+        self.inertia.check(problems, "time.inertia");
+        for (key, given) in [("time.beta", self.beta), ("time.gamma", self.gamma)] {
+            if let (Inertia::GeneralizedAlpha(_), Some(given)) = (self.inertia, given) {
+                problems.refuse(key, Number(given), "belongs to time.inertia \"newmark\": remove one of the two");
+            }
         }
         // 2β ≥ γ ≥ ½, up to the rounding of β = (γ + ½)²/4 and the like
         let Newmark { beta, gamma } = self.newmark();

@@ -226,7 +226,7 @@ fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), F
         nodal.velocity.iter_mut().zip(&positions).for_each(|(v, x)| *v = velocity(x));
         // v_{n+1} = v_n, also of the dual numbers' real part.
         let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
-        let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+        let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
         let pieces = equilibrium.terms.pieces();
         let piece = pieces.iter().find(|piece| piece.name == "damping").ok_or("no damping")?;
         let force = equilibrium.residual_of::<f64>(*piece, &dphi)?;
@@ -246,7 +246,7 @@ fn the_force_of_damping_is_the_gradient_of_its_potential() -> Result<(), Failure
     let dt = simulation.clock.step();
     let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
     let nodal = Nodal::project(&simulation.particles, &supports, 0.5)?;
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.newmark.alphas(dt), dt);
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     let (dphi, u) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
     let seeded: Vec<_> = dphi.iter().zip(&u).map(|(x, u)| x.zip_map(u, |x, u| Dual64::new(0.01 * x, u))).collect();
     let dphi: Vec<_> = dphi.iter().map(|x| x * 0.01).collect();

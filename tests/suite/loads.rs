@@ -5,9 +5,9 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Pressing, SurfaceLoad, SurfacePoint};
 use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::{ForceField, Step};
-use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scene;
@@ -334,7 +334,7 @@ fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
     let particles = &simulation.particles;
     let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
     let nodal = Nodal::project(particles, &supports, 1.0)?;
-    let alphas = simulation.settings.newmark.alphas(0.02);
+    let alphas = simulation.settings.scheme.end(0.02);
     let zero = vec![Vector::zeros(); nodes.len()];
     for t in [0.0, 0.3] {
         let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, t);

@@ -20,6 +20,7 @@ mod rebound;
 mod restart;
 mod runs;
 mod scenes;
+mod schemes;
 mod smoothing;
 mod statics;
 mod storage;

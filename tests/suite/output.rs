@@ -6,7 +6,7 @@ use bfree::field::Field;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::time::{Inertia, Newmark};
+use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::output::plot::plot_run;
 use bfree::output::vtu::{Snapshot, Values};
@@ -17,6 +17,7 @@ use bfree::solver::NewtonSettings;
 use bfree::tensor::{Tensor, Vector};
 use serde_json::{Map, Value, json};
 use std::path::Path;
+use std::sync::Arc;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -39,8 +40,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
         particles,
         loads: Loads::default(),
         settings: Settings {
-            inertia: Inertia::Newmark,
-            newmark: Newmark::default(),
+            scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,

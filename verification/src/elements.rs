@@ -11,9 +11,9 @@ use bfree::grid::Grid;
 use bfree::material::{Law, admissible};
 use bfree::mechanics::loads::{Loads, prescribed_dofs};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
+use bfree::mechanics::schemes::{Newmark, Scheme};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Step;
-use bfree::mechanics::time::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
@@ -21,6 +21,7 @@ use bfree::pooled::Pool;
 use bfree::simulation::StepError;
 use bfree::solver::{BlockJacobi, NewtonReport, NewtonSettings, newton};
 use bfree::tensor::Vector;
+use std::sync::Arc;
 
 /// Quadratic serendipity elements whose corners are every second node of the grid, which must have an even number of cells
 /// along each axis.
@@ -106,8 +107,8 @@ pub struct Elements<const D: usize, L> {
     acceleration: Vec<Vector<f64, D>>,
     /// Gravity and prescribed motion.
     pub loads: Loads<D>,
-    /// β and γ.
-    pub newmark: Newmark,
+    /// The time scheme.
+    pub scheme: Arc<dyn Scheme>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
     /// Where in time.
@@ -161,7 +162,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
             velocity: zero.clone(),
             acceleration: zero,
             loads: Loads::default(),
-            newmark: Newmark::default(),
+            scheme: Arc::new(Newmark::default()),
             newton: NewtonSettings::default(),
             clock,
         })
@@ -178,7 +179,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
     /// No equilibrium found; the elements are then as before.
     pub fn step(&mut self) -> Result<NewtonReport, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
-        let alphas = self.newmark.alphas(dt);
+        let (theta, alphas, end) = (self.scheme.instant(), self.scheme.balance(dt), self.scheme.end(dt));
         let carried: Vec<_> = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
         let nodal = Nodal {
             mass: self.mass.clone().into(),
@@ -190,8 +191,8 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, t, dt);
         let nodal = nodal.with_prescribed(&prescribed);
         let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);
-        let (nodal, lumping, time) = (&nodal, 0.0, t + dt);
-        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt };
+        let (nodal, lumping, time) = (&nodal, 0.0, t + theta * dt);
+        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt: alphas.dt };
         let equilibrium = Equilibrium::new(step, &prescribed);
         let mut u = self.displacement.clone();
         let report = newton(
@@ -201,13 +202,13 @@ impl<const D: usize, L: Law> Elements<D, L> {
             &self.newton,
             &Pool::default(),
         )?;
-        for (node, new) in u.iter().enumerate() {
-            let (by, v, a) = (new - self.displacement[node], self.velocity[node], self.acceleration[node]);
-            let (delta_v, delta_a) = alphas.increments(&by, &v, &a);
+        for (node, balanced) in u.iter().enumerate() {
+            let by = (balanced - self.displacement[node]) / theta;
+            let (delta_v, delta_a) = end.increments(&by, &self.velocity[node], &self.acceleration[node]);
+            self.displacement[node] += by;
             self.velocity[node] += delta_v;
             self.acceleration[node] += delta_a;
         }
-        self.displacement = u;
         self.clock.advance();
         Ok(report)
     }

@@ -4,8 +4,8 @@ use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
 use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::residual::Equilibrium;
+use bfree::mechanics::schemes::Alphas;
 use bfree::mechanics::sweep::{SupportError, Supports};
-use bfree::mechanics::time::Alphas;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
@@ -40,7 +40,7 @@ impl<const D: usize> Prepared<D> {
             Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
         let prescribed = simulation.prescribed(&nodes);
         let nodal = simulation.project(&supports)?.with_prescribed(&prescribed);
-        Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.alphas(dt), end: t + dt })
+        Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.scheme.end(dt), end: t + dt })
     }
 
     /// The equilibrium of the step.

@@ -3,8 +3,8 @@
 use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, Unit};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Flow, Laned, Number};
-use crate::mechanics::time::Alphas;
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};

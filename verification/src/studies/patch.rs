@@ -13,7 +13,7 @@ use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Step;
-use bfree::mechanics::time::{Alphas, Newmark};
+use bfree::mechanics::schemes::{Alphas, Newmark, Scheme, Statics};
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
@@ -247,7 +247,7 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
         let (supports, nodes) = Supports::new(shape, &grid, &particles.position)?;
         let (at_rest, nodal) = (vec![Vector::zeros(); nodes.len()], Nodal::default());
         let (particles, bodies, supports, loads) = (&particles, &bodies, &supports, &Loads::default());
-        let (nodal, alphas, lumping, time, dt) = (&nodal, Alphas::NONE, 1.0, 0.0, 0.0);
+        let (nodal, alphas, lumping, time, dt) = (&nodal, Statics.end(0.0), 1.0, 0.0, 0.0);
         let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt };
         let equilibrium = Equilibrium::new(step, &[]);
         let force = equilibrium.residual::<f64>(&at_rest)?;

@@ -7,7 +7,7 @@ use crate::report::{Bound, Report, chain};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
 use crate::table::Table;
-use bfree::mechanics::time::{Alphas, Newmark};
+use bfree::mechanics::schemes::Alphas;
 use bfree::mechanics::transfer::{Nodal, Update};
 use bfree::simulation::{Simulation, StepReport};
 use bfree::pooled::Pool;
@@ -87,8 +87,10 @@ impl Ledger {
 ///
 /// It follows from Δφ = Δt v_n + Δt² [(½−β) a_n + β a_{n+1}] and Δv = Δt [(1−γ) a_n + γ a_{n+1}]. With M a_{n+1} = −f_{n+1} the rule as a
 /// whole takes ½ Δφ·(f_n + f_{n+1}) − ΔW less this.
-fn of_newmark(newmark: &Newmark, dt: f64, dphi: &Vector<f64, 2>, a: &Vector<f64, 2>, change: &Vector<f64, 2>) -> f64 {
-    let (half, damping) = (newmark.gamma - 0.5, 0.5 * newmark.gamma - newmark.beta);
+fn of_newmark(alphas: &Alphas, dphi: &Vector<f64, 2>, a: &Vector<f64, 2>, change: &Vector<f64, 2>) -> f64 {
+    let dt = alphas.dt;
+    let (beta, gamma) = (1.0 / (alphas.a1 * dt * dt), alphas.a4 / (alphas.a1 * dt));
+    let (half, damping) = (gamma - 0.5, 0.5 * gamma - beta);
     half * dphi.dot(change) + dt * dt * damping * change.dot(&(a + change * (0.5 + half)))
 }
 
@@ -135,7 +137,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
         let f_n = unbalanced[node] - a * nodal.mass[node];
         let f_end = residual[node] - (a + change_a) * nodal.mass[node];
         forces += 0.5 * dphi[node].dot(&(f_n + f_end));
-        damping += nodal.mass[node] * of_newmark(&settings.newmark, alphas.dt, &dphi[node], &a, &change_a);
+        damping += nodal.mass[node] * of_newmark(&alphas, &dphi[node], &a, &change_a);
         left += 0.5 * dphi[node].dot(&free).abs();
         of_nodes += 0.5 * nodal.mass[node] * (new.norm_squared() - v.norm_squared());
         change[node] = new - v;

@@ -32,12 +32,13 @@ const LOADS: Check = Check::Test("loads::");
 const SHAPES: Check = Check::Test("approximation::");
 const SWEEP: Check = Check::Test("sweep::");
 const LAWS: Check = Check::Test("laws::");
+const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
 const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
-    TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SMOOTH, SWEEP, LAWS,
+    TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP, LAWS,
     SOLVER,
 ];
 
@@ -94,6 +95,7 @@ const PLAIN: &str = "src/mechanics/sweep/plain.rs";
 const NEWMARK: &str = "src/mechanics/time.rs";
 const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
+const GENERALIZED: &str = "src/mechanics/schemes/generalized_alpha.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
 const CLOSED: &str = "src/material/closed_tangent.rs";
@@ -450,6 +452,18 @@ pub(super) const PATCHES: &[Patch] = &[
         "end.prescribed, Alphas::START",
         "end.prescribed, Alphas { a3: 1.0, ..Alphas::START }",
         Killed(&[LOADS], &[DYNAMICS])),
+    patch("the balance of the generalised-α method with Newmark's α₃", GENERALIZED,
+        "inertia * (a3 + 1.0) - 1.0",
+        "a3",
+        Killed(&[SCHEMES], &[TANGENT, DYNAMICS])),
+    patch("Δφ taken for the motion to the instant of the balance", STEP,
+        "*dphi /= theta",
+        "*dphi /= 1.0",
+        Killed(&[SCHEMES], &[TANGENT, DYNAMICS])),
+    patch("prescribed nodes at their end before the step's", STEP,
+        "theta * dof.step.increment",
+        "dof.step.increment",
+        Killed(&[SCHEMES], &[TANGENT, DYNAMICS])),
     patch("sign of q in the frozen tangent", CLOSED,
         "with.mul_sub(q_a_lt[j], a[j][k], sum)",
         "with.mul_add(q_a_lt[j], a[j][k], sum)",

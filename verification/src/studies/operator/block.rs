@@ -7,13 +7,14 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Elastic, Lame, Law, Material, NeoHookean, Start};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::time::{Inertia, Newmark};
+use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, Krylov, NewtonSettings};
 use bfree::tensor::{Deformation, Tensor, Vector};
+use std::sync::Arc;
 
 /// E = 1000, ν = 0.3, ρ = 1, h = 1.
 pub(super) fn lame() -> Result<Lame, StudyError> {
@@ -85,8 +86,7 @@ pub(super) fn block<const D: usize>(
             ..Loads::default()
         },
         settings: Settings {
-            inertia: Inertia::Newmark,
-            newmark: Newmark::default(),
+            scheme: Arc::new(Newmark::default()),
             lumping,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::default(),

@@ -65,7 +65,7 @@ fn compare<const D: usize, L: Law>(
     let u: Vec<Vector<f64, D>> = random.field(count);
     let by = |supports: &Supports<D>| -> Result<[Vec<f64>; 5], StudyError> {
         let nodal = Nodal::project(&simulation.particles, supports, 0.5)?;
-        let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
+        let alphas = simulation.settings.scheme.end(simulation.clock.step());
         let equilibrium = simulation.equilibrium(supports, &nodal, &prescribed, alphas, 0.1);
         let tangent = equilibrium.tangent(&dphi)?;
         let mut product = vec![Vector::zeros(); count];
@@ -85,7 +85,7 @@ fn compare<const D: usize, L: Law>(
     }
     let (single, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
     let nodal = Nodal::project(&simulation.particles, &single, 0.5)?;
-    let alphas = simulation.settings.newmark.alphas(simulation.clock.step());
+    let alphas = simulation.settings.scheme.end(simulation.clock.step());
     let equilibrium = simulation.equilibrium(&single, &nodal, &prescribed, alphas, 0.1);
     let product = equilibrium.single_tangent(None, &dphi)?.map_or_else(Vec::new, |tangent| {
         let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();

@@ -8,13 +8,14 @@ use crate::studies::StudyError;
 use bfree::clock::Clock;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::time::Newmark;
+use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::Body;
 use bfree::simulation::Simulation;
 use bfree::solver::Forcing;
 use bfree::tensor::Vector;
 use std::time::Instant;
+use std::sync::Arc;
 
 const DENSITY: f64 = 2600.0;
 const POISSON: f64 = 0.3;
@@ -236,7 +237,7 @@ pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, St
     let clock = Clock::new(END / steps as f64, 0);
     let origin = Vector::from([MIDDLE - count * mesh.h]);
     let mut bar = Elements::new(origin, mesh.h, [2 * count as u32], body, clock)?;
-    bar.newmark = Newmark { beta: 0.25 * (gamma + 0.5).powi(2), gamma };
+    bar.scheme = Arc::new(Newmark { beta: 0.25 * (gamma + 0.5).powi(2), gamma });
     bar.newton.relative_tolerance = 1e-8;
     bar.newton.forcing = Forcing::EisenstatWalker;
     bar.set_velocity(|x| x.map(|x| if x <= MIDDLE + 1e-6 * mesh.h { jump.left } else { jump.right }));

@@ -1,17 +1,7 @@
-//! What a step in time is: incremental Newmark-β (the paper's Table 1), or a load step without inertia.
+//! Incremental Newmark-β (the paper's Table 1).
 
-use crate::tensor::Vector;
-
-/// Whether bodies have inertia.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Inertia {
-    /// They have, integrated in time by [`Newmark`].
-    #[default]
-    Newmark,
-    /// They have none: every step ends in static equilibrium under the loads at its end. Time says which loads those are, and no
-    /// velocity, acceleration or mass matrix exists.
-    None,
-}
+use super::{Alphas, Scheme};
+use std::fmt::{Display, Formatter};
 
 /// Newmark's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,68 +19,11 @@ impl Default for Newmark {
     }
 }
 
-/// a = α₁ Δφ − α₂ v_n − α₃ a_n,  v = α₄ Δφ + α₅ v_n + α₆ a_n   (eq. 19), evaluated as
-///
-/// ```text
-/// a       = α₁ (Δφ − Δφ̂),  Δφ̂ = Δt v_n + α₃/α₁ a_n
-/// v − v_n = α₄ (Δφ − Δt v_n) + α₆ a_n
-/// a − a_n = α₁ (Δφ − Δt v_n) − (α₃ + 1) a_n
-/// ```
-///
-/// which is the same, because α₂ = α₁ Δt and α₅ = 1 − α₄ Δt. As printed, large terms leave a small difference, and in steady flight
-/// they are rounded the same way in every step: the momentum drifts. Here Δφ = Δt v_n without acceleration changes not a bit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)] // named in the formulas above
-pub struct Alphas {
-    pub dt: f64,
-    pub a1: f64,
-    pub a2: f64,
-    pub a3: f64,
-    pub a4: f64,
-    pub a6: f64,
-}
-
-impl Alphas {
-    /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
-    pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0 };
-    /// Nothing has inertia, a velocity or an acceleration.
-    pub const NONE: Self = Self { dt: 0.0, a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a6: 0.0 };
-
-    /// Δφ̂, the increment that ends without acceleration, from v_n and a_n. There is none without inertia.
-    ///
-    /// ```
-    /// use bfree::mechanics::time::Newmark;
-    /// use bfree::tensor::Vector;
-    ///
-    /// // Without acceleration at the start either, it is that of uniform motion.
-    /// let (v, rest) = (Vector::from([3.0, -1.0]), Vector::from([0.0, 0.0]));
-    /// assert_eq!(Newmark::default().alphas(0.5).predicted(&v, &rest), v * 0.5);
-    /// ```
-    #[inline(always)]
-    pub fn predicted<const D: usize>(&self, v: &Vector<f64, D>, a: &Vector<f64, D>) -> Vector<f64, D> {
-        v * self.dt + a * (self.a3 / self.a1)
-    }
-
-    /// v − v_n and a − a_n, from Δφ, v_n and a_n.
-    ///
-    /// Example: [`Newmark::alphas`].
-    #[inline(always)]
-    pub fn increments<const D: usize>(
-        &self,
-        dphi: &Vector<f64, D>,
-        v: &Vector<f64, D>,
-        a: &Vector<f64, D>,
-    ) -> (Vector<f64, D>, Vector<f64, D>) {
-        let bent = dphi - v * self.dt;
-        (bent * self.a4 + a * self.a6, bent * self.a1 - a * (self.a3 + 1.0))
-    }
-}
-
 impl Newmark {
     /// The α-parameters of a step of length `dt`.
     ///
     /// ```
-    /// use bfree::mechanics::time::Newmark;
+    /// use bfree::mechanics::schemes::Newmark;
     /// use bfree::tensor::Vector;
     ///
     /// // Uniformly accelerated motion, Δφ = v Δt + ½ a Δt², is exact for every β and γ.
@@ -113,9 +46,26 @@ impl Newmark {
     }
 }
 
+impl Display for Newmark {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Newmark β = {}, γ = {}", self.beta, self.gamma)
+    }
+}
+
+impl Scheme for Newmark {
+    fn end(&self, dt: f64) -> Alphas {
+        self.alphas(dt)
+    }
+
+    fn error_constant(&self) -> f64 {
+        self.beta - 1.0 / 6.0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tensor::Vector;
 
     const RULES: [(f64, f64); 4] = [(0.25, 0.5), (0.3025, 0.6), (0.5, 0.9), (1.0, 1.5)];
 

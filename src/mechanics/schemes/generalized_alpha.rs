@@ -1,0 +1,142 @@
+//! The generalised-α method (Chung and Hulbert, 1993).
+
+use super::{Alphas, Newmark, Scheme};
+use crate::problems::Problems;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
+
+/// M a(t_{n+1−α_m}) + R(φ_{n+1−α_f}, t_{n+1−α_f}) = 0 with Newmark's relations between Δφ, v and a. Motion is interpolated, not force: with
+/// α_m = α_f = ½ it is the midpoint rule.
+///
+/// α_m = (2ρ − 1)/(ρ + 1),  α_f = ρ/(ρ + 1),  γ = ½ − α_m + α_f,  β = ¼ (1 − α_m + α_f)²
+///
+/// ```
+/// use bfree::mechanics::schemes::{GeneralizedAlpha, Scheme};
+///
+/// // ρ = 1 damps nothing: forces are in balance halfway, and the end of the step is that of the trapezoidal rule.
+/// let midpoint = GeneralizedAlpha { spectral_radius: 1.0 };
+/// assert_eq!((midpoint.instant(), midpoint.newmark().beta, midpoint.newmark().gamma), (0.5, 0.25, 0.5));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GeneralizedAlpha {
+    /// ρ∞ (no unit), 0 to 1: what a step leaves of a vibration much faster than it; 1 damps nothing, 0 ends it in one step.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub spectral_radius: f64,
+}
+
+impl GeneralizedAlpha {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str) {
+        problems.between(&format!("{path}.spectral_radius"), self.spectral_radius, 0.0, 1.0);
+    }
+
+    /// 1 − α_m and 1 − α_f.
+    fn weights(&self) -> (f64, f64) {
+        let rho = self.spectral_radius;
+        ((2.0 - rho) / (rho + 1.0), 1.0 / (rho + 1.0))
+    }
+
+    /// Its relations between Δφ, v and a.
+    pub fn newmark(&self) -> Newmark {
+        let (inertia, force) = self.weights();
+        let shift = inertia - force;
+        Newmark { beta: 0.25 * (1.0 + shift) * (1.0 + shift), gamma: 0.5 + shift }
+    }
+}
+
+impl Display for GeneralizedAlpha {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "generalised-α ρ∞ = {}", self.spectral_radius)
+    }
+}
+
+impl Scheme for GeneralizedAlpha {
+    fn instant(&self) -> f64 {
+        self.weights().1
+    }
+
+    /// With Newmark's α, θ = 1 − α_f, and μ = 1 − α_m:  μ a + (1−μ) a_n  and  θ v + (1−θ) v_n  as functions of θ Δφ.
+    fn balance(&self, dt: f64) -> Alphas {
+        let (inertia, force) = self.weights();
+        let Alphas { a1, a2, a3, a4, a6, .. } = self.end(dt);
+        Alphas {
+            dt: force * dt,
+            a1: a1 * inertia / force,
+            a2: a2 * inertia,
+            a3: inertia * (a3 + 1.0) - 1.0,
+            a4,
+            a6: force * a6,
+        }
+    }
+
+    fn end(&self, dt: f64) -> Alphas {
+        self.newmark().alphas(dt)
+    }
+
+    /// An acceleration a is that of the time (α_m − α_f) Δt later, half of which Δφ has of it.
+    fn error_constant(&self) -> f64 {
+        let (inertia, force) = self.weights();
+        self.newmark().beta - 0.5 * (inertia - force) - 1.0 / 6.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tensor::Vector;
+
+    /// The amplification of x″ = −ω² x over one step, as (x, v, a) ← A (x, v, a).
+    fn amplification(scheme: &dyn Scheme, omega: f64, dt: f64) -> nalgebra::Matrix3<f64> {
+        let (theta, balance, end) = (scheme.instant(), scheme.balance(dt), scheme.end(dt));
+        let columns = [0, 1, 2].map(|k| {
+            let state = [0, 1, 2].map(|i| if i == k { 1.0 } else { 0.0 });
+            let [x, v, a] = state.map(|value| Vector::from([value]));
+            // α₁ (y − ŷ) + ω² (x + y) = 0
+            let y = (balance.predicted(&v, &a) * balance.a1 - x * (omega * omega)) / (balance.a1 + omega * omega);
+            let (delta_v, delta_a) = end.increments(&(y / theta), &v, &a);
+            nalgebra::Vector3::new((x + y / theta)[0], (v + delta_v)[0], (a + delta_a)[0])
+        });
+        nalgebra::Matrix3::from_columns(&columns)
+    }
+
+    #[test]
+    fn what_it_leaves_of_the_fastest_vibration_is_its_spectral_radius() {
+        for rho in [0.0, 0.25, 0.5, 0.8, 1.0] {
+            let scheme = GeneralizedAlpha { spectral_radius: rho };
+            let radius = |omega: f64| {
+                let eigenvalues = amplification(&scheme, omega, 1.0).complex_eigenvalues();
+                eigenvalues.iter().map(|z| z.norm()).fold(0.0, f64::max)
+            };
+            // A triple eigenvalue: the root of the distance 1/ω from the limit.
+            assert!((radius(1e7) - rho).abs() < 2e-2, "ρ = {rho}: {}", radius(1e7));
+            assert!([0.1, 1.0, 3.0, 30.0].into_iter().all(|omega| radius(omega) < 1.0 + 1e-9), "ρ = {rho} is unstable");
+        }
+    }
+
+    #[test]
+    fn it_is_of_second_order_and_its_local_error_is_the_estimate() {
+        for rho in [0.0, 0.5, 1.0] {
+            let scheme = GeneralizedAlpha { spectral_radius: rho };
+            let errors = [0.02, 0.01].map(|dt| {
+                let map = amplification(&scheme, 1.0, dt);
+                // On x = cos t: accelerations are those (α_m − α_f) Δt later.
+                let (inertia, force) = scheme.weights();
+                let later = (force - inertia) * dt;
+                let start = nalgebra::Vector3::new(1.0, 0.0, -later.cos());
+                let end = (0..(1.0 / dt).round() as usize).fold(start, |state, _| map * state);
+                (end[0] - 1f64.cos()).abs().max((end[1] + 1f64.sin()).abs())
+            });
+            let order = (errors[0] / errors[1]).log2();
+            assert!((order - 2.0).abs() < 0.1, "ρ = {rho}: order {order}");
+            // One step from t = 1, where the third derivative is sin 1.
+            let dt = 1e-3;
+            let (inertia, force) = scheme.weights();
+            let state = nalgebra::Vector3::new(1f64.cos(), -1f64.sin(), -(1.0 + (force - inertia) * dt).cos());
+            let after = amplification(&scheme, 1.0, dt) * state;
+            let (error, estimate) =
+                (after[0] - (1.0 + dt).cos(), scheme.error_constant() * dt * dt * (after[2] - state[2]));
+            assert!((error / estimate - 1.0).abs() < 0.01, "ρ = {rho}: {error} for {estimate}");
+        }
+    }
+}

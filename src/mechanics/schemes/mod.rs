@@ -1,0 +1,137 @@
+//! Time schemes, a file each: at which instant of a step forces are in balance, and what a and v are there and at its end.
+//!
+//! All of them make a and v functions of the increment of motion, affine and of one form ([`Alphas`]), so that no term of the residual
+//! knows which of them it is evaluated for.
+
+mod generalized_alpha;
+mod newmark;
+mod statics;
+
+pub use generalized_alpha::GeneralizedAlpha;
+pub use newmark::Newmark;
+pub use statics::Statics;
+
+use crate::problems::Problems;
+use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt::{Debug, Display};
+use std::sync::Arc;
+
+/// How a step goes from t_n to t_{n+1}. Reports call it by its [`Display`].
+///
+/// Newton's unknown is the motion to t_n + θ Δt, where forces are in balance; the step ends with Δφ, which is 1/θ of it.
+pub trait Scheme: Debug + Display + Send + Sync {
+    /// θ in (0, 1].
+    fn instant(&self) -> f64 {
+        1.0
+    }
+
+    /// a and v of the balance, functions of the motion to t_n + θ Δt, which lasts θ Δt.
+    fn balance(&self, dt: f64) -> Alphas {
+        self.end(dt)
+    }
+
+    /// a and v at t_{n+1}, functions of Δφ.
+    fn end(&self, dt: f64) -> Alphas;
+
+    /// c of the displacement's local error c Δt² |Δa|; exact to leading order.
+    fn error_constant(&self) -> f64;
+
+    /// Without inertia there is no velocity, acceleration or mass matrix, and time says only which loads act.
+    fn has_inertia(&self) -> bool {
+        true
+    }
+}
+
+/// What a scene writes: the key of a scheme, with its parameters if it has some.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "Inertia")]
+pub enum Parameters {
+    /// Dynamics, by Newmark's method.
+    #[default]
+    Newmark,
+    /// Dynamics, by the generalised-α method of Chung and Hulbert, which damps what the time steps do not resolve and is of second order.
+    GeneralizedAlpha(GeneralizedAlpha),
+    /// Quasi-statics: time only says which loads act and how far prescribed motions have come.
+    None,
+}
+
+impl Parameters {
+    /// The scheme, with the constants that are Newmark's own.
+    pub fn scheme(&self, newmark: Newmark) -> Arc<dyn Scheme> {
+        match *self {
+            Self::Newmark => Arc::new(newmark),
+            Self::GeneralizedAlpha(scheme) => Arc::new(scheme),
+            Self::None => Arc::new(Statics),
+        }
+    }
+
+    /// As [`Scheme::has_inertia`].
+    pub fn has_inertia(&self) -> bool {
+        *self != Self::None
+    }
+
+    /// Adds what is wrong with them to `problems`, of the keys below `path`.
+    pub(crate) fn check(&self, problems: &mut Problems, path: &str) {
+        if let Self::GeneralizedAlpha(scheme) = self {
+            scheme.check(problems, &format!("{path}.generalized_alpha"));
+        }
+    }
+}
+
+/// a = α₁ Δφ − α₂ v_n − α₃ a_n,  v = α₄ Δφ + α₅ v_n + α₆ a_n   (eq. 19), evaluated as
+///
+/// ```text
+/// a       = α₁ (Δφ − Δφ̂),  Δφ̂ = Δt v_n + α₃/α₁ a_n
+/// v − v_n = α₄ (Δφ − Δt v_n) + α₆ a_n
+/// a − a_n = α₁ (Δφ − Δt v_n) − (α₃ + 1) a_n
+/// ```
+///
+/// which is the same, because α₂ = α₁ Δt and α₅ = 1 − α₄ Δt. As printed, large terms leave a small difference, and in steady flight
+/// they are rounded the same way in every step: the momentum drifts. Here Δφ = Δt v_n without acceleration changes not a bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)] // named in the formulas above
+pub struct Alphas {
+    pub dt: f64,
+    pub a1: f64,
+    pub a2: f64,
+    pub a3: f64,
+    pub a4: f64,
+    pub a6: f64,
+}
+
+impl Alphas {
+    /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
+    pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0 };
+
+    /// Δφ̂, the increment that ends without acceleration, from v_n and a_n. There is none without inertia.
+    ///
+    /// ```
+    /// use bfree::mechanics::schemes::Newmark;
+    /// use bfree::tensor::Vector;
+    ///
+    /// // Without acceleration at the start either, it is that of uniform motion.
+    /// let (v, rest) = (Vector::from([3.0, -1.0]), Vector::from([0.0, 0.0]));
+    /// assert_eq!(Newmark::default().alphas(0.5).predicted(&v, &rest), v * 0.5);
+    /// ```
+    #[inline(always)]
+    pub fn predicted<const D: usize>(&self, v: &Vector<f64, D>, a: &Vector<f64, D>) -> Vector<f64, D> {
+        v * self.dt + a * (self.a3 / self.a1)
+    }
+
+    /// v − v_n and a − a_n, from Δφ, v_n and a_n.
+    ///
+    /// Example: [`Newmark::alphas`].
+    #[inline(always)]
+    pub fn increments<const D: usize>(
+        &self,
+        dphi: &Vector<f64, D>,
+        v: &Vector<f64, D>,
+        a: &Vector<f64, D>,
+    ) -> (Vector<f64, D>, Vector<f64, D>) {
+        let bent = dphi - v * self.dt;
+        (bent * self.a4 + a * self.a6, bent * self.a1 - a * (self.a3 + 1.0))
+    }
+}

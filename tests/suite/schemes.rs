@@ -1,0 +1,132 @@
+//! Time schemes in whole steps: what holds for each of them.
+
+use crate::support::{Failure, scene};
+use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
+use bfree::simulation::Simulation;
+use bfree::tensor::Vector;
+use std::fmt::{Display, Formatter};
+use std::sync::Arc;
+
+const FALL: &[&str] = &["gravity={\"acceleration\":[0,-0.01]}", "time.beta=null", "time.gamma=null"];
+
+fn generalized(rho: f64) -> String {
+    format!(r#"time.inertia={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
+}
+
+fn advance(simulation: &mut Simulation<2>, steps: usize) -> Result<(), Failure> {
+    (0..steps).try_for_each(|_| simulation.advance().map(drop)).map_err(Into::into)
+}
+
+/// Uniform acceleration is in the span of every scheme: x = ½ g t², v = g t, and nothing is strained.
+#[test]
+fn free_fall_is_exact_for_every_spectral_radius() -> Result<(), Failure> {
+    for rho in [0.0, 0.5, 1.0] {
+        for lumping in [1.0, 0.3] {
+            let mut overrides = FALL.to_vec();
+            let (key, lumping) = (generalized(rho), format!("time.lumping={lumping}"));
+            overrides.extend([&*key, &*lumping]);
+            let mut simulation = scene::<2>("rebound.json", &overrides)?;
+            let (start, steps) = (simulation.particles.by_id(), 20);
+            advance(&mut simulation, steps)?;
+            let (end, t) = (simulation.particles.by_id(), 0.05 * steps as f64);
+            for p in 0..end.len() {
+                let (fallen, g) =
+                    (end.position[p] - start.position[p] - start.velocity[p] * t, Vector::from([0.0, -0.01]));
+                assert!((fallen - g * (0.5 * t * t)).norm() < 1e-9, "ρ = {rho}: {fallen}");
+                assert!((end.velocity[p] - start.velocity[p] - g * t).norm() < 1e-9, "ρ = {rho}");
+            }
+            assert!(simulation.strain_energy() < 1e-16, "ρ = {rho}");
+        }
+    }
+    Ok(())
+}
+
+/// A wall is where it was told to be at the end of each step, not at the instant of the balance, and what it did is work: the confined
+/// compaction is nearly static, so that Newmark's method finds the same.
+#[test]
+fn a_moving_wall_arrives_and_its_work_is_counted() -> Result<(), Failure> {
+    let run = |scheme: &str| -> Result<Simulation<2>, Failure> {
+        let mut simulation = scene::<2>("compaction_confined.json", &["time.beta=null", "time.gamma=null", scheme])?;
+        advance(&mut simulation, 30)?;
+        Ok(simulation)
+    };
+    let newmark = run("time.inertia=\"newmark\"")?;
+    let top = |of: &Simulation<2>| of.particles.position.iter().map(|x| x[1]).fold(f64::MIN, f64::max);
+    for rho in [0.6, 1.0] {
+        let other = run(&generalized(rho))?;
+        let (place, work) = (top(&other) - top(&newmark), other.external_work / newmark.external_work - 1.0);
+        assert!(place.abs() < 1e-3 * newmark.grid.spacing, "ρ = {rho}: the top is {place} away");
+        assert!(work.abs() < 1e-3, "ρ = {rho}: work differs by {work}");
+    }
+    Ok(())
+}
+
+/// After a jump of the load, the fastest vibrations are there with the trapezoidal rule and gone with ρ∞ = 0; the slow one stays.
+#[test]
+fn it_damps_what_steps_do_not_resolve() -> Result<(), Failure> {
+    let energies = |scheme: &str| -> Result<f64, Failure> {
+        let mut simulation =
+            scene::<2>("rebound.json", &["time.step=0.2", "time.beta=null", "time.gamma=null", scheme])?;
+        while simulation.clock.time() < 30.0 {
+            simulation.advance()?;
+        }
+        Ok(simulation.strain_energy() + simulation.particles.kinetic_energy())
+    };
+    let (none, some, all) = (energies(&generalized(1.0))?, energies(&generalized(0.5))?, energies(&generalized(0.0))?);
+    assert!(none > some && some > all && all > 0.5 * none, "{none} {some} {all}");
+    Ok(())
+}
+
+/// A scheme of one's own is one `impl`: backward Euler, as a user would write it.
+#[derive(Debug)]
+struct BackwardEuler;
+
+impl Display for BackwardEuler {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str("backward Euler")
+    }
+}
+
+impl Scheme for BackwardEuler {
+    /// v = Δφ/Δt, a = (v − v_n)/Δt
+    fn end(&self, dt: f64) -> Alphas {
+        Alphas { dt, a1: 1.0 / (dt * dt), a2: 1.0 / dt, a3: 0.0, a4: 1.0 / dt, a6: 0.0 }
+    }
+
+    fn error_constant(&self) -> f64 {
+        0.5
+    }
+}
+
+#[test]
+fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
+    let mut own = scene::<2>("rebound.json", &[])?;
+    // β = 1 and γ = 1 are the same relations between Δφ and a, and other ones between Δφ and v.
+    own.settings.scheme = Arc::new(BackwardEuler);
+    let mut newmark = own.clone();
+    newmark.settings.scheme = Arc::new(Newmark { beta: 0.5, gamma: 1.0 });
+    let energy = own.particles.kinetic_energy();
+    advance(&mut own, 100)?;
+    advance(&mut newmark, 100)?;
+    // In free flight both are exact.
+    assert!((own.particles.kinetic_energy() / energy - 1.0).abs() < 1e-9);
+    let (own, newmark) = (own.particles.by_id(), newmark.particles.by_id());
+    assert!(own.position.iter().zip(&newmark.position).all(|(a, b)| (a - b).norm() < 1e-9));
+    Ok(())
+}
+
+#[test]
+fn what_is_newmarks_own_is_refused_elsewhere() {
+    for (more, words) in [
+        ("time.beta=0.25", "time.beta"),
+        ("time.gamma=0.5", "time.gamma"),
+        ("time.inertia.generalized_alpha.spectral_radius=1.5", "time.inertia.generalized_alpha.spectral_radius"),
+        ("time.inertia.generalized_alpha.spectral_radius=-0.1", "must"),
+        ("time.inertia.generalized_alpha.radius=0.1", "radius"),
+    ] {
+        let error = scene::<2>("rebound.json", &["time.beta=null", "time.gamma=null", &generalized(0.5), more])
+            .expect_err(more)
+            .to_string();
+        assert!(error.contains(words), "{more}: {error}");
+    }
+}
