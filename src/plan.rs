@@ -5,9 +5,9 @@ use crate::material::Law;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
-use crate::mechanics::terms::Rayleigh;
+use crate::mechanics::terms::{Given, Terms};
 use crate::particles::Particles;
-use crate::simulation::{Settings, Simulation};
+use crate::simulation::Simulation;
 use crate::solver::{Krylov, Precision};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
@@ -193,67 +193,24 @@ impl Plan {
 }
 
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
-    let term = |name, used, why: &str| TermUse { name, used, why: why.into() };
     let (loads, settings) = (&simulation.loads, &simulation.settings);
-    let Settings { lumping, scheme, .. } = settings;
-    let (lumping, moves) = (*lumping, scheme.has_inertia());
-    let still = "time.inertia is \"none\": load steps, each to its equilibrium";
-    let of_motion = |why: String| if moves { why } else { still.into() };
-    let surface = |pressure: bool| {
-        let of_kind = loads.surface.iter().filter(|load| matches!(load.pressing, Pressing::Pressure(_)) == pressure);
-        of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
-    };
-    let (tractions, pressures) = (surface(false), surface(true));
+    let scheme = &*settings.scheme;
+    let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
-    vec![
-        term("inertia, lumped", moves && lumping > 0.0, &of_motion(format!("time.lumping = {lumping}, {scheme}"))),
-        term(
-            "inertia, consistent",
-            moves && lumping < 1.0,
-            &of_motion("only for time.lumping < 1; its projection is an iteration".into()),
-        ),
-        term(
-            "smoothing",
-            moves && settings.smoothing.is_some(),
-            &of_motion("only with a transfer other than flip".into()),
-        ),
-        term("internal force", true, &format!("F S of every particle, {D}×{D}")),
-        term("choice of laws", simulation.bodies.len() > 1, &choice_of_laws(simulation, supports)),
-        term("third axis", D == 3, &format!("grid.size has {D} components: so has every vector")),
-        term(
-            "gravity",
-            loads.gravity.is_some(),
-            match (loads.gravity.is_some(), moves) {
-                (false, _) => "only with gravity",
-                (true, true) => "from the lumped mass: no pass over particles of its own",
-                (true, false) => "one pass over particles a step, for the nodal mass it acts on",
-            },
-        ),
-        term("tractions", tractions > 0, &format!("{tractions} loaded particles")),
-        term(
-            "follower pressure",
-            pressures > 0,
-            &format!("{pressures} loaded particles; makes the tangent unsymmetric"),
-        ),
-        term(
-            "damping",
-            moves && loads.damping.is_some(),
-            &loads.damping.map_or_else(
-                || "only with damping".into(),
-                |Rayleigh { mass, stiffness }| format!("{mass} M + {stiffness} K; two passes more a residual"),
-            ),
-        ),
-        term("prescribed nodes", !loads.prescribed.is_empty(), &format!("{} conditions", loads.prescribed.len())),
-        term("work of moving walls", moving, "only where a prescribed motion does not rest"),
-        term(
-            "single precision",
-            precision_used(supports) == Precision::Mixed,
-            match simulation.settings.newton.precision {
-                Precision::Double => "only with solver.krylov.precision = \"mixed\"",
-                Precision::Mixed => "of the linear systems; for shape functions that are products",
-            },
-        ),
-    ]
+    let precision = match settings.newton.precision {
+        Precision::Double => "only with solver.krylov.precision = \"mixed\"",
+        Precision::Mixed => "of the linear systems; for shape functions that are products",
+    };
+    let mut all = Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping });
+    all.extend([
+        ("smoothing", smooths, "only with a transfer other than flip".into()),
+        ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),
+        ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
+        ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
+        ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
+        ("single precision", precision_used(supports) == Precision::Mixed, precision.into()),
+    ]);
+    all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
 }
 
 /// How often the sweep asks which law it evaluates.
@@ -279,7 +236,7 @@ fn arrays<const D: usize, L: Law, A>(
     nodes: usize,
 ) -> Vec<ArrayUse> {
     let (vector, tensor) = (size_of::<Vector<f64, D>>(), size_of::<Tensor<f64, D>>());
-    let particles = simulation.particles.len();
+    let (particles, remembered) = (simulation.particles.len(), simulation.particles.remembered);
     let moves = simulation.settings.scheme.has_inertia();
     let weighs = moves || simulation.loads.gravity.is_some();
     let lumping = if moves { simulation.settings.lumping } else { 1.0 };
@@ -301,6 +258,7 @@ fn arrays<const D: usize, L: Law, A>(
     [
         only(true, array("particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES)),
         only(moves, array("particles: v, a", particles * 2 * vector)),
+        only(remembered > 0, array("particles: memory of laws", particles * remembered * size_of::<f64>())),
         // At the start and at the end of the step.
         only(consistent, array("particles: prediction for the consistent inertia", particles * 2 * vector)),
         // The field without what nodes can carry, what it changes by, and the change of the other field.

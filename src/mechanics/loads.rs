@@ -5,6 +5,7 @@ use crate::mechanics::terms::{ForceField, Rayleigh};
 use crate::nodes::Nodes;
 use crate::shape::Shape;
 use crate::tensor::Vector;
+use std::collections::HashSet;
 
 /// A piecewise-linear function of time, constant before its first and after its last point.
 ///
@@ -283,6 +284,12 @@ pub struct PressurePoint<const D: usize> {
 }
 
 impl<const D: usize> Loads<D> {
+    /// How many particles carry loads of a kind.
+    pub(crate) fn loaded(&self, kind: impl Fn(&Pressing<D>) -> bool) -> usize {
+        let of_kind = self.surface.iter().filter(|load| kind(&load.pressing));
+        of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
+    }
+
     /// p A N of every particle under follower pressure at time `t`.
     ///
     /// ```

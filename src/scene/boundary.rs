@@ -186,7 +186,7 @@ pub(super) fn check_times(problems: &mut Problems, path: &str, times: impl Itera
         let path = format!("{path}[{i}][0]");
         problems.number(&path, t);
         if let Some(last) = last.filter(|last| t <= *last) {
-            let allowed = format!("must be later than the row before, {}", Number(last));
+            let allowed = format!("must be greater than in the row before, {}", Number(last));
             problems.refuse(&path, Number(t), allowed);
         }
         last = Some(t);

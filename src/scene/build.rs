@@ -12,6 +12,7 @@ use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::smoothing::Smoothing;
+use crate::mechanics::terms::ForceField;
 use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
@@ -20,6 +21,7 @@ use crate::solver::{NewtonSettings, Preconditioning};
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Why a checked scene still gives no simulation.
 #[derive(Debug, thiserror::Error)]
@@ -295,12 +297,20 @@ impl Scene {
     }
 
     fn loads<const D: usize>(&self, grid: &Grid<D>, particles: &Particles<D>) -> Result<Loads<D>, BuildError> {
-        let mut loads = Loads { damping: self.damping, ..Loads::default() };
+        let mut loads = self.given_as_they_are();
         if let Some(gravity) = &self.gravity {
-            loads.gravity = Some(Gravity {
-                acceleration: vector("gravity.acceleration", &gravity.acceleration)?,
-                curve: curve("gravity.curve", gravity.curve.as_ref())?,
-            });
+            let acceleration = vector("gravity.acceleration", &gravity.acceleration)?;
+            let curve_in_time = curve("gravity.curve", gravity.curve.as_ref())?;
+            if let Some(profile) = &gravity.profile {
+                let along = vector::<D>("gravity.profile.along", &profile.along)?.normalize();
+                let factor = curve("gravity.profile.factor", Some(&profile.factor))?;
+                let field = move |_, x: &Vector<f64, D>, t| {
+                    acceleration * (curve_in_time.value(t) * factor.value(along.dot(x)))
+                };
+                loads.field = Some(ForceField(Arc::new(field)));
+            } else {
+                loads.gravity = Some(Gravity { acceleration, curve: curve_in_time });
+            }
         }
         for axis in 0..D {
             for upper in [false, true] {

@@ -21,6 +21,18 @@ pub struct Gravity {
     pub acceleration: Vec<f64>,
     /// A factor in time. Default: 1.
     pub curve: Option<Curve>,
+    /// A factor in space. Default: 1.
+    pub profile: Option<Profile>,
+}
+
+/// A factor that varies along a straight line: how far along it a particle is at the beginning of a step.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// The direction of the line, of any length but zero: s = along · x / |along|.
+    pub along: Vec<f64>,
+    /// Rows `[s, factor]` (length, no unit), linear in between and constant outside.
+    pub factor: Curve,
 }
 
 /// A force per reference area that keeps its direction, on the particles less than one particle spacing below a body's surface.
@@ -84,6 +96,10 @@ impl Gravity {
         problems.vector("gravity.acceleration", &self.acceleration, dimension);
         if let Some(curve) = &self.curve {
             curve.check(problems, "gravity.curve");
+        }
+        if let Some(profile) = &self.profile {
+            check_normal(problems, "gravity.profile.along", &profile.along, dimension);
+            profile.factor.check(problems, "gravity.profile.factor");
         }
     }
 }

@@ -30,6 +30,7 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
+use crate::mechanics::loads::Loads;
 use crate::mechanics::terms::Rayleigh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -206,6 +207,11 @@ impl Scene {
             self.refuse_inertia(&mut problems);
         }
         problems
+    }
+
+    /// Loads that need nothing of grid and particles.
+    fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
+        Loads { damping: self.damping, ..Loads::default() }
     }
 
     /// Without inertia, keys that speak of it say what nobody would do.

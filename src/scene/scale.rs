@@ -58,7 +58,8 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
     }
     if let Some(gravity) = &scene.gravity {
         let largest = gravity.acceleration.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let weight = heaviest * largest * factor(gravity.curve.as_ref());
+        let profile = gravity.profile.as_ref().map(|profile| &profile.factor);
+        let weight = heaviest * largest * factor(gravity.curve.as_ref()) * factor(profile);
         require("gravity", &[("the weight of a particle", weight, 0.0, MOST)])?;
     }
     let driven = |path: &str, displacement: Option<&Table>, velocity: Option<&Table>| {

@@ -354,3 +354,42 @@ fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
     }
     Ok(())
 }
+
+/// Gravity that varies along a line: in free fall the momentum grows by Σ m b Δt, b as the table says at each particle; where the table is
+/// one everywhere, it is plain gravity.
+#[test]
+fn gravity_follows_its_profile() -> Result<(), Failure> {
+    let falling = |profile: serde_json::Value| {
+        build::<2>(&json!({
+            "grid": {"size": [4, 4], "spacing": 0.5},
+            "time": {"step": 0.01, "end": 1},
+            "bodies": [{
+                "name": "block", "shape": {"box": {"min": [1, 1], "max": [2.25, 3]}}, "density": 2,
+                "material": {"neo_hookean": {"lambda": 100, "shear": 100}}, "particles_per_cell": 2
+            }],
+            "gravity": {"acceleration": [0.3, -1], "curve": [[0, 1], [1, 3]], "profile": profile}
+        }))
+    };
+    // s = (3 x + 4 y)/5 runs from 1.4 to 3.75: below 2 the factor is 0.5, above 3 it is 2.
+    let table = json!({"along": [3, 4], "factor": [[2, 0.5], [3, 2]]});
+    let factor = |x: &Vector<f64, 2>| 0.5 + 1.5 * ((3.0 * x[0] + 4.0 * x[1]) / 5.0 - 2.0).clamp(0.0, 1.0);
+    let mut simulation = falling(table)?;
+    let particles = &simulation.particles;
+    let force: f64 = particles.position.iter().zip(&particles.mass).map(|(x, m)| m * factor(x)).sum();
+    let before = particles.momentum();
+    simulation.step()?;
+    // The trapezoidal rule: b at both ends of the step, at t = 0 and 0.01.
+    let given = Vector::from([0.3, -1.0]) * (force * 0.01 * 0.5 * (1.0 + 1.02));
+    let gained = simulation.particles.momentum() - before;
+    assert!((gained - given).norm() < 1e-9 * given.norm(), "{gained} for {given}");
+
+    let mut uniform = falling(json!({"along": [1, 0], "factor": [[0, 1]]}))?;
+    let mut plain = falling(json!(null))?;
+    for _ in 0..5 {
+        uniform.step()?;
+        plain.step()?;
+    }
+    let (uniform, plain) = (uniform.particles.by_id(), plain.particles.by_id());
+    assert!(uniform.position.iter().zip(&plain.position).all(|(a, b)| (a - b).norm() < 1e-13));
+    Ok(())
+}

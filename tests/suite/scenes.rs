@@ -25,7 +25,7 @@ const GOOD: &str = r#"{
   ],
   "boundary": { "left": "sliding", "bottom": "fixed", "top": { "held": [true, false] }, "right": { "velocity": [[0, [-1, null]], [2, [0, null]]] } },
   "prescribed": [{ "region": { "ball": { "center": [4, 2], "radius": 0.6 } }, "displacement": [[0, [0, null]], [1, [0.1, null]]] }],
-  "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]] },
+  "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]], "profile": { "along": [0, 2], "factor": [[0, 1], [4, 0.5]] } },
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
@@ -151,6 +151,9 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
 
 /// (what stands in the good scene, what replaces it, the key to be named, words of the message)
 const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
+    (r#""along": [0, 2]"#, r#""along": [0, 0]"#, "gravity.profile.along", &["zero vector", "direction"]),
+    (r#""along": [0, 2]"#, r#""along": [1]"#, "gravity.profile.along", &["length 1", "2 components"]),
+    ("[4, 0.5]", "[0, 0.5]", "gravity.profile.factor[1][0]", &["0 is not", "row before, 0"]),
     ("[4, 2]", "[]", "grid.size", &["length 0", "1, 2 or 3"]),
     ("[4, 2]", "[4, 2, 2, 2]", "grid.size", &["length 4", "1, 2 or 3"]),
     ("[4, 2]", "[4.2, 2]", "grid.size[0]", &["4.2", "multiple of the spacing 0.5", "such as 4"]),
@@ -269,7 +272,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
         "boundary.right.velocity[0][1]",
         &["at least one component"],
     ),
-    ("[2, [0, null]]", "[0, [0, null]]", "boundary.right.velocity[1][0]", &["later than the row before, 0"]),
+    ("[2, [0, null]]", "[0, [0, null]]", "boundary.right.velocity[1][0]", &["greater than in the row before, 0"]),
     ("[0, [0, null]]", "[0, [0.3, null]]", "prescribed[0].displacement[0][1][0]", &["0.3", "must be 0"]),
     ("[0, [0, null]]", "[0.2, [0, null]]", "prescribed[0].displacement[0][0]", &["0.2", "must be 0"]),
     (
@@ -286,7 +289,12 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     ),
     ("[0, -9.81]", "[-9.81]", "gravity.acceleration", &["length 1", "2 components"]),
     ("[[0, 0], [1, 1]]", "[]", "gravity.curve", &["empty"]),
-    ("[[0, 0], [1, 1]]", "[[0, 0], [1, 1], [0.5, 1]]", "gravity.curve[2][0]", &["0.5", "later than the row before, 1"]),
+    (
+        "[[0, 0], [1, 1]]",
+        "[[0, 0], [1, 1], [0.5, 1]]",
+        "gravity.curve[2][0]",
+        &["0.5", "greater than in the row before, 1"],
+    ),
     (r#""body": "soft""#, r#""body": "sft""#, "tractions[0].body", &["sft", "did you mean \"soft\""]),
     (r#""normal": [0, 1]"#, r#""normal": [0, 0]"#, "pressures[0].surface.normal", &["zero vector"]),
     (r#""area": 0.1"#, r#""area": -0.1"#, "pressures[0].surface.area", &["-0.1", "> 0"]),

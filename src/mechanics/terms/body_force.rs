@@ -1,6 +1,6 @@
 //! Body forces −Σ_p m b N_I: gravity, and fields b(x, t) given in code.
 
-use super::{Role, Step, Sum, Term, dead_load};
+use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::pooled::Pooled;
@@ -49,6 +49,17 @@ impl<const D: usize> BodyForce<D> {
             step.supports.spread(&mut force, |p| of_particle(p) * particles.mass[p]);
         }
         Some(Self(force))
+    }
+
+    fn reasons(given: Given<'_, D>) -> Vec<Reason> {
+        let Given { loads, scheme, .. } = given;
+        let why = match (&loads.gravity, &loads.field) {
+            (None, None) => "only with gravity",
+            (_, Some(_)) => "it varies: one pass over particles a step",
+            (Some(_), None) if scheme.has_inertia() => "from the lumped mass: no pass over particles of its own",
+            (Some(_), None) => "one pass over particles a step, for the nodal mass it acts on",
+        };
+        vec![("gravity", loads.gravity.is_some() || loads.field.is_some(), why.into())]
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::inertia::FrozenMass;
 use super::stress::FrozenStress;
-use super::{BlocksAtPoints, Frozen, ProductAtPoints, Role, Step, Stress, Sum, Term, Unit};
+use super::{BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, Unit};
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
@@ -100,6 +100,12 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
 impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     const NAME: &'static str = "damping";
     const ROLE: Role = Role::Dissipates;
+
+    fn planned(given: Given<'_, D>) -> Vec<Reason> {
+        let damping = given.loads.damping.filter(|_| given.scheme.has_inertia());
+        let why = |Rayleigh { mass, stiffness }| format!("{mass} M + {stiffness} K; two passes more a residual");
+        vec![(Self::NAME, damping.is_some(), damping.map_or_else(|| "only with damping".into(), why))]
+    }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         let force = self.force_of(&self.velocity(dphi));

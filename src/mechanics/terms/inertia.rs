@@ -1,6 +1,6 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, Unit};
+use super::{AtPoints, BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
@@ -47,6 +47,16 @@ impl<'a, const D: usize> Inertia<'a, D> {
 
 impl<const D: usize> Term<D> for Inertia<'_, D> {
     const NAME: &'static str = "inertia";
+
+    fn planned(Given { scheme, lumping, .. }: Given<'_, D>) -> Vec<Reason> {
+        let moves = scheme.has_inertia();
+        let consistent = "only for time.lumping < 1; its projection is an iteration";
+        let why = |why: String| if moves { why } else { format!("time.inertia is \"none\": {scheme}") };
+        vec![
+            ("inertia, lumped", moves && lumping > 0.0, why(format!("time.lumping = {lumping}, {scheme}"))),
+            ("inertia, consistent", moves && lumping < 1.0, why(consistent.into())),
+        ]
+    }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         out.iter_mut().zip(self.motion(dphi)).for_each(|(out, (m, a))| *out += a * m);

@@ -22,7 +22,7 @@ use crate::material::Law;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
-use crate::mechanics::schemes::Alphas;
+use crate::mechanics::schemes::{Alphas, Scheme};
 use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
@@ -100,6 +100,18 @@ impl Unit {
 /// A sum with the magnitude of its contributions.
 pub type Sum<T> = (T, f64);
 
+/// What a simulation gives a term, before any step: what a plan is made from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Given<'a, const D: usize> {
+    pub loads: &'a Loads<D>,
+    pub scheme: &'a dyn Scheme,
+    /// ε
+    pub lumping: f64,
+}
+
+/// Whether a term, or a part of it, is there, and why: `(name, used, why)`.
+pub(crate) type Reason = (&'static str, bool, String);
+
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
     /// As checks, plans and reports call it.
@@ -108,6 +120,9 @@ pub(crate) trait Term<const D: usize>: Sync {
     const PARTS: &'static [(Part, &'static str)] = &[];
     /// Where its work goes.
     const ROLE: Role = Role::Stores;
+
+    /// What a plan says of it.
+    fn planned(given: Given<'_, D>) -> Vec<Reason>;
 
     /// Adds what acts at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
@@ -203,9 +218,9 @@ macro_rules! terms {
                 Self { $($field: <$term>::of(step)),* }
             }
 
-            /// All terms that there are, and which of them these are.
-            pub fn used(&self) -> Vec<(&'static str, bool)> {
-                vec![$((<$term as Term<D>>::NAME, self.$field.is_some())),*]
+            /// What a plan says of all terms that there are.
+            pub(crate) fn planned(given: Given<'_, D>) -> Vec<Reason> {
+                [$(<$term as Term<D>>::planned(given)),*].concat()
             }
 
             /// The terms that are there, whole and by the parts that can be frozen alone.
@@ -316,6 +331,10 @@ macro_rules! dead_load {
         impl<const D: usize> Term<D> for $load<D> {
             const NAME: &'static str = $name;
             const ROLE: Role = Role::Loads;
+
+            fn planned(given: Given<'_, D>) -> Vec<Reason> {
+                Self::reasons(given)
+            }
 
             fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
                 out.iter_mut().zip(&self.0).for_each(|(out, force)| *out -= force.map(T::lit));

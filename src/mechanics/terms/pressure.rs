@@ -1,7 +1,7 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface: with an exact tangent, not symmetric on an open surface.
 
-use super::{Frozen, Role, Step, Sum, Term, Unit};
-use crate::mechanics::loads::PressurePoint;
+use super::{Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
+use crate::mechanics::loads::{Pressing, PressurePoint};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Laned, Number, Supports};
 use crate::particles::Particles;
@@ -24,6 +24,11 @@ impl<'a, const D: usize> Pressure<'a, D> {
 impl<const D: usize> Term<D> for Pressure<'_, D> {
     const NAME: &'static str = "follower pressure";
     const ROLE: Role = Role::Loads;
+
+    fn planned(given: Given<'_, D>) -> Vec<Reason> {
+        let loaded = given.loads.loaded(|pressing| matches!(pressing, Pressing::Pressure(_)));
+        vec![(Self::NAME, loaded > 0, format!("{loaded} loaded particles; makes the tangent unsymmetric"))]
+    }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         for point in &self.points {

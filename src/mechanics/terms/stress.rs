@@ -1,6 +1,6 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{AtPoints, BlocksAtPoints, Frozen, ProductAtPoints, Step, Sum, Term, Unit};
+use super::{AtPoints, BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit};
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Supports, add_quadratic};
@@ -73,6 +73,10 @@ const MOST_ROWS: usize = Form::General.rows(3);
 impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     const NAME: &'static str = "stress";
     const PARTS: &'static [(Part, &'static str)] = &[(Part::Geometric, "geometric"), (Part::Material, "material")];
+
+    fn planned(_: Given<'_, D>) -> Vec<Reason> {
+        vec![("internal force", true, format!("F S of every particle, {D}×{D}"))]
+    }
 
     fn at_points<T: Number>(&self, part: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
         Some((Flow::GRADIENT, Box::new(self.laws.stresses(part))))

@@ -1,6 +1,6 @@
 //! Nominal tractions −Σ_Γ T N_I A, dead loads on the particles of a surface.
 
-use super::{Role, Step, Sum, Term, dead_load};
+use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
 use crate::mechanics::loads::Pressing;
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
@@ -24,6 +24,11 @@ impl<const D: usize> Traction<D> {
             }
         }
         force.map(Self)
+    }
+
+    fn reasons(given: Given<'_, D>) -> Vec<Reason> {
+        let loaded = given.loads.loaded(|pressing| matches!(pressing, Pressing::Traction(_)));
+        vec![("tractions", loaded > 0, format!("{loaded} loaded particles"))]
     }
 }
 
