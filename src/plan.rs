@@ -201,7 +201,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         Precision::Double => "only with solver.krylov.precision = \"mixed\"",
         Precision::Mixed => "of the linear systems; for shape functions that are products",
     };
-    let mut all = Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping });
+    let mut all = Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping, ghost: settings.ghost });
     all.extend([
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),

@@ -44,6 +44,9 @@ pub struct Settings {
     pub scheme: Arc<dyn Scheme>,
     /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
     pub lumping: f64,
+    /// γ of the ghost stiffness, as a share of Λ + 2G; 0 for none. It holds nodes that have little of a body: without inertia nothing else
+    /// does, and with smooth shape functions the answer needs it.
+    pub ghost: f64,
     /// Where Newton starts.
     pub initial_guess: InitialGuess,
     /// What resting walls do to particle velocities.
@@ -67,6 +70,7 @@ impl Default for Settings {
         Self {
             scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
+            ghost: 0.0,
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
             smoothing: None,
@@ -479,7 +483,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // At t_n, too, laws are asked about a step.
         let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
         Equilibrium::new(
-            terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt },
+            terms::Step {
+                particles,
+                bodies,
+                loads,
+                supports,
+                nodal,
+                alphas,
+                lumping,
+                time: t,
+                dt,
+                ghost: settings.ghost,
+            },
             prescribed,
         )
     }
@@ -582,7 +597,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         work += mean_work(&end.external_force(dphi)?, &start.external_force(&at_rest)?, dphi);
         let mut dissipated = 0.0;
-        if self.loads.damping.is_some() {
+        if self.loads.damping.is_some() || self.settings.ghost > 0.0 {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, dphi| equilibrium.forces(Role::Dissipates, dphi);
             dissipated = mean_work(&lost(end, dphi)?, &lost(&start, &at_rest)?, dphi);
         }

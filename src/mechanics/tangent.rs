@@ -8,7 +8,7 @@ use crate::mechanics::terms::{Frozen, Piece, Unit};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem, Precision};
-use crate::tensor::{Deformation, Tensor, Vector};
+use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
 /// K(Δφ), frozen: an operator in double or, divided by a power of two, in single precision.
@@ -162,14 +162,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.
     fn size(&self, h: f64) -> f64 {
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |largest: f64, x| largest.max(*x));
-        let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
-        let along_x = Tensor::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
-        let modulus = |p: usize| {
-            let start = self.step.particles.start(p, self.step.dt);
-            self.step.law(p).elasticity(&at_rest, &start, &along_x)[(0, 0)].abs()
-        };
-        let first_of_body = |body| self.step.particles.body.iter().position(|&of| of as usize == body);
-        let moduli: Vec<f64> = (0..self.step.bodies.len()).filter_map(first_of_body).map(modulus).collect();
+        let moduli: Vec<f64> = (0..self.step.bodies.len()).map(|body| self.step.modulus(body)).collect();
         let stiffness = largest(&moduli) * largest(&self.step.particles.volume) / (h * h);
         let size = stiffness + self.step.alphas.a1 * largest(&self.step.nodal.mass);
         if size > 0.0 && size.is_finite() { size.log2().round().exp2() } else { 1.0 }

@@ -267,6 +267,7 @@ impl Scene {
         Settings {
             scheme: self.time.inertia.scheme(self.time.newmark()),
             lumping: self.time.lumping(),
+            ghost: self.ghost(),
             initial_guess: match self.time.initial_guess.unwrap_or_default() {
                 time::InitialGuess::Zero => InitialGuess::Zero,
                 time::InitialGuess::Velocity => InitialGuess::Velocity,

@@ -36,6 +36,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+/// γ of the ghost stiffness where it is needed.
+const GHOST: f64 = 1e-3;
+
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -70,6 +73,10 @@ pub struct Scene {
     /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
+    /// Ghost stiffness γ (no unit), 0 to 1: holds nodes that have little of a body, by this share of its stiffness against bending from
+    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia, unless functions are linear; else 0.
+    #[schemars(range(min = 0, max = 1))]
+    pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
     pub gravity: Option<load::Gravity>,
     /// Rayleigh damping, a M + b K. Default: none.
@@ -167,6 +174,9 @@ impl Scene {
         for (i, prescribed) in problems.few("prescribed", &self.prescribed).iter().enumerate() {
             prescribed.check(&mut problems, &format!("prescribed[{i}]"), dimension);
         }
+        if let Some(ghost) = self.ghost_stiffness {
+            problems.between("ghost_stiffness", ghost, 0.0, 1.0);
+        }
         if let Some(gravity) = &self.gravity {
             gravity.check(&mut problems, dimension);
         }
@@ -209,6 +219,12 @@ impl Scene {
         problems
     }
 
+    /// γ of the ghost stiffness. Hat functions have no small cuts that matter; with inertia, mass holds what stiffness does not.
+    fn ghost(&self) -> f64 {
+        let needed = !self.time.inertia.has_inertia() && self.approximation.key() != "linear";
+        self.ghost_stiffness.unwrap_or(if needed { GHOST } else { 0.0 })
+    }
+
     /// Loads that need nothing of grid and particles.
     fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
         Loads { damping: self.damping, ..Loads::default() }
@@ -236,6 +252,7 @@ impl Scene {
         if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
         }
+        self.ghost_stiffness = Some(self.ghost());
         self.output.fields = Some(self.output.fields(self.time.inertia));
         self
     }

@@ -8,6 +8,7 @@ mod damping;
 mod dynamics;
 mod equilibrium;
 mod examples;
+mod ghost;
 mod hostile;
 mod ladder;
 mod laws;

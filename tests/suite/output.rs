@@ -41,6 +41,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
         loads: Loads::default(),
         settings: Settings {
             scheme: Arc::new(Newmark::default()),
+            ghost: 0.0,
             lumping: 1.0,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::Literal,

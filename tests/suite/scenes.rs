@@ -25,7 +25,7 @@ const GOOD: &str = r#"{
   ],
   "boundary": { "left": "sliding", "bottom": "fixed", "top": { "held": [true, false] }, "right": { "velocity": [[0, [-1, null]], [2, [0, null]]] } },
   "prescribed": [{ "region": { "ball": { "center": [4, 2], "radius": 0.6 } }, "displacement": [[0, [0, null]], [1, [0.1, null]]] }],
-  "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]], "profile": { "along": [0, 2], "factor": [[0, 1], [4, 0.5]] } },
+  "ghost_stiffness": 0.01, "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]], "profile": { "along": [0, 2], "factor": [[0, 1], [4, 0.5]] } },
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },
@@ -151,6 +151,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
 
 /// (what stands in the good scene, what replaces it, the key to be named, words of the message)
 const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
+    (r#""ghost_stiffness": 0.01"#, r#""ghost_stiffness": -1"#, "ghost_stiffness", &["-1 is not", "0", "1"]),
     (r#""along": [0, 2]"#, r#""along": [0, 0]"#, "gravity.profile.along", &["zero vector", "direction"]),
     (r#""along": [0, 2]"#, r#""along": [1]"#, "gravity.profile.along", &["length 1", "2 components"]),
     ("[4, 0.5]", "[0, 0.5]", "gravity.profile.factor[1][0]", &["0 is not", "row before, 0"]),

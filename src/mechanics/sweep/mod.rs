@@ -83,8 +83,9 @@ const WIDEST: usize = 16;
 #[derive(Debug)]
 pub struct Supports<const D: usize> {
     way: Way<D>,
+    grid: Grid<D>,
     /// Active nodes.
-    nodes: usize,
+    nodes: Nodes,
     /// h, if weights in single precision are there.
     unit: Option<f64>,
     /// How often the sweeps have gone through all particles.
@@ -95,9 +96,9 @@ pub struct Supports<const D: usize> {
 
 impl<const D: usize> Clone for Supports<D> {
     fn clone(&self) -> Self {
-        let Self { way, nodes, unit, pool, .. } = self;
+        let Self { way, grid, nodes, unit, pool, .. } = self;
         let passes = AtomicU64::new(self.passes());
-        Self { way: way.clone(), nodes: *nodes, unit: *unit, passes, pool: pool.clone() }
+        Self { way: way.clone(), grid: *grid, nodes: nodes.clone(), unit: *unit, passes, pool: pool.clone() }
     }
 }
 
@@ -280,7 +281,7 @@ impl<const D: usize> Supports<D> {
                     Way::Tiled(tiled) => Some(tiled),
                 });
                 let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
-                Ok((Self::of_way(Way::Tiled(tiled), &nodes, single.then_some(grid.spacing), pool), nodes))
+                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, single.then_some(grid.spacing), pool), nodes))
             }
             _ => {
                 let by_id = |SupportError { particle, source }| SupportError {
@@ -288,7 +289,7 @@ impl<const D: usize> Supports<D> {
                     source,
                 };
                 let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
-                Ok((Self::of_way(Way::Plain(plain), &nodes, None, pool), nodes))
+                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, pool), nodes))
             }
         }
     }
@@ -326,16 +327,16 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, positions)?;
-        Ok((Self::of_way(Way::Plain(plain), &nodes, None, &Pool::default()), nodes))
+        Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, &Pool::default()), nodes))
     }
 
-    fn of_way(way: Way<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
-        Self { way, nodes: nodes.len(), unit, passes: AtomicU64::new(0), pool: pool.clone() }
+    fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
+        Self { way, grid: *grid, nodes: nodes.clone(), unit, passes: AtomicU64::new(0), pool: pool.clone() }
     }
 
     /// A nodal field of zeros, one entry for each active node.
     pub(crate) fn field<T: Element + num_traits::Zero>(&self) -> Pooled<T> {
-        self.pool.filled(self.nodes, T::zero())
+        self.pool.filled(self.nodes.len(), T::zero())
     }
 
     /// Where fields take their memory from.
@@ -385,7 +386,17 @@ impl<const D: usize> Supports<D> {
     ///
     /// Example: [`Self::passes`].
     pub fn nodes(&self) -> usize {
-        self.nodes
+        self.nodes.len()
+    }
+
+    /// The active nodes.
+    pub fn active(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    /// The grid they are of.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
     }
 
     /// How often the methods below have gone through all particles so far.
@@ -474,6 +485,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<T, C>],
         point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
     ) -> Result<(), E> {
+        const { assert!(C == 1 || C == D) };
         self.pass();
         let failure = Mutex::new(None);
         let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
@@ -597,6 +609,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
+        const { assert!(C == 1 || C == D) };
         self.pass();
         let point = |group: Group<'_>, _: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
             for (lane, &p) in group.particles.iter().enumerate() {
@@ -633,6 +646,7 @@ impl<const D: usize> Supports<D> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], mut take: impl FnMut(usize, Vector<f64, C>)) {
+        const { assert!(C == 1 || C == D) };
         self.pass();
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
         let field = bytemuck::cast_slice(field);

@@ -6,6 +6,7 @@
 
 mod body_force;
 mod damping;
+mod ghost;
 mod inertia;
 mod pressure;
 mod stress;
@@ -13,6 +14,7 @@ mod traction;
 
 pub use body_force::{BodyForce, ForceField};
 pub use damping::{Damping, Rayleigh};
+pub use ghost::Ghost;
 pub use inertia::Inertia;
 pub use pressure::Pressure;
 pub use stress::Stress;
@@ -26,7 +28,7 @@ use crate::mechanics::schemes::{Alphas, Scheme};
 use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Deformation, Tensor, Vector};
 
 /// What all terms of a step are made from.
 #[derive(Debug)]
@@ -49,6 +51,8 @@ pub struct Step<'a, const D: usize, L> {
     pub time: f64,
     /// Δt
     pub dt: f64,
+    /// γ of the ghost stiffness; 0 without.
+    pub ghost: f64,
 }
 
 impl<const D: usize, L> Clone for Step<'_, D, L> {
@@ -58,6 +62,19 @@ impl<const D: usize, L> Clone for Step<'_, D, L> {
 }
 
 impl<const D: usize, L> Copy for Step<'_, D, L> {}
+
+impl<const D: usize, L: Law> Step<'_, D, L> {
+    /// Λ + 2G of a body at rest, the stiffness of its first particle in uniaxial strain; 0 if it has none.
+    pub fn modulus(&self, body: usize) -> f64 {
+        let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
+        let along_x = Tensor::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
+        let first = self.particles.body.iter().position(|&of| of as usize == body);
+        first.map_or(0.0, |p| {
+            let start = self.particles.start(p, self.dt);
+            self.bodies[body].law.elasticity(&at_rest, &start, &along_x)[(0, 0)].abs()
+        })
+    }
+}
 
 impl<'a, const D: usize, L> Step<'a, D, L> {
     /// The mass operator.
@@ -107,6 +124,8 @@ pub(crate) struct Given<'a, const D: usize> {
     pub scheme: &'a dyn Scheme,
     /// ε
     pub lumping: f64,
+    /// γ
+    pub ghost: f64,
 }
 
 /// Whether a term, or a part of it, is there, and why: `(name, used, why)`.
@@ -320,6 +339,7 @@ terms! {
     inertia: Inertia<'a, D>,
     stress: Stress<'a, D, L>,
     damping: Damping<'a, D, L>,
+    ghost: Ghost,
     body_force: BodyForce<D>,
     traction: Traction<D>,
     pressure: Pressure<'a, D>,

@@ -54,7 +54,7 @@ pub(super) fn block<const D: usize>(
     law: Option<Material>,
     cells: u32,
     jitter: f64,
-    lumping: f64,
+            lumping: f64,
 ) -> Result<Simulation<D>, StudyError> {
     let lame = lame()?;
     let mut random = Random::new(3);
@@ -87,6 +87,7 @@ pub(super) fn block<const D: usize>(
         },
         settings: Settings {
             scheme: Arc::new(Newmark::default()),
+            ghost: 0.0,
             lumping,
             initial_guess: InitialGuess::Zero,
             wall_update: WallUpdate::default(),

@@ -1,0 +1,170 @@
+//! Ghost stiffness: the cure of cells that a body cuts. Nodes beyond a free face feel next to nothing of it, and without inertia nothing
+//! else holds them: rows of the tangent nearly vanish, and with smooth functions the answer itself is spoiled.
+//!
+//! Π = ½ Σ k |Δφ_{i−1} − 2 Δφ_i + Δφ_{i+1}|²  over triples of nodes along an axis that contain a node with little of a body,
+//! k = γ (1 − 2f) (Λ + 2G) h^{D−2},  f < ½ the least share of a cell that one of the three has.
+//!
+//! It is zero for every affine Δφ: momentum, moment of momentum, turning as a whole and the patch test stay exact.
+
+use super::{Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
+use crate::material::Law;
+use crate::mechanics::point::{Inadmissible, Part};
+use crate::mechanics::sweep::{Laned, Number};
+use crate::tensor::{Tensor, Vector, determinant, identity, scaled};
+
+/// Second differences at nodes with little of a body, with their stiffness.
+pub struct Ghost {
+    triples: Vec<Triple>,
+}
+
+/// Three neighbours along an axis, and k.
+#[derive(Clone, Copy, Debug)]
+struct Triple {
+    nodes: [u32; 3],
+    stiffness: f64,
+}
+
+/// The second difference's weights.
+const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
+
+impl Ghost {
+    pub(super) fn of<const D: usize, L: Law>(step: &Step<'_, D, L>) -> Option<Self> {
+        if step.ghost == 0.0 {
+            return None;
+        }
+        let (grid, nodes) = (step.supports.grid(), step.supports.active());
+        // Volume, and volume times modulus, of what each node has of the bodies.
+        let moduli: Vec<f64> = (0..step.bodies.len()).map(|body| step.modulus(body)).collect();
+        let volume =
+            |p: usize| step.particles.volume[p] * determinant(&(identity() + step.particles.displacement_gradient[p]));
+        let spread = |value: &(dyn Fn(usize) -> f64 + Sync)| {
+            let mut share: Vec<Vector<f64, 1>> = vec![Vector::zeros(); nodes.len()];
+            step.supports.spread(&mut share, |p| Vector::from([value(p)]));
+            share
+        };
+        let (volumes, stiff) = (spread(&volume), spread(&|p| volume(p) * moduli[step.particles.body[p] as usize]));
+        let h = grid.spacing;
+        // Beyond a wall there is nothing to fill.
+        let filled = |node: usize| {
+            let index = grid.index(nodes.ids()[node]);
+            let at_walls = (0..D).filter(|&k| index[k] == 0 || index[k] == grid.cells[k]).count();
+            volumes[node][0] / (h.powi(D as i32) * 0.5_f64.powi(at_walls as i32))
+        };
+        let modulus =
+            |node: usize| if volumes[node][0] > 0.0 { stiff[node][0] / volumes[node][0] } else { f64::INFINITY };
+        let mut triples = Vec::new();
+        for axis in 0..D {
+            let beside = |node: usize, by: i64| {
+                let mut index = grid.index(nodes.ids()[node]);
+                let moved = i64::from(index[axis]) + by;
+                index[axis] = u32::try_from(moved).ok().filter(|&moved| moved <= grid.cells[axis])?;
+                nodes.number(grid.id(index))
+            };
+            let low = (0..nodes.len()).filter(|&node| filled(node) < 0.5);
+            let mut centres: Vec<usize> =
+                low.flat_map(|node| [-1, 0, 1].into_iter().filter_map(move |by| beside(node, by))).collect();
+            centres.sort_unstable();
+            centres.dedup();
+            for centre in centres {
+                let (Some(before), Some(after)) = (beside(centre, -1), beside(centre, 1)) else { continue };
+                let all = [before, centre, after];
+                let least = all.into_iter().map(filled).fold(f64::INFINITY, f64::min);
+                let softest = all.into_iter().map(modulus).fold(f64::INFINITY, f64::min);
+                if softest.is_finite() {
+                    let stiffness = step.ghost * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
+                    triples.push(Triple { nodes: all.map(|node| node as u32), stiffness });
+                }
+            }
+        }
+        Some(Self { triples })
+    }
+}
+
+impl Triple {
+    /// The second difference of a field.
+    fn bend<T: Number, const D: usize>(&self, field: &[Vector<T, D>]) -> Vector<T, D> {
+        let [a, b, c] = self.nodes.map(|node| field[node as usize]);
+        a - b - b + c
+    }
+}
+
+impl<const D: usize> Term<D> for Ghost {
+    const NAME: &'static str = "ghost stiffness";
+    const ROLE: Role = Role::Dissipates;
+
+    fn planned(given: Given<'_, D>) -> Vec<Reason> {
+        let why = match given.ghost {
+            0.0 => "only with ghost_stiffness".into(),
+            factor => format!("{factor} of the stiffness, at nodes with less than half a cell of a body"),
+        };
+        vec![(<Self as Term<D>>::NAME, given.ghost > 0.0, why)]
+    }
+
+    fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
+        for triple in &self.triples {
+            let force = triple.bend(dphi) * T::lit(triple.stiffness);
+            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
+                out[node as usize] += force * T::lit(weight);
+            }
+        }
+    }
+
+    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let (mut sum, mut magnitude) = (T::zero(), 0.0);
+        for triple in &self.triples {
+            let bend = triple.bend(dphi);
+            let energy = T::lit(0.5 * triple.stiffness) * bend.dot(&bend);
+            sum += energy;
+            magnitude += energy.value();
+        }
+        Some(Ok((sum, magnitude)))
+    }
+
+    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+        for triple in &self.triples {
+            let [a, b, c] = triple.nodes.map(|node| dphi[node as usize].abs());
+            let size = (a + b * 2.0 + c) * triple.stiffness;
+            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
+                out[node as usize] += size * weight.abs();
+            }
+        }
+    }
+
+    fn freeze<X: Laned>(
+        &self,
+        _: &[Vector<f64, D>],
+        _: Part,
+        unit: Unit,
+    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+        Ok(Some(Box::new(FrozenGhost { triples: &self.triples, factor: 1.0 / unit.scale })))
+    }
+}
+
+/// It is linear: its tangent is itself.
+struct FrozenGhost<'a> {
+    triples: &'a [Triple],
+    factor: f64,
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenGhost<'_> {
+    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+        for triple in self.triples {
+            let k = X::lit(self.factor * triple.stiffness);
+            let [a, b, c] = triple.nodes.map(|node| node as usize);
+            for i in 0..D {
+                let force = (u[a][i] - u[b][i] - u[b][i] + u[c][i]) * k;
+                out[a][i] += force;
+                out[b][i] -= force + force;
+                out[c][i] += force;
+            }
+        }
+    }
+
+    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+        for triple in self.triples {
+            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
+                blocks[node as usize] += scaled(&identity(), self.factor * triple.stiffness * weight * weight);
+            }
+        }
+    }
+}
