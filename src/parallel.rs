@@ -25,20 +25,21 @@ pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// `f(part)` of every part.
-pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: impl Fn(P) + Sync) {
+pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
     let parts: Vec<Mutex<Option<P>>> = parts.map(|part| Mutex::new(Some(part))).collect();
     each(parts.len(), &|k| {
         let part = held(&parts[k]).take();
-        if let Some(part) = part {
-            f(part);
-        }
+        part.into_iter().for_each(f);
     });
 }
 
 /// As [`for_each`], with scratch space that a thread hands on from part to part.
-pub(crate) fn for_each_with<P: Send, S: Send + Default>(parts: impl Iterator<Item = P>, f: impl Fn(&mut S, P) + Sync) {
+pub(crate) fn for_each_with<P: Send, S: Send + Default>(
+    parts: impl Iterator<Item = P>,
+    f: &(dyn Fn(&mut S, P) + Sync),
+) {
     let spare = Mutex::new(Vec::new());
-    for_each(parts, |part| {
+    for_each(parts, &|part| {
         let scratch = held(&spare).pop();
         let mut scratch = scratch.unwrap_or_default();
         f(&mut scratch, part);
@@ -46,18 +47,10 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(parts: impl Iterator<Ite
     });
 }
 
-/// `f(part)` of every part, in their order.
-pub(crate) fn map<P: Send, R: Send>(parts: impl ExactSizeIterator<Item = P>, f: impl Fn(P) -> R + Sync) -> Vec<R> {
-    map_with(parts, |(), part| f(part))
-}
-
-/// As [`map`], with scratch space that a thread hands on.
-pub(crate) fn map_with<P: Send, R: Send, S: Send + Default>(
-    parts: impl ExactSizeIterator<Item = P>,
-    f: impl Fn(&mut S, P) -> R + Sync,
-) -> Vec<R> {
-    let mut results: Vec<Option<R>> = (0..parts.len()).map(|_| None).collect();
-    for_each_with(results.iter_mut().zip(parts), |scratch, (result, part)| *result = Some(f(scratch, part)));
+/// `f(0)`, …, `f(count − 1)`.
+pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
+    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
+    for_each(results.iter_mut().enumerate(), &|(k, result)| *result = Some(f(k)));
     // Every one is there.
     results.into_iter().flatten().collect()
 }
@@ -77,9 +70,9 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 assert_eq!(several(), threads > 1);
-                assert_eq!(map(0..1000, |k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
+                assert_eq!(map(1000, &|k| 3 * k), (0..1000).map(|k| 3 * k).collect::<Vec<_>>());
                 let mut numbers = vec![0; 1000];
-                for_each_with(numbers.chunks_mut(7).enumerate(), |scratch: &mut Vec<usize>, (k, part)| {
+                for_each_with(numbers.chunks_mut(7).enumerate(), &|scratch: &mut Vec<usize>, (k, part)| {
                     scratch.clear();
                     scratch.extend((0..part.len()).map(|i| 7 * k + i));
                     part.iter_mut().zip(scratch).for_each(|(number, &mut i)| *number += i);

@@ -52,7 +52,8 @@ pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
-        parallel::map(x.chunks(CHUNK).zip(y.chunks(CHUNK)), |(x, y)| dot_chunk(x, y)).iter().sum()
+        let part = |k| Some(dot_chunk(x.chunks(CHUNK).nth(k)?, y.chunks(CHUNK).nth(k)?));
+        parallel::map(x.len().div_ceil(CHUNK), &part).iter().flatten().sum()
     }
 }
 
@@ -114,7 +115,7 @@ fn update<S: Entry>(x: &[S], y: &mut [S], f: impl Fn(S, S) -> S + Sync) {
     if y.len() < PARALLEL {
         chunk((x, y));
     } else {
-        parallel::for_each(x.chunks(CHUNK).zip(y.chunks_mut(CHUNK)), chunk);
+        parallel::for_each(x.chunks(CHUNK).zip(y.chunks_mut(CHUNK)), &chunk);
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn sorted<const D: usize>(
         true => keys.iter_mut().for_each(|key| *key = key_of(key.particle)),
         false => keys = (0..positions.len() as u32).map(key_of).collect(),
     }
-    parallel::for_each(keys.chunks_mut(RUN), |keys| {
+    parallel::for_each(keys.chunks_mut(RUN), &|keys| {
         for key in keys {
             key.cell = place(key.particle).unwrap_or(u64::MAX);
         }

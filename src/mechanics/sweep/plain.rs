@@ -48,7 +48,7 @@ impl<const D: usize> Plain<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let count = positions.len().div_ceil(BLOCK);
-        let built: Result<Vec<_>, _> = parallel::map(0..count, |b| {
+        let built: Result<Vec<_>, _> = parallel::map(count, &|b| {
             let particles = b * BLOCK..((b + 1) * BLOCK).min(positions.len());
             Block::new(approximation, grid, positions, particles)
         })
@@ -104,7 +104,7 @@ impl<const D: usize> Plain<D> {
         point: &Point<'_, X, C, D>,
     ) {
         let numbers = fields * C;
-        let buffers = parallel::map(0..self.blocks.len(), |b| {
+        let buffers = parallel::map(self.blocks.len(), &|b| {
             let block = &self.blocks[b];
             let mut buffer = vec![X::zero(); block.nodes.len() * numbers];
             for group in self.groups_of(b) {
@@ -138,7 +138,7 @@ impl<const D: usize> Plain<D> {
     }
 
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
-        let buffers = parallel::map(0..self.blocks.len(), |b| {
+        let buffers = parallel::map(self.blocks.len(), &|b| {
             let block = &self.blocks[b];
             let mut buffer = vec![Tensor::<f64, D>::zeros(); block.nodes.len()];
             for group in self.groups_of(b) {
@@ -171,7 +171,7 @@ impl<const D: usize> Plain<D> {
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
-        let parts = parallel::map(0..self.blocks.len(), |b| {
+        let parts = parallel::map(self.blocks.len(), &|b| {
             let mut part = Vec::with_capacity(BLOCK);
             for group in self.groups_of(b) {
                 let mut at = vec![At::<f64, C, D>::zero(); fields];
@@ -185,7 +185,7 @@ impl<const D: usize> Plain<D> {
     }
 
     pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
-        parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), |(b, rows)| {
+        parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), &|(b, rows)| {
             for (group, rows) in self.groups_of(b).zip(rows.chunks_mut(count)) {
                 let mut at = [At::zero()];
                 self.blocks[b].gather(group, field, &mut at);

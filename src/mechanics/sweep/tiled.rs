@@ -57,11 +57,10 @@ impl<const D: usize> Tiled<D> {
         let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
         blocks.resize_with(runs().count(), Block::default);
         let (family, failed) = (Family::new(product), Mutex::new(None));
-        parallel::for_each_with(blocks.iter_mut().zip(runs()), |scratch, (place, keys)| {
-            match block(family, grid, positions, keys, single, std::mem::take(place), scratch) {
-                Ok(built) => *place = built,
-                Err(error) => keep_first(&mut held(&failed), keys[0].particle as usize, error),
-            }
+        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (place, keys)| {
+            let built = block(family, grid, positions, keys, single, std::mem::take(place), scratch);
+            let keep = |error| keep_first(&mut held(&failed), keys[0].particle as usize, error);
+            built.map_or_else(keep, |built| *place = built);
         });
         if let Some((particle, error)) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
             return Err(failure(particle, error));

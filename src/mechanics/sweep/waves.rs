@@ -130,11 +130,11 @@ impl<const D: usize> Tiled<D> {
         let mut buffers = vec![X::zero(); WAVE.min(self.blocks.len()) * length];
         for blocks in self.blocks.chunks(WAVE) {
             let parts = buffers.chunks_mut(length).zip(blocks);
-            parallel::for_each_with(parts, |scratch, (buffer, block)| one(scratch, buffer, block));
+            parallel::for_each_with(parts, &|scratch, (buffer, block)| one(scratch, buffer, block));
             let first = blocks.iter().filter_map(|block| block.nodes.first()).min().map_or(0, |&n| n as usize);
             let last = blocks.iter().filter_map(|block| block.nodes.last()).max().map_or(0, |&n| n as usize + 1);
             let slabs = out[first * numbers..last * numbers].chunks_mut(SLAB * numbers).enumerate();
-            parallel::for_each(slabs, |(slab, out)| {
+            parallel::for_each(slabs, &|(slab, out)| {
                 for (block, buffer) in blocks.iter().zip(buffers.chunks(length)) {
                     add(block, buffer, first + slab * SLAB, out);
                 }
@@ -166,7 +166,7 @@ impl<const D: usize> Tiled<D> {
         }
         let mut waiting: Vec<Vec<(usize, R)>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
         for blocks in self.blocks.chunks(WAVE) {
-            parallel::for_each_with(blocks.iter().zip(&mut waiting), |nodal, (block, part)| {
+            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|nodal, (block, part)| {
                 gather(nodal, block, &mut |p, result| part.push((p, result)));
             });
             for (p, result) in waiting.iter_mut().flat_map(|part| part.drain(..)) {
@@ -194,7 +194,7 @@ impl<const D: usize> Tiled<D> {
         };
         let both = self.blocks.iter().zip(chunks);
         if self.in_parallel() {
-            parallel::for_each_with(both, one);
+            parallel::for_each_with(both, &one);
         } else {
             let mut nodal = Vec::new();
             both.for_each(|both| one(&mut nodal, both));
