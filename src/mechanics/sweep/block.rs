@@ -99,6 +99,43 @@ impl Groups {
         }
     }
 
+    /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
+    #[inline(always)]
+    pub(super) fn entries<const D: usize>(
+        &self,
+        group: usize,
+        lane: usize,
+        mut visit: impl FnMut(usize, f64, Vector<f64, D>),
+    ) {
+        let window = self.window(group, &self.weights);
+        let weights = |k: usize, at: usize| {
+            let (n, dn) = window.axis(k);
+            [n[at][lane], dn[at][lane]]
+        };
+        // Along an axis that does not exist N = 1.
+        let mut w = [[1.0, 0.0]; 3];
+        for z in 0..window.width[2] {
+            if D > 2 {
+                w[2] = weights(2, z);
+            }
+            for y in 0..window.width[1] {
+                if D > 1 {
+                    w[1] = weights(1, y);
+                }
+                let row = window.first + y * window.stride[0] + z * window.stride[1];
+                for x in 0..window.width[0] {
+                    w[0] = weights(0, x);
+                    let n: f64 = (0..D).map(|k| w[k][0]).product();
+                    let grad_n: Vector<f64, D> =
+                        Vector::from_fn(|k, _| (0..D).map(|m| w[m][usize::from(m == k)]).product());
+                    if n != 0.0 || grad_n.iter().any(|&g| g != 0.0) {
+                        visit(row + x, n, grad_n);
+                    }
+                }
+            }
+        }
+    }
+
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.windows.as_slice())
             + size_of_val(self.weights.as_slice())
@@ -144,43 +181,6 @@ impl Block {
         let range = place_of(first)..place_of(end);
         for (&node, &place) in self.nodes[range.clone()].iter().zip(&self.places[range]) {
             add(place as usize, node as usize - first);
-        }
-    }
-
-    /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
-    #[inline(always)]
-    pub(super) fn entries<const D: usize>(
-        &self,
-        group: usize,
-        lane: usize,
-        mut visit: impl FnMut(usize, f64, Vector<f64, D>),
-    ) {
-        let window = self.groups.window(group, &self.groups.weights);
-        let weights = |k: usize, at: usize| {
-            let (n, dn) = window.axis(k);
-            [n[at][lane], dn[at][lane]]
-        };
-        // Along an axis that does not exist N = 1.
-        let mut w = [[1.0, 0.0]; 3];
-        for z in 0..window.width[2] {
-            if D > 2 {
-                w[2] = weights(2, z);
-            }
-            for y in 0..window.width[1] {
-                if D > 1 {
-                    w[1] = weights(1, y);
-                }
-                let row = window.first + y * window.stride[0] + z * window.stride[1];
-                for x in 0..window.width[0] {
-                    w[0] = weights(0, x);
-                    let n: f64 = (0..D).map(|k| w[k][0]).product();
-                    let grad_n: Vector<f64, D> =
-                        Vector::from_fn(|k, _| (0..D).map(|m| w[m][usize::from(m == k)]).product());
-                    if n != 0.0 || grad_n.iter().any(|&g| g != 0.0) {
-                        visit(row + x, n, grad_n);
-                    }
-                }
-            }
         }
     }
 }

@@ -147,12 +147,13 @@ impl<const D: usize> Building<'_, D> {
         }
         groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
         groups.windows.push(group);
-        self.mark(&columns[..D], keys.len(), active);
+        self.mark(groups, &columns[..D], keys.len(), active);
         Ok(())
     }
 
-    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes.
-    fn mark(&self, columns: &[Columns], count: usize, active: &mut [u64]) {
+    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes of the last group.
+    fn mark(&self, groups: &Groups, columns: &[Columns], count: usize, active: &mut [u64]) {
+        let nx = self.size[0];
         for lane in 0..count {
             let (mut begin, mut end) = ([0; 3], [1; 3]);
             for k in 0..D {
@@ -160,29 +161,17 @@ impl<const D: usize> Building<'_, D> {
             }
             // No N vanishes, nor underflows: the whole of the particle's window.
             let whole = columns.iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
+            if !whole {
+                groups.entries::<D>(groups.len() - 1, lane, |place, _, _| active[place / nx] |= 1 << (place % nx));
+                continue;
+            }
             let row = ((1 << (end[0] - begin[0])) - 1) << begin[0];
             for z in begin[2]..end[2] {
                 for y in begin[1]..end[1] {
-                    active[z * self.size[1] + y] |=
-                        if whole { row } else { self.visible(columns, lane, [begin[0], y, z], end[0]) };
+                    active[z * self.size[1] + y] |= row;
                 }
             }
         }
-    }
-
-    /// The nodes of a row, from `at` to `end`, with N ≠ 0 or ∇N ≠ 0.
-    fn visible(&self, columns: &[Columns], lane: usize, at: [usize; 3], end: usize) -> u64 {
-        let mut bits = 0;
-        for x in at[0]..end {
-            let place = [x, at[1], at[2]];
-            let w: [[f64; 2]; D] = std::array::from_fn(|k| columns[k].at(lane, self.origin[k] + place[k] as u32));
-            let n: f64 = w.iter().map(|w| w[0]).product();
-            let slope = |k: usize| (0..D).map(|m| w[m][usize::from(m == k)]).product::<f64>();
-            if n != 0.0 || (0..D).any(|k| slope(k) != 0.0) {
-                bits |= 1 << x;
-            }
-        }
-        bits
     }
 }
 

@@ -106,8 +106,6 @@ struct Places<'a> {
 }
 
 impl WithLanes<f64> for Places<'_> {
-    type Output = ();
-
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, _: S) {
         let Self { axis, radius, along } = self;
@@ -163,12 +161,6 @@ impl Columns {
         }
     }
 
-    /// N and dN/dx of a node in a list.
-    pub(super) fn at(&self, lane: usize, node: u32) -> [f64; 2] {
-        let row = (i64::from(node) - self.first[lane]) as usize;
-        [self.values[row][lane], self.derivatives[row][lane]]
-    }
-
     /// Writes N and dN/dx of the first `count` lanes to the rows of the nodes `low ..`, which hold zeros.
     pub(super) fn write(&self, count: usize, low: u32, values: &mut [[f64; LANES]], derivatives: &mut [[f64; LANES]]) {
         // The same nodes in all lanes, as in one cell: whole rows.
@@ -220,8 +212,6 @@ struct Evaluate<'a, 'b, I, const M: usize> {
 }
 
 impl<I: Interior, const M: usize> WithLanes<f64> for Evaluate<'_, '_, I, M> {
-    type Output = ();
-
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, s: S) {
         let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;

@@ -3,7 +3,7 @@
 
 use super::block::Group;
 use super::blocks::{Quadratic, pair};
-use super::kernel::{At, Parts};
+use super::kernel::At;
 use super::lanes::LANES;
 use super::{Fill, Flow, Point, SupportError, Visit};
 use crate::approximation::{Scratch, ShapeFunction, Support};
@@ -12,6 +12,7 @@ use crate::nodes::Nodes;
 use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
+use num_traits::Zero;
 use std::ops::{AddAssign, Range};
 
 /// Particles of a block: enough to pay for a task, few enough to keep a block's nodes in cache.
@@ -82,11 +83,10 @@ impl<const D: usize> Plain<D> {
         self.blocks.iter().map(of_block).sum::<usize>() + size_of_val(self.particles.as_slice())
     }
 
-    pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
+    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
-        block
-            .entries(particle)
-            .map(move |e| (block.nodes[block.local[e] as usize] as usize, block.values[e], block.gradients[e]))
+        let node = |e: usize| block.nodes[block.local[e] as usize] as usize;
+        block.entries(particle).map(|e| (node(e), block.values[e], block.gradients[e])).collect()
     }
 
     /// The groups of a block.
@@ -104,70 +104,54 @@ impl<const D: usize> Plain<D> {
         point: &Point<'_, X, C, D>,
     ) {
         let numbers = fields * C;
-        let buffers = parallel::map(0..self.blocks.len(), |b| {
-            let block = &self.blocks[b];
-            let mut buffer = vec![X::zero(); block.nodes.len() * numbers];
-            for group in self.groups_of(b) {
-                let mut at = vec![At::<X, C, D>::zero(); fields];
-                let mut sums = at.clone();
-                if let Some(field) = field {
-                    block.gather(group, field, &mut at);
-                }
-                point(group, &at, &mut sums);
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    for e in block.entries(p as usize) {
-                        let (n, grad_n) = flow.weights.of(block.values[e], block.gradients[e]);
-                        let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
-                        for (f, sums) in sums.iter().enumerate() {
-                            for c in 0..C {
-                                let to = &mut buffer[block.local[e] as usize * numbers + f * C + c];
-                                if flow.scatter.value {
-                                    *to += sums.value[c][lane] * n;
-                                }
-                                for k in (0..D).filter(|_| flow.scatter.gradient) {
-                                    *to += sums.gradient[c][k][lane] * grad_n[k];
-                                }
-                            }
+        self.scatter(numbers, out, |block, group, buffer: &mut [X]| {
+            let mut at = vec![At::<X, C, D>::zero(); fields];
+            let mut sums = at.clone();
+            if let Some(field) = field {
+                block.gather(group, field, &mut at);
+            }
+            point(group, &at, &mut sums);
+            for (lane, e) in block.entries_of(group) {
+                let (n, grad_n) = flow.weights.of(block.values[e], block.gradients[e]);
+                let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
+                for (f, sums) in sums.iter().enumerate() {
+                    for c in 0..C {
+                        let to = &mut buffer[block.local[e] as usize * numbers + f * C + c];
+                        if flow.value {
+                            *to += sums.value[c][lane] * n;
+                        }
+                        for k in (0..D).filter(|_| flow.gradient) {
+                            *to += sums.gradient[c][k][lane] * grad_n[k];
                         }
                     }
                 }
             }
-            buffer
         });
-        self.add(&buffers, numbers, out);
     }
 
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
-        let buffers = parallel::map(0..self.blocks.len(), |b| {
-            let block = &self.blocks[b];
-            let mut buffer = vec![Tensor::<f64, D>::zeros(); block.nodes.len()];
-            for group in self.groups_of(b) {
-                let mut form = Quadratic::zero();
-                quadratic(group, &mut form);
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    for e in block.entries(p as usize) {
-                        let (n, grad_n) = (block.values[e], &block.gradients[e]);
-                        let sum = &mut buffer[block.local[e] as usize];
-                        *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
-                        for l in 0..D {
-                            for k in 0..=l {
-                                let of_pair = &form.bilinear[pair(k, l)];
-                                *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
-                            }
-                        }
+        self.scatter(1, out, |block, group, buffer: &mut [Tensor<f64, D>]| {
+            let mut form = Quadratic::zero();
+            quadratic(group, &mut form);
+            for (lane, e) in block.entries_of(group) {
+                let (n, grad_n) = (block.values[e], &block.gradients[e]);
+                let sum = &mut buffer[block.local[e] as usize];
+                *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
+                for l in 0..D {
+                    for k in 0..=l {
+                        let of_pair = &form.bilinear[pair(k, l)];
+                        *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
                     }
                 }
             }
-            buffer
         });
-        self.add(&buffers, 1, out);
     }
 
     pub(super) fn each<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
-        _: Parts,
+        _: Flow,
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
@@ -194,8 +178,18 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// Adds the buffers of the blocks, `numbers` numbers a node, in their order.
-    fn add<X: Copy + AddAssign>(&self, buffers: &[Vec<X>], numbers: usize, out: &mut [X]) {
+    /// `scatter(block, group, buffer)` of all groups, with a buffer of `numbers` numbers a node for each block; adds them in their order.
+    fn scatter<Y: Copy + Zero + AddAssign + Send>(
+        &self,
+        numbers: usize,
+        out: &mut [Y],
+        scatter: impl Fn(&Block<D>, Group<'_>, &mut [Y]) + Sync,
+    ) {
+        let buffers = parallel::map(0..self.blocks.len(), |b| {
+            let mut buffer = vec![Y::zero(); self.blocks[b].nodes.len() * numbers];
+            self.groups_of(b).for_each(|group| scatter(&self.blocks[b], group, &mut buffer));
+            buffer
+        });
         for (block, buffer) in self.blocks.iter().zip(buffers) {
             for (&node, sums) in block.nodes.iter().zip(buffer.chunks(numbers)) {
                 for (out, &sum) in out[node as usize * numbers..].iter_mut().zip(sums) {
@@ -242,20 +236,24 @@ impl<const D: usize> Block<D> {
         self.offsets[k] as usize..self.offsets[k + 1] as usize
     }
 
+    /// (lane, entry) of the particles of a group.
+    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, usize)> {
+        let lanes = group.particles.iter().enumerate();
+        lanes.flat_map(|(lane, &p)| self.entries(p as usize).map(move |e| (lane, e)))
+    }
+
     /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
     fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
         let numbers = at.len() * C;
-        for (lane, &p) in group.particles.iter().enumerate() {
-            for e in self.entries(p as usize) {
-                let node = self.nodes[self.local[e] as usize] as usize;
-                let (n, grad_n) = (X::lit(self.values[e]), self.gradients[e].map(X::lit));
-                for (f, at) in at.iter_mut().enumerate() {
-                    for c in 0..C {
-                        let u = field[node * numbers + f * C + c];
-                        at.value[c][lane] += u * n;
-                        for k in 0..D {
-                            at.gradient[c][k][lane] += u * grad_n[k];
-                        }
+        for (lane, e) in self.entries_of(group) {
+            let node = self.nodes[self.local[e] as usize] as usize;
+            let (n, grad_n) = (X::lit(self.values[e]), self.gradients[e].map(X::lit));
+            for (f, at) in at.iter_mut().enumerate() {
+                for c in 0..C {
+                    let u = field[node * numbers + f * C + c];
+                    at.value[c][lane] += u * n;
+                    for k in 0..D {
+                        at.gradient[c][k][lane] += u * grad_n[k];
                     }
                 }
             }
