@@ -1,6 +1,6 @@
 //! Everything that is written about a run, in one place.
 
-use super::files::TEMPORARY;
+use super::files::{Stream, TEMPORARY};
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
@@ -212,9 +212,7 @@ impl<const D: usize> Recorder<D> {
     /// The system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
-        let mut lengths = BTreeMap::from([self.history.mark()?, self.newton.mark()?]);
-        lengths.extend(self.reactions.as_mut().map(Reactions::mark).transpose()?);
-        lengths.extend(self.probes.as_mut().map(Probes::mark).transpose()?);
+        let lengths = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
         let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
         let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
         Ok(Mark { lengths, snapshots, watch, counts, seconds })
@@ -303,10 +301,14 @@ impl<const D: usize> Recorder<D> {
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {
-        self.history.flush()?;
-        self.newton.flush()?;
-        self.reactions.as_mut().map_or(Ok(()), Reactions::flush)?;
-        self.probes.as_mut().map_or(Ok(()), Probes::flush)
+        self.streams().try_for_each(Stream::flush)
+    }
+
+    /// All files that grow line by line.
+    fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
+        let reactions = self.reactions.as_mut().map(|reactions| &mut reactions.0.0);
+        let probes = self.probes.as_mut().map(|probes| &mut probes.table.0);
+        [&mut self.history.table.0, &mut self.newton.0].into_iter().chain(reactions).chain(probes)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::body::Body;
 use super::boundary::{Face, Table};
+use super::load::{self, Loaded};
 use super::particle_file::{self, ParticleFileError};
 use super::transfer::Transfer;
-use super::{Problems, Scene, load, scale, time};
+use super::{Problems, Scene, scale, time};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -307,17 +308,11 @@ impl Scene {
                 curve: curve("gravity.curve", gravity.curve.as_ref())?,
             });
         }
-        for axis in 0..D {
-            for upper in [false, true] {
-                let name = FACES[axis][usize::from(upper)];
-                let motion = self.boundary.face(axis, upper).motion::<D>(&format!("boundary.{name}"), axis)?;
-                if motion.iter().any(Option::is_some) {
-                    loads.prescribed.push(Prescribed {
-                        name: name.into(),
-                        on: Selection::Face { axis, upper },
-                        motion,
-                    });
-                }
+        for (k, (name, face)) in self.boundary.faces().into_iter().enumerate().take(2 * D) {
+            let (Some(face), axis, upper) = (face, k / 2, k % 2 == 1) else { continue };
+            let motion = face.motion::<D>(&format!("boundary.{name}"), axis)?;
+            if motion.iter().any(Option::is_some) {
+                loads.prescribed.push(Prescribed { name: name.into(), on: Selection::Face { axis, upper }, motion });
             }
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
@@ -333,17 +328,12 @@ impl Scene {
         for (i, traction) in self.tractions.iter().enumerate() {
             let path = format!("tractions[{i}]");
             let pressing = Pressing::Traction(vector(&format!("{path}.traction"), &traction.traction)?);
-            let curve = curve(&format!("{path}.curve"), traction.curve.as_ref())?;
-            let on = SurfaceOf { body: &traction.body, region: &traction.region, given: &traction.surface };
-            let points = self.surface(&path, &on, grid, particles)?;
-            loads.surface.push(SurfaceLoad { pressing, curve, points });
+            loads.surface.push(self.surface(&path, pressing, &traction.loaded(), grid, particles)?);
         }
         for (i, pressure) in self.pressures.iter().enumerate() {
+            let pressing = Pressing::Pressure(pressure.pressure);
             let path = format!("pressures[{i}]");
-            let curve = curve(&format!("{path}.curve"), pressure.curve.as_ref())?;
-            let on = SurfaceOf { body: &pressure.body, region: &pressure.region, given: &pressure.surface };
-            let points = self.surface(&path, &on, grid, particles)?;
-            loads.surface.push(SurfaceLoad { pressing: Pressing::Pressure(pressure.pressure), curve, points });
+            loads.surface.push(self.surface(&path, pressing, &pressure.loaded(), grid, particles)?);
         }
         Ok(loads)
     }
@@ -354,10 +344,12 @@ impl Scene {
     fn surface<const D: usize>(
         &self,
         path: &str,
-        on: &SurfaceOf<'_>,
+        pressing: Pressing<D>,
+        on: &Loaded<'_>,
         grid: &Grid<D>,
         particles: &Particles<D>,
-    ) -> Result<Vec<SurfacePoint<D>>, BuildError> {
+    ) -> Result<SurfaceLoad<D>, BuildError> {
+        let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
         let region = match on.region {
             Some(region) => Some(region.build::<D>().ok_or_else(|| dimension::<D>(path))?),
             None => None,
@@ -367,7 +359,7 @@ impl Scene {
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
         let spacing = grid.spacing / f64::from(body.particles_per_cell);
-        let given = match on.given {
+        let given = match on.surface {
             Some(given) => {
                 Some((vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize(), given.area))
             }
@@ -406,7 +398,7 @@ impl Scene {
         if points.is_empty() {
             return Err(BuildError::NoSurface { path: path.into(), body: on.body.into() });
         }
-        Ok(points)
+        Ok(SurfaceLoad { pressing, curve, points })
     }
 
     fn fill<const D: usize>(
@@ -434,7 +426,7 @@ impl Scene {
             let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
             let volume = (grid.spacing / f64::from(body.particles_per_cell)).powi(D as i32);
             let velocity = common.unwrap_or_else(Vector::zeros);
-            let positions = fill(grid, &shape, body.particles_per_cell, body.fill.into())
+            let positions = fill(grid, &shape, body.particles_per_cell, body.fill)
                 .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
             means.make_room(&path, particles, positions.len())?;
             for x in positions {
@@ -485,16 +477,6 @@ impl Scene {
             })
             .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })
     }
-}
-
-/// Names of the faces, lower and upper, along each axis.
-pub(super) const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
-
-/// Which surface a load acts on.
-struct SurfaceOf<'a> {
-    body: &'a str,
-    region: &'a Option<super::shape::Shape>,
-    given: &'a Option<load::Surface>,
 }
 
 impl Face {

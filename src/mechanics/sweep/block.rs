@@ -158,23 +158,6 @@ impl Block {
             + size_of_val(self.active.as_slice())
     }
 
-    /// Fills the box with `components` numbers a node, those from `at` on of the `numbers` numbers that `field` has; zero at nodes that
-    /// are not active.
-    pub(super) fn fill<X: Copy + num_traits::Zero>(
-        &self,
-        field: &[X],
-        numbers: usize,
-        at: usize,
-        components: usize,
-        nodal: &mut [X],
-    ) {
-        nodal.fill(X::zero());
-        for (&node, &place) in self.nodes.iter().zip(&self.places) {
-            let (to, from) = (place as usize * components, node as usize * numbers + at);
-            nodal[to..to + components].copy_from_slice(&field[from..from + components]);
-        }
-    }
-
     /// Calls `add(place in the box, node − first)` for the active nodes `first .. end`.
     pub(super) fn each_node(&self, first: usize, end: usize, mut add: impl FnMut(usize, usize)) {
         let place_of = |bound: usize| self.nodes.partition_point(|&node| (node as usize) < bound);

@@ -1,6 +1,6 @@
 //! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
 
-use super::kernel::{In, Pairs, Window, by_tile, tile};
+use super::kernel::{In, Pairs, Window, each_tile, tile};
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::Arithmetic;
 
@@ -47,12 +47,7 @@ impl<const D: usize> WithLanes<f64> for In<ScatterBlocks<'_>, D, D> {
         let at_once = S::ROWS;
         for chunk in 0..rows.div_ceil(at_once) {
             let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
-            let mut start = 0;
-            while start < window.width[0] {
-                let tile = tile(window.width[0] - start);
-                by_tile!(tile, blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
-                start += tile;
-            }
+            each_tile!(window, start => blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
         }
     }
 }

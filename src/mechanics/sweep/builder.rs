@@ -235,22 +235,6 @@ pub(super) fn number<const D: usize>(
     rows: &mut Vec<Row>,
     mut ids: Vec<u64>,
 ) -> Nodes {
-    /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
-    fn apart(mut line: &[Row]) -> Vec<&[Row]> {
-        let mut parts = Vec::new();
-        while let Some(first) = line.first() {
-            let mut reach = first.x;
-            let gap = line.iter().position(|row| {
-                let beyond = row.x > reach;
-                reach = reach.max(row.end());
-                beyond
-            });
-            let (part, rest) = line.split_at(gap.unwrap_or(line.len()));
-            parts.push(part);
-            line = rest;
-        }
-        parts
-    }
     rows.clear();
     rows.reserve(blocks.iter().map(|block| block.active.len()).sum());
     for (b, block) in blocks.iter().enumerate() {
@@ -268,7 +252,15 @@ pub(super) fn number<const D: usize>(
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
     ids.clear();
     let mut numbers: Vec<u32> = Vec::new();
-    for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {
+    // The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
+    let mut reach = 0;
+    let together = |row: &Row, next: &Row| {
+        reach = row.end().max(reach);
+        let together = next.start == row.start && next.x <= reach;
+        reach = if together { reach } else { 0 };
+        together
+    };
+    for same in rows.chunk_by(together) {
         let low = same[0].x;
         numbers.clear();
         for row in same {

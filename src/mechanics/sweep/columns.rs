@@ -154,10 +154,9 @@ impl Columns {
         self.first[lane] = i64::from(list.first);
         self.spans[lane] = span(list);
         self.smallest[lane] = list.values.iter().fold(f64::INFINITY, |low, n| low.min(n.abs()));
-        let nodes =
-            list.values.iter().zip(&list.derivatives).map(|(&n, &dn)| (n, dn)).chain(std::iter::repeat((0.0, 0.0)));
-        for ((n, dn), (values, derivatives)) in nodes.zip(self.values.iter_mut().zip(&mut self.derivatives)) {
-            (values[lane], derivatives[lane]) = (n, dn);
+        for row in 0..WIDEST {
+            self.values[row][lane] = list.values.get(row).copied().unwrap_or(0.0);
+            self.derivatives[row][lane] = list.derivatives.get(row).copied().unwrap_or(0.0);
         }
     }
 

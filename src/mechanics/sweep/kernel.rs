@@ -63,22 +63,28 @@ pub(super) fn tile(left: usize) -> usize {
     if left <= WIDEST_TILE { left } else { left.div_ceil(2).min(WIDEST_TILE - 1) }
 }
 
-/// Calls a function of the width of a tile: compiled for every width, or once for all where the lanes are rare.
-macro_rules! by_tile {
-    ($tile:expr, $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
-        match $tile {
-            tile if $lanes::RARE => $function::<$lanes, $($generic,)* 6>($($argument,)* tile),
-            1 => $function::<$lanes, $($generic,)* 1>($($argument,)* 1),
-            2 => $function::<$lanes, $($generic,)* 2>($($argument,)* 2),
-            3 => $function::<$lanes, $($generic,)* 3>($($argument,)* 3),
-            4 => $function::<$lanes, $($generic,)* 4>($($argument,)* 4),
-            5 => $function::<$lanes, $($generic,)* 5>($($argument,)* 5),
-            _ => $function::<$lanes, $($generic,)* 6>($($argument,)* 6),
+/// Calls a function for every tile of a window, from `start` on and as wide as the last argument says: compiled for every width, or
+/// once for all where the lanes are rare.
+macro_rules! each_tile {
+    ($window:ident, $start:ident => $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
+        let mut $start = 0;
+        while $start < $window.width[0] {
+            let tile = tile($window.width[0] - $start);
+            match tile {
+                tile if $lanes::RARE => $function::<$lanes, $($generic,)* 6>($($argument,)* tile),
+                1 => $function::<$lanes, $($generic,)* 1>($($argument,)* 1),
+                2 => $function::<$lanes, $($generic,)* 2>($($argument,)* 2),
+                3 => $function::<$lanes, $($generic,)* 3>($($argument,)* 3),
+                4 => $function::<$lanes, $($generic,)* 4>($($argument,)* 4),
+                5 => $function::<$lanes, $($generic,)* 5>($($argument,)* 5),
+                _ => $function::<$lanes, $($generic,)* 6>($($argument,)* 6),
+            }
+            $start += tile;
         }
     };
 }
 
-pub(super) use by_tile;
+pub(super) use each_tile;
 
 /// Work on C components in D dimensions.
 pub(super) struct In<W, const C: usize, const D: usize>(pub W);
@@ -97,12 +103,7 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Gather<'_, X>,
     fn run<S: Lanes<X = X>>(self, s: S) {
         let Gather { window, nodal, flow, value, gradient } = self.0;
         let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
-        let mut start = 0;
-        while start < window.width[0] {
-            let tile = tile(window.width[0] - start);
-            by_tile!(tile, gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
-            start += tile;
-        }
+        each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
         // Loops, not closures: what is not inlined loses the wide instructions.
         if flow.value {
             for (c, row) in value.iter_mut().enumerate().take(C) {
@@ -242,12 +243,7 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Scatter<'_, X>
         let at_once = S::ROWS;
         for chunk in 0..rows.div_ceil(at_once) {
             let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
-            let mut start = 0;
-            while start < window.width[0] {
-                let tile = tile(window.width[0] - start);
-                by_tile!(tile, scatter_tile::<S, C, D>(s, &window, start, &pairs, flow, value, gradient, out));
-                start += tile;
-            }
+            each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, flow, value, gradient, out));
         }
     }
 }

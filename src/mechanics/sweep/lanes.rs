@@ -239,31 +239,22 @@ mod x86 {
         #[inline(always)]
         fn transpose_f64s(self, rows: &mut [f64x8]) {
             let x = self.avx512f;
-            let &mut [r0, r1, r2, r3, r4, r5, r6, r7] = rows else { return };
-            // Two rows interleaved: columns (0, 2, 4, 6) or (1, 3, 5, 7) of both, two numbers a quarter.
-            let e0 = x._mm512_unpacklo_pd(cast(r0), cast(r1));
-            let o0 = x._mm512_unpackhi_pd(cast(r0), cast(r1));
-            let e1 = x._mm512_unpacklo_pd(cast(r2), cast(r3));
-            let o1 = x._mm512_unpackhi_pd(cast(r2), cast(r3));
-            let e2 = x._mm512_unpacklo_pd(cast(r4), cast(r5));
-            let o2 = x._mm512_unpackhi_pd(cast(r4), cast(r5));
-            let e3 = x._mm512_unpacklo_pd(cast(r6), cast(r7));
-            let o3 = x._mm512_unpackhi_pd(cast(r6), cast(r7));
-            // Then quarters.
-            let (a, b) = (x._mm512_shuffle_f64x2::<EVEN>(e0, e1), x._mm512_shuffle_f64x2::<ODD>(e0, e1));
-            let (c, d) = (x._mm512_shuffle_f64x2::<EVEN>(e2, e3), x._mm512_shuffle_f64x2::<ODD>(e2, e3));
-            let (e, f) = (x._mm512_shuffle_f64x2::<EVEN>(o0, o1), x._mm512_shuffle_f64x2::<ODD>(o0, o1));
-            let (g, h) = (x._mm512_shuffle_f64x2::<EVEN>(o2, o3), x._mm512_shuffle_f64x2::<ODD>(o2, o3));
-            rows.copy_from_slice(&[
-                cast(x._mm512_shuffle_f64x2::<EVEN>(a, c)),
-                cast(x._mm512_shuffle_f64x2::<EVEN>(e, g)),
-                cast(x._mm512_shuffle_f64x2::<EVEN>(b, d)),
-                cast(x._mm512_shuffle_f64x2::<EVEN>(f, h)),
-                cast(x._mm512_shuffle_f64x2::<ODD>(a, c)),
-                cast(x._mm512_shuffle_f64x2::<ODD>(e, g)),
-                cast(x._mm512_shuffle_f64x2::<ODD>(b, d)),
-                cast(x._mm512_shuffle_f64x2::<ODD>(f, h)),
-            ]);
+            // Two rows interleaved: columns (0, 2, 4, 6) and (1, 3, 5, 7) of both, two numbers a quarter; then quarters.
+            let mut two = [[x._mm512_setzero_pd(); 4]; 2];
+            for i in 0..4 {
+                two[0][i] = x._mm512_unpacklo_pd(cast(rows[2 * i]), cast(rows[2 * i + 1]));
+                two[1][i] = x._mm512_unpackhi_pd(cast(rows[2 * i]), cast(rows[2 * i + 1]));
+            }
+            for (k, two) in two.into_iter().enumerate() {
+                let (a, b) =
+                    (x._mm512_shuffle_f64x2::<EVEN>(two[0], two[1]), x._mm512_shuffle_f64x2::<ODD>(two[0], two[1]));
+                let (c, d) =
+                    (x._mm512_shuffle_f64x2::<EVEN>(two[2], two[3]), x._mm512_shuffle_f64x2::<ODD>(two[2], two[3]));
+                rows[k] = cast(x._mm512_shuffle_f64x2::<EVEN>(a, c));
+                rows[2 + k] = cast(x._mm512_shuffle_f64x2::<EVEN>(b, d));
+                rows[4 + k] = cast(x._mm512_shuffle_f64x2::<ODD>(a, c));
+                rows[6 + k] = cast(x._mm512_shuffle_f64x2::<ODD>(b, d));
+            }
         }
     }
 }

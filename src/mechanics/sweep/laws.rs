@@ -265,19 +265,14 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedR
 
 /// What is evaluated of a law in every lane.
 #[derive(Clone, Copy)]
-enum What {
+pub(super) enum What {
     Stresses,
     Tangents { form: Form, factor: f64 },
 }
 
-/// The loop of a shipped law's stresses.
-pub(super) fn shipped_stresses(law: &Material, dimension: usize) -> Box<Loop<'static, f64>> {
-    shipped(law, dimension, What::Stresses)
-}
-
 /// A loop of a shipped law. Not generic, so that it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
+pub(super) fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
     law.with(Choose { dimension, what })
 }
 

@@ -182,10 +182,6 @@ impl Weights {
             Self::Square => Some(|n| n * n),
         }
     }
-
-    fn of<const D: usize>(self, n: f64, grad_n: Vector<f64, D>) -> (f64, Vector<f64, D>) {
-        self.changed().map_or((n, grad_n), |changed| (changed(n), grad_n.map(changed)))
-    }
 }
 
 /// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.
@@ -201,15 +197,6 @@ pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, 
 pub(crate) type Linear<'a, X, const D: usize> = dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a;
 
 impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
-    fn clear(&mut self, flow: Flow) {
-        if flow.value {
-            self.value = [[X::zero(); LANES]; C];
-        }
-        if flow.gradient {
-            self.gradient = [[[X::zero(); LANES]; D]; C];
-        }
-    }
-
     /// u and L of one particle.
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> (Vector<X, C>, nalgebra::SMatrix<X, C, D>) {

@@ -2,7 +2,7 @@
 
 use super::kernel::At;
 use super::lanes::LANES;
-use super::laws::{Loop, shipped_stresses};
+use super::laws::{Loop, What, shipped};
 use crate::material::Material;
 use crate::scalar::Real;
 use crate::tensor::Vector;
@@ -102,7 +102,7 @@ impl Number for f64 {
     }
 
     fn stresses_of(law: &Material, dimension: usize) -> Option<Box<Loop<'static, Self>>> {
-        Some(shipped_stresses(law, dimension))
+        Some(shipped(law, dimension, What::Stresses))
     }
 
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {

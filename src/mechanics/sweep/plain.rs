@@ -29,7 +29,10 @@ pub(super) struct Plain<const D: usize> {
     particles: Vec<u32>,
 }
 
-/// The entries (node, N, ∇_n N) of consecutive particles; `local` refers to the block's own list of nodes.
+/// A node, by its place in the block's own list, N and ∇_n N.
+type Entry<const D: usize> = (u32, f64, Vector<f64, D>);
+
+/// The entries of consecutive particles.
 #[derive(Clone, Debug)]
 struct Block<const D: usize> {
     particles: Range<usize>,
@@ -37,9 +40,7 @@ struct Block<const D: usize> {
     nodes: Vec<u32>,
     /// Start of each particle's entries, and the end of the last one's.
     offsets: Vec<u32>,
-    local: Vec<u32>,
-    values: Vec<f64>,
-    gradients: Vec<Vector<f64, D>>,
+    entries: Vec<Entry<D>>,
 }
 
 impl<const D: usize> Plain<D> {
@@ -76,17 +77,16 @@ impl<const D: usize> Plain<D> {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let entry = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
         let of_block = |block: &Block<D>| {
-            block.values.len() * entry + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
+            size_of_val(block.entries.as_slice()) + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
         };
         self.blocks.iter().map(of_block).sum::<usize>() + size_of_val(self.particles.as_slice())
     }
 
     pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
-        let node = |e: usize| block.nodes[block.local[e] as usize] as usize;
-        block.entries(particle).map(|e| (node(e), block.values[e], block.gradients[e])).collect()
+        let entries = block.entries(particle).iter();
+        entries.map(|&(place, n, grad_n)| (block.nodes[place as usize] as usize, n, grad_n)).collect()
     }
 
     /// The groups of a block.
@@ -111,12 +111,12 @@ impl<const D: usize> Plain<D> {
                 block.gather(group, field, &mut at);
             }
             point(group, &at, &mut sums);
-            for (lane, e) in block.entries_of(group) {
-                let (n, grad_n) = flow.weights.of(block.values[e], block.gradients[e]);
-                let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
+            for (lane, &(place, n, grad_n)) in block.entries_of(group) {
+                let changed = flow.weights.changed().unwrap_or(|n| n);
+                let (n, grad_n) = (X::lit(changed(n)), grad_n.map(|n| X::lit(changed(n))));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
-                        let to = &mut buffer[block.local[e] as usize * numbers + f * C + c];
+                        let to = &mut buffer[place as usize * numbers + f * C + c];
                         if flow.value {
                             *to += sums.value[c][lane] * n;
                         }
@@ -133,9 +133,8 @@ impl<const D: usize> Plain<D> {
         self.scatter(1, out, |block, group, buffer: &mut [Tensor<f64, D>]| {
             let mut form = Quadratic::zero();
             quadratic(group, &mut form);
-            for (lane, e) in block.entries_of(group) {
-                let (n, grad_n) = (block.values[e], &block.gradients[e]);
-                let sum = &mut buffer[block.local[e] as usize];
+            for (lane, &(place, n, grad_n)) in block.entries_of(group) {
+                let sum = &mut buffer[place as usize];
                 *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
                 for l in 0..D {
                     for k in 0..=l {
@@ -201,7 +200,7 @@ impl<const D: usize> Plain<D> {
 }
 
 impl<const D: usize> Block<D> {
-    /// The block with an empty node list, and the grid numbers that `local` refers to.
+    /// The block with an empty node list, and the grid numbers of its nodes.
     ///
     /// # Errors
     /// The first particle that has no support.
@@ -213,41 +212,41 @@ impl<const D: usize> Block<D> {
     ) -> Result<(Self, Vec<u64>), SupportError> {
         let mut scratch = Scratch::default();
         let mut support = Support::default();
-        let (mut offsets, mut ids) = (vec![0], Vec::new());
-        let (mut values, mut gradients) = (Vec::new(), Vec::new());
+        let (mut offsets, mut found) = (vec![0], Vec::new());
         for particle in particles.clone() {
             approximation
                 .evaluate(grid, &positions[particle], &mut scratch, &mut support)
                 .map_err(|source| SupportError { particle, source })?;
-            ids.extend(support.nodes.iter().map(|&index| grid.id(index)));
-            values.extend_from_slice(&support.values);
-            gradients.extend(support.gradients.iter().map(|&gradient| Vector::from(gradient)));
-            offsets.push(ids.len() as u32);
+            let slopes = support.gradients.iter().map(|&gradient| Vector::from(gradient));
+            let entries = support.nodes.iter().zip(&support.values).zip(slopes);
+            found.extend(entries.map(|((&index, &n), grad_n)| (grid.id(index), n, grad_n)));
+            offsets.push(found.len() as u32);
         }
-        let mut unique = ids.clone();
-        unique.sort_unstable();
-        unique.dedup();
-        let local = ids.iter().filter_map(|id| unique.binary_search(id).ok()).map(|place| place as u32).collect();
-        Ok((Self { particles, nodes: Vec::new(), offsets, local, values, gradients }, unique))
+        let mut ids: Vec<u64> = found.iter().map(|entry| entry.0).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        let place = |id: u64| ids.partition_point(|&before| before < id) as u32;
+        let entries = found.into_iter().map(|(id, n, grad_n)| (place(id), n, grad_n)).collect();
+        Ok((Self { particles, nodes: Vec::new(), offsets, entries }, ids))
     }
 
-    fn entries(&self, particle: usize) -> Range<usize> {
+    fn entries(&self, particle: usize) -> &[Entry<D>] {
         let k = particle - self.particles.start;
-        self.offsets[k] as usize..self.offsets[k + 1] as usize
+        &self.entries[self.offsets[k] as usize..self.offsets[k + 1] as usize]
     }
 
     /// (lane, entry) of the particles of a group.
-    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, usize)> {
+    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, &Entry<D>)> {
         let lanes = group.particles.iter().enumerate();
-        lanes.flat_map(|(lane, &p)| self.entries(p as usize).map(move |e| (lane, e)))
+        lanes.flat_map(|(lane, &p)| self.entries(p as usize).iter().map(move |entry| (lane, entry)))
     }
 
     /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
     fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
         let numbers = at.len() * C;
-        for (lane, e) in self.entries_of(group) {
-            let node = self.nodes[self.local[e] as usize] as usize;
-            let (n, grad_n) = (X::lit(self.values[e]), self.gradients[e].map(X::lit));
+        for (lane, &(place, n, grad_n)) in self.entries_of(group) {
+            let node = self.nodes[place as usize] as usize;
+            let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
             for (f, at) in at.iter_mut().enumerate() {
                 for c in 0..C {
                     let u = field[node * numbers + f * C + c];

@@ -59,10 +59,7 @@ impl<const D: usize> Tiled<D> {
         parallel::for_each_with(blocks.iter_mut().zip(runs()), |scratch, (place, keys)| {
             match block(family, grid, positions, keys, single, std::mem::take(place), scratch) {
                 Ok(built) => *place = built,
-                Err(error) => {
-                    let particle = keys[0].particle as usize;
-                    failed.keep(particle, (particle, error));
-                }
+                Err(error) => failed.keep(keys[0].particle as usize, (keys[0].particle as usize, error)),
             }
         });
         failed.check().map_err(|(particle, error)| failure(particle, error))?;

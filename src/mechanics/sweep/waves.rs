@@ -51,20 +51,15 @@ impl<const D: usize> Tiled<D> {
             let Scratch { nodal, at, sums, weights } = scratch;
             at.resize(fields, At::zero());
             sums.resize(fields, At::zero());
-            let boxed = block.box_nodes() * C;
             if let Some(field) = field {
                 gather_boxes::<X, C>(block, field, fields, nodal);
             }
             for group in 0..block.groups.len() {
                 let mut window = block.groups.window(group, X::weights(&block.groups));
                 if field.is_some() {
-                    for (at, nodal) in at.iter_mut().zip(nodal.chunks(boxed)) {
-                        let At { value, gradient } = at;
-                        let gradient = gradient.as_flattened_mut();
-                        X::gather(C, Gather { window, nodal, flow, value, gradient });
-                    }
+                    gather(window, nodal, flow, at);
                 }
-                sums.iter_mut().for_each(|sums| sums.clear(flow));
+                sums.fill(At::zero());
                 point(block.groups.group(group), at, sums);
                 if let Some(changed) = flow.weights.changed() {
                     weights.clear();
@@ -224,12 +219,28 @@ struct Scratch<X, const C: usize, const D: usize> {
     weights: Vec<[X; LANES]>,
 }
 
-/// The boxes of the fields, one after the other.
+/// The boxes of the fields, one after the other; zero at nodes that are not active.
 fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
     let boxed = block.box_nodes() * C;
+    nodal.clear();
     nodal.resize(fields * boxed, X::zero());
     for (f, nodal) in nodal.chunks_mut(boxed).enumerate() {
-        block.fill(field, fields * C, f * C, C, nodal);
+        for (&node, &place) in block.nodes.iter().zip(&block.places) {
+            let (to, from) = (place as usize * C, (node as usize * fields + f) * C);
+            nodal[to..to + C].copy_from_slice(&field[from..from + C]);
+        }
+    }
+}
+
+/// Gathers a group from the boxes of the fields.
+fn gather<X: Laned, const C: usize, const D: usize>(
+    window: Window<'_, X>,
+    nodal: &[X],
+    flow: Flow,
+    at: &mut [At<X, C, D>],
+) {
+    for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
+        X::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
     }
 }
 
@@ -245,11 +256,7 @@ fn gathered<const C: usize, const D: usize>(
     gather_boxes::<f64, C>(block, field, fields, nodal);
     at.resize(fields, At::zero());
     for group in 0..block.groups.len() {
-        let window = block.groups.window(group, &block.groups.weights);
-        for (at, nodal) in at.iter_mut().zip(nodal.chunks(block.box_nodes() * C)) {
-            let At { value, gradient } = at;
-            f64::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
-        }
+        gather(block.groups.window(group, &block.groups.weights), nodal, flow, at);
         visit(block.groups.group(group), at);
     }
 }

@@ -88,7 +88,6 @@ const DIAGONAL: &str = "src/mechanics/sweep/blocks.rs";
 const FROZEN: &str = "src/mechanics/sweep/tangents.rs";
 const IN_LANES: &str = "src/mechanics/sweep/laws.rs";
 const WAVES: &str = "src/mechanics/sweep/waves.rs";
-const BOXES: &str = "src/mechanics/sweep/block.rs";
 const BUILDER: &str = "src/mechanics/sweep/builder.rs";
 const PLAIN: &str = "src/mechanics/sweep/plain.rs";
 const NEWMARK: &str = "src/mechanics/time.rs";
@@ -354,9 +353,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "node * numbers + f * C",
         "node * numbers + (fields - 1 - f) * C",
         Killed(&[TANGENT, DYNAMICS], &[OPERATOR])),
-    patch("components beside each other read from the first field", BOXES,
-        "node as usize * numbers + at",
-        "node as usize * numbers",
+    patch("components beside each other read from the first field", WAVES,
+        "(node as usize * fields + f) * C",
+        "node as usize * fields * C",
         Killed(&[TANGENT, DYNAMICS], &[OPERATOR])),
     patch("slopes in single precision not in units of 1/h", BUILDER,
         "(dn * h) as f32",
