@@ -173,24 +173,19 @@ impl<const D: usize> Recorder<D> {
         // A file that the mark does not know begins anew.
         let kept = |name: &str| mark.and_then(|mark| mark.lengths.get(name).copied());
         let loads = &simulation.loads;
+        let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
         let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
         Ok(Self {
             history: History::open(at("history.csv"), D, simulation.loads.damping.is_some(), kept("history.csv"))?,
-            reactions: match loads.prescribed.is_empty() {
-                true => None,
-                false => Some(Reactions::open(at("reactions.csv"), loads, kept("reactions.csv"))?),
-            },
-            probes: match probes.is_empty() {
-                true => None,
-                false => Some(Probes::open(at("probes.csv"), probes, kept("probes.csv"))?),
-            },
-            snapshots: match snapshot_every {
-                None => None,
-                Some(every) => {
-                    let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-                    Some(Snapshots::new(directory.clone(), &fields, every, snapshots)?)
-                }
-            },
+            reactions: (!loads.prescribed.is_empty())
+                .then(|| Reactions::open(at("reactions.csv"), loads, kept("reactions.csv")))
+                .transpose()?,
+            probes: (!probes.is_empty())
+                .then(|| Probes::open(at("probes.csv"), probes, kept("probes.csv")))
+                .transpose()?,
+            snapshots: snapshot_every
+                .map(|every| Snapshots::new(directory.clone(), &fields, every, snapshots))
+                .transpose()?,
             newton: NewtonLog::open(at("newton.jsonl"), kept("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, audience),
             watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),

@@ -119,23 +119,15 @@ pub enum BuildError {
         /// The most allowed.
         most: f64,
     },
-    /// Velocities from a file and from `initial_velocity`.
-    #[error(
-        "{path}: {file} gives velocities, and so does initial_velocity; remove its columns vx, … or the key initial_velocity"
-    )]
-    TwoVelocities {
+    /// Velocities from a file that something else forbids.
+    #[error("{path}: {file} gives velocities, and {why}")]
+    Velocities {
         /// The key.
         path: String,
         /// The file.
         file: String,
-    },
-    /// Velocities from a file, and no inertia.
-    #[error("{path}: {file} gives velocities, and time.inertia is \"none\"; remove its columns vx, … or that key")]
-    VelocityWithoutInertia {
-        /// The key.
-        path: String,
-        /// The file.
-        file: String,
+        /// What forbids them, and what to remove.
+        why: &'static str,
     },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
@@ -350,21 +342,15 @@ impl Scene {
         particles: &Particles<D>,
     ) -> Result<SurfaceLoad<D>, BuildError> {
         let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
-        let region = match on.region {
-            Some(region) => Some(region.build::<D>().ok_or_else(|| dimension::<D>(path))?),
-            None => None,
-        };
+        let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| dimension::<D>(path));
+        let region = on.region.as_ref().map(built).transpose()?;
         let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
             return Err(dimension::<D>(path));
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
         let spacing = grid.spacing / f64::from(body.particles_per_cell);
-        let given = match on.surface {
-            Some(given) => {
-                Some((vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize(), given.area))
-            }
-            None => None,
-        };
+        let normal = |given: &load::Surface| vector::<D>(&format!("{path}.surface.normal"), &given.normal);
+        let given = on.surface.as_ref().map(|given| Ok((normal(given)?.normalize(), given.area))).transpose()?;
         let mut points = Vec::new();
         for particle in 0..particles.len() {
             if particles.body[particle] as usize != number {
@@ -417,10 +403,7 @@ impl Scene {
                 time::Inertia::None => particles.push_without_inertia(x, volume, mass, number),
             }
         };
-        let common = match &body.velocity {
-            Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
-            None => None,
-        };
+        let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
             let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
@@ -441,11 +424,15 @@ impl Scene {
                 source: Box::new(source),
             })?;
             if read.velocities.is_some() {
-                let file = place.display().to_string();
-                match self.time.inertia {
-                    time::Inertia::None => return Err(BuildError::VelocityWithoutInertia { path, file }),
-                    _ if self.initial_velocity.is_some() => return Err(BuildError::TwoVelocities { path, file }),
-                    time::Inertia::Newmark => {}
+                let why = match self.time.inertia {
+                    time::Inertia::None => Some("time.inertia is \"none\"; remove its columns vx, … or that key"),
+                    time::Inertia::Newmark => self
+                        .initial_velocity
+                        .as_ref()
+                        .map(|_| "so does initial_velocity; remove its columns vx, … or the key initial_velocity"),
+                };
+                if let Some(why) = why {
+                    return Err(BuildError::Velocities { path, file: place.display().to_string(), why });
                 }
             }
             means.make_room(&path, particles, read.positions.len())?;

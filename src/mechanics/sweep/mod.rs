@@ -289,10 +289,8 @@ impl<const D: usize> Supports<D> {
                 Ok((Self::of_way(Way::Tiled(tiled), &nodes, single.then_some(grid.spacing), pool), nodes))
             }
             _ => {
-                let by_id = |SupportError { particle, source }| SupportError {
-                    particle: ids.map_or(particle, |ids| ids[particle] as usize),
-                    source,
-                };
+                let id = |particle: usize| ids.map_or(particle, |ids| ids[particle] as usize);
+                let by_id = |error: SupportError| SupportError { particle: id(error.particle), ..error };
                 let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
                 Ok((Self::of_way(Way::Plain(plain), &nodes, None, pool), nodes))
             }

@@ -29,10 +29,7 @@ pub(super) struct Plain<const D: usize> {
     particles: Vec<u32>,
 }
 
-/// A node, by its place in the block's own list, N and ∇_n N.
-type Entry<const D: usize> = (u32, f64, Vector<f64, D>);
-
-/// The entries of consecutive particles.
+/// The entries (node, N, ∇_n N) of consecutive particles; nodes by their places in the block's own list.
 #[derive(Clone, Debug)]
 struct Block<const D: usize> {
     particles: Range<usize>,
@@ -40,7 +37,8 @@ struct Block<const D: usize> {
     nodes: Vec<u32>,
     /// Start of each particle's entries, and the end of the last one's.
     offsets: Vec<u32>,
-    entries: Vec<Entry<D>>,
+    places: Vec<u32>,
+    weights: Vec<(f64, Vector<f64, D>)>,
 }
 
 impl<const D: usize> Plain<D> {
@@ -50,13 +48,12 @@ impl<const D: usize> Plain<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let count = positions.len().div_ceil(BLOCK);
-        let built: Result<Vec<_>, _> = parallel::map(0..count, |b| {
+        let built = parallel::map(0..count, |b| {
             let particles = b * BLOCK..((b + 1) * BLOCK).min(positions.len());
             Block::new(approximation, grid, positions, particles)
         })
         .into_iter()
-        .collect();
-        let built = built?;
+        .collect::<Result<Vec<_>, _>>()?;
         let nodes = Nodes::new(built.iter().map(|(_, ids)| ids.as_slice()));
         let blocks = built
             .into_iter()
@@ -78,15 +75,15 @@ impl<const D: usize> Plain<D> {
 
     pub(super) fn bytes(&self) -> usize {
         let of_block = |block: &Block<D>| {
-            size_of_val(block.entries.as_slice()) + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
+            let numbers = block.places.len() + block.nodes.len() + block.offsets.len();
+            size_of_val(block.weights.as_slice()) + numbers * size_of::<u32>()
         };
         self.blocks.iter().map(of_block).sum::<usize>() + size_of_val(self.particles.as_slice())
     }
 
     pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
-        let entries = block.entries(particle).iter();
-        entries.map(|&(place, n, grad_n)| (block.nodes[place as usize] as usize, n, grad_n)).collect()
+        block.entries(particle).map(|(place, n, grad_n)| (block.nodes[place] as usize, n, grad_n)).collect()
     }
 
     /// The groups of a block.
@@ -111,12 +108,12 @@ impl<const D: usize> Plain<D> {
                 block.gather(group, field, &mut at);
             }
             point(group, &at, &mut sums);
-            for (lane, &(place, n, grad_n)) in block.entries_of(group) {
+            for (lane, (place, n, grad_n)) in block.entries_of(group) {
                 let changed = flow.weights.changed().unwrap_or(|n| n);
                 let (n, grad_n) = (X::lit(changed(n)), grad_n.map(|n| X::lit(changed(n))));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
-                        let to = &mut buffer[place as usize * numbers + f * C + c];
+                        let to = &mut buffer[place * numbers + f * C + c];
                         if flow.value {
                             *to += sums.value[c][lane] * n;
                         }
@@ -133,8 +130,8 @@ impl<const D: usize> Plain<D> {
         self.scatter(1, out, |block, group, buffer: &mut [Tensor<f64, D>]| {
             let mut form = Quadratic::zero();
             quadratic(group, &mut form);
-            for (lane, &(place, n, grad_n)) in block.entries_of(group) {
-                let sum = &mut buffer[place as usize];
+            for (lane, (place, n, grad_n)) in block.entries_of(group) {
+                let sum = &mut buffer[place];
                 *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
                 for l in 0..D {
                     for k in 0..=l {
@@ -226,26 +223,29 @@ impl<const D: usize> Block<D> {
         ids.sort_unstable();
         ids.dedup();
         let place = |id: u64| ids.partition_point(|&before| before < id) as u32;
-        let entries = found.into_iter().map(|(id, n, grad_n)| (place(id), n, grad_n)).collect();
-        Ok((Self { particles, nodes: Vec::new(), offsets, entries }, ids))
+        let (places, weights) = found.into_iter().map(|(id, n, grad_n)| (place(id), (n, grad_n))).unzip();
+        Ok((Self { particles, nodes: Vec::new(), offsets, places, weights }, ids))
     }
 
-    fn entries(&self, particle: usize) -> &[Entry<D>] {
+    /// (place, N, ∇_n N) of a particle.
+    fn entries(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let k = particle - self.particles.start;
-        &self.entries[self.offsets[k] as usize..self.offsets[k + 1] as usize]
+        let range = self.offsets[k] as usize..self.offsets[k + 1] as usize;
+        let both = self.places[range.clone()].iter().zip(&self.weights[range]);
+        both.map(|(&place, &(n, grad_n))| (place as usize, n, grad_n))
     }
 
     /// (lane, entry) of the particles of a group.
-    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, &Entry<D>)> {
+    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, (usize, f64, Vector<f64, D>))> {
         let lanes = group.particles.iter().enumerate();
-        lanes.flat_map(|(lane, &p)| self.entries(p as usize).iter().map(move |entry| (lane, entry)))
+        lanes.flat_map(|(lane, &p)| self.entries(p as usize).map(move |entry| (lane, entry)))
     }
 
     /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
     fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
         let numbers = at.len() * C;
-        for (lane, &(place, n, grad_n)) in self.entries_of(group) {
-            let node = self.nodes[place as usize] as usize;
+        for (lane, (place, n, grad_n)) in self.entries_of(group) {
+            let node = self.nodes[place] as usize;
             let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
             for (f, at) in at.iter_mut().enumerate() {
                 for c in 0..C {
