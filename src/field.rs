@@ -3,41 +3,78 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A quantity that every particle has.
-///
-/// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing
-/// components of displacement, velocity and strain are 0, and the out-of-plane normal stress is that of plane (uniaxial) strain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Field {
+/// Declares the fields, each with its sentence, its name in scenes and files, and its kind.
+macro_rules! fields {
+    ($($(#[$sentence:meta])+ $name:literal => $field:ident: $kind:ident;)+) => {
+        /// A quantity that every particle has.
+        ///
+        /// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing
+        /// components of displacement, velocity and strain are 0, and the out-of-plane normal stress is that of plane (uniaxial) strain.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+        pub enum Field {
+            $($(#[$sentence])+ #[serde(rename = $name)] $field),+
+        }
+
+        impl Field {
+            /// The name, as in scenes and files.
+            ///
+            /// ```
+            /// use bfree::field::Field;
+            ///
+            /// // One name, in scenes and in files.
+            /// let read: Field = serde_json::from_str(r#""von_mises""#)?;
+            /// assert_eq!(read, Field::VonMises);
+            /// assert_eq!(read.name(), "von_mises");
+            /// # Ok::<(), serde_json::Error>(())
+            /// ```
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$field => $name),+ }
+            }
+
+            /// What its components are.
+            ///
+            /// ```
+            /// use bfree::field::{Field, Kind};
+            ///
+            /// // F is not symmetric, E is.
+            /// assert_eq!((Field::DeformationGradient.kind(), Field::Strain.kind()), (Kind::Tensor, Kind::Symmetric));
+            /// ```
+            pub const fn kind(self) -> Kind {
+                match self { $(Self::$field => Kind::$kind),+ }
+            }
+        }
+    };
+}
+
+fields! {
     /// Position x.
-    Position,
+    "position" => Position: Vector;
     /// Displacement from the position at the start of the run.
-    Displacement,
+    "displacement" => Displacement: Vector;
     /// Velocity v.
-    Velocity,
+    "velocity" => Velocity: Vector;
     /// Acceleration a.
-    Acceleration,
+    "acceleration" => Acceleration: Vector;
     /// Deformation gradient F.
-    DeformationGradient,
+    "deformation_gradient" => DeformationGradient: Tensor;
     /// J = det F, the present volume over the reference volume.
-    Jacobian,
+    "jacobian" => Jacobian: Scalar;
     /// Green-Lagrange strain E = (FᵀF - I) / 2.
-    Strain,
+    "strain" => Strain: Symmetric;
     /// Cauchy stress, with the out-of-plane normal stress.
-    Stress,
+    "stress" => Stress: Symmetric;
     /// Pressure, minus a third of the trace of the Cauchy stress; positive in compression.
-    Pressure,
+    "pressure" => Pressure: Scalar;
     /// Von Mises equivalent of the Cauchy stress.
-    VonMises,
+    "von_mises" => VonMises: Scalar;
     /// Strain energy per reference volume.
-    EnergyDensity,
+    "energy_density" => EnergyDensity: Scalar;
     /// Mass.
-    Mass,
+    "mass" => Mass: Scalar;
     /// Reference volume.
-    Volume,
+    "volume" => Volume: Scalar;
     /// Number of the body, from 0.
-    Body,
+    "body" => Body: Index;
 }
 
 /// How many components a field has, and what they mean.
@@ -76,36 +113,6 @@ impl Kind {
 }
 
 impl Field {
-    /// The name, as in scenes and files.
-    ///
-    /// ```
-    /// use bfree::field::Field;
-    ///
-    /// // One name, in scenes and in files.
-    /// let read: Field = serde_json::from_str(r#""von_mises""#)?;
-    /// assert_eq!(read, Field::VonMises);
-    /// assert_eq!(read.name(), "von_mises");
-    /// # Ok::<(), serde_json::Error>(())
-    /// ```
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Position => "position",
-            Self::Displacement => "displacement",
-            Self::Velocity => "velocity",
-            Self::Acceleration => "acceleration",
-            Self::DeformationGradient => "deformation_gradient",
-            Self::Jacobian => "jacobian",
-            Self::Strain => "strain",
-            Self::Stress => "stress",
-            Self::Pressure => "pressure",
-            Self::VonMises => "von_mises",
-            Self::EnergyDensity => "energy_density",
-            Self::Mass => "mass",
-            Self::Volume => "volume",
-            Self::Body => "body",
-        }
-    }
-
     /// Whether particles have it only where bodies have inertia.
     ///
     /// ```
@@ -117,26 +124,6 @@ impl Field {
     /// ```
     pub const fn needs_inertia(self) -> bool {
         matches!(self, Self::Velocity | Self::Acceleration)
-    }
-
-    /// What its components are.
-    ///
-    /// ```
-    /// use bfree::field::{Field, Kind};
-    ///
-    /// // F is not symmetric, E is.
-    /// assert_eq!((Field::DeformationGradient.kind(), Field::Strain.kind()), (Kind::Tensor, Kind::Symmetric));
-    /// ```
-    pub const fn kind(self) -> Kind {
-        match self {
-            Self::Position | Self::Displacement | Self::Velocity | Self::Acceleration => Kind::Vector,
-            Self::DeformationGradient => Kind::Tensor,
-            Self::Strain | Self::Stress => Kind::Symmetric,
-            Self::Body => Kind::Index,
-            Self::Jacobian | Self::Pressure | Self::VonMises | Self::EnergyDensity | Self::Mass | Self::Volume => {
-                Kind::Scalar
-            }
-        }
     }
 
     /// The columns of a table in `dimension` dimensions that hold the field under the name `name`: `name` itself for a scalar,

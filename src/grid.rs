@@ -147,6 +147,18 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// All indices below `count`, the first axis fastest.
+pub(crate) fn indices<const D: usize>(count: [u64; D]) -> impl Iterator<Item = [u64; D]> {
+    (0..count.iter().product()).map(move |id| {
+        let mut rest: u64 = id;
+        std::array::from_fn(|k| {
+            let index = rest % count[k];
+            rest /= count[k];
+            index
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

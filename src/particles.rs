@@ -34,7 +34,7 @@ pub struct Body<L> {
 /// let of_center = particles.momentum().norm_squared() / (2.0 * mass);
 /// assert_eq!(particles.kinetic_energy(), of_center + 0.5 * reduced * relative * relative);
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles<const D: usize> {
     /// Position x.
     pub position: Vec<Vector<f64, D>>,
@@ -56,23 +56,6 @@ pub struct Particles<const D: usize> {
     pub memory: Vec<f64>,
     /// Numbers that the law with the longest memory remembers; 0 where all are elastic.
     pub remembered: usize,
-}
-
-impl<const D: usize> Default for Particles<D> {
-    fn default() -> Self {
-        Self {
-            position: Vec::new(),
-            velocity: Vec::new(),
-            acceleration: Vec::new(),
-            displacement_gradient: Vec::new(),
-            volume: Vec::new(),
-            mass: Vec::new(),
-            body: Vec::new(),
-            id: Vec::new(),
-            memory: Vec::new(),
-            remembered: 0,
-        }
-    }
 }
 
 impl<const D: usize> Particles<D> {

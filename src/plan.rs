@@ -248,39 +248,33 @@ fn arrays<const D: usize, L: Law, A>(
         Krylov::Gmres { restart } => restart as usize + 5,
         Krylov::ConjugateGradient => 5,
     };
-    let array = |name, bytes: usize| ArrayUse { name, bytes: bytes as u64 };
     let precision = precision_used(supports);
     let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
     // What is not there does not appear.
-    let only = |used: bool, array: ArrayUse| used.then_some(array);
-    [
-        only(true, array("particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES)),
-        only(moves, array("particles: v, a", particles * 2 * vector)),
-        only(remembered > 0, array("particles: memory of laws", particles * remembered * size_of::<f64>())),
+    let used: [(bool, &'static str, usize); 14] = [
+        (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
+        (moves, "particles: v, a", particles * 2 * vector),
+        (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
         // At the start and at the end of the step.
-        only(consistent, array("particles: prediction for the consistent inertia", particles * 2 * vector)),
+        (consistent, "particles: prediction for the consistent inertia", particles * 2 * vector),
         // The field without what nodes can carry, what it changes by, and the change of the other field.
-        only(smooths, array("particles: smoothing", particles * 3 * vector)),
-        only(true, array("shape functions: N, dN/dx by axis", supports.bytes())),
-        only(tiled, array("particles: the order of the sweep", particles * 2 * size_of::<u64>())),
+        (smooths, "particles: smoothing", particles * 3 * vector),
+        (true, "shape functions: N, dN/dx by axis", supports.bytes()),
+        (tiled, "particles: the order of the sweep", particles * 2 * size_of::<u64>()),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
-        only(true, array("nodal fields: loads, Δφ, residuals", nodes * 8 * vector)),
+        (true, "nodal fields: loads, Δφ, residuals", nodes * 8 * vector),
         // Both as projected, and with prescribed values in place.
-        only(weighs, array("nodal mass", nodes * 2 * size_of::<f64>())),
-        only(moves, array("nodal fields: v, a", nodes * 4 * vector)),
-        only(faces > 0, array("loaded surfaces", faces * size_of::<SurfacePoint<D>>())),
-        only(true, array("frozen tangent", frozen)),
-        only(
-            true,
-            array("preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
-        ),
-        only(true, array("Krylov vectors", nodes * vector / share * krylov_vectors)),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+        (weighs, "nodal mass", nodes * 2 * size_of::<f64>()),
+        (moves, "nodal fields: v, a", nodes * 4 * vector),
+        (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
+        (true, "frozen tangent", frozen),
+        (true, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (true, "Krylov vectors", nodes * vector / share * krylov_vectors),
+    ];
+    let used = used.into_iter().filter(|(used, ..)| *used);
+    used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()
 }
 
 impl Display for Plan {

@@ -1,7 +1,9 @@
 //! Solid geometry by signed distances, and its filling with particles.
 
-use crate::grid::Grid;
+use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// The largest number of particle positions that [`fill`] looks at for one body.
 pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
@@ -274,9 +276,11 @@ fn box_distance<const D: usize>(
 }
 
 /// Which of the regular positions become particles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Fill {
     /// Those that lie in the shape.
+    #[default]
     Particles,
     /// Those of all cells whose centre lies in the shape.
     Cells,
@@ -361,18 +365,6 @@ pub fn fill<const D: usize>(
         }
     }
     if particles.is_empty() { Err(FillError::Empty { candidates: candidates as u64 }) } else { Ok(particles) }
-}
-
-/// All indices below `count`, the first axis fastest.
-fn indices<const D: usize>(count: [u64; D]) -> impl Iterator<Item = [u64; D]> {
-    (0..count.iter().product()).map(move |id| {
-        let mut rest: u64 = id;
-        std::array::from_fn(|k| {
-            let index = rest % count[k];
-            rest /= count[k];
-            index
-        })
-    })
 }
 
 #[cfg(test)]

@@ -50,11 +50,7 @@ impl Listed for Bspline {
     }
 }
 
-impl Validate for Bspline {
-    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
-        Ok(())
-    }
-}
+impl Validate for Bspline {}
 
 /// The kernel of [`Bspline::Quadratic`].
 pub(super) struct Quadratic;

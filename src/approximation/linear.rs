@@ -23,11 +23,7 @@ impl Listed for Linear {
     }
 }
 
-impl Validate for Linear {
-    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
-        Ok(())
-    }
-}
+impl Validate for Linear {}
 
 impl Separable for Linear {
     #[inline]

@@ -59,7 +59,9 @@ pub trait Validate {
     ///
     /// # Errors
     /// The parameter that means nothing, and its range.
-    fn validate(&self, dimension: usize) -> Result<(), ApproximationError>;
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
 }
 
 /// The nodes a particle sees: all with N ≠ 0 or ∇N ≠ 0. A buffer to be reused.

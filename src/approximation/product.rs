@@ -1,7 +1,7 @@
 //! Functions of one coordinate and their tensor product: the one path of all separable families.
 
 use super::{ApproximationError, Shipped, Support, Validate};
-use crate::grid::{Axis, Grid};
+use crate::grid::{Axis, Grid, indices};
 use crate::tensor::Vector;
 
 /// The functions of one axis at one coordinate, nodes `first .. first + values.len()`. A buffer to be reused.
@@ -168,27 +168,13 @@ pub(super) fn inside<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> Resu
 #[inline]
 pub(super) fn product<const D: usize>(axes: &[AxisWeights; 3], out: &mut Support<D>) {
     out.clear();
-    let mut at = [0; D];
-    loop {
+    for at in indices::<D>(std::array::from_fn(|k| axes[k].values.len() as u64)).map(|at| at.map(|i| i as usize)) {
         let value: f64 = (0..D).map(|k| axes[k].values[at[k]]).product();
         let gradient: [f64; D] = std::array::from_fn(|k| {
             (0..D).map(|m| if m == k { axes[m].derivatives[at[m]] } else { axes[m].values[at[m]] }).product()
         });
         if value != 0.0 || gradient.iter().any(|&g| g != 0.0) {
             out.push(std::array::from_fn(|k| axes[k].first + at[k] as u32), value, gradient);
-        }
-        // The next node: an odometer whose first digit is the first axis.
-        let mut k = 0;
-        loop {
-            if k == D {
-                return;
-            }
-            at[k] += 1;
-            if at[k] < axes[k].values.len() {
-                break;
-            }
-            at[k] = 0;
-            k += 1;
         }
     }
 }

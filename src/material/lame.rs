@@ -30,6 +30,10 @@ pub enum LameError {
     Poisson(f64),
 }
 
+fn positive(x: f64, error: impl Fn(f64) -> LameError) -> Result<(), LameError> {
+    if x > 0.0 && x.is_finite() { Ok(()) } else { Err(error(x)) }
+}
+
 impl Lame {
     /// From Λ and G.
     ///
@@ -46,13 +50,8 @@ impl Lame {
     /// # Errors
     /// G ≤ 0 or K = Λ + 2G/3 ≤ 0, or not finite.
     pub fn new(lambda: f64, shear: f64) -> Result<Self, LameError> {
-        if !(shear > 0.0 && shear.is_finite()) {
-            return Err(LameError::Shear(shear));
-        }
-        let bulk = lambda + 2.0 * shear / 3.0;
-        if !(bulk > 0.0 && bulk.is_finite()) {
-            return Err(LameError::Bulk(bulk));
-        }
+        positive(shear, LameError::Shear)?;
+        positive(lambda + 2.0 * shear / 3.0, LameError::Bulk)?;
         Ok(Self { lambda, shear })
     }
 
@@ -70,9 +69,7 @@ impl Lame {
     /// # Ok::<(), bfree::material::LameError>(())
     /// ```
     pub fn from_young_poisson(young: f64, poisson: f64) -> Result<Self, LameError> {
-        if !(young > 0.0 && young.is_finite()) {
-            return Err(LameError::Young(young));
-        }
+        positive(young, LameError::Young)?;
         if !(poisson > -1.0 && poisson < 0.5) {
             return Err(LameError::Poisson(poisson));
         }
@@ -97,9 +94,7 @@ impl Lame {
     /// # Errors
     /// K ≤ 0 or G ≤ 0, or not finite.
     pub fn from_bulk_shear(bulk: f64, shear: f64) -> Result<Self, LameError> {
-        if !(bulk > 0.0 && bulk.is_finite()) {
-            return Err(LameError::Bulk(bulk));
-        }
+        positive(bulk, LameError::Bulk)?;
         Self::new(bulk - 2.0 * shear / 3.0, shear)
     }
 

@@ -171,6 +171,18 @@ pub trait Law: Send + Sync {
 
     /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
     /// By embedding into 3D.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, Start, StVenantKirchhoff};
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
+    /// let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25)? };
+    /// let strain = 1e-9;
+    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
+    /// assert!((law.out_of_plane_stress(&at, &Start::NONE) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
     fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>) -> f64 {
         let embedded = Deformation::new(embed(&at.h));
         // σ_zz = P_zz F_zz / J with F_zz = 1
@@ -263,31 +275,6 @@ pub trait Elastic: Send + Sync {
     ) -> Option<ClosedTangent<f64, D>> {
         None
     }
-
-    /// See [`Law::shipped`].
-    fn shipped(&self) -> Option<&Material> {
-        None
-    }
-
-    /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
-    /// By embedding into 3D.
-    ///
-    /// ```
-    /// use bfree::material::{Elastic, Lame, StVenantKirchhoff};
-    /// use bfree::tensor::{Deformation, Tensor};
-    ///
-    /// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
-    /// let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25)? };
-    /// let strain = 1e-9;
-    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
-    /// assert!((law.out_of_plane_stress(&at) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
-    /// # Ok::<(), bfree::material::LameError>(())
-    /// ```
-    fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>) -> f64 {
-        let embedded = Deformation::new(embed(&at.h));
-        // σ_zz = P_zz F_zz / J with F_zz = 1
-        self.stress(&embedded)[(2, 2)] / at.jacobian
-    }
 }
 
 /// An elastic law as the residual asks it.
@@ -327,12 +314,6 @@ impl<E: Elastic> Law for E {
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         Elastic::closed(self, f_n, at, volume)
-    }
-    fn shipped(&self) -> Option<&Material> {
-        Elastic::shipped(self)
-    }
-    fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>, _: &Start<'_>) -> f64 {
-        Elastic::out_of_plane_stress(self, at)
     }
 }
 

@@ -99,7 +99,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         }
         let mut points = self.terms.at_points::<T>(&picked, part);
         // Of values the magnitudes are those at the nodes.
-        points.retain(|(flow, _)| !magnitude || flow.scatter.gradient);
+        points.retain(|(flow, _)| !magnitude || flow.gradient);
         let (flows, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         let Some(flow) = flows.into_iter().reduce(Flow::and) else { return Ok(()) };
         self.step.supports.sweep(Some(dphi), Flow { weights, ..flow }, out, |group, at, sums| {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// A table on disk.
 #[derive(Debug)]
-pub(crate) struct Table(Stream);
+pub(crate) struct Table(pub(crate) Stream);
 
 impl Table {
     /// Creates the file and writes the header; or continues one whose first `kept` bytes are good.
@@ -37,16 +37,6 @@ impl Table {
     /// Appends a row.
     pub(crate) fn row(&mut self, row: &Row) -> Result<(), OutputError> {
         self.0.line(&row.0)
-    }
-
-    /// Hands all rows to the system.
-    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
-        self.0.flush()
-    }
-
-    /// Puts all rows on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.0.mark()
     }
 }
 
@@ -102,7 +92,7 @@ mod tests {
         let directory = tempfile::tempdir()?;
         let path = directory.path().join("t.csv");
         let mut table = Table::open(path.clone(), &["left, \"low\"_x".to_owned(), "time".to_owned()], None)?;
-        table.flush()?;
+        table.0.flush()?;
         assert_eq!(std::fs::read_to_string(&path)?, "\"left, \"\"low\"\"_x\",time\n");
         let twice = Table::open(path, &["a".to_owned(), "a".to_owned()], None);
         assert!(matches!(twice, Err(OutputError::DuplicateColumn { column, .. }) if column == "a"));

@@ -88,7 +88,7 @@ pub struct Cost {
 /// ```
 #[derive(Debug)]
 pub struct History {
-    table: Table,
+    pub(crate) table: Table,
     damped: bool,
 }
 
@@ -136,11 +136,6 @@ impl History {
     /// # Errors
     /// The system refuses.
     pub fn flush(&mut self) -> Result<(), OutputError> {
-        self.table.flush()
-    }
-
-    /// Puts all rows on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.table.mark()
+        self.table.0.flush()
     }
 }

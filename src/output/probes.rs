@@ -87,7 +87,7 @@ pub fn nearest<const D: usize>(
 #[derive(Debug)]
 pub(crate) struct Probes<const D: usize> {
     probes: Vec<Probe<D>>,
-    table: Table,
+    pub(crate) table: Table,
 }
 
 impl<const D: usize> Probes<D> {
@@ -120,15 +120,5 @@ impl<const D: usize> Probes<D> {
             row.extend(values.iter().copied().take(columns));
         }
         self.table.row(&row)
-    }
-
-    /// Hands everything to the system.
-    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
-        self.table.flush()
-    }
-
-    /// Puts all rows on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.table.mark()
     }
 }

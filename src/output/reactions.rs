@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// Writes `reactions.csv`.
 #[derive(Debug)]
-pub(crate) struct Reactions(Table);
+pub(crate) struct Reactions(pub(crate) Table);
 
 impl Reactions {
     /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition; or continues one whose first `kept`
@@ -32,15 +32,5 @@ impl Reactions {
         row.push(time);
         row.extend(forces.iter().flatten().copied());
         self.0.row(&row)
-    }
-
-    /// Hands everything to the system.
-    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
-        self.0.flush()
-    }
-
-    /// Puts all rows on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.0.mark()
     }
 }

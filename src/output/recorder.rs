@@ -1,6 +1,6 @@
 //! Everything that is written about a run, in one place.
 
-use super::files::TEMPORARY;
+use super::files::{Stream, TEMPORARY};
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
@@ -173,24 +173,19 @@ impl<const D: usize> Recorder<D> {
         // A file that the mark does not know begins anew.
         let kept = |name: &str| mark.and_then(|mark| mark.lengths.get(name).copied());
         let loads = &simulation.loads;
+        let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
         let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
         Ok(Self {
             history: History::open(at("history.csv"), D, simulation.loads.damping.is_some(), kept("history.csv"))?,
-            reactions: match loads.prescribed.is_empty() {
-                true => None,
-                false => Some(Reactions::open(at("reactions.csv"), loads, kept("reactions.csv"))?),
-            },
-            probes: match probes.is_empty() {
-                true => None,
-                false => Some(Probes::open(at("probes.csv"), probes, kept("probes.csv"))?),
-            },
-            snapshots: match snapshot_every {
-                None => None,
-                Some(every) => {
-                    let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-                    Some(Snapshots::new(directory.clone(), &fields, every, snapshots)?)
-                }
-            },
+            reactions: (!loads.prescribed.is_empty())
+                .then(|| Reactions::open(at("reactions.csv"), loads, kept("reactions.csv")))
+                .transpose()?,
+            probes: (!probes.is_empty())
+                .then(|| Probes::open(at("probes.csv"), probes, kept("probes.csv")))
+                .transpose()?,
+            snapshots: snapshot_every
+                .map(|every| Snapshots::new(directory.clone(), &fields, every, snapshots))
+                .transpose()?,
             newton: NewtonLog::open(at("newton.jsonl"), kept("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, audience),
             watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),
@@ -212,9 +207,7 @@ impl<const D: usize> Recorder<D> {
     /// The system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
-        let mut lengths = BTreeMap::from([self.history.mark()?, self.newton.mark()?]);
-        lengths.extend(self.reactions.as_mut().map(Reactions::mark).transpose()?);
-        lengths.extend(self.probes.as_mut().map(Probes::mark).transpose()?);
+        let lengths = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
         let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
         let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
         Ok(Mark { lengths, snapshots, watch, counts, seconds })
@@ -303,10 +296,14 @@ impl<const D: usize> Recorder<D> {
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {
-        self.history.flush()?;
-        self.newton.flush()?;
-        self.reactions.as_mut().map_or(Ok(()), Reactions::flush)?;
-        self.probes.as_mut().map_or(Ok(()), Probes::flush)
+        self.streams().try_for_each(Stream::flush)
+    }
+
+    /// All files that grow line by line.
+    fn streams(&mut self) -> impl Iterator<Item = &mut Stream> {
+        let reactions = self.reactions.as_mut().map(|reactions| &mut reactions.0.0);
+        let probes = self.probes.as_mut().map(|probes| &mut probes.table.0);
+        [&mut self.history.table.0, &mut self.newton.0].into_iter().chain(reactions).chain(probes)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::phases::Phase;
 use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
 use crate::solver::NewtonHistory;
 use serde::{Deserialize, Serialize, Serializer};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -231,7 +231,7 @@ struct StepLine<'a> {
 
 /// `newton.jsonl`: what Newton's method did in a step on a line, while the run goes on.
 #[derive(Debug)]
-pub(crate) struct NewtonLog(Stream);
+pub(crate) struct NewtonLog(pub(crate) Stream);
 
 impl NewtonLog {
     /// Creates the file, or continues one whose first `kept` bytes are good.
@@ -247,21 +247,11 @@ impl NewtonLog {
             newton: NewtonLine::new(step.projection_iterations, &step.newton.history),
             failed_attempts: AttemptLine::all(&step.failed),
         };
-        self.0.line(&serde_json::to_string(&line).map_err(json(self.0.path()))?)
-    }
-
-    /// Hands everything to the system.
-    pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
-        self.0.flush()
-    }
-
-    /// Puts everything on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
-        self.0.mark()
+        self.0.line(&serde_json::to_string(&line).map_err(failed(self.0.path()))?)
     }
 }
 
-fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
+fn failed(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
     move |source| OutputError::Json { path: path.to_owned(), source }
 }
 
@@ -287,9 +277,9 @@ pub(crate) struct Report<'a> {
 impl Report<'_> {
     /// Writes the report, all or nothing; the steps go from `log` into it line by line, then `log` is removed unless it is `kept`.
     pub(crate) fn write(&self, path: &Path, mut log: NewtonLog, kept: bool) -> Result<(), OutputError> {
-        log.flush()?;
+        log.0.flush()?;
         let log = log.0.path();
-        let head = serde_json::to_string_pretty(&self.head(path)?).map_err(json(path))?;
+        let head = serde_json::to_string_pretty(&self.head()).map_err(failed(path))?;
         let lines = BufReader::new(File::open(log).map_err(OutputError::io("read", log))?).lines();
         write_atomically(path, |file| {
             // The object is left open for one more key.
@@ -302,34 +292,25 @@ impl Report<'_> {
         if kept { Ok(()) } else { std::fs::remove_file(log).map_err(OutputError::io("remove", log)) }
     }
 
-    fn head(&self, path: &Path) -> Result<Map<String, Value>, OutputError> {
-        let value = |number| serde_json::to_value(Number(number)).map_err(json(path));
+    fn head(&self) -> Value {
         let Energies { kinetic, strain, external, dissipated, total, balance } = self.energies;
-        let mut energies = Map::new();
-        let all = [("kinetic", kinetic), ("strain", strain), ("external", external), ("dissipated", dissipated)];
-        for (name, x) in all.into_iter().chain([("total", total), ("balance", balance)]) {
-            energies.insert(name.to_owned(), value(x)?);
-        }
-        let mut seconds = Map::new();
-        for (name, x) in self.seconds.named().chain([("total", self.seconds.total)]) {
-            seconds.insert(name.to_owned(), value(x)?);
-        }
-        let mut head = Map::new();
-        head.insert("program".to_owned(), concat!("bfree ", env!("CARGO_PKG_VERSION")).into());
+        let seconds = self.seconds.named().chain([("total", self.seconds.total)]);
+        let seconds: Map<_, _> = seconds.map(|(name, x)| (name.to_owned(), json!(Number(x)))).collect();
         let (outcome, message) = self.outcome.words(self.time);
-        head.insert("outcome".to_owned(), outcome.into());
-        head.insert("message".to_owned(), message.into());
+        let mut head = json!({
+            "program": concat!("bfree ", env!("CARGO_PKG_VERSION")), "outcome": outcome, "message": message,
+            "time": Number(self.time),
+            "energies": {
+                "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
+                "dissipated": Number(dissipated), "total": Number(total), "balance": Number(balance),
+            },
+            "counts": self.counts, "seconds": seconds, "warnings": self.warnings,
+        });
         if let Outcome::Failed(error) = self.outcome {
-            let attempts = serde_json::to_value(AttemptLine::all(&error.failed)).map_err(json(path))?;
-            head.insert("failed_attempts".to_owned(), attempts);
+            head["failed_attempts"] = json!(AttemptLine::all(&error.failed));
         }
-        head.extend(self.asked.clone());
-        head.insert("time".to_owned(), value(self.time)?);
-        head.insert("energies".to_owned(), energies.into());
-        head.insert("counts".to_owned(), serde_json::to_value(self.counts).map_err(json(path))?);
-        head.insert("seconds".to_owned(), seconds.into());
-        head.insert("warnings".to_owned(), serde_json::to_value(self.warnings).map_err(json(path))?);
-        Ok(head)
+        self.asked.iter().for_each(|(key, value)| head[key] = value.clone());
+        head
     }
 }
 

@@ -4,7 +4,7 @@ use super::grid::GridBox;
 use super::shape::Shape;
 use crate::material;
 use crate::problems::{Number, Problems};
-use crate::shape as geometry;
+use crate::shape::Fill;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -43,26 +43,6 @@ pub struct ParticleFile {
     /// Path of a CSV file with the header `x[,y[,z]],volume[,vx[,vy[,vz]]]`, relative to the scene's folder.
     #[schemars(length(min = 1))]
     pub file: PathBuf,
-}
-
-/// Which of the regular positions become particles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Fill {
-    /// Those that lie in the shape.
-    #[default]
-    Particles,
-    /// Those of all cells whose centre lies in the shape.
-    Cells,
-}
-
-impl From<Fill> for geometry::Fill {
-    fn from(fill: Fill) -> Self {
-        match fill {
-            Fill::Particles => Self::Particles,
-            Fill::Cells => Self::Cells,
-        }
-    }
 }
 
 impl Body {

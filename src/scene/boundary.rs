@@ -81,27 +81,23 @@ impl Boundary {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn face(&self, axis: usize, upper: bool) -> &Face {
-        let face = match (axis, upper) {
-            (0, false) => &self.left,
-            (0, true) => &self.right,
-            (1, false) => &self.bottom,
-            (1, true) => &self.top,
-            (_, false) => &self.back,
-            (_, true) => &self.front,
-        };
-        face.as_ref().unwrap_or(&Face::Free)
+        self.faces()[2 * axis + usize::from(upper)].1.unwrap_or(&Face::Free)
+    }
+
+    /// All faces by name, lower and upper, axis after axis.
+    pub(super) fn faces(&self) -> [(&'static str, Option<&Face>); 6] {
+        [
+            ("left", self.left.as_ref()),
+            ("right", self.right.as_ref()),
+            ("bottom", self.bottom.as_ref()),
+            ("top", self.top.as_ref()),
+            ("back", self.back.as_ref()),
+            ("front", self.front.as_ref()),
+        ]
     }
 
     pub(super) fn check(&self, problems: &mut Problems, dimension: usize) {
-        let faces = [
-            ("left", &self.left),
-            ("right", &self.right),
-            ("bottom", &self.bottom),
-            ("top", &self.top),
-            ("back", &self.back),
-            ("front", &self.front),
-        ];
-        for (i, (name, face)) in faces.into_iter().enumerate() {
+        for (i, (name, face)) in self.faces().into_iter().enumerate() {
             let Some(face) = face else { continue };
             let path = format!("boundary.{name}");
             if i / 2 >= dimension {

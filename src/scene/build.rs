@@ -2,9 +2,10 @@
 
 use super::body::Body;
 use super::boundary::{Face, Table};
+use super::load::{self, Loaded};
 use super::particle_file::{self, ParticleFileError};
 use super::transfer::Transfer;
-use super::{Problems, Scene, load, scale, time};
+use super::{Problems, Scene, scale, time};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -119,23 +120,15 @@ pub enum BuildError {
         /// The most allowed.
         most: f64,
     },
-    /// Velocities from a file and from `initial_velocity`.
-    #[error(
-        "{path}: {file} gives velocities, and so does initial_velocity; remove its columns vx, … or the key initial_velocity"
-    )]
-    TwoVelocities {
+    /// Velocities from a file that something else forbids.
+    #[error("{path}: {file} gives velocities, and {why}")]
+    Velocities {
         /// The key.
         path: String,
         /// The file.
         file: String,
-    },
-    /// Velocities from a file, and no inertia.
-    #[error("{path}: {file} gives velocities, and time.inertia is \"none\"; remove its columns vx, … or that key")]
-    VelocityWithoutInertia {
-        /// The key.
-        path: String,
-        /// The file.
-        file: String,
+        /// What forbids them, and what to remove.
+        why: &'static str,
     },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
@@ -313,17 +306,11 @@ impl Scene {
                 loads.gravity = Some(Gravity { acceleration, curve: curve_in_time });
             }
         }
-        for axis in 0..D {
-            for upper in [false, true] {
-                let name = FACES[axis][usize::from(upper)];
-                let motion = self.boundary.face(axis, upper).motion::<D>(&format!("boundary.{name}"), axis)?;
-                if motion.iter().any(Option::is_some) {
-                    loads.prescribed.push(Prescribed {
-                        name: name.into(),
-                        on: Selection::Face { axis, upper },
-                        motion,
-                    });
-                }
+        for (k, (name, face)) in self.boundary.faces().into_iter().enumerate().take(2 * D) {
+            let (Some(face), axis, upper) = (face, k / 2, k % 2 == 1) else { continue };
+            let motion = face.motion::<D>(&format!("boundary.{name}"), axis)?;
+            if motion.iter().any(Option::is_some) {
+                loads.prescribed.push(Prescribed { name: name.into(), on: Selection::Face { axis, upper }, motion });
             }
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
@@ -339,17 +326,12 @@ impl Scene {
         for (i, traction) in self.tractions.iter().enumerate() {
             let path = format!("tractions[{i}]");
             let pressing = Pressing::Traction(vector(&format!("{path}.traction"), &traction.traction)?);
-            let curve = curve(&format!("{path}.curve"), traction.curve.as_ref())?;
-            let on = SurfaceOf { body: &traction.body, region: &traction.region, given: &traction.surface };
-            let points = self.surface(&path, &on, grid, particles)?;
-            loads.surface.push(SurfaceLoad { pressing, curve, points });
+            loads.surface.push(self.surface(&path, pressing, &traction.loaded(), grid, particles)?);
         }
         for (i, pressure) in self.pressures.iter().enumerate() {
+            let pressing = Pressing::Pressure(pressure.pressure);
             let path = format!("pressures[{i}]");
-            let curve = curve(&format!("{path}.curve"), pressure.curve.as_ref())?;
-            let on = SurfaceOf { body: &pressure.body, region: &pressure.region, given: &pressure.surface };
-            let points = self.surface(&path, &on, grid, particles)?;
-            loads.surface.push(SurfaceLoad { pressing: Pressing::Pressure(pressure.pressure), curve, points });
+            loads.surface.push(self.surface(&path, pressing, &pressure.loaded(), grid, particles)?);
         }
         Ok(loads)
     }
@@ -360,25 +342,21 @@ impl Scene {
     fn surface<const D: usize>(
         &self,
         path: &str,
-        on: &SurfaceOf<'_>,
+        pressing: Pressing<D>,
+        on: &Loaded<'_>,
         grid: &Grid<D>,
         particles: &Particles<D>,
-    ) -> Result<Vec<SurfacePoint<D>>, BuildError> {
-        let region = match on.region {
-            Some(region) => Some(region.build::<D>().ok_or_else(|| dimension::<D>(path))?),
-            None => None,
-        };
+    ) -> Result<SurfaceLoad<D>, BuildError> {
+        let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
+        let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| dimension::<D>(path));
+        let region = on.region.as_ref().map(built).transpose()?;
         let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
             return Err(dimension::<D>(path));
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
         let spacing = grid.spacing / f64::from(body.particles_per_cell);
-        let given = match on.given {
-            Some(given) => {
-                Some((vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize(), given.area))
-            }
-            None => None,
-        };
+        let normal = |given: &load::Surface| vector::<D>(&format!("{path}.surface.normal"), &given.normal);
+        let given = on.surface.as_ref().map(|given| Ok((normal(given)?.normalize(), given.area))).transpose()?;
         let mut points = Vec::new();
         for particle in 0..particles.len() {
             if particles.body[particle] as usize != number {
@@ -412,7 +390,7 @@ impl Scene {
         if points.is_empty() {
             return Err(BuildError::NoSurface { path: path.into(), body: on.body.into() });
         }
-        Ok(points)
+        Ok(SurfaceLoad { pressing, curve, points })
     }
 
     fn fill<const D: usize>(
@@ -432,16 +410,13 @@ impl Scene {
                 particles.push_without_inertia(x, volume, mass, number)
             }
         };
-        let common = match &body.velocity {
-            Some(velocity) => Some(vector::<D>(&format!("{path}.velocity"), velocity)?),
-            None => None,
-        };
+        let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
             let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
             let volume = (grid.spacing / f64::from(body.particles_per_cell)).powi(D as i32);
             let velocity = common.unwrap_or_else(Vector::zeros);
-            let positions = fill(grid, &shape, body.particles_per_cell, body.fill.into())
+            let positions = fill(grid, &shape, body.particles_per_cell, body.fill)
                 .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
             means.make_room(&path, particles, positions.len())?;
             for x in positions {
@@ -456,12 +431,14 @@ impl Scene {
                 source: Box::new(source),
             })?;
             if read.velocities.is_some() {
-                let file = place.display().to_string();
-                if !self.time.inertia.has_inertia() {
-                    return Err(BuildError::VelocityWithoutInertia { path, file });
-                }
-                if self.initial_velocity.is_some() {
-                    return Err(BuildError::TwoVelocities { path, file });
+                let why = if !self.time.inertia.has_inertia() {
+                    Some("time.inertia is \"none\"; remove its columns vx, … or that key")
+                } else {
+                    let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
+                    self.initial_velocity.as_ref().map(|_| twice)
+                };
+                if let Some(why) = why {
+                    return Err(BuildError::Velocities { path, file: place.display().to_string(), why });
                 }
             }
             means.make_room(&path, particles, read.positions.len())?;
@@ -493,16 +470,6 @@ impl Scene {
             })
             .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })
     }
-}
-
-/// Names of the faces, lower and upper, along each axis.
-pub(super) const FACES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];
-
-/// Which surface a load acts on.
-struct SurfaceOf<'a> {
-    body: &'a str,
-    region: &'a Option<super::shape::Shape>,
-    given: &'a Option<load::Surface>,
 }
 
 impl Face {

@@ -107,25 +107,31 @@ impl Gravity {
 impl Traction {
     pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
         problems.vector(&format!("{path}.traction"), &self.traction, dimension);
-        let on = Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface };
-        on.check(problems, path, bodies, dimension);
+        self.loaded().check(problems, path, bodies, dimension);
+    }
+
+    pub(super) fn loaded(&self) -> Loaded<'_> {
+        Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface }
     }
 }
 
 impl Pressure {
     pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
         problems.number(&format!("{path}.pressure"), self.pressure);
-        let on = Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface };
-        on.check(problems, path, bodies, dimension);
+        self.loaded().check(problems, path, bodies, dimension);
+    }
+
+    pub(super) fn loaded(&self) -> Loaded<'_> {
+        Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface }
     }
 }
 
 /// What tractions and pressures have in common.
-struct Loaded<'a> {
-    body: &'a str,
-    region: &'a Option<Shape>,
-    curve: &'a Option<Curve>,
-    surface: &'a Option<Surface>,
+pub(super) struct Loaded<'a> {
+    pub body: &'a str,
+    pub region: &'a Option<Shape>,
+    pub curve: &'a Option<Curve>,
+    pub surface: &'a Option<Surface>,
 }
 
 impl Loaded<'_> {

@@ -312,6 +312,15 @@ impl<'de> Deserialize<'de> for Unique {
 
 struct UniqueVisitor;
 
+/// Values without anything in them are kept as they are.
+macro_rules! scalars {
+    ($($visit:ident: $scalar:ty),*) => {$(
+        fn $visit<E>(self, x: $scalar) -> Result<Value, E> {
+            Ok(x.into())
+        }
+    )*};
+}
+
 impl<'de> Visitor<'de> for UniqueVisitor {
     type Value = Value;
 
@@ -319,28 +328,10 @@ impl<'de> Visitor<'de> for UniqueVisitor {
         f.write_str("JSON")
     }
 
+    scalars! { visit_bool: bool, visit_u64: u64, visit_i64: i64, visit_f64: f64, visit_str: &str }
+
     fn visit_unit<E>(self) -> Result<Value, E> {
         Ok(Value::Null)
-    }
-
-    fn visit_bool<E>(self, x: bool) -> Result<Value, E> {
-        Ok(Value::Bool(x))
-    }
-
-    fn visit_u64<E>(self, x: u64) -> Result<Value, E> {
-        Ok(Value::from(x))
-    }
-
-    fn visit_i64<E>(self, x: i64) -> Result<Value, E> {
-        Ok(Value::from(x))
-    }
-
-    fn visit_f64<E>(self, x: f64) -> Result<Value, E> {
-        Ok(Value::from(x))
-    }
-
-    fn visit_str<E>(self, x: &str) -> Result<Value, E> {
-        Ok(Value::String(x.to_owned()))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {

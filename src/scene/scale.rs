@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::boundary::{Face, Table};
-use super::build::{BuildError, FACES};
+use super::build::BuildError;
 use super::load::Curve;
 use crate::material::p_wave_modulus;
 use crate::mechanics::loads::Pressing;
@@ -70,13 +70,11 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
         let force = heaviest * (alphas.a1 * largest(displacement) + alphas.a2 * largest(velocity));
         require(path, &[("the force that moves a particle so in one step", force, 0.0, MOST)])
     };
-    for (axis, names) in FACES.iter().enumerate().take(D) {
-        for (name, upper) in names.iter().zip([false, true]) {
-            match scene.boundary.face(axis, upper) {
-                Face::Displacement(table) => driven(&format!("boundary.{name}"), Some(table), None)?,
-                Face::Velocity(table) => driven(&format!("boundary.{name}"), None, Some(table))?,
-                Face::Free | Face::Sliding | Face::Fixed | Face::Held(_) => {}
-            }
+    for (name, face) in scene.boundary.faces().into_iter().take(2 * D) {
+        match face {
+            Some(Face::Displacement(table)) => driven(&format!("boundary.{name}"), Some(table), None)?,
+            Some(Face::Velocity(table)) => driven(&format!("boundary.{name}"), None, Some(table))?,
+            Some(Face::Free | Face::Sliding | Face::Fixed | Face::Held(_)) | None => {}
         }
     }
     for (i, motion) in scene.prescribed.iter().enumerate() {

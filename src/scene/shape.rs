@@ -8,61 +8,41 @@ use serde::{Deserialize, Serialize};
 
 /// A region of space.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// An axis-parallel box (an interval in 1D, a rectangle in 2D).
-    Box(Corners),
+    /// An axis-parallel box (an interval in 1D, a rectangle in 2D), by two corners.
+    Box {
+        /// The lower corner (length).
+        min: Vec<f64>,
+        /// The upper corner (length), above `min` in every component.
+        max: Vec<f64>,
+    },
     /// A ball (an interval in 1D, a disc in 2D).
-    Ball(Ball),
-    /// Everything behind a plane.
-    HalfSpace(HalfSpace),
+    Ball {
+        /// The centre (length).
+        center: Vec<f64>,
+        /// The radius (length), > 0.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    /// Everything behind a plane. A body of this shape is clipped to the grid's box.
+    HalfSpace {
+        /// A point of the plane (length).
+        point: Vec<f64>,
+        /// The normal that points out of the region, of any length but zero.
+        normal: Vec<f64>,
+    },
     /// What lies in any of these, at least one.
     Union(Vec<Shape>),
-    /// What lies in one and not in another.
-    Difference(Difference),
+    /// What lies in one and not in another: a solid with a hole.
+    Difference {
+        /// The solid.
+        of: Box<Shape>,
+        /// The hole.
+        minus: Box<Shape>,
+    },
     /// What lies in all of these, at least one.
     Intersection(Vec<Shape>),
-}
-
-/// Two corners of a box.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Corners {
-    /// The lower corner (length).
-    pub min: Vec<f64>,
-    /// The upper corner (length), above `min` in every component.
-    pub max: Vec<f64>,
-}
-
-/// A ball.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Ball {
-    /// The centre (length).
-    pub center: Vec<f64>,
-    /// The radius (length), > 0.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub radius: f64,
-}
-
-/// Everything behind a plane. A body of this shape is clipped to the grid's box.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HalfSpace {
-    /// A point of the plane (length).
-    pub point: Vec<f64>,
-    /// The normal that points out of the region, of any length but zero.
-    pub normal: Vec<f64>,
-}
-
-/// A solid with a hole.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Difference {
-    /// The solid.
-    pub of: Box<Shape>,
-    /// The hole.
-    pub minus: Box<Shape>,
 }
 
 impl Shape {
@@ -83,14 +63,14 @@ impl Shape {
     pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
         let all = |parts: &[Self]| parts.iter().map(Self::build).collect::<Option<Vec<_>>>();
         Some(match self {
-            Self::Box(corners) => shape::Shape::Box { min: vector(&corners.min)?, max: vector(&corners.max)? },
-            Self::Ball(ball) => shape::Shape::Ball { center: vector(&ball.center)?, radius: ball.radius },
-            Self::HalfSpace(half) => {
-                shape::Shape::HalfSpace { point: vector(&half.point)?, normal: vector(&half.normal)? }
+            Self::Box { min, max } => shape::Shape::Box { min: vector(min)?, max: vector(max)? },
+            Self::Ball { center, radius } => shape::Shape::Ball { center: vector(center)?, radius: *radius },
+            Self::HalfSpace { point, normal } => {
+                shape::Shape::HalfSpace { point: vector(point)?, normal: vector(normal)? }
             }
             Self::Union(parts) => shape::Shape::Union(all(parts)?),
-            Self::Difference(parts) => {
-                shape::Shape::Difference { of: Box::new(parts.of.build()?), minus: Box::new(parts.minus.build()?) }
+            Self::Difference { of, minus } => {
+                shape::Shape::Difference { of: Box::new(of.build()?), minus: Box::new(minus.build()?) }
             }
             Self::Intersection(parts) => shape::Shape::Intersection(all(parts)?),
         })
@@ -99,7 +79,7 @@ impl Shape {
     /// Whether the shape is sound.
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
         match self {
-            Self::Box(Corners { min, max }) => {
+            Self::Box { min, max } => {
                 let path = format!("{path}.box");
                 let mut ok = problems.vector(&format!("{path}.min"), min, dimension);
                 ok &= problems.vector(&format!("{path}.max"), max, dimension);
@@ -109,17 +89,17 @@ impl Shape {
                 }
                 ok && min.iter().zip(max).all(|(min, max)| max > min)
             }
-            Self::Ball(Ball { center, radius }) => {
+            Self::Ball { center, radius } => {
                 let ok = problems.vector(&format!("{path}.ball.center"), center, dimension);
                 problems.positive(&format!("{path}.ball.radius"), *radius) && ok
             }
-            Self::HalfSpace(HalfSpace { point, normal }) => {
+            Self::HalfSpace { point, normal } => {
                 let ok = problems.vector(&format!("{path}.half_space.point"), point, dimension);
                 check_normal(problems, &format!("{path}.half_space.normal"), normal, dimension) && ok
             }
             Self::Union(parts) => check_parts(parts, problems, &format!("{path}.union"), dimension),
             Self::Intersection(parts) => check_parts(parts, problems, &format!("{path}.intersection"), dimension),
-            Self::Difference(Difference { of, minus }) => {
+            Self::Difference { of, minus } => {
                 let ok = of.check(problems, &format!("{path}.difference.of"), dimension);
                 minus.check(problems, &format!("{path}.difference.minus"), dimension) && ok
             }

@@ -1,9 +1,7 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
 use super::vector::{Entry, axpy, dot, norm, xpby};
-use super::{
-    InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, checked_norm, finite, true_residual,
-};
+use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A curvature below this part of the largest one seen, in units of round-off: neither its size nor its sign means anything.
@@ -73,10 +71,7 @@ pub fn conjugate_gradient<S: Entry>(
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
-    let b_norm = checked_norm(rhs, solution)?;
-    solution.fill(S::zero());
-    let mut report =
-        LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 };
+    let (mut report, b_norm) = begin(rhs, solution)?;
     if b_norm == 0.0 {
         return Ok(report);
     }

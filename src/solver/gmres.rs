@@ -1,9 +1,7 @@
 //! Restarted GMRES, preconditioned from the right (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.5).
 
 use super::vector::{Entry, axpy, dot, norm, scaled};
-use super::{
-    InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, checked_norm, finite, true_residual,
-};
+use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A second orthogonalisation is made when the first one leaves less than this part of the vector: 1/√2 (Daniel, Gragg,
@@ -84,10 +82,7 @@ pub fn gmres<S: Entry>(
 ) -> Result<LinearReport, LinearError> {
     InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
     InvalidSetting::check_restart(settings.restart)?;
-    let b_norm = checked_norm(rhs, solution)?;
-    solution.fill(S::zero());
-    let mut report =
-        LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 };
+    let (mut report, b_norm) = begin(rhs, solution)?;
     if b_norm == 0.0 {
         return Ok(report);
     }

@@ -311,12 +311,17 @@ impl InvalidSetting {
     }
 }
 
-/// Common start of the Krylov methods: agreeing lengths and a finite ‖b‖, which is returned.
-fn checked_norm<S: Entry>(rhs: &[S], solution: &[S]) -> Result<f64, LinearError> {
+/// The report of no iterations at the solution 0, and ‖b‖.
+///
+/// # Errors
+/// Lengths that differ, or a right-hand side that is not finite.
+fn begin<S: Entry>(rhs: &[S], solution: &mut [S]) -> Result<(LinearReport, f64), LinearError> {
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
     }
-    finite(vector::norm(rhs), "the norm of the right-hand side", 0)
+    let b_norm = finite(vector::norm(rhs), "the norm of the right-hand side", 0)?;
+    solution.fill(S::zero());
+    Ok((LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 }, b_norm))
 }
 
 /// Lets only finite numbers pass.

@@ -4,7 +4,7 @@ use bfree::material::{Lame, NeoHookean};
 use bfree::particles::Particles;
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Place, Scene, SceneError};
-use bfree::shape::{Fill, fill};
+use bfree::shape::fill;
 use bfree::simulation::Simulation;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -83,7 +83,7 @@ fn filled<const D: usize>(name: &str) -> (bfree::grid::Grid<D>, usize) {
     let scene = scene::read_file(&folder("scenes").join(name), &[]).unwrap();
     let (grid, body) = (scene.grid.build::<D>().unwrap(), &scene.bodies[0]);
     let shape = body.shape.as_ref().and_then(|shape| shape.build()).unwrap();
-    let particles = fill(&grid, &shape, body.particles_per_cell, Fill::from(body.fill)).unwrap();
+    let particles = fill(&grid, &shape, body.particles_per_cell, body.fill).unwrap();
     (grid, particles.len())
 }
 

@@ -3,7 +3,7 @@
 use super::{Lme, radius, validate};
 use crate::approximation::product::{Place, inside};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
-use crate::grid::Grid;
+use crate::grid::{Grid, indices};
 use crate::tensor::{Tensor, Vector, determinant, identity, inverse, outer};
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::neldermead::NelderMead;
@@ -95,34 +95,21 @@ impl LmeCircle {
     fn support<const D: usize>(&self, grid: &Grid<D>, places: &[Place; D], out: &mut Support<D>) {
         // Ring n holds |k − k₀| ≤ n, and |x − k₀| ≤ ½: those with n < R + ½ reach into the circle.
         let rings = (self.radius + 0.5).min(f64::from(u32::MAX)) as i64;
-        let mut first = [0; D];
-        let mut last = [0; D];
+        let (mut first, mut count) = ([0; D], [0; D]);
         for k in 0..D {
             let closest = i64::from(places[k].cell) + i64::from(places[k].below > 0.5);
             first[k] = (closest - rings).max(0);
-            last[k] = (closest + rings).min(grid.axis(k).last());
+            count[k] = ((closest + rings).min(grid.axis(k).last()) - first[k] + 1) as u64;
         }
         out.clear();
-        let mut node = first;
-        loop {
+        for at in indices(count) {
+            let node: [i64; D] = std::array::from_fn(|k| first[k] + at[k] as i64);
             let distance: [f64; D] = std::array::from_fn(|k| {
                 let offset = (node[k] - i64::from(places[k].cell)) as f64;
                 if offset <= 0.0 { places[k].below - offset } else { -(places[k].above + (offset - 1.0)) }
             });
             if distance.iter().map(|d| d * d).sum::<f64>() < self.radius * self.radius {
                 out.push(node.map(|index| index as u32), 0.0, distance);
-            }
-            let mut k = 0;
-            loop {
-                if k == D {
-                    return;
-                }
-                node[k] += 1;
-                if node[k] <= last[k] {
-                    break;
-                }
-                node[k] = first[k];
-                k += 1;
             }
         }
     }

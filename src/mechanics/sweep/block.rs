@@ -99,54 +99,6 @@ impl Groups {
         }
     }
 
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.windows.as_slice())
-            + size_of_val(self.weights.as_slice())
-            + size_of_val(self.single.as_slice())
-            + size_of_val(self.particles.as_slice())
-    }
-}
-
-impl Block {
-    /// Nodes of the box.
-    pub(super) fn box_nodes(&self) -> usize {
-        self.size.iter().product()
-    }
-
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(self)
-            + self.groups.bytes()
-            + size_of_val(self.nodes.as_slice())
-            + size_of_val(self.places.as_slice())
-            + size_of_val(self.active.as_slice())
-    }
-
-    /// Fills the box with `components` numbers a node, those from `at` on of the `numbers` numbers that `field` has; zero at nodes that
-    /// are not active.
-    pub(super) fn fill<X: Copy + num_traits::Zero>(
-        &self,
-        field: &[X],
-        numbers: usize,
-        at: usize,
-        components: usize,
-        nodal: &mut [X],
-    ) {
-        nodal.fill(X::zero());
-        for (&node, &place) in self.nodes.iter().zip(&self.places) {
-            let (to, from) = (place as usize * components, node as usize * numbers + at);
-            nodal[to..to + components].copy_from_slice(&field[from..from + components]);
-        }
-    }
-
-    /// Calls `add(place in the box, node − first)` for the active nodes `first .. end`.
-    pub(super) fn each_node(&self, first: usize, end: usize, mut add: impl FnMut(usize, usize)) {
-        let place_of = |bound: usize| self.nodes.partition_point(|&node| (node as usize) < bound);
-        let range = place_of(first)..place_of(end);
-        for (&node, &place) in self.nodes[range.clone()].iter().zip(&self.places[range]) {
-            add(place as usize, node as usize - first);
-        }
-    }
-
     /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
     #[inline(always)]
     pub(super) fn entries<const D: usize>(
@@ -155,7 +107,7 @@ impl Block {
         lane: usize,
         mut visit: impl FnMut(usize, f64, Vector<f64, D>),
     ) {
-        let window = self.groups.window(group, &self.groups.weights);
+        let window = self.window(group, &self.weights);
         let weights = |k: usize, at: usize| {
             let (n, dn) = window.axis(k);
             [n[at][lane], dn[at][lane]]
@@ -181,6 +133,37 @@ impl Block {
                     }
                 }
             }
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.windows.as_slice())
+            + size_of_val(self.weights.as_slice())
+            + size_of_val(self.single.as_slice())
+            + size_of_val(self.particles.as_slice())
+    }
+}
+
+impl Block {
+    /// Nodes of the box.
+    pub(super) fn box_nodes(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self)
+            + self.groups.bytes()
+            + size_of_val(self.nodes.as_slice())
+            + size_of_val(self.places.as_slice())
+            + size_of_val(self.active.as_slice())
+    }
+
+    /// Calls `add(place in the box, node − first)` for the active nodes `first .. end`.
+    pub(super) fn each_node(&self, first: usize, end: usize, mut add: impl FnMut(usize, usize)) {
+        let place_of = |bound: usize| self.nodes.partition_point(|&node| (node as usize) < bound);
+        let range = place_of(first)..place_of(end);
+        for (&node, &place) in self.nodes[range.clone()].iter().zip(&self.places[range]) {
+            add(place as usize, node as usize - first);
         }
     }
 }

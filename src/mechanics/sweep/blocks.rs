@@ -1,7 +1,7 @@
 //! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
 
-use super::kernel::{Pairs, Window, by_tile, tile};
-use super::lanes::{LANES, Lanes, Rows, WithLanes};
+use super::kernel::{In, Pairs, Window, each_tile, tile};
+use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::Arithmetic;
 
 /// Pairs (k, l) with k ≤ l of D axes.
@@ -33,28 +33,21 @@ pub(super) const fn pair(k: usize, l: usize) -> usize {
 ///
 /// With ∇N = (N_x' P_x, N_x P_y, N_x P_z), P_x = N_y N_z, …, row i of the block is
 /// N_x'² B_xx P_x P_x + N_x N_x' (B_xy P_x P_y + B_xz P_x P_z) + N_x² (B_yy P_y P_y + B_yz P_y P_z + B_zz P_z P_z + m P_x P_x e_i).
-pub(super) struct ScatterBlocks<'a, const D: usize> {
+pub(super) struct ScatterBlocks<'a> {
     pub window: Window<'a, f64>,
     pub from: &'a Quadratic,
     pub out: &'a mut [f64],
 }
 
-impl<const D: usize> WithLanes<f64> for ScatterBlocks<'_, D> {
-    type Output = ();
-
+impl<const D: usize> WithLanes<f64> for In<ScatterBlocks<'_>, D, D> {
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, s: S) {
-        let Self { window, from, out } = self;
+        let ScatterBlocks { window, from, out } = self.0;
         let rows = window.width[1] * window.width[2];
-        let at_once = <S::Rows as Rows>::COUNT;
+        let at_once = S::ROWS;
         for chunk in 0..rows.div_ceil(at_once) {
             let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
-            let mut start = 0;
-            while start < window.width[0] {
-                let tile = tile(window.width[0] - start);
-                by_tile!(tile, blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
-                start += tile;
-            }
+            each_tile!(window, start => blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
         }
     }
 }
@@ -85,16 +78,17 @@ fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
                     let power = usize::from(k > 0) + usize::from(l > 0);
                     let product = s.mul(pairs.products[k][p], pairs.products[l][p]);
                     for j in 0..D {
-                        let coefficient = s.splat(from.bilinear[pair(k, l)][i][j][p]);
+                        let coefficient = lanes.splat_rows(from.bilinear[pair(k, l)][i][j][p]);
                         powers[power][j] = s.mul_add(coefficient, product, powers[power][j]);
                     }
                 }
             }
             let square = s.mul(pairs.products[0][p], pairs.products[0][p]);
-            powers[2][i] = s.mul_add(s.splat(from.mass[p]), square, powers[2][i]);
+            powers[2][i] = s.mul_add(lanes.splat_rows(from.mass[p]), square, powers[2][i]);
             for x in 0..sums.len() {
                 let (nx, dx) = (n[x][p], dn[x][p]);
-                let (two, one, none) = (s.splat(dx * dx), s.splat(nx * dx), s.splat(nx * nx));
+                let (two, one, none) =
+                    (lanes.splat_rows(dx * dx), lanes.splat_rows(nx * dx), lanes.splat_rows(nx * nx));
                 for j in 0..D {
                     row[x][j] = s.mul_add(powers[0][j], two, row[x][j]);
                     if D > 1 {

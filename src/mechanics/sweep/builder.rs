@@ -147,12 +147,13 @@ impl<const D: usize> Building<'_, D> {
         }
         groups.particles.push(std::array::from_fn(|lane| keys.get(lane).map_or(u32::MAX, |key| key.particle)));
         groups.windows.push(group);
-        self.mark(&columns[..D], keys.len(), active);
+        self.mark(groups, &columns[..D], keys.len(), active);
         Ok(())
     }
 
-    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes.
-    fn mark(&self, columns: &[Columns], count: usize, active: &mut [u64]) {
+    /// Marks the nodes with N ≠ 0 or ∇N ≠ 0 of the first `count` lanes of the last group.
+    fn mark(&self, groups: &Groups, columns: &[Columns], count: usize, active: &mut [u64]) {
+        let nx = self.size[0];
         for lane in 0..count {
             let (mut begin, mut end) = ([0; 3], [1; 3]);
             for k in 0..D {
@@ -160,29 +161,17 @@ impl<const D: usize> Building<'_, D> {
             }
             // No N vanishes, nor underflows: the whole of the particle's window.
             let whole = columns.iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
+            if !whole {
+                groups.entries::<D>(groups.len() - 1, lane, |place, _, _| active[place / nx] |= 1 << (place % nx));
+                continue;
+            }
             let row = ((1 << (end[0] - begin[0])) - 1) << begin[0];
             for z in begin[2]..end[2] {
                 for y in begin[1]..end[1] {
-                    active[z * self.size[1] + y] |=
-                        if whole { row } else { self.visible(columns, lane, [begin[0], y, z], end[0]) };
+                    active[z * self.size[1] + y] |= row;
                 }
             }
         }
-    }
-
-    /// The nodes of a row, from `at` to `end`, with N ≠ 0 or ∇N ≠ 0.
-    fn visible(&self, columns: &[Columns], lane: usize, at: [usize; 3], end: usize) -> u64 {
-        let mut bits = 0;
-        for x in at[0]..end {
-            let place = [x, at[1], at[2]];
-            let w: [[f64; 2]; D] = std::array::from_fn(|k| columns[k].at(lane, self.origin[k] + place[k] as u32));
-            let n: f64 = w.iter().map(|w| w[0]).product();
-            let slope = |k: usize| (0..D).map(|m| w[m][usize::from(m == k)]).product::<f64>();
-            if n != 0.0 || (0..D).any(|k| slope(k) != 0.0) {
-                bits |= 1 << x;
-            }
-        }
-        bits
     }
 }
 
@@ -246,22 +235,6 @@ pub(super) fn number<const D: usize>(
     rows: &mut Vec<Row>,
     mut ids: Vec<u64>,
 ) -> Nodes {
-    /// The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
-    fn apart(mut line: &[Row]) -> Vec<&[Row]> {
-        let mut parts = Vec::new();
-        while let Some(first) = line.first() {
-            let mut reach = first.x;
-            let gap = line.iter().position(|row| {
-                let beyond = row.x > reach;
-                reach = reach.max(row.end());
-                beyond
-            });
-            let (part, rest) = line.split_at(gap.unwrap_or(line.len()));
-            parts.push(part);
-            line = rest;
-        }
-        parts
-    }
     rows.clear();
     rows.reserve(blocks.iter().map(|block| block.active.len()).sum());
     for (b, block) in blocks.iter().enumerate() {
@@ -279,7 +252,15 @@ pub(super) fn number<const D: usize>(
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
     ids.clear();
     let mut numbers: Vec<u32> = Vec::new();
-    for same in rows.chunk_by(|a, b| a.start == b.start).flat_map(apart) {
+    // The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
+    let mut reach = 0;
+    let together = |row: &Row, next: &Row| {
+        reach = row.end().max(reach);
+        let together = next.start == row.start && next.x <= reach;
+        reach = if together { reach } else { 0 };
+        together
+    };
+    for same in rows.chunk_by(together) {
         let low = same[0].x;
         numbers.clear();
         for row in same {

@@ -106,8 +106,6 @@ struct Places<'a> {
 }
 
 impl WithLanes<f64> for Places<'_> {
-    type Output = ();
-
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, _: S) {
         let Self { axis, radius, along } = self;
@@ -156,17 +154,10 @@ impl Columns {
         self.first[lane] = i64::from(list.first);
         self.spans[lane] = span(list);
         self.smallest[lane] = list.values.iter().fold(f64::INFINITY, |low, n| low.min(n.abs()));
-        let nodes =
-            list.values.iter().zip(&list.derivatives).map(|(&n, &dn)| (n, dn)).chain(std::iter::repeat((0.0, 0.0)));
-        for ((n, dn), (values, derivatives)) in nodes.zip(self.values.iter_mut().zip(&mut self.derivatives)) {
-            (values[lane], derivatives[lane]) = (n, dn);
+        for row in 0..WIDEST {
+            self.values[row][lane] = list.values.get(row).copied().unwrap_or(0.0);
+            self.derivatives[row][lane] = list.derivatives.get(row).copied().unwrap_or(0.0);
         }
-    }
-
-    /// N and dN/dx of a node in a list.
-    pub(super) fn at(&self, lane: usize, node: u32) -> [f64; 2] {
-        let row = (i64::from(node) - self.first[lane]) as usize;
-        [self.values[row][lane], self.derivatives[row][lane]]
     }
 
     /// Writes N and dN/dx of the first `count` lanes to the rows of the nodes `low ..`, which hold zeros.
@@ -220,8 +211,6 @@ struct Evaluate<'a, 'b, I, const M: usize> {
 }
 
 impl<I: Interior, const M: usize> WithLanes<f64> for Evaluate<'_, '_, I, M> {
-    type Output = ();
-
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, s: S) {
         let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;

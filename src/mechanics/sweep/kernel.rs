@@ -6,7 +6,8 @@
 //! gather, a lane a particle:  u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z;
 //! scatter, a lane a row (y, z) of the window: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
-use super::lanes::{LANES, Lanes, Rows, WithLanes};
+use super::Flow;
+use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::{Arithmetic, Real};
 use num_traits::One;
 
@@ -56,76 +57,60 @@ impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
     }
 }
 
-/// Whether values and gradients are there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parts {
-    /// Σ u_I N_I, or q N_I
-    pub value: bool,
-    /// Σ u_I ⊗ ∇N_I, or σ ∇N_I
-    pub gradient: bool,
-}
-
-impl Parts {
-    /// Both.
-    pub const BOTH: Self = Self { value: true, gradient: true };
-    /// Values alone.
-    pub const VALUE: Self = Self { value: true, gradient: false };
-    /// Gradients alone.
-    pub const GRADIENT: Self = Self { value: false, gradient: true };
-}
-
 /// The width of the next tile where `left` nodes are left along x: 1 only for a window of one node.
 #[inline(always)]
 pub(super) fn tile(left: usize) -> usize {
     if left <= WIDEST_TILE { left } else { left.div_ceil(2).min(WIDEST_TILE - 1) }
 }
 
-/// Calls a function of the width of a tile: compiled for every width, or once for all where the lanes are rare.
-macro_rules! by_tile {
-    ($tile:expr, $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
-        match $tile {
-            tile if $lanes::RARE => $function::<$lanes, $($generic,)* 6>($($argument,)* tile),
-            1 => $function::<$lanes, $($generic,)* 1>($($argument,)* 1),
-            2 => $function::<$lanes, $($generic,)* 2>($($argument,)* 2),
-            3 => $function::<$lanes, $($generic,)* 3>($($argument,)* 3),
-            4 => $function::<$lanes, $($generic,)* 4>($($argument,)* 4),
-            5 => $function::<$lanes, $($generic,)* 5>($($argument,)* 5),
-            _ => $function::<$lanes, $($generic,)* 6>($($argument,)* 6),
+/// Calls a function for every tile of a window, from `start` on and as wide as the last argument says: compiled for every width, or
+/// once for all where the lanes are rare.
+macro_rules! each_tile {
+    ($window:ident, $start:ident => $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
+        let mut $start = 0;
+        while $start < $window.width[0] {
+            let tile = tile($window.width[0] - $start);
+            match tile {
+                tile if $lanes::RARE => $function::<$lanes, $($generic,)* 6>($($argument,)* tile),
+                1 => $function::<$lanes, $($generic,)* 1>($($argument,)* 1),
+                2 => $function::<$lanes, $($generic,)* 2>($($argument,)* 2),
+                3 => $function::<$lanes, $($generic,)* 3>($($argument,)* 3),
+                4 => $function::<$lanes, $($generic,)* 4>($($argument,)* 4),
+                5 => $function::<$lanes, $($generic,)* 5>($($argument,)* 5),
+                _ => $function::<$lanes, $($generic,)* 6>($($argument,)* 6),
+            }
+            $start += tile;
         }
     };
 }
 
-pub(super) use by_tile;
+pub(super) use each_tile;
+
+/// Work on C components in D dimensions.
+pub(super) struct In<W, const C: usize, const D: usize>(pub W);
 
 /// Fills value and gradient, C and C·D rows, from the box `nodal`, component after component of each node.
-pub(super) struct Gather<'a, X, const C: usize, const D: usize> {
+pub struct Gather<'a, X> {
     pub window: Window<'a, X>,
     pub nodal: &'a [X],
-    pub parts: Parts,
+    pub flow: Flow,
     pub value: &'a mut [[X; LANES]],
     pub gradient: &'a mut [[X; LANES]],
 }
 
-impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Gather<'_, X, C, D> {
-    type Output = ();
-
+impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Gather<'_, X>, C, D> {
     #[inline(always)]
     fn run<S: Lanes<X = X>>(self, s: S) {
-        let Self { window, nodal, parts, value, gradient } = self;
+        let Gather { window, nodal, flow, value, gradient } = self.0;
         let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
-        let mut start = 0;
-        while start < window.width[0] {
-            let tile = tile(window.width[0] - start);
-            by_tile!(tile, gather_tile::<S, C, D>(s, &window, start, nodal, parts.value, &mut out));
-            start += tile;
-        }
+        each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
         // Loops, not closures: what is not inlined loses the wide instructions.
-        if parts.value {
+        if flow.value {
             for (c, row) in value.iter_mut().enumerate().take(C) {
                 s.store(out.value[c], row);
             }
         }
-        if parts.gradient {
+        if flow.gradient {
             let slopes = out.gradient.as_flattened();
             for (k, row) in gradient.iter_mut().enumerate().take(C * D) {
                 s.store(slopes[k], row);
@@ -240,32 +225,25 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 
 /// f_I += σ ∇N_I + q N_I, with q in the place of u, C rows, and σ in that of L, C·D rows, a lane a particle; `out` is a box as in
 /// [`Gather`], a vector longer than its nodes.
-pub(super) struct Scatter<'a, X, const C: usize, const D: usize> {
+pub struct Scatter<'a, X> {
     pub window: Window<'a, X>,
-    pub parts: Parts,
+    pub flow: Flow,
     pub value: &'a [[X; LANES]],
     pub gradient: &'a [[X; LANES]],
     pub out: &'a mut [X],
 }
 
-impl<X: Real, const C: usize, const D: usize> WithLanes<X> for Scatter<'_, X, C, D> {
-    type Output = ();
-
+impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Scatter<'_, X>, C, D> {
     #[inline(always)]
     fn run<S: Lanes<X = X>>(self, s: S) {
-        let Self { window, parts, value, gradient, out } = self;
+        let Scatter { window, flow, value, gradient, out } = self.0;
         // Fixed lengths, so that no place in them is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
         let rows = window.width[1] * window.width[2];
-        let at_once = <S::Rows as Rows>::COUNT;
+        let at_once = S::ROWS;
         for chunk in 0..rows.div_ceil(at_once) {
             let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
-            let mut start = 0;
-            while start < window.width[0] {
-                let tile = tile(window.width[0] - start);
-                by_tile!(tile, scatter_tile::<S, C, D>(s, &window, start, &pairs, parts, value, gradient, out));
-                start += tile;
-            }
+            each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, flow, value, gradient, out));
         }
     }
 }
@@ -281,7 +259,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
     #[inline(always)]
     pub(super) fn new(s: S, window: &Window<'_, S::X>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
-        let count = (wy * wz - start).min(<S::Rows as Rows>::COUNT);
+        let count = (wy * wz - start).min(S::ROWS);
         let mut products = [[s.zero(); LANES]; D];
         let mut places = [0; LANES];
         let (mut y, mut z) = (start % wy, start / wy);
@@ -310,7 +288,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         let r = s.rows();
         let mut columns = [[r.zero(); LANES]; D];
         for k in 0..D {
-            columns[k] = r.columns(products[k]);
+            columns[k] = s.columns(&products[k]);
         }
         Self { products: columns, places, count }
     }
@@ -323,7 +301,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         for place in &mut places {
             *place = (*place + at) * numbers;
         }
-        s.rows().add_up(sums, &places[..self.count], out);
+        s.add_up(sums, &places[..self.count], out);
     }
 }
 
@@ -334,7 +312,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     window: &Window<'_, S::X>,
     start: usize,
     pairs: &Pairs<S, D>,
-    parts: Parts,
+    flow: Flow,
     value: &[[S::X; LANES]; C],
     gradient: &[[[S::X; LANES]; D]; C],
     out: &mut [S::X],
@@ -349,22 +327,22 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     for p in 0..window.lanes.min(LANES) {
         // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z; which of them there are is asked outside the inner loops.
         let (mut across, mut along) = ([zero; C], [zero; C]);
-        if parts.gradient {
+        if flow.gradient {
             for c in 0..C {
                 for k in 1..D {
-                    across[c] = s.mul_add(s.splat(gradient[c][k][p]), pairs.products[k][p], across[c]);
+                    across[c] = s.mul_add(lanes.splat_rows(gradient[c][k][p]), pairs.products[k][p], across[c]);
                 }
-                along[c] = s.mul(s.splat(gradient[c][0][p]), pairs.products[0][p]);
+                along[c] = s.mul(lanes.splat_rows(gradient[c][0][p]), pairs.products[0][p]);
             }
         }
-        if parts.value {
+        if flow.value {
             for c in 0..C {
-                across[c] = s.mul_add(s.splat(value[c][p]), pairs.products[0][p], across[c]);
+                across[c] = s.mul_add(lanes.splat_rows(value[c][p]), pairs.products[0][p], across[c]);
             }
         }
-        if !parts.gradient {
+        if !flow.gradient {
             for x in 0..sums.len() {
-                let nx = s.splat(n[x][p]);
+                let nx = lanes.splat_rows(n[x][p]);
                 for c in 0..C {
                     sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
                 }
@@ -372,7 +350,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
             continue;
         }
         for x in 0..sums.len() {
-            let (nx, dx) = (s.splat(n[x][p]), s.splat(dn[x][p]));
+            let (nx, dx) = (lanes.splat_rows(n[x][p]), lanes.splat_rows(dn[x][p]));
             for c in 0..C {
                 sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
                 sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);
@@ -384,8 +362,9 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::{Portable, Widest};
+    use super::super::lanes::{Portable, Registers, Widest};
     use super::*;
+    use pulp::Scalar;
 
     const WIDTH: [usize; 3] = [7, 3, 5];
     const BOX: [usize; 3] = [9, 4, 6];
@@ -397,24 +376,21 @@ mod tests {
     }
 
     /// Gathers and scatters what was gathered.
-    #[derive(Clone, Copy)]
-    struct ThereAndBack<'a, X>(&'a [[X; LANES]], &'a [X]);
+    struct ThereAndBack<'a, X>(&'a [[X; LANES]], &'a [X], &'a mut Vec<(Vec<X>, Vec<X>)>);
 
     impl<X: Real> WithLanes<X> for ThereAndBack<'_, X> {
-        type Output = (Vec<X>, Vec<X>);
-
         #[inline(always)]
-        fn run<S: Lanes<X = X>>(self, s: S) -> Self::Output {
+        fn run<S: Lanes<X = X>>(self, s: S) {
             let stride = [BOX[0], BOX[0] * BOX[1]];
             let window = Window { dimension: 3, width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
-            let (parts, mut at) = (Parts::BOTH, At::<X, 3, 3>::zero());
+            let (flow, mut at) = (Flow::BOTH, At::<X, 3, 3>::zero());
             let At { value, gradient } = &mut at;
             let gradient = gradient.as_flattened_mut();
-            Gather::<X, 3, 3> { window, nodal: self.1, parts, value, gradient }.run(s);
+            In::<_, 3, 3>(Gather { window, nodal: self.1, flow, value, gradient }).run(s);
             let mut out = vec![X::zero(); self.1.len() + LANES];
             let (value, gradient) = (at.value.as_slice(), at.gradient.as_flattened());
-            Scatter::<X, 3, 3> { window, parts, value, gradient, out: &mut out }.run(s);
-            (gradient.iter().chain(value).flatten().copied().collect(), out)
+            In::<_, 3, 3>(Scatter { window, flow, value, gradient, out: &mut out }).run(s);
+            self.2.push((gradient.iter().chain(value).flatten().copied().collect(), out));
         }
     }
 
@@ -465,18 +441,22 @@ mod tests {
     #[test]
     fn all_instruction_sets_give_the_plain_sums() {
         let (weights, nodal, gathered, scattered) = problem::<f64>();
-        let work = ThereAndBack(&weights, &nodal);
-        judge(vec![work.run(Portable::<f64>::NEW), f64::widest(work)], &gathered, &scattered, 1e-13);
+        let mut found = Vec::new();
+        ThereAndBack(&weights, &nodal, &mut found).run(Portable::<f64>::of(Scalar));
+        f64::widest(ThereAndBack(&weights, &nodal, &mut found));
         #[cfg(target_arch = "x86_64")]
         if let Some(s) = pulp::x86::V3::try_new() {
-            judge(vec![work.run(s)], &gathered, &scattered, 1e-13);
+            ThereAndBack(&weights, &nodal, &mut found).run(Registers::<_, f64, 2, 1>::of(s));
         }
+        judge(found, &gathered, &scattered, 1e-13);
     }
 
     #[test]
     fn so_they_do_in_single_precision() {
         let (weights, nodal, gathered, scattered) = problem::<f32>();
-        let work = ThereAndBack(&weights, &nodal);
-        judge(vec![work.run(Portable::<f32>::NEW), f32::widest(work)], &gathered, &scattered, 1e-4);
+        let mut found = Vec::new();
+        ThereAndBack(&weights, &nodal, &mut found).run(Portable::<f32>::of(Scalar));
+        f32::widest(ThereAndBack(&weights, &nodal, &mut found));
+        judge(found, &gathered, &scattered, 1e-4);
     }
 }

@@ -4,39 +4,43 @@
 
 use super::block::Groups;
 use super::blocks::{Quadratic, ScatterBlocks};
-use super::kernel::{Gather, Parts, Scatter, Window};
+use super::kernel::{Gather, In, Scatter};
 use super::lanes::{LANES, Widest};
 use super::tangents::{AddTo, Form, Product};
 use crate::pooled;
 use bytemuck::Pod;
 
 /// A number of which fields are gathered and scattered, in double or in single precision.
-pub trait Laned: Widest + Pod + Send + Sync + pooled::Number {
+pub trait Laned: Widest + Pod + Default + Send + Sync + pooled::Number {
     /// The weights of all groups of a block.
     fn weights(groups: &Groups) -> &[[Self; LANES]];
 
     /// Values and gradients of `components` numbers a node, 1 or as many as axes, from a box.
-    fn gather(
-        components: usize,
-        window: Window<'_, Self>,
-        nodal: &[Self],
-        parts: Parts,
-        value: &mut [[Self; LANES]],
-        gradient: &mut [[Self; LANES]],
-    );
+    fn gather(components: usize, work: Gather<'_, Self>);
 
     /// Adds values and gradients to a box.
-    fn scatter(
-        components: usize,
-        window: Window<'_, Self>,
-        parts: Parts,
-        value: &[[Self; LANES]],
-        gradient: &[[Self; LANES]],
-        out: &mut [Self],
-    );
+    fn scatter(components: usize, work: Scatter<'_, Self>);
 
     /// Adds the product of a group's tangents with its gradients.
-    fn product(form: Form, dimension: usize, rows: &[[Self; LANES]], l: &[[Self; LANES]], out: &mut [[Self; LANES]]);
+    fn product(dimension: usize, work: Product<'_, Self>);
+}
+
+/// Does work on one component, or on as many as there are axes, with the widest lanes of a number.
+macro_rules! widest {
+    ($number:ty, $dimension:expr, $work:expr) => {
+        match $dimension {
+            1 => <$number>::widest(In::<_, 1, 1>($work)),
+            2 => <$number>::widest(In::<_, 2, 2>($work)),
+            _ => <$number>::widest(In::<_, 3, 3>($work)),
+        }
+    };
+    ($number:ty, $dimension:expr, $components:expr, $work:expr) => {
+        match ($dimension, $components) {
+            (2, 1) => <$number>::widest(In::<_, 1, 2>($work)),
+            (3, 1) => <$number>::widest(In::<_, 1, 3>($work)),
+            _ => widest!($number, $dimension, $work),
+        }
+    };
 }
 
 macro_rules! laned {
@@ -46,52 +50,16 @@ macro_rules! laned {
                 &groups.$weights
             }
 
-            fn gather(
-                components: usize,
-                window: Window<'_, Self>,
-                nodal: &[Self],
-                parts: Parts,
-                value: &mut [[Self; LANES]],
-                gradient: &mut [[Self; LANES]],
-            ) {
-                match (window.dimension, components) {
-                    (1, _) => Self::widest(Gather::<_, 1, 1> { window, nodal, parts, value, gradient }),
-                    (2, 1) => Self::widest(Gather::<_, 1, 2> { window, nodal, parts, value, gradient }),
-                    (2, _) => Self::widest(Gather::<_, 2, 2> { window, nodal, parts, value, gradient }),
-                    (_, 1) => Self::widest(Gather::<_, 1, 3> { window, nodal, parts, value, gradient }),
-                    (_, _) => Self::widest(Gather::<_, 3, 3> { window, nodal, parts, value, gradient }),
-                }
+            fn gather(components: usize, work: Gather<'_, Self>) {
+                widest!(Self, work.window.dimension, components, work);
             }
 
-            fn scatter(
-                components: usize,
-                window: Window<'_, Self>,
-                parts: Parts,
-                value: &[[Self; LANES]],
-                gradient: &[[Self; LANES]],
-                out: &mut [Self],
-            ) {
-                match (window.dimension, components) {
-                    (1, _) => Self::widest(Scatter::<_, 1, 1> { window, parts, value, gradient, out }),
-                    (2, 1) => Self::widest(Scatter::<_, 1, 2> { window, parts, value, gradient, out }),
-                    (2, _) => Self::widest(Scatter::<_, 2, 2> { window, parts, value, gradient, out }),
-                    (_, 1) => Self::widest(Scatter::<_, 1, 3> { window, parts, value, gradient, out }),
-                    (_, _) => Self::widest(Scatter::<_, 3, 3> { window, parts, value, gradient, out }),
-                }
+            fn scatter(components: usize, work: Scatter<'_, Self>) {
+                widest!(Self, work.window.dimension, components, work);
             }
 
-            fn product(
-                form: Form,
-                dimension: usize,
-                rows: &[[Self; LANES]],
-                l: &[[Self; LANES]],
-                out: &mut [[Self; LANES]],
-            ) {
-                match dimension {
-                    1 => Self::widest(Product::<_, 1> { form, rows, l, out }),
-                    2 => Self::widest(Product::<_, 2> { form, rows, l, out }),
-                    _ => Self::widest(Product::<_, 3> { form, rows, l, out }),
-                }
+            fn product(dimension: usize, work: Product<'_, Self>) {
+                widest!(Self, dimension, work);
             }
         }
     };
@@ -101,12 +69,8 @@ laned!(f64, weights);
 laned!(f32, single);
 
 /// Adds the diagonal blocks of a group's quadratic form to a box of D×D blocks.
-pub(super) fn blocks(window: Window<'_, f64>, from: &Quadratic, out: &mut [f64]) {
-    match window.dimension {
-        1 => f64::widest(ScatterBlocks::<1> { window, from, out }),
-        2 => f64::widest(ScatterBlocks::<2> { window, from, out }),
-        _ => f64::widest(ScatterBlocks::<3> { window, from, out }),
-    }
+pub(super) fn blocks(work: ScatterBlocks<'_>) {
+    widest!(f64, work.window.dimension, work);
 }
 
 /// Adds `factor` times the quadratic form of the tangents of a group, see [`AddTo`].
@@ -119,10 +83,5 @@ pub(crate) fn add_quadratic<X: Laned>(
 ) {
     let mut plain = [[0.0; LANES]; Form::General.rows(3)];
     plain.iter_mut().zip(rows).for_each(|(to, from)| *to = from.map(X::value));
-    let rows = &plain[..rows.len()];
-    match dimension {
-        1 => f64::widest(AddTo::<1> { form, rows, factor, into }),
-        2 => f64::widest(AddTo::<2> { form, rows, factor, into }),
-        _ => f64::widest(AddTo::<3> { form, rows, factor, into }),
-    }
+    widest!(f64, dimension, AddTo { form, rows: &plain[..rows.len()], factor, into });
 }

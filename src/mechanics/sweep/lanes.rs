@@ -4,6 +4,11 @@
 //! twice where it has not, and that is all a result can differ by between processors.
 
 use crate::scalar::{Arithmetic, Real};
+use pulp::{Scalar, Simd};
+use std::marker::PhantomData;
+
+#[cfg(target_arch = "x86_64")]
+use pulp::x86::{V3, V4};
 
 /// Lanes of a vector, in double and in single precision.
 pub const LANES: usize = 8;
@@ -13,7 +18,7 @@ pub trait Lanes: Arithmetic {
     /// The number in a lane.
     type X: Real;
     /// Whether these lanes are there for the rare processor that has no other: kernels then do without a copy for every width.
-    const RARE: bool = false;
+    const RARE: bool;
     fn splat(self, x: Self::X) -> Self::N;
     fn load(self, x: &[Self::X; LANES]) -> Self::N;
     fn store(self, v: Self::N, out: &mut [Self::X; LANES]);
@@ -22,432 +27,234 @@ pub trait Lanes: Arithmetic {
     fn div(self, a: Self::N, b: Self::N) -> Self::N;
     /// `then` where a < b, and `otherwise` elsewhere.
     fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N;
-    /// Vectors of rows of nodes, no wider than the registers are.
-    type Rows: Rows<X = Self::X, Particles = Self::N>;
-    fn rows(self) -> Self::Rows;
-}
-
-/// Arithmetic on rows of nodes, a lane each, with as many as fill one register.
-pub trait Rows: Arithmetic {
-    /// The number in a lane.
-    type X: Real;
-    /// A vector with a lane for each particle.
-    type Particles: Copy;
+    /// Arithmetic on rows of nodes, a lane each, with as many as fill one register.
+    type Rows: Arithmetic;
     /// Rows of a vector.
-    const COUNT: usize;
-    fn splat(self, x: Self::X) -> Self::N;
+    const ROWS: usize;
+    fn rows(self) -> Self::Rows;
+    fn splat_rows(self, x: Self::X) -> <Self::Rows as Arithmetic>::N;
     /// From a vector of particles for each row to a vector of rows for each particle.
-    fn columns(self, rows: [Self::Particles; LANES]) -> [Self::N; LANES];
+    fn columns(self, rows: &[Self::N; LANES]) -> [<Self::Rows as Arithmetic>::N; LANES];
     /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row; a vector's length from there is read and written.
-    fn add_up(self, sums: &[Self::N], places: &[usize], out: &mut [Self::X]);
+    fn add_up(self, sums: &[<Self::Rows as Arithmetic>::N], places: &[usize], out: &mut [Self::X]);
 }
 
-/// Rows that are as many as the particles.
-macro_rules! square {
-    ($s:ty, $number:ty, $this:ident, $transpose:expr) => {
-        impl Rows for $s {
-            type X = $number;
-            type Particles = <Self as Arithmetic>::N;
-            const COUNT: usize = LANES;
-            #[inline(always)]
-            fn splat(self, x: $number) -> Self::N {
-                Lanes::splat(self, x)
-            }
-            #[inline(always)]
-            fn columns($this, rows: [Self::N; LANES]) -> [Self::N; LANES] {
-                $transpose($this, rows)
-            }
-            #[inline(always)]
-            fn add_up(self, sums: &[Self::N], places: &[usize], out: &mut [$number]) {
-                for (part, some) in sums.chunks(LANES).enumerate() {
-                    let mut rows = [self.zero(); LANES];
-                    rows[..some.len()].copy_from_slice(some);
-                    let rows = self.columns(rows);
-                    for (row, &place) in rows.iter().zip(places) {
-                        if let Some(slot) = out[place + part * LANES..].first_chunk_mut::<LANES>() {
-                            let sum = Arithmetic::add(self, self.load(slot), *row);
-                            self.store(sum, slot);
-                        }
-                    }
-                }
-            }
-        }
-    };
-}
-
-/// Rows become columns.
-#[inline(always)]
-fn transposed<S, X: Copy, const N: usize>(_: S, rows: [[X; N]; N]) -> [[X; N]; N] {
-    let mut columns = rows;
-    for i in 0..N {
-        for k in 0..N {
-            columns[i][k] = rows[k][i];
-        }
+/// An instruction set that turns the rows of a square of numbers, a register each, into columns.
+pub(super) trait Square: Simd {
+    #[inline(always)]
+    fn transpose_f64s(self, rows: &mut [Self::f64s]) {
+        transpose::<f64>(bytemuck::cast_slice_mut(rows), Self::F64_LANES);
     }
-    columns
+    #[inline(always)]
+    fn transpose_f32s(self, rows: &mut [Self::f32s]) {
+        transpose::<f32>(bytemuck::cast_slice_mut(rows), Self::F32_LANES);
+    }
 }
 
 /// Something to be done with the widest lanes there are.
 pub trait WithLanes<X> {
-    /// What comes out.
-    type Output;
     /// Does it.
-    fn run<S: Lanes<X = X>>(self, s: S) -> Self::Output;
+    fn run<S: Lanes<X = X>>(self, s: S);
 }
 
 /// A number that has vectors.
 pub trait Widest: Real {
     /// Does it with the widest lanes of this processor.
-    fn widest<W: WithLanes<Self>>(work: W) -> W::Output;
+    fn widest(work: impl WithLanes<Self>);
 }
 
-/// Plain arrays.
+/// Eight numbers in `N` registers of the instruction set `I`; their rows of nodes are `R` registers wide.
 #[derive(Clone, Copy)]
-pub(super) struct Portable<X>(std::marker::PhantomData<X>);
+pub(super) struct Registers<I, X, const N: usize, const R: usize>(I, PhantomData<X>);
 
-impl<X> Portable<X> {
-    pub(super) const NEW: Self = Self(std::marker::PhantomData);
+/// Plain numbers.
+pub(super) type Portable<X> = Registers<Scalar, X, LANES, LANES>;
+
+impl<I, X, const N: usize, const R: usize> Registers<I, X, N, R> {
+    /// The proof `I` that the processor has the instructions.
+    #[inline(always)]
+    pub(super) fn of(instructions: I) -> Self {
+        Self(instructions, PhantomData)
+    }
 }
 
-macro_rules! portable {
-    ($number:ty) => {
-        impl Arithmetic for Portable<$number> {
-            type N = [$number; LANES];
-            #[inline(always)]
-            fn add(self, a: Self::N, b: Self::N) -> Self::N {
-                std::array::from_fn(|i| a[i] + b[i])
+/// An operation on numbers, register by register.
+macro_rules! by_register {
+    ($method:ident($($a:ident),+) = $of_one:ident) => {
+        #[inline(always)]
+        fn $method(self, $($a: Self::N),+) -> Self::N {
+            // A loop, not a closure: what is not inlined loses the wide instructions.
+            let mut out = self.zero();
+            for i in 0..N {
+                out[i] = self.0.$of_one($($a[i]),+);
             }
-            #[inline(always)]
-            fn mul(self, a: Self::N, b: Self::N) -> Self::N {
-                std::array::from_fn(|i| a[i] * b[i])
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N {
-                std::array::from_fn(|i| a[i] * b[i] + c[i])
-            }
-            #[inline(always)]
-            fn mul_sub(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N {
-                std::array::from_fn(|i| c[i] - a[i] * b[i])
-            }
+            out
+        }
+    };
+}
+
+/// Lanes and rows of one kind of number with any instruction set, by what `pulp` calls that number's operations.
+macro_rules! registers {
+    ($number:ident: $vector:ident, $in_one:ident, $read:ident, $written:ident, $splat:ident, $less:ident, $select:ident, $transpose:ident;
+     $($arithmetic:ident $arguments:tt = $of_one:ident),+; $($more:ident $more_arguments:tt = $more_of_one:ident),+;) => {
+        impl<I: Simd, const N: usize, const R: usize> Arithmetic for Registers<I, $number, N, R> {
+            type N = [I::$vector; N];
             #[inline(always)]
             fn zero(self) -> Self::N {
-                [0.0; LANES]
+                [self.0.$splat(0.0); N]
             }
+            $(by_register!($arithmetic $arguments = $of_one);)+
         }
 
-        impl Lanes for Portable<$number> {
+        impl<I: Square, const N: usize, const R: usize> Lanes for Registers<I, $number, N, R> {
             type X = $number;
+            type Rows = Registers<I, $number, R, R>;
             // An x86-64 without AVX2.
-            const RARE: bool = cfg!(target_arch = "x86_64");
+            const RARE: bool = I::IS_SCALAR && cfg!(target_arch = "x86_64");
             #[inline(always)]
             fn splat(self, x: $number) -> Self::N {
-                [x; LANES]
+                [self.0.$splat(x); N]
             }
             #[inline(always)]
             fn load(self, x: &[$number; LANES]) -> Self::N {
-                *x
+                let mut out = self.zero();
+                out.copy_from_slice(I::$read(x).0);
+                out
             }
             #[inline(always)]
             fn store(self, v: Self::N, out: &mut [$number; LANES]) {
-                *out = v;
-            }
-            type Rows = Self;
-            #[inline(always)]
-            fn rows(self) -> Self {
-                self
+                I::$written(out).0.copy_from_slice(&v);
             }
             #[inline(always)]
-            fn abs(self, a: Self::N) -> Self::N {
-                a.map(<$number>::abs)
+            fn where_less(self, a: Self::N, b: Self::N, then: Self::N, mut otherwise: Self::N) -> Self::N {
+                for i in 0..N {
+                    otherwise[i] = self.0.$select(self.0.$less(a[i], b[i]), then[i], otherwise[i]);
+                }
+                otherwise
+            }
+            $(by_register!($more $more_arguments = $more_of_one);)+
+            const ROWS: usize = R * I::$in_one;
+            #[inline(always)]
+            fn rows(self) -> Self::Rows {
+                Registers::of(self.0)
             }
             #[inline(always)]
-            fn sub(self, a: Self::N, b: Self::N) -> Self::N {
-                std::array::from_fn(|i| a[i] - b[i])
+            fn splat_rows(self, x: $number) -> [I::$vector; R] {
+                [self.0.$splat(x); R]
             }
             #[inline(always)]
-            fn div(self, a: Self::N, b: Self::N) -> Self::N {
-                std::array::from_fn(|i| a[i] / b[i])
+            fn columns(self, rows: &[Self::N; LANES]) -> [[I::$vector; R]; LANES] {
+                self.turned(rows)
             }
             #[inline(always)]
-            fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N {
-                std::array::from_fn(|i| if a[i] < b[i] { then[i] } else { otherwise[i] })
+            fn add_up(self, sums: &[[I::$vector; R]], places: &[usize], out: &mut [$number]) {
+                for (part, some) in sums.chunks(Self::ROWS).enumerate() {
+                    let mut rows = [self.rows().zero(); LANES];
+                    rows[..some.len()].copy_from_slice(some);
+                    let rows = self.turned::<R, R>(&rows);
+                    for (row, &place) in rows[..Self::ROWS].iter().zip(places) {
+                        let to = &mut out[place + part * Self::ROWS..][..Self::ROWS];
+                        if let Some(to) = I::$written(to).0.first_chunk_mut() {
+                            *to = self.rows().add(*to, *row);
+                        }
+                    }
+                }
+            }
+        }
+
+        impl<I: Square, const N: usize, const R: usize> Registers<I, $number, N, R> {
+            /// Rows of `A` registers become columns of `B`, as many as both have numbers.
+            #[inline(always)]
+            fn turned<const A: usize, const B: usize>(self, rows: &[[I::$vector; A]; LANES]) -> [[I::$vector; B]; LANES] {
+                let mut columns = [[self.0.$splat(0.0); B]; LANES];
+                for a in 0..A {
+                    for b in 0..B {
+                        let mut square = [self.0.$splat(0.0); LANES];
+                        for i in 0..I::$in_one {
+                            square[i] = rows[b * I::$in_one + i][a];
+                        }
+                        self.0.$transpose(&mut square[..I::$in_one]);
+                        for i in 0..I::$in_one {
+                            columns[a * I::$in_one + i][b] = square[i];
+                        }
+                    }
+                }
+                columns
             }
         }
     };
 }
 
-portable!(f64);
-portable!(f32);
-square!(Portable<f64>, f64, self, transposed);
-square!(Portable<f32>, f32, self, transposed);
+registers! {
+    f64: f64s, F64_LANES, as_simd_f64s, as_mut_simd_f64s, splat_f64s, less_than_f64s, select_f64s, transpose_f64s;
+    add(a, b) = add_f64s, mul(a, b) = mul_f64s, mul_add(a, b, c) = mul_add_e_f64s, mul_sub(a, b, c) = negate_mul_add_e_f64s;
+    sub(a, b) = sub_f64s, div(a, b) = div_f64s, abs(a) = abs_f64s;
+}
+registers! {
+    f32: f32s, F32_LANES, as_simd_f32s, as_mut_simd_f32s, splat_f32s, less_than_f32s, select_f32s, transpose_f32s;
+    add(a, b) = add_f32s, mul(a, b) = mul_f32s, mul_add(a, b, c) = mul_add_e_f32s, mul_sub(a, b, c) = negate_mul_add_e_f32s;
+    sub(a, b) = sub_f32s, div(a, b) = div_f32s, abs(a) = abs_f32s;
+}
+
+impl Square for Scalar {}
+
+/// A square of numbers, row by row, becomes that of its columns.
+#[inline(always)]
+fn transpose<X>(numbers: &mut [X], edge: usize) {
+    for i in 0..edge {
+        for k in 0..i {
+            numbers.swap(i * edge + k, k * edge + i);
+        }
+    }
+}
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Arithmetic, LANES, Lanes, Rows, transposed};
+    use super::Square;
     use pulp::x86::{V3, V4};
-    use pulp::{Simd, cast, f32x8, f64x4, f64x8};
+    use pulp::{cast, f64x4, f64x8};
 
-    /// The same processor, in single precision: eight numbers are one register of AVX2.
-    #[derive(Clone, Copy)]
-    pub(in super::super) struct Single(pub V3);
-
-    /// Vectors of one register.
-    macro_rules! whole {
-        ($s:ty, $this:ident => $simd:expr, $vector:ty, $number:ty, $family:ident, $fnmadd:ident,
-         $add:ident, $mul:ident, $mul_add:ident, $splat:ident, $abs:ident, $sub:ident, $div:ident, $less:ident, $select:ident) => {
-            impl Arithmetic for $s {
-                type N = $vector;
-                #[inline(always)]
-                fn add($this, a: $vector, b: $vector) -> $vector {
-                    $simd.$add(a, b)
-                }
-                #[inline(always)]
-                fn mul($this, a: $vector, b: $vector) -> $vector {
-                    $simd.$mul(a, b)
-                }
-                #[inline(always)]
-                fn mul_add($this, a: $vector, b: $vector, c: $vector) -> $vector {
-                    $simd.$mul_add(a, b, c)
-                }
-                #[inline(always)]
-                fn mul_sub($this, a: $vector, b: $vector, c: $vector) -> $vector {
-                    cast($simd.$family.$fnmadd(cast(a), cast(b), cast(c)))
-                }
-                #[inline(always)]
-                fn zero($this) -> $vector {
-                    $simd.$splat(0.0)
-                }
-            }
-
-            impl Lanes for $s {
-                type X = $number;
-                #[inline(always)]
-                fn splat($this, x: $number) -> $vector {
-                    $simd.$splat(x)
-                }
-                #[inline(always)]
-                fn load(self, x: &[$number; LANES]) -> $vector {
-                    cast(*x)
-                }
-                #[inline(always)]
-                fn store(self, v: $vector, out: &mut [$number; LANES]) {
-                    *out = cast(v);
-                }
-                #[inline(always)]
-                fn abs($this, a: $vector) -> $vector {
-                    $simd.$abs(a)
-                }
-                #[inline(always)]
-                fn sub($this, a: $vector, b: $vector) -> $vector {
-                    $simd.$sub(a, b)
-                }
-                #[inline(always)]
-                fn div($this, a: $vector, b: $vector) -> $vector {
-                    $simd.$div(a, b)
-                }
-                #[inline(always)]
-                fn where_less($this, a: $vector, b: $vector, then: $vector, otherwise: $vector) -> $vector {
-                    $simd.$select($simd.$less(a, b), then, otherwise)
-                }
-                type Rows = Self;
-                #[inline(always)]
-                fn rows(self) -> Self {
-                    self
-                }
-            }
-        };
+    impl Square for V3 {
+        #[inline(always)]
+        fn transpose_f64s(self, rows: &mut [f64x4]) {
+            let x = self.avx;
+            let &mut [a, b, c, d] = rows else { return };
+            let (ab_low, ab_high) = (x._mm256_unpacklo_pd(cast(a), cast(b)), x._mm256_unpackhi_pd(cast(a), cast(b)));
+            let (cd_low, cd_high) = (x._mm256_unpacklo_pd(cast(c), cast(d)), x._mm256_unpackhi_pd(cast(c), cast(d)));
+            rows.copy_from_slice(&[
+                cast(x._mm256_permute2f128_pd::<0x20>(ab_low, cd_low)),
+                cast(x._mm256_permute2f128_pd::<0x20>(ab_high, cd_high)),
+                cast(x._mm256_permute2f128_pd::<0x31>(ab_low, cd_low)),
+                cast(x._mm256_permute2f128_pd::<0x31>(ab_high, cd_high)),
+            ]);
+        }
     }
-
-    whole!(V4, self => self, f64x8, f64, avx512f, _mm512_fnmadd_pd,
-        add_f64s, mul_f64s, mul_add_f64s, splat_f64s, abs_f64s, sub_f64s, div_f64s, less_than_f64s, select_f64s);
-    square!(V4, f64, self, transpose_8);
-    whole!(Single, self => self.0, f32x8, f32, fma, _mm256_fnmadd_ps,
-        add_f32s, mul_f32s, mul_add_f32s, splat_f32s, abs_f32s, sub_f32s, div_f32s, less_than_f32s, select_f32s);
-    square!(Single, f32, self, transpose_single);
 
     /// Quarters 0 and 2 of both.
     const EVEN: i32 = 0b10_00_10_00;
     /// Quarters 1 and 3 of both.
     const ODD: i32 = 0b11_01_11_01;
 
-    #[inline(always)]
-    fn transpose_8(s: V4, rows: [f64x8; LANES]) -> [f64x8; LANES] {
-        let x = s.avx512f;
-        let [r0, r1, r2, r3, r4, r5, r6, r7] = rows;
-        // Two rows interleaved: columns (0, 2, 4, 6) or (1, 3, 5, 7) of both, two numbers a quarter.
-        let e0 = x._mm512_unpacklo_pd(cast(r0), cast(r1));
-        let o0 = x._mm512_unpackhi_pd(cast(r0), cast(r1));
-        let e1 = x._mm512_unpacklo_pd(cast(r2), cast(r3));
-        let o1 = x._mm512_unpackhi_pd(cast(r2), cast(r3));
-        let e2 = x._mm512_unpacklo_pd(cast(r4), cast(r5));
-        let o2 = x._mm512_unpackhi_pd(cast(r4), cast(r5));
-        let e3 = x._mm512_unpacklo_pd(cast(r6), cast(r7));
-        let o3 = x._mm512_unpackhi_pd(cast(r6), cast(r7));
-        // Then quarters.
-        let (a, b) = (x._mm512_shuffle_f64x2::<EVEN>(e0, e1), x._mm512_shuffle_f64x2::<ODD>(e0, e1));
-        let (c, d) = (x._mm512_shuffle_f64x2::<EVEN>(e2, e3), x._mm512_shuffle_f64x2::<ODD>(e2, e3));
-        let (e, f) = (x._mm512_shuffle_f64x2::<EVEN>(o0, o1), x._mm512_shuffle_f64x2::<ODD>(o0, o1));
-        let (g, h) = (x._mm512_shuffle_f64x2::<EVEN>(o2, o3), x._mm512_shuffle_f64x2::<ODD>(o2, o3));
-        [
-            cast(x._mm512_shuffle_f64x2::<EVEN>(a, c)),
-            cast(x._mm512_shuffle_f64x2::<EVEN>(e, g)),
-            cast(x._mm512_shuffle_f64x2::<EVEN>(b, d)),
-            cast(x._mm512_shuffle_f64x2::<EVEN>(f, h)),
-            cast(x._mm512_shuffle_f64x2::<ODD>(a, c)),
-            cast(x._mm512_shuffle_f64x2::<ODD>(e, g)),
-            cast(x._mm512_shuffle_f64x2::<ODD>(b, d)),
-            cast(x._mm512_shuffle_f64x2::<ODD>(f, h)),
-        ]
-    }
-
-    #[inline(always)]
-    fn transpose_single(s: Single, rows: [f32x8; LANES]) -> [f32x8; LANES] {
-        let mut numbers = [[0.0_f32; LANES]; LANES];
-        for k in 0..LANES {
-            numbers[k] = cast(rows[k]);
-        }
-        let numbers = transposed(s, numbers);
-        let mut columns = rows;
-        for i in 0..LANES {
-            columns[i] = cast(numbers[i]);
-        }
-        columns
-    }
-
-    /// Four rows in one register of AVX2: eight in two would leave no room for their sums.
-    #[derive(Clone, Copy)]
-    pub struct Four(V3);
-
-    impl Arithmetic for Four {
-        type N = f64x4;
+    impl Square for V4 {
         #[inline(always)]
-        fn add(self, a: f64x4, b: f64x4) -> f64x4 {
-            self.0.add_f64s(a, b)
-        }
-        #[inline(always)]
-        fn mul(self, a: f64x4, b: f64x4) -> f64x4 {
-            self.0.mul_f64s(a, b)
-        }
-        #[inline(always)]
-        fn mul_add(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
-            self.0.mul_add_f64s(a, b, c)
-        }
-        #[inline(always)]
-        fn mul_sub(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
-            cast(self.0.fma._mm256_fnmadd_pd(cast(a), cast(b), cast(c)))
-        }
-        #[inline(always)]
-        fn zero(self) -> f64x4 {
-            self.0.splat_f64s(0.0)
-        }
-    }
-
-    impl Rows for Four {
-        type X = f64;
-        type Particles = [f64x4; 2];
-        const COUNT: usize = 4;
-        #[inline(always)]
-        fn splat(self, x: f64) -> f64x4 {
-            self.0.splat_f64s(x)
-        }
-        #[inline(always)]
-        fn columns(self, rows: [[f64x4; 2]; LANES]) -> [f64x4; LANES] {
-            let [a, b, c, d] = self.transpose([rows[0][0], rows[1][0], rows[2][0], rows[3][0]]);
-            let [e, f, g, h] = self.transpose([rows[0][1], rows[1][1], rows[2][1], rows[3][1]]);
-            [a, b, c, d, e, f, g, h]
-        }
-        #[inline(always)]
-        fn add_up(self, sums: &[f64x4], places: &[usize], out: &mut [f64]) {
-            for (part, some) in sums.chunks(4).enumerate() {
-                let mut rows = [self.zero(); 4];
-                rows[..some.len()].copy_from_slice(some);
-                let rows = self.transpose(rows);
-                for (row, &place) in rows.iter().zip(places) {
-                    if let Some(slot) = out[place + part * 4..].first_chunk_mut::<4>() {
-                        *slot = cast(self.0.add_f64s(cast(*slot), *row));
-                    }
-                }
+        fn transpose_f64s(self, rows: &mut [f64x8]) {
+            let x = self.avx512f;
+            // Two rows interleaved: columns (0, 2, 4, 6) and (1, 3, 5, 7) of both, two numbers a quarter; then quarters.
+            let mut two = [[x._mm512_setzero_pd(); 4]; 2];
+            for i in 0..4 {
+                two[0][i] = x._mm512_unpacklo_pd(cast(rows[2 * i]), cast(rows[2 * i + 1]));
+                two[1][i] = x._mm512_unpackhi_pd(cast(rows[2 * i]), cast(rows[2 * i + 1]));
             }
-        }
-    }
-
-    impl Four {
-        /// Rows become columns.
-        #[inline(always)]
-        fn transpose(self, [a, b, c, d]: [f64x4; 4]) -> [f64x4; 4] {
-            let x = self.0.avx;
-            let (ab_low, ab_high) = (x._mm256_unpacklo_pd(cast(a), cast(b)), x._mm256_unpackhi_pd(cast(a), cast(b)));
-            let (cd_low, cd_high) = (x._mm256_unpacklo_pd(cast(c), cast(d)), x._mm256_unpackhi_pd(cast(c), cast(d)));
-            [
-                cast(x._mm256_permute2f128_pd::<0x20>(ab_low, cd_low)),
-                cast(x._mm256_permute2f128_pd::<0x20>(ab_high, cd_high)),
-                cast(x._mm256_permute2f128_pd::<0x31>(ab_low, cd_low)),
-                cast(x._mm256_permute2f128_pd::<0x31>(ab_high, cd_high)),
-            ]
-        }
-    }
-
-    /// Vectors of two registers.
-    impl Arithmetic for V3 {
-        type N = [f64x4; 2];
-        #[inline(always)]
-        fn add(self, a: Self::N, b: Self::N) -> Self::N {
-            [self.add_f64s(a[0], b[0]), self.add_f64s(a[1], b[1])]
-        }
-        #[inline(always)]
-        fn mul(self, a: Self::N, b: Self::N) -> Self::N {
-            [self.mul_f64s(a[0], b[0]), self.mul_f64s(a[1], b[1])]
-        }
-        #[inline(always)]
-        fn mul_add(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N {
-            [self.mul_add_f64s(a[0], b[0], c[0]), self.mul_add_f64s(a[1], b[1], c[1])]
-        }
-        #[inline(always)]
-        fn mul_sub(self, a: Self::N, b: Self::N, c: Self::N) -> Self::N {
-            let one = |a, b, c| cast(self.fma._mm256_fnmadd_pd(cast(a), cast(b), cast(c)));
-            [one(a[0], b[0], c[0]), one(a[1], b[1], c[1])]
-        }
-        #[inline(always)]
-        fn zero(self) -> Self::N {
-            [self.splat_f64s(0.0); 2]
-        }
-    }
-
-    impl Lanes for V3 {
-        type X = f64;
-        #[inline(always)]
-        fn splat(self, x: f64) -> Self::N {
-            [self.splat_f64s(x); 2]
-        }
-        #[inline(always)]
-        fn load(self, x: &[f64; LANES]) -> Self::N {
-            cast(*x)
-        }
-        #[inline(always)]
-        fn store(self, v: Self::N, out: &mut [f64; LANES]) {
-            *out = cast(v);
-        }
-        type Rows = Four;
-        #[inline(always)]
-        fn rows(self) -> Four {
-            Four(self)
-        }
-        #[inline(always)]
-        fn abs(self, a: Self::N) -> Self::N {
-            [self.abs_f64s(a[0]), self.abs_f64s(a[1])]
-        }
-        #[inline(always)]
-        fn sub(self, a: Self::N, b: Self::N) -> Self::N {
-            [self.sub_f64s(a[0], b[0]), self.sub_f64s(a[1], b[1])]
-        }
-        #[inline(always)]
-        fn div(self, a: Self::N, b: Self::N) -> Self::N {
-            [self.div_f64s(a[0], b[0]), self.div_f64s(a[1], b[1])]
-        }
-        #[inline(always)]
-        fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N {
-            let half = |i: usize| self.select_f64s(self.less_than_f64s(a[i], b[i]), then[i], otherwise[i]);
-            [half(0), half(1)]
+            for (k, two) in two.into_iter().enumerate() {
+                let (a, b) =
+                    (x._mm512_shuffle_f64x2::<EVEN>(two[0], two[1]), x._mm512_shuffle_f64x2::<ODD>(two[0], two[1]));
+                let (c, d) =
+                    (x._mm512_shuffle_f64x2::<EVEN>(two[2], two[3]), x._mm512_shuffle_f64x2::<ODD>(two[2], two[3]));
+                rows[k] = cast(x._mm512_shuffle_f64x2::<EVEN>(a, c));
+                rows[2 + k] = cast(x._mm512_shuffle_f64x2::<EVEN>(b, d));
+                rows[4 + k] = cast(x._mm512_shuffle_f64x2::<ODD>(a, c));
+                rows[6 + k] = cast(x._mm512_shuffle_f64x2::<ODD>(b, d));
+            }
         }
     }
 }
@@ -458,38 +265,37 @@ struct Call<W, S>(W, S);
 
 #[cfg(target_arch = "x86_64")]
 impl<W: WithLanes<S::X>, S: Lanes> pulp::NullaryFnOnce for Call<W, S> {
-    type Output = W::Output;
+    type Output = ();
     #[inline(always)]
-    fn call(self) -> W::Output {
-        self.0.run(self.1)
+    fn call(self) {
+        self.0.run(self.1);
     }
 }
 
 impl Widest for f64 {
     #[inline]
-    fn widest<W: WithLanes<Self>>(work: W) -> W::Output {
+    fn widest(work: impl WithLanes<Self>) {
         #[cfg(target_arch = "x86_64")]
         {
-            use pulp::x86::{V3, V4};
             if let Some(s) = V4::try_new() {
-                return s.vectorize(Call(work, s));
+                return s.vectorize(Call(work, Registers::<_, f64, 1, 1>::of(s)));
             }
             if let Some(s) = V3::try_new() {
-                return s.vectorize(Call(work, s));
+                return s.vectorize(Call(work, Registers::<_, f64, 2, 1>::of(s)));
             }
         }
-        work.run(Portable::<f64>::NEW)
+        work.run(Portable::<f64>::of(Scalar));
     }
 }
 
 impl Widest for f32 {
     #[inline]
-    fn widest<W: WithLanes<Self>>(work: W) -> W::Output {
+    fn widest(work: impl WithLanes<Self>) {
         #[cfg(target_arch = "x86_64")]
-        if let Some(s) = pulp::x86::V3::try_new() {
-            return s.vectorize(Call(work, x86::Single(s)));
+        if let Some(s) = V3::try_new() {
+            return s.vectorize(Call(work, Registers::<_, f32, 1, 1>::of(s)));
         }
-        work.run(Portable::<f32>::NEW)
+        work.run(Portable::<f32>::of(Scalar));
     }
 }
 
@@ -498,18 +304,21 @@ mod tests {
     use super::*;
 
     /// Sums, products and the transposition of an irregular matrix.
-    #[derive(Clone, Copy)]
-    struct Everything;
+    struct Everything<'a, X>(&'a mut Vec<[X; LANES]>);
+
+    fn results<X>(run: impl FnOnce(Everything<'_, X>)) -> Vec<[X; LANES]> {
+        let mut out = Vec::new();
+        run(Everything(&mut out));
+        out
+    }
 
     fn entry(i: usize, k: usize) -> f64 {
         ((i * LANES + k + 1) as f64 * 0.618_033_988_749_894_9).fract() - 0.5
     }
 
-    impl<X: Real> WithLanes<X> for Everything {
-        type Output = Vec<[X; LANES]>;
-
+    impl<X: Real> WithLanes<X> for Everything<'_, X> {
         #[inline(always)]
-        fn run<S: Lanes<X = X>>(self, s: S) -> Self::Output {
+        fn run<S: Lanes<X = X>>(self, s: S) {
             let mut rows = [s.zero(); LANES];
             for (i, row) in rows.iter_mut().enumerate() {
                 let mut numbers = [X::zero(); LANES];
@@ -519,11 +328,9 @@ mod tests {
                 *row = s.load(&numbers);
             }
             // As many columns as there are rows, one after the other, and back into memory.
-            let r = s.rows();
-            let (columns, count) = (r.columns(rows), <S::Rows as Rows>::COUNT);
             let mut written = vec![X::zero(); LANES * LANES + LANES];
-            let places: Vec<usize> = (0..count).map(|row| row * LANES).collect();
-            r.add_up(&columns, &places, &mut written);
+            let places: Vec<usize> = (0..S::ROWS).map(|row| row * LANES).collect();
+            s.add_up(&s.columns(&rows), &places, &mut written);
             let (a, b, c) = (rows[1], rows[2], s.splat(X::lit(0.3)));
             let results = [
                 s.add(a, b),
@@ -536,14 +343,14 @@ mod tests {
                 s.where_less(a, b, c, a),
             ];
             let mut out: Vec<[X; LANES]> = written.as_chunks().0[..LANES].to_vec();
-            out.truncate(count);
+            out.truncate(S::ROWS);
             out.resize(LANES, [X::zero(); LANES]);
             for v in results {
                 let mut numbers = [X::zero(); LANES];
                 s.store(v, &mut numbers);
                 out.push(numbers);
             }
-            out
+            *self.0 = out;
         }
     }
 
@@ -572,12 +379,12 @@ mod tests {
 
     #[test]
     fn all_instruction_sets_compute_the_same() {
-        let mut double = vec![Everything.run(Portable::<f64>::NEW), f64::widest(Everything)];
-        let mut single = vec![Everything.run(Portable::<f32>::NEW), f32::widest(Everything)];
+        let mut double = vec![results(|work| work.run(Portable::<f64>::of(Scalar))), results(|work| f64::widest(work))];
+        let mut single = vec![results(|work| work.run(Portable::<f32>::of(Scalar))), results(|work| f32::widest(work))];
         #[cfg(target_arch = "x86_64")]
-        if let Some(s) = pulp::x86::V3::try_new() {
-            double.push(Everything.run(s));
-            single.push(Everything.run(x86::Single(s)));
+        if let Some(s) = V3::try_new() {
+            double.push(results(|work| work.run(Registers::<_, f64, 2, 1>::of(s))));
+            single.push(results(|work| work.run(Registers::<_, f32, 1, 1>::of(s))));
         }
         judge(double, f64::EPSILON);
         judge(single, 2.0 * f64::from(f32::EPSILON));

@@ -114,9 +114,9 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         &self,
         part: Part,
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(|law| match law.shipped().and_then(|material| T::stresses_of(material, D, part)) {
+        let chosen = self.chosen(|law| match law.shipped().and_then(|material| T::stresses_of(material, D)) {
             Some(shipped) => shipped,
-            None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, det_f, out)),
+            None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
         });
         move |group, at, sums| {
             let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
@@ -143,7 +143,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
         let chosen = self.chosen(move |law| match law.shipped() {
             Some(material) if part == Part::Whole && form != Form::General => {
-                shipped_tangents(material, D, form, factor)
+                shipped(material, D, What::Tangents { form, factor })
             }
             _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, (part, form, factor), out, det_f)),
         });
@@ -175,8 +175,8 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     law: &L,
     states: &States<'_, T>,
     part: Part,
-    det_f: &mut [f64; LANES],
     out: &mut [[T; LANES]],
+    det_f: &mut [f64; LANES],
 ) {
     // Fixed lengths, so that no place in them is checked and the loop becomes vector instructions.
     let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
@@ -263,96 +263,56 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedR
     }
 }
 
-/// The loop of a shipped law's stresses. Not generic, so that it is compiled here and not by every crate that uses it.
-#[inline(never)]
-pub(super) fn shipped_stresses(law: &Material, dimension: usize, part: Part) -> Box<Loop<'static, f64>> {
-    law.with(ChooseStresses { dimension, part })
+/// What is evaluated of a law in every lane.
+#[derive(Clone, Copy)]
+pub(super) enum What {
+    Stresses,
+    Tangents { form: Form, factor: f64 },
 }
 
-/// As [`shipped_stresses`], of its whole tangent.
+/// A loop of a shipped law. Not generic, so that it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped_tangents(law: &Material, dimension: usize, form: Form, factor: f64) -> Box<Loop<'static, f64>> {
-    law.with(ChooseTangents { dimension, form, factor })
+pub(super) fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
+    law.with(Choose { dimension, what })
 }
 
-struct ChooseStresses {
+struct Choose {
     dimension: usize,
-    part: Part,
+    what: What,
 }
 
-impl LawVisitor for ChooseStresses {
+impl LawVisitor for Choose {
     type Output = Box<Loop<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L, part: Part) -> Box<Loop<'static, f64>> {
-            if part != Part::Whole {
-                // Plain numbers carry no derivatives.
-                return Box::new(move |states, out, det_f| stresses_of::<L, f64, D>(&law, states, part, det_f, out));
+        fn in_dimension<L: Law + 'static, const D: usize>(law: L, what: What) -> Box<Loop<'static, f64>> {
+            Box::new(move |states, out, det_f| f64::widest(Evaluate::<L, D> { law: &law, what, states, out, det_f }))
+        }
+        match self.dimension {
+            1 => in_dimension::<L, 1>(law, self.what),
+            2 => in_dimension::<L, 2>(law, self.what),
+            _ => in_dimension::<L, 3>(law, self.what),
+        }
+    }
+}
+
+struct Evaluate<'a, L, const D: usize> {
+    law: &'a L,
+    what: What,
+    states: &'a States<'a, f64>,
+    out: &'a mut [[f64; LANES]],
+    det_f: &'a mut [f64; LANES],
+}
+
+impl<L: Law, const D: usize> WithLanes<f64> for Evaluate<'_, L, D> {
+    #[inline(always)]
+    fn run<S: Lanes<X = f64>>(self, _: S) {
+        let Self { law, what, states, out, det_f } = self;
+        match what {
+            What::Stresses => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
+            What::Tangents { form, factor } => {
+                tangents_of::<L, D>(law, states, (Part::Whole, form, factor), out, det_f);
             }
-            Box::new(move |states, out, det_f| f64::widest(StressesOf::<L, D> { law: &law, states, out, det_f }))
         }
-        match self.dimension {
-            1 => in_dimension::<L, 1>(law, self.part),
-            2 => in_dimension::<L, 2>(law, self.part),
-            _ => in_dimension::<L, 3>(law, self.part),
-        }
-    }
-}
-
-struct ChooseTangents {
-    dimension: usize,
-    form: Form,
-    factor: f64,
-}
-
-impl LawVisitor for ChooseTangents {
-    type Output = Box<Loop<'static, f64>>;
-
-    fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L, form: Form, factor: f64) -> Box<Loop<'static, f64>> {
-            Box::new(move |states, out, det_f| {
-                f64::widest(TangentsOf::<L, D> { law: &law, states, form, factor, out, det_f });
-            })
-        }
-        match self.dimension {
-            1 => in_dimension::<L, 1>(law, self.form, self.factor),
-            2 => in_dimension::<L, 2>(law, self.form, self.factor),
-            _ => in_dimension::<L, 3>(law, self.form, self.factor),
-        }
-    }
-}
-
-struct StressesOf<'a, L, const D: usize> {
-    law: &'a L,
-    states: &'a States<'a, f64>,
-    out: &'a mut [[f64; LANES]],
-    det_f: &'a mut [f64; LANES],
-}
-
-impl<L: Law, const D: usize> WithLanes<f64> for StressesOf<'_, L, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, _: S) {
-        stresses_of::<L, f64, D>(self.law, self.states, Part::Whole, self.det_f, self.out);
-    }
-}
-
-struct TangentsOf<'a, L, const D: usize> {
-    law: &'a L,
-    states: &'a States<'a, f64>,
-    form: Form,
-    factor: f64,
-    out: &'a mut [[f64; LANES]],
-    det_f: &'a mut [f64; LANES],
-}
-
-impl<L: Law, const D: usize> WithLanes<f64> for TangentsOf<'_, L, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, _: S) {
-        let which = (Part::Whole, self.form, self.factor);
-        tangents_of::<L, D>(self.law, self.states, which, self.out, self.det_f);
     }
 }

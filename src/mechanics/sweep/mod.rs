@@ -30,13 +30,13 @@ mod waves;
 
 pub use block::Group;
 pub use blocks::Quadratic;
-pub use kernel::{At, Parts};
+pub use kernel::At;
 pub use laned::Laned;
 pub(crate) use laned::add_quadratic;
 pub use lanes::LANES;
 pub use laws::Laws;
 pub use number::Number;
-pub use tangents::Form;
+pub use tangents::{Form, Product};
 
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
@@ -49,7 +49,7 @@ use crate::tensor::{Tensor, Vector};
 use plain::Plain;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
-use tiled::{Tiled, keep_first};
+use tiled::Tiled;
 
 /// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
 const LEAPS: usize = 8;
@@ -118,29 +118,48 @@ pub struct SupportError {
     pub source: ApproximationError,
 }
 
-/// What a pass gathers and scatters.
+/// Of several failures, of any threads, the one with the smallest number.
+pub(crate) struct First<E>(Mutex<Option<(usize, E)>>);
+
+impl<E> First<E> {
+    pub(crate) fn none() -> Self {
+        Self(Mutex::new(None))
+    }
+
+    pub(crate) fn keep(&self, number: usize, error: E) {
+        let mut first = held(&self.0);
+        if first.as_ref().is_none_or(|(before, _)| number < *before) {
+            *first = Some((number, error));
+        }
+    }
+
+    pub(crate) fn check(self) -> Result<(), E> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), |(_, error)| Err(error))
+    }
+}
+
+/// What a pass gathers, and scatters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flow {
-    /// Of u and L.
-    pub gather: Parts,
-    /// Of q and σ.
-    pub scatter: Parts,
+    /// Σ u_I N_I, and q N_I
+    pub value: bool,
+    /// Σ u_I ⊗ ∇N_I, and σ ∇N_I
+    pub gradient: bool,
     /// The weights of the scatter.
     pub weights: Weights,
 }
 
 impl Flow {
-    /// Values and gradients, both ways.
-    pub const BOTH: Self = Self { gather: Parts::BOTH, scatter: Parts::BOTH, weights: Weights::Signed };
+    /// Values and gradients.
+    pub const BOTH: Self = Self { value: true, gradient: true, weights: Weights::Signed };
     /// Gradients alone.
-    pub const GRADIENT: Self = Self { gather: Parts::GRADIENT, scatter: Parts::GRADIENT, ..Self::BOTH };
+    pub const GRADIENT: Self = Self { value: false, ..Self::BOTH };
     /// Values alone.
-    pub const VALUE: Self = Self { gather: Parts::VALUE, scatter: Parts::VALUE, ..Self::BOTH };
+    pub const VALUE: Self = Self { gradient: false, ..Self::BOTH };
 
     /// What one or the other needs.
     pub fn and(self, other: Self) -> Self {
-        let either = |a: Parts, b: Parts| Parts { value: a.value || b.value, gradient: a.gradient || b.gradient };
-        Self { gather: either(self.gather, other.gather), scatter: either(self.scatter, other.scatter), ..self }
+        Self { value: self.value || other.value, gradient: self.gradient || other.gradient, ..self }
     }
 }
 
@@ -164,10 +183,6 @@ impl Weights {
             Self::Square => Some(|n| n * n),
         }
     }
-
-    fn of<const D: usize>(self, n: f64, grad_n: Vector<f64, D>) -> (f64, Vector<f64, D>) {
-        self.changed().map_or((n, grad_n), |changed| (changed(n), grad_n.map(changed)))
-    }
 }
 
 /// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.
@@ -183,15 +198,6 @@ pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, 
 pub(crate) type Linear<'a, X, const D: usize> = dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a;
 
 impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
-    fn clear(&mut self, parts: Parts) {
-        if parts.value {
-            self.value = [[X::zero(); LANES]; C];
-        }
-        if parts.gradient {
-            self.gradient = [[[X::zero(); LANES]; D]; C];
-        }
-    }
-
     /// u and L of one particle.
     #[inline(always)]
     pub fn lane(&self, lane: usize) -> (Vector<X, C>, nalgebra::SMatrix<X, C, D>) {
@@ -284,10 +290,8 @@ impl<const D: usize> Supports<D> {
                 Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, single.then_some(grid.spacing), pool), nodes))
             }
             _ => {
-                let by_id = |SupportError { particle, source }| SupportError {
-                    particle: ids.map_or(particle, |ids| ids[particle] as usize),
-                    source,
-                };
+                let id = |particle: usize| ids.map_or(particle, |ids| ids[particle] as usize);
+                let by_id = |error: SupportError| SupportError { particle: id(error.particle), ..error };
                 let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
                 Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, pool), nodes))
             }
@@ -457,11 +461,7 @@ impl<const D: usize> Supports<D> {
 
     /// The entries (active node, N, ∇_n N) of one particle.
     pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
-        let (plain, tiled) = match &self.way {
-            Way::Plain(plain) => (Some(plain.of(particle)), None),
-            Way::Tiled(tiled) => (None, Some(tiled.of(particle))),
-        };
-        plain.into_iter().flatten().chain(tiled.into_iter().flatten())
+        either!(self, way => way.of(particle)).into_iter()
     }
 
     /// Σ u_I ⊗ ∇_n N_I at one particle.
@@ -487,18 +487,17 @@ impl<const D: usize> Supports<D> {
     ) -> Result<(), E> {
         const { assert!(C == 1 || C == D) };
         self.pass();
-        let failure = Mutex::new(None);
+        let failure = First::none();
         let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
             if let Err((number, error)) = T::at(fields, sums, |at, sums| point(group, at, sums)) {
-                keep_first(&mut held(&failure), number, error);
+                failure.keep(number, error);
             }
         };
         let field = field.map(T::flat);
         T::add_flat(out, |out| {
             either!(self, way => way.sweep::<f64, C>(T::FIELDS, field.as_deref(), flow, out, &point));
         });
-        let failure = failure.into_inner().unwrap_or_else(PoisonError::into_inner);
-        failure.map_or(Ok(()), |(_, error)| Err(error))
+        failure.check()
     }
 
     /// As [`Self::sweep`], for D plain numbers a node in either precision: what a product with a tangent is.
@@ -650,7 +649,7 @@ impl<const D: usize> Supports<D> {
         self.pass();
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
         let field = bytemuck::cast_slice(field);
-        either!(self, way => way.each::<_, C>(1, field, Parts::VALUE, &point, &mut take));
+        either!(self, way => way.each::<_, C>(1, field, Flow::VALUE, &point, &mut take));
     }
 
     /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
@@ -682,7 +681,7 @@ impl<const D: usize> Supports<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Parts::BOTH, &point, &mut take));
+        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Flow::BOTH, &point, &mut take));
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in their order.
@@ -697,12 +696,13 @@ impl<const D: usize> Supports<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
     ) -> Result<Vec<R>, E> {
         let mut results: Vec<Option<R>> = (0..self.particles()).map(|_| None).collect();
-        let mut failure = None;
+        let failure = First::none();
         self.each_particle(field, point, |p, result| match result {
             Ok(result) => results[p] = Some(result),
-            Err(error) => keep_first(&mut failure, p, error),
+            Err(error) => failure.keep(p, error),
         });
-        failure.map_or(Ok(results.into_iter().flatten().collect()), |(_, error)| Err(error))
+        failure.check()?;
+        Ok(results.into_iter().flatten().collect())
     }
 }
 
@@ -711,7 +711,7 @@ fn each_lane<T: Real, E, const D: usize>(
     point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
 ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), (usize, E)> + Sync {
     move |group, at, sums| {
-        let mut failure = None;
+        let failure = First::none();
         for (lane, &p) in group.particles.iter().enumerate() {
             let (value, gradient) = at.lane(lane);
             match point(p as usize, value, gradient) {
@@ -721,9 +721,9 @@ fn each_lane<T: Real, E, const D: usize>(
                         (0..D).for_each(|k| sums.gradient[c][k][lane] += sigma[(c, k)]);
                     }
                 }
-                Err(error) => keep_first(&mut failure, p as usize, error),
+                Err(error) => failure.keep(p as usize, (p as usize, error)),
             }
         }
-        failure.map_or(Ok(()), Err)
+        failure.check()
     }
 }

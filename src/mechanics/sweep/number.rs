@@ -2,9 +2,8 @@
 
 use super::kernel::At;
 use super::lanes::LANES;
-use super::laws::{Loop, shipped_stresses};
+use super::laws::{Loop, What, shipped};
 use crate::material::Material;
-use crate::mechanics::point::Part;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use num_dual::{Dual2_64, Dual64};
@@ -60,9 +59,10 @@ pub trait Number: Real + Send + Sync {
         result
     }
 
-    /// The loop over lanes with the stresses of a shipped law, if there is one in vector instructions.
+    /// The loop over lanes with the stresses of a shipped law, if there is one in vector instructions: of plain numbers, which carry no
+    /// derivatives.
     #[doc(hidden)]
-    fn stresses_of(_law: &Material, _dimension: usize, _part: Part) -> Option<Box<Loop<'static, Self>>> {
+    fn stresses_of(_law: &Material, _dimension: usize) -> Option<Box<Loop<'static, Self>>> {
         None
     }
 
@@ -101,8 +101,8 @@ impl Number for f64 {
         point(&fields[0], &mut sums[0])
     }
 
-    fn stresses_of(law: &Material, dimension: usize, part: Part) -> Option<Box<Loop<'static, Self>>> {
-        Some(shipped_stresses(law, dimension, part))
+    fn stresses_of(law: &Material, dimension: usize) -> Option<Box<Loop<'static, Self>>> {
+        Some(shipped(law, dimension, What::Stresses))
     }
 
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {

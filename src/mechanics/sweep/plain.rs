@@ -3,7 +3,7 @@
 
 use super::block::Group;
 use super::blocks::{Quadratic, pair};
-use super::kernel::{At, Parts};
+use super::kernel::At;
 use super::lanes::LANES;
 use super::{Fill, Flow, Point, SupportError, Visit};
 use crate::approximation::{Scratch, ShapeFunction, Support};
@@ -12,6 +12,7 @@ use crate::nodes::Nodes;
 use crate::parallel;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
+use num_traits::Zero;
 use std::ops::{AddAssign, Range};
 
 /// Particles of a block: enough to pay for a task, few enough to keep a block's nodes in cache.
@@ -28,7 +29,7 @@ pub(super) struct Plain<const D: usize> {
     particles: Vec<u32>,
 }
 
-/// The entries (node, N, ∇_n N) of consecutive particles; `local` refers to the block's own list of nodes.
+/// The entries (node, N, ∇_n N) of consecutive particles; nodes by their places in the block's own list.
 #[derive(Clone, Debug)]
 struct Block<const D: usize> {
     particles: Range<usize>,
@@ -36,9 +37,8 @@ struct Block<const D: usize> {
     nodes: Vec<u32>,
     /// Start of each particle's entries, and the end of the last one's.
     offsets: Vec<u32>,
-    local: Vec<u32>,
-    values: Vec<f64>,
-    gradients: Vec<Vector<f64, D>>,
+    places: Vec<u32>,
+    weights: Vec<(f64, Vector<f64, D>)>,
 }
 
 impl<const D: usize> Plain<D> {
@@ -48,13 +48,12 @@ impl<const D: usize> Plain<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let count = positions.len().div_ceil(BLOCK);
-        let built: Result<Vec<_>, _> = parallel::map(count, &|b| {
+        let built = parallel::map(count, &|b| {
             let particles = b * BLOCK..((b + 1) * BLOCK).min(positions.len());
             Block::new(approximation, grid, positions, particles)
         })
         .into_iter()
-        .collect();
-        let built = built?;
+        .collect::<Result<Vec<_>, _>>()?;
         let nodes = Nodes::new(built.iter().map(|(_, ids)| ids.as_slice()));
         let blocks = built
             .into_iter()
@@ -75,18 +74,16 @@ impl<const D: usize> Plain<D> {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let entry = size_of::<u32>() + size_of::<f64>() + size_of::<Vector<f64, D>>();
         let of_block = |block: &Block<D>| {
-            block.values.len() * entry + (block.nodes.len() + block.offsets.len()) * size_of::<u32>()
+            let numbers = block.places.len() + block.nodes.len() + block.offsets.len();
+            size_of_val(block.weights.as_slice()) + numbers * size_of::<u32>()
         };
         self.blocks.iter().map(of_block).sum::<usize>() + size_of_val(self.particles.as_slice())
     }
 
-    pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
+    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let block = &self.blocks[particle / BLOCK];
-        block
-            .entries(particle)
-            .map(move |e| (block.nodes[block.local[e] as usize] as usize, block.values[e], block.gradients[e]))
+        block.entries(particle).map(|(place, n, grad_n)| (block.nodes[place] as usize, n, grad_n)).collect()
     }
 
     /// The groups of a block.
@@ -104,70 +101,53 @@ impl<const D: usize> Plain<D> {
         point: &Point<'_, X, C, D>,
     ) {
         let numbers = fields * C;
-        let buffers = parallel::map(self.blocks.len(), &|b| {
-            let block = &self.blocks[b];
-            let mut buffer = vec![X::zero(); block.nodes.len() * numbers];
-            for group in self.groups_of(b) {
-                let mut at = vec![At::<X, C, D>::zero(); fields];
-                let mut sums = at.clone();
-                if let Some(field) = field {
-                    block.gather(group, field, &mut at);
-                }
-                point(group, &at, &mut sums);
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    for e in block.entries(p as usize) {
-                        let (n, grad_n) = flow.weights.of(block.values[e], block.gradients[e]);
-                        let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
-                        for (f, sums) in sums.iter().enumerate() {
-                            for c in 0..C {
-                                let to = &mut buffer[block.local[e] as usize * numbers + f * C + c];
-                                if flow.scatter.value {
-                                    *to += sums.value[c][lane] * n;
-                                }
-                                for k in (0..D).filter(|_| flow.scatter.gradient) {
-                                    *to += sums.gradient[c][k][lane] * grad_n[k];
-                                }
-                            }
+        self.scatter(numbers, out, |block, group, buffer: &mut [X]| {
+            let mut at = vec![At::<X, C, D>::zero(); fields];
+            let mut sums = at.clone();
+            if let Some(field) = field {
+                block.gather(group, field, &mut at);
+            }
+            point(group, &at, &mut sums);
+            for (lane, (place, n, grad_n)) in block.entries_of(group) {
+                let changed = flow.weights.changed().unwrap_or(|n| n);
+                let (n, grad_n) = (X::lit(changed(n)), grad_n.map(|n| X::lit(changed(n))));
+                for (f, sums) in sums.iter().enumerate() {
+                    for c in 0..C {
+                        let to = &mut buffer[place * numbers + f * C + c];
+                        if flow.value {
+                            *to += sums.value[c][lane] * n;
+                        }
+                        for k in (0..D).filter(|_| flow.gradient) {
+                            *to += sums.gradient[c][k][lane] * grad_n[k];
                         }
                     }
                 }
             }
-            buffer
         });
-        self.add(&buffers, numbers, out);
     }
 
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
-        let buffers = parallel::map(self.blocks.len(), &|b| {
-            let block = &self.blocks[b];
-            let mut buffer = vec![Tensor::<f64, D>::zeros(); block.nodes.len()];
-            for group in self.groups_of(b) {
-                let mut form = Quadratic::zero();
-                quadratic(group, &mut form);
-                for (lane, &p) in group.particles.iter().enumerate() {
-                    for e in block.entries(p as usize) {
-                        let (n, grad_n) = (block.values[e], &block.gradients[e]);
-                        let sum = &mut buffer[block.local[e] as usize];
-                        *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
-                        for l in 0..D {
-                            for k in 0..=l {
-                                let of_pair = &form.bilinear[pair(k, l)];
-                                *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
-                            }
-                        }
+        self.scatter(1, out, |block, group, buffer: &mut [Tensor<f64, D>]| {
+            let mut form = Quadratic::zero();
+            quadratic(group, &mut form);
+            for (lane, (place, n, grad_n)) in block.entries_of(group) {
+                let sum = &mut buffer[place];
+                *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
+                for l in 0..D {
+                    for k in 0..=l {
+                        let of_pair = &form.bilinear[pair(k, l)];
+                        *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
                     }
                 }
             }
-            buffer
         });
-        self.add(&buffers, 1, out);
     }
 
     pub(super) fn each<R: Send, const C: usize>(
         &self,
         fields: usize,
         field: &[f64],
-        _: Parts,
+        _: Flow,
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
@@ -194,8 +174,18 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// Adds the buffers of the blocks, `numbers` numbers a node, in their order.
-    fn add<X: Copy + AddAssign>(&self, buffers: &[Vec<X>], numbers: usize, out: &mut [X]) {
+    /// `scatter(block, group, buffer)` of all groups, with a buffer of `numbers` numbers a node for each block; adds them in their order.
+    fn scatter<Y: Copy + Zero + AddAssign + Send>(
+        &self,
+        numbers: usize,
+        out: &mut [Y],
+        scatter: impl Fn(&Block<D>, Group<'_>, &mut [Y]) + Sync,
+    ) {
+        let buffers = parallel::map(self.blocks.len(), &|b: usize| {
+            let mut buffer = vec![Y::zero(); self.blocks[b].nodes.len() * numbers];
+            self.groups_of(b).for_each(|group| scatter(&self.blocks[b], group, &mut buffer));
+            buffer
+        });
         for (block, buffer) in self.blocks.iter().zip(buffers) {
             for (&node, sums) in block.nodes.iter().zip(buffer.chunks(numbers)) {
                 for (out, &sum) in out[node as usize * numbers..].iter_mut().zip(sums) {
@@ -207,7 +197,7 @@ impl<const D: usize> Plain<D> {
 }
 
 impl<const D: usize> Block<D> {
-    /// The block with an empty node list, and the grid numbers that `local` refers to.
+    /// The block with an empty node list, and the grid numbers of its nodes.
     ///
     /// # Errors
     /// The first particle that has no support.
@@ -219,43 +209,50 @@ impl<const D: usize> Block<D> {
     ) -> Result<(Self, Vec<u64>), SupportError> {
         let mut scratch = Scratch::default();
         let mut support = Support::default();
-        let (mut offsets, mut ids) = (vec![0], Vec::new());
-        let (mut values, mut gradients) = (Vec::new(), Vec::new());
+        let (mut offsets, mut found) = (vec![0], Vec::new());
         for particle in particles.clone() {
             approximation
                 .evaluate(grid, &positions[particle], &mut scratch, &mut support)
                 .map_err(|source| SupportError { particle, source })?;
-            ids.extend(support.nodes.iter().map(|&index| grid.id(index)));
-            values.extend_from_slice(&support.values);
-            gradients.extend(support.gradients.iter().map(|&gradient| Vector::from(gradient)));
-            offsets.push(ids.len() as u32);
+            let slopes = support.gradients.iter().map(|&gradient| Vector::from(gradient));
+            let entries = support.nodes.iter().zip(&support.values).zip(slopes);
+            found.extend(entries.map(|((&index, &n), grad_n)| (grid.id(index), n, grad_n)));
+            offsets.push(found.len() as u32);
         }
-        let mut unique = ids.clone();
-        unique.sort_unstable();
-        unique.dedup();
-        let local = ids.iter().filter_map(|id| unique.binary_search(id).ok()).map(|place| place as u32).collect();
-        Ok((Self { particles, nodes: Vec::new(), offsets, local, values, gradients }, unique))
+        let mut ids: Vec<u64> = found.iter().map(|entry| entry.0).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        let place = |id: u64| ids.partition_point(|&before| before < id) as u32;
+        let (places, weights) = found.into_iter().map(|(id, n, grad_n)| (place(id), (n, grad_n))).unzip();
+        Ok((Self { particles, nodes: Vec::new(), offsets, places, weights }, ids))
     }
 
-    fn entries(&self, particle: usize) -> Range<usize> {
+    /// (place, N, ∇_n N) of a particle.
+    fn entries(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let k = particle - self.particles.start;
-        self.offsets[k] as usize..self.offsets[k + 1] as usize
+        let range = self.offsets[k] as usize..self.offsets[k + 1] as usize;
+        let both = self.places[range.clone()].iter().zip(&self.weights[range]);
+        both.map(|(&place, &(n, grad_n))| (place as usize, n, grad_n))
+    }
+
+    /// (lane, entry) of the particles of a group.
+    fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, (usize, f64, Vector<f64, D>))> {
+        let lanes = group.particles.iter().enumerate();
+        lanes.flat_map(|(lane, &p)| self.entries(p as usize).map(move |entry| (lane, entry)))
     }
 
     /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
     fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
         let numbers = at.len() * C;
-        for (lane, &p) in group.particles.iter().enumerate() {
-            for e in self.entries(p as usize) {
-                let node = self.nodes[self.local[e] as usize] as usize;
-                let (n, grad_n) = (X::lit(self.values[e]), self.gradients[e].map(X::lit));
-                for (f, at) in at.iter_mut().enumerate() {
-                    for c in 0..C {
-                        let u = field[node * numbers + f * C + c];
-                        at.value[c][lane] += u * n;
-                        for k in 0..D {
-                            at.gradient[c][k][lane] += u * grad_n[k];
-                        }
+        for (lane, (place, n, grad_n)) in self.entries_of(group) {
+            let node = self.nodes[place] as usize;
+            let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
+            for (f, at) in at.iter_mut().enumerate() {
+                for c in 0..C {
+                    let u = field[node * numbers + f * C + c];
+                    at.value[c][lane] += u * n;
+                    for k in 0..D {
+                        at.gradient[c][k][lane] += u * grad_n[k];
                     }
                 }
             }

@@ -1,6 +1,7 @@
 //! Frozen tangents, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
 
 use super::blocks::{Quadratic, pair};
+use super::kernel::In;
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::material::ClosedTangent;
 use crate::scalar::Real;
@@ -69,19 +70,21 @@ fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut us
 }
 
 /// `out` += 𝔸 : L of a group; L and what is added to by rows.
-pub(super) struct Product<'a, X, const D: usize> {
+pub struct Product<'a, X> {
+    /// Of the tangents.
     pub form: Form,
+    /// The tangents.
     pub rows: &'a [[X; LANES]],
+    /// L
     pub l: &'a [[X; LANES]],
+    /// What is added to.
     pub out: &'a mut [[X; LANES]],
 }
 
-impl<X: Real, const D: usize> WithLanes<X> for Product<'_, X, D> {
-    type Output = ();
-
+impl<X: Real, const D: usize> WithLanes<X> for In<Product<'_, X>, D, D> {
     #[inline(always)]
     fn run<S: Lanes<X = X>>(self, s: S) {
-        let Self { form, rows, l, out } = self;
+        let Product { form, rows, l, out } = self.0;
         let mut gradient = [[s.zero(); D]; D];
         for i in 0..D {
             for k in 0..D {
@@ -117,19 +120,17 @@ impl<X: Real, const D: usize> WithLanes<X> for Product<'_, X, D> {
 }
 
 /// Adds a multiple of the quadratic form of the tangents of a group.
-pub(super) struct AddTo<'a, const D: usize> {
+pub(super) struct AddTo<'a> {
     pub form: Form,
     pub rows: &'a [[f64; LANES]],
     pub factor: f64,
     pub into: &'a mut Quadratic,
 }
 
-impl<const D: usize> WithLanes<f64> for AddTo<'_, D> {
-    type Output = ();
-
+impl<const D: usize> WithLanes<f64> for In<AddTo<'_>, D, D> {
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, s: S) {
-        let Self { form, rows, factor, into } = self;
+        let AddTo { form, rows, factor, into } = self.0;
         let factor = s.splat(factor);
         let closed = if form == Form::General { None } else { Some(form.read::<S, D>(s, rows)) };
         for l in 0..D {

@@ -3,18 +3,17 @@
 //! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
-use super::SupportError;
 use super::block::Block;
 use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::lanes::LANES;
 use super::order::{self, Key};
+use super::{First, SupportError};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
-use crate::parallel::{self, held};
+use crate::parallel;
 use crate::tensor::Vector;
-use std::sync::{Mutex, PoisonError};
 
 /// Shape functions of all particles, by axis.
 #[derive(Clone, Debug, Default)]
@@ -56,15 +55,20 @@ impl<const D: usize> Tiled<D> {
         })?;
         let runs = || keys.chunk_by(|a, b| order::block::<D>(a) == order::block::<D>(b));
         blocks.resize_with(runs().count(), Block::default);
-        let (family, failed) = (Family::new(product), Mutex::new(None));
-        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (place, keys)| {
-            let built = block(family, grid, positions, keys, single, std::mem::take(place), scratch);
-            let keep = |error| keep_first(&mut held(&failed), keys[0].particle as usize, error);
-            built.map_or_else(keep, |built| *place = built);
+        let (family, failed) = (Family::new(product), First::none());
+        parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (place, keys)| match block(
+            family,
+            grid,
+            positions,
+            keys,
+            single,
+            std::mem::take(place),
+            scratch,
+        ) {
+            Ok(built) => *place = built,
+            Err(error) => failed.keep(keys[0].particle as usize, (keys[0].particle as usize, error)),
         });
-        if let Some((particle, error)) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            return Err(failure(particle, error));
-        }
+        failed.check().map_err(|(particle, error)| failure(particle, error))?;
         let mut first = 0;
         for block in &mut blocks {
             block.groups.first = first;
@@ -118,21 +122,14 @@ impl<const D: usize> Tiled<D> {
         (block, group - block.groups.first, lane)
     }
 
-    pub(super) fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
+    pub(super) fn of(&self, particle: usize) -> Vec<(usize, f64, Vector<f64, D>)> {
         let (block, group, lane) = self.place(particle);
         let mut entries = Vec::new();
-        block.entries::<D>(group, lane, |place, n, grad_n| {
+        block.groups.entries::<D>(group, lane, |place, n, grad_n| {
             if let Ok(at) = block.places.binary_search(&(place as u32)) {
                 entries.push((block.nodes[at] as usize, n, grad_n));
             }
         });
-        entries.into_iter()
-    }
-}
-
-/// Keeps the failure with the smallest number.
-pub(super) fn keep_first<E>(first: &mut Option<(usize, E)>, p: usize, error: E) {
-    if first.as_ref().is_none_or(|(q, _)| p < *q) {
-        *first = Some((p, error));
+        entries
     }
 }

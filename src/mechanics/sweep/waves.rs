@@ -5,14 +5,13 @@
 //! depend on the number of threads.
 
 use super::block::{Block, Group};
-use super::blocks::Quadratic;
-use super::kernel::{At, Parts, Window};
+use super::blocks::{Quadratic, ScatterBlocks};
+use super::kernel::{At, Gather, Scatter, Window};
 use super::laned::{self, Laned};
 use super::lanes::LANES;
 use super::tiled::Tiled;
 use super::{Fill, Flow, Point, Visit};
 use crate::parallel;
-use crate::scalar::Real;
 use crate::tensor::Tensor;
 use num_traits::Zero;
 
@@ -26,7 +25,7 @@ const SLAB: usize = 1024;
 const PARALLEL: usize = 256;
 
 /// `(block, scratch, buffer)`: fills the buffer of a block.
-type Work<'a, X> = dyn Fn(&Block, &mut Vec<X>, &mut [X]) + Sync + 'a;
+type Work<'a, X, S> = dyn Fn(&Block, &mut S, &mut [X]) + Sync + 'a;
 
 /// `(block, buffer, first, slab)`: adds what lies on the active nodes of the slab, which begins at the node `first`.
 type Add<'a, X> = dyn Fn(&Block, &[X], usize, &mut [X]) + Sync + 'a;
@@ -48,31 +47,28 @@ impl<const D: usize> Tiled<D> {
         let numbers = fields * C;
         // The buffer of a field is a vector longer than its nodes.
         let length = |block: &Block| block.box_nodes() * C + LANES;
-        let work = |block: &Block, nodal: &mut Vec<X>, buffer: &mut [X]| {
-            let (mut few, mut few_sums) = ([At::<X, C, D>::zero(); FEW], [At::<X, C, D>::zero(); FEW]);
-            let (mut many, mut many_sums) = (Vec::new(), Vec::new());
-            let (at, sums) = (room(&mut few, &mut many, fields), room(&mut few_sums, &mut many_sums, fields));
-            let boxed = block.box_nodes() * C;
+        let work = |block: &Block, scratch: &mut Scratch<X, C, D>, buffer: &mut [X]| {
+            let Scratch { nodal, at, sums, weights } = scratch;
+            at.resize(fields, At::zero());
+            sums.resize(fields, At::zero());
             if let Some(field) = field {
                 gather_boxes::<X, C>(block, field, fields, nodal);
             }
-            let mut weights = Vec::new();
             for group in 0..block.groups.len() {
                 let mut window = block.groups.window(group, X::weights(&block.groups));
                 if field.is_some() {
-                    for (at, nodal) in at.iter_mut().zip(nodal.chunks(boxed)) {
-                        X::gather(C, window, nodal, flow.gather, &mut at.value, at.gradient.as_flattened_mut());
-                    }
+                    gather(window, nodal, flow, at);
                 }
-                sums.iter_mut().for_each(|sums| sums.clear(flow.scatter));
+                sums.fill(At::zero());
                 point(block.groups.group(group), at, sums);
                 if let Some(changed) = flow.weights.changed() {
                     weights.clear();
                     weights.extend(window.weights.iter().map(|row| row.map(changed)));
-                    window = Window { weights: &weights, ..window };
+                    window = Window { weights, ..window };
                 }
                 for (sums, buffer) in sums.iter().zip(buffer.chunks_mut(length(block))) {
-                    X::scatter(C, window, flow.scatter, &sums.value, sums.gradient.as_flattened(), buffer);
+                    let (value, gradient) = (&sums.value, sums.gradient.as_flattened());
+                    X::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
                 }
             }
         };
@@ -92,11 +88,12 @@ impl<const D: usize> Tiled<D> {
     /// `out_I += ` the diagonal blocks of the quadratic forms that `quadratic` fills in, group by group.
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         let numbers = D * D;
-        let work = |block: &Block, _: &mut Vec<f64>, buffer: &mut [f64]| {
+        let work = |block: &Block, (): &mut (), buffer: &mut [f64]| {
             for group in 0..block.groups.len() {
                 let mut form = Quadratic::zero();
                 quadratic(block.groups.group(group), &mut form);
-                laned::blocks(block.groups.window(group, &block.groups.weights), &form, buffer);
+                let window = block.groups.window(group, &block.groups.weights);
+                laned::blocks(ScatterBlocks { window, from: &form, out: buffer });
             }
         };
         let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [f64]| {
@@ -113,14 +110,21 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// The waves, with `numbers` numbers a node in the buffers and `more` behind them.
-    fn each_block<X: Laned>(&self, numbers: usize, more: usize, out: &mut [X], work: &Work<'_, X>, add: &Add<'_, X>) {
+    fn each_block<X: Laned, S: Default + Send>(
+        &self,
+        numbers: usize,
+        more: usize,
+        out: &mut [X],
+        work: &Work<'_, X, S>,
+        add: &Add<'_, X>,
+    ) {
         let length = self.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + more;
-        let one = |scratch: &mut Vec<X>, buffer: &mut [X], block: &Block| {
+        let one = |scratch: &mut S, buffer: &mut [X], block: &Block| {
             buffer[..block.box_nodes() * numbers + more].fill(X::zero());
             work(block, scratch, buffer);
         };
         if !self.in_parallel() {
-            let (mut scratch, mut buffer) = (Vec::new(), vec![X::zero(); length]);
+            let (mut scratch, mut buffer) = (S::default(), vec![X::zero(); length]);
             for block in &self.blocks {
                 one(&mut scratch, &mut buffer, block);
                 add(block, &buffer, 0, out);
@@ -148,26 +152,26 @@ impl<const D: usize> Tiled<D> {
         &self,
         fields: usize,
         field: &[f64],
-        parts: Parts,
+        flow: Flow,
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
-        let gather = |nodal: &mut Vec<f64>, block: &Block, take: &mut dyn FnMut(usize, R)| {
-            gathered::<C, D>(block, field, fields, parts, nodal, |group, at| {
+        let gather = |scratch: &mut Scratch<f64, C, D>, block: &Block, take: &mut dyn FnMut(usize, R)| {
+            gathered(block, field, fields, flow, scratch, |group, at| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     take(p as usize, point(p as usize, at, lane));
                 }
             });
         };
         if !self.in_parallel() {
-            let mut nodal = Vec::new();
-            self.blocks.iter().for_each(|block| gather(&mut nodal, block, take));
+            let mut scratch = Scratch::default();
+            self.blocks.iter().for_each(|block| gather(&mut scratch, block, take));
             return;
         }
         let mut waiting: Vec<Vec<(usize, R)>> = self.blocks.iter().take(WAVE).map(|_| Vec::new()).collect();
         for blocks in self.blocks.chunks(WAVE) {
-            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|nodal, (block, part)| {
-                gather(nodal, block, &mut |p, result| part.push((p, result)));
+            parallel::for_each_with(blocks.iter().zip(&mut waiting), &|scratch, (block, part)| {
+                gather(scratch, block, &mut |p, result| part.push((p, result)));
             });
             for (p, result) in waiting.iter_mut().flat_map(|part| part.drain(..)) {
                 take(p, result);
@@ -184,9 +188,9 @@ impl<const D: usize> Tiled<D> {
             chunks.push(chunk);
             rest = behind;
         }
-        let one = |nodal: &mut Vec<f64>, (block, chunk): (&Block, &mut [Y])| {
+        let one = |scratch: &mut Scratch<f64, D, D>, (block, chunk): (&Block, &mut [Y])| {
             let mut rows = chunk.chunks_mut(count);
-            gathered::<D, D>(block, field, 1, Parts::GRADIENT, nodal, |group, at| {
+            gathered(block, field, 1, Flow::GRADIENT, scratch, |group, at| {
                 if let Some(rows) = rows.next() {
                     fill(group, &at[0], rows);
                 }
@@ -196,34 +200,47 @@ impl<const D: usize> Tiled<D> {
         if self.in_parallel() {
             parallel::for_each_with(both, &one);
         } else {
-            let mut nodal = Vec::new();
-            both.for_each(|both| one(&mut nodal, both));
+            let mut scratch = Scratch::default();
+            both.for_each(|both| one(&mut scratch, both));
         }
     }
 }
 
-/// Fields that a block has room for without allocating: those of a dual number.
-const FEW: usize = 2;
-
-/// Zeros for so many fields.
-fn room<'a, X: Real, const C: usize, const D: usize>(
-    few: &'a mut [At<X, C, D>; FEW],
-    many: &'a mut Vec<At<X, C, D>>,
-    fields: usize,
-) -> &'a mut [At<X, C, D>] {
-    if fields <= FEW {
-        return &mut few[..fields];
-    }
-    many.resize(fields, At::zero());
-    many
+/// What one thread works in.
+#[derive(Default)]
+struct Scratch<X, const C: usize, const D: usize> {
+    /// The boxes of the fields.
+    nodal: Vec<X>,
+    /// What was gathered of each field.
+    at: Vec<At<X, C, D>>,
+    /// What is scattered of each.
+    sums: Vec<At<X, C, D>>,
+    /// The weights of a group, changed.
+    weights: Vec<[X; LANES]>,
 }
 
-/// The boxes of the fields, one after the other.
+/// The boxes of the fields, one after the other; zero at nodes that are not active.
 fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
     let boxed = block.box_nodes() * C;
+    nodal.clear();
     nodal.resize(fields * boxed, X::zero());
     for (f, nodal) in nodal.chunks_mut(boxed).enumerate() {
-        block.fill(field, fields * C, f * C, C, nodal);
+        for (&node, &place) in block.nodes.iter().zip(&block.places) {
+            let (to, from) = (place as usize * C, (node as usize * fields + f) * C);
+            nodal[to..to + C].copy_from_slice(&field[from..from + C]);
+        }
+    }
+}
+
+/// Gathers a group from the boxes of the fields.
+fn gather<X: Laned, const C: usize, const D: usize>(
+    window: Window<'_, X>,
+    nodal: &[X],
+    flow: Flow,
+    at: &mut [At<X, C, D>],
+) {
+    for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
+        X::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
     }
 }
 
@@ -232,18 +249,14 @@ fn gathered<const C: usize, const D: usize>(
     block: &Block,
     field: &[f64],
     fields: usize,
-    parts: Parts,
-    nodal: &mut Vec<f64>,
+    flow: Flow,
+    Scratch { nodal, at, .. }: &mut Scratch<f64, C, D>,
     mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
 ) {
     gather_boxes::<f64, C>(block, field, fields, nodal);
-    let (mut few, mut many) = ([At::<f64, C, D>::zero(); FEW], Vec::new());
-    let at = room(&mut few, &mut many, fields);
+    at.resize(fields, At::zero());
     for group in 0..block.groups.len() {
-        let window = block.groups.window(group, &block.groups.weights);
-        for (at, nodal) in at.iter_mut().zip(nodal.chunks(block.box_nodes() * C)) {
-            f64::gather(C, window, nodal, parts, &mut at.value, at.gradient.as_flattened_mut());
-        }
+        gather(block.groups.window(group, &block.groups.weights), nodal, flow, at);
         visit(block.groups.group(group), at);
     }
 }

@@ -3,7 +3,9 @@
 
 use super::inertia::FrozenMass;
 use super::stress::FrozenStress;
-use super::{BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, Unit};
+use super::{
+    BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, Unit, summed,
+};
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
@@ -115,13 +117,8 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     /// ½ v·C v/α₄, whose gradient is C v
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let v = self.velocity(dphi);
-        let (mut sum, mut magnitude) = (T::zero(), 0.0);
-        for (force, v) in self.force_of(&v).iter().zip(&v) {
-            let energy = T::lit(0.5 / self.step.alphas.a4) * force.dot(v);
-            sum += energy;
-            magnitude += energy.value().abs();
-        }
-        Some(Ok((sum, magnitude)))
+        let energy = |(force, v): (&Vector<T, D>, &Vector<T, D>)| T::lit(0.5 / self.step.alphas.a4) * force.dot(v);
+        Some(Ok(summed(self.force_of(&v).iter().zip(&v).map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
@@ -132,12 +129,7 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 
-    fn freeze<X: Laned>(
-        &self,
-        _: &[Vector<f64, D>],
-        _: Part,
-        unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
         let mut of_stress = None;

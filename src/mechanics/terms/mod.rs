@@ -130,6 +130,13 @@ pub(crate) struct Given<'a, const D: usize> {
 
 /// Whether a term, or a part of it, is there, and why: `(name, used, why)`.
 pub(crate) type Reason = (&'static str, bool, String);
+/// The sum of energies.
+fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
+    energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
+}
+
+/// What freezing a term comes to.
+pub(crate) type Freezing<'a, X, const D: usize> = Result<Option<Box<dyn Frozen<X, D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
@@ -158,7 +165,7 @@ pub(crate) trait Term<const D: usize>: Sync {
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>>;
 
     /// Adds the magnitudes of what [`Self::add_at_nodes`] sums up.
-    fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]);
+    fn add_magnitudes_at_nodes(&self, _dphi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
     /// Adds what rounding Δφ and the state changes in the residual, in units of eps.
     ///
@@ -172,12 +179,7 @@ pub(crate) trait Term<const D: usize>: Sync {
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn freeze<X: Laned>(
-        &self,
-        _dphi: &[Vector<f64, D>],
-        _part: Part,
-        _unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, _dphi: &[Vector<f64, D>], _part: Part, _unit: Unit) -> Freezing<'_, X, D> {
         Ok(None)
     }
 }
@@ -361,13 +363,8 @@ macro_rules! dead_load {
             }
 
             fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-                let (mut sum, mut magnitude) = (T::zero(), 0.0);
-                for (force, dphi) in self.0.iter().zip(dphi) {
-                    let work = force.map(T::lit).dot(dphi);
-                    sum -= work;
-                    magnitude += work.value().abs();
-                }
-                Some(Ok((sum, magnitude)))
+                let energy = |(force, dphi): (&Vector<f64, D>, &Vector<T, D>)| -force.map(T::lit).dot(dphi);
+                Some(Ok(super::summed(self.0.iter().zip(dphi).map(energy))))
             }
 
             fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {

@@ -1,6 +1,6 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface: with an exact tangent, not symmetric on an open surface.
 
-use super::{Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
+use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
 use crate::mechanics::loads::{Pressing, PressurePoint};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Laned, Number, Supports};
@@ -53,12 +53,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         }
     }
 
-    fn freeze<X: Laned>(
-        &self,
-        dphi: &[Vector<f64, D>],
-        _: Part,
-        unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
         let freeze = |point: &PressurePoint<D>| {
             let (p, h_n) = (point.particle, &self.particles.displacement_gradient[point.particle]);
             let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));

@@ -1,9 +1,11 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{AtPoints, BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit};
+use super::{
+    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
+};
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Supports, add_quadratic};
+use crate::mechanics::sweep::{First, Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 
@@ -39,7 +41,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         let factor = 1.0 / (unit.scale * unit.length * unit.length);
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [X::zero(); LANES]);
         let evaluate = self.laws.tangents(part, form, factor);
-        let failure = std::sync::Mutex::new(None::<Inadmissible>);
+        let failure = First::none();
         self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
             let mut tangents: [[f64; LANES]; MOST_ROWS];
             let mut few = [[0.0; LANES]; FEW_ROWS];
@@ -50,17 +52,12 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
                 &mut tangents[..count]
             };
             if let Err(error) = evaluate(group, at, tangents) {
-                let mut first = crate::parallel::held(&failure);
-                if first.is_none_or(|first| error.particle < first.particle) {
-                    *first = Some(error);
-                }
+                failure.keep(error.particle, error);
             }
             rows.iter_mut().zip(tangents).for_each(|(to, from)| *to = from.map(X::lit));
         });
-        match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
-            Some(error) => Err(error),
-            None => Ok(FrozenStress { form, rows, length: unit.length, factor: 1.0 }),
-        }
+        failure.check()?;
+        Ok(FrozenStress { form, rows, length: unit.length, factor: 1.0 })
     }
 }
 
@@ -93,19 +90,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
                 .map_err(|source| Inadmissible { particle: id, source })?;
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at, &particles.start(p, self.laws.dt)))
         });
-        let (mut sum, mut magnitude) = (T::zero(), 0.0);
-        let energies = match energies {
-            Ok(energies) => energies,
-            Err(error) => return Some(Err(error)),
-        };
-        for energy in energies {
-            sum += energy;
-            magnitude += energy.value().abs();
-        }
-        Some(Ok((sum, magnitude)))
+        Some(energies.map(summed))
     }
-
-    fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], _: &mut [Vector<f64, D>]) {}
 
     /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖, the response to a change of volume standing for all, and δF of size ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
@@ -123,12 +109,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         })
     }
 
-    fn freeze<X: Laned>(
-        &self,
-        dphi: &[Vector<f64, D>],
-        part: Part,
-        unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], part: Part, unit: Unit) -> Freezing<'_, X, D> {
         Ok(Some(Box::new(self.frozen::<X>(dphi, part, unit)?)))
     }
 }
@@ -160,12 +141,12 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X> {
         Some((
             Flow::GRADIENT,
             Box::new(move |group, at, sums| {
-                let (rows, l) = (self.of_group(group.number, D), at.gradient.as_flattened());
+                let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
                 if self.factor == 1.0 {
-                    <X as Laned>::product(self.form, D, rows, l, sums.gradient.as_flattened_mut());
+                    <X as Laned>::product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
                 } else {
                     let mut product = [[[X::zero(); LANES]; D]; D];
-                    <X as Laned>::product(self.form, D, rows, l, product.as_flattened_mut());
+                    <X as Laned>::product(D, Product { form, rows, l, out: product.as_flattened_mut() });
                     let both = sums.gradient.as_flattened_mut().iter_mut().zip(product.as_flattened());
                     both.for_each(|(sum, x)| sum.iter_mut().zip(x).for_each(|(sum, &x)| *sum += factor * x));
                 }

@@ -73,7 +73,7 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
                 return Err(no_extent());
             }
             extent = extent.min(high - low);
-            if let Shape::Box(_) = shape {
+            if let Shape::Box { .. } = shape {
                 faces.extend([low, high]);
             }
         }

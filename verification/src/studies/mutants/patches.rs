@@ -89,7 +89,6 @@ const DIAGONAL: &str = "src/mechanics/sweep/blocks.rs";
 const FROZEN: &str = "src/mechanics/sweep/tangents.rs";
 const IN_LANES: &str = "src/mechanics/sweep/laws.rs";
 const WAVES: &str = "src/mechanics/sweep/waves.rs";
-const BOXES: &str = "src/mechanics/sweep/block.rs";
 const BUILDER: &str = "src/mechanics/sweep/builder.rs";
 const PLAIN: &str = "src/mechanics/sweep/plain.rs";
 const NEWMARK: &str = "src/mechanics/time.rs";
@@ -200,8 +199,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "*out += force.map(T::lit)",
         Killed(&[TANGENT, BALANCE], &[POINTS])),
     patch("potential with the other sign of dead loads", TERMS,
-        "sum -= work;",
-        "sum += work;",
+        "-force.map(T::lit).dot(dphi)",
+        "force.map(T::lit).dot(dphi)",
         Killed(&[TANGENT], &[POINTS])),
     patch("a force field without the mass it acts on", BODY_FORCE,
         "of_particle(p) * particles.mass[p]",
@@ -313,12 +312,12 @@ pub(super) const PATCHES: &[Patch] = &[
         "0..window.lanes.min(LANES - 1)",
         Killed(&[OPERATOR, SWEEP], &[POINTS])),
     patch("the last row of a full vector cut from a window", KERNEL,
-        "(wy * wz - start).min(<S::Rows as Rows>::COUNT)",
-        "(wy * wz - start).min(<S::Rows as Rows>::COUNT - 1)",
+        "(wy * wz - start).min(S::ROWS)",
+        "(wy * wz - start).min(S::ROWS - 1)",
         Killed(&[OPERATOR, SWEEP, TANGENT], &[POINTS])),
     patch("values scattered by a slope", KERNEL,
-        "s.mul_add(s.splat(value[c][p]), pairs.products[0][p], across[c])",
-        "s.mul_add(s.splat(value[c][p]), pairs.products[D - 1][p], across[c])",
+        "s.mul_add(lanes.splat_rows(value[c][p]), pairs.products[0][p], across[c])",
+        "s.mul_add(lanes.splat_rows(value[c][p]), pairs.products[D - 1][p], across[c])",
         Killed(&[OPERATOR, SWEEP, TANGENT], &[POINTS])),
     patch("stresses along x scattered by N for its slope", KERNEL,
         "s.mul_add(along[c], dx, sums[x][c])",
@@ -356,9 +355,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "node * numbers + f * C",
         "node * numbers + (fields - 1 - f) * C",
         Killed(&[TANGENT, DYNAMICS], &[OPERATOR])),
-    patch("components beside each other read from the first field", BOXES,
-        "node as usize * numbers + at",
-        "node as usize * numbers",
+    patch("components beside each other read from the first field", WAVES,
+        "(node as usize * fields + f) * C",
+        "node as usize * fields * C",
         Killed(&[TANGENT, DYNAMICS], &[OPERATOR])),
     patch("slopes in single precision not in units of 1/h", BUILDER,
         "(dn * h) as f32",
