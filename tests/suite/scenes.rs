@@ -70,6 +70,7 @@ fn shipped_scenes_are_sound() {
             "column_static",
             "compaction",
             "compaction_confined",
+            "elastica",
             "rebound",
             "rebound_fast",
             "riemann",
