@@ -253,7 +253,7 @@ pub enum LinearOutcome {
     /// The residual no longer falls: round-off, a singular operator, or a restart that is too short.
     Stagnated,
     /// Conjugate gradients only: the operator (pᵀAp < 0) or the preconditioner (rᵀM⁻¹r ≤ 0) is not positive definite. The solution is
-    /// the last x, along which ½ x·Ax − b·x fell all the way; if there was none yet, the direction M⁻¹b of negative curvature.
+    /// then an x along which ½ x·Ax − b·x falls, the first direction if it has negative curvature; zero if not even that falls.
     NegativeCurvature,
 }
 
