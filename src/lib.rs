@@ -80,8 +80,9 @@
 //!
 //! and Π is the merit function of the line search; det F ≤ 0 is refused as Π = +∞.
 //!
-//! **4. Newton's method** ([`solver::newton()`]) solves R = 0 on the free degrees of freedom, and GMRES ([`solver::gmres()`]) the linear
-//! systems K d = −R. The product with K is applied particle by particle and never assembled (30), (34), with δF = Σ_J u_J ⊗ ∇N_J:
+//! **4. Newton's method** ([`solver::newton()`]) solves R = 0 on the free degrees of freedom, and conjugate gradients
+//! ([`solver::conjugate_gradient()`]), or GMRES ([`solver::gmres()`]) where K is not symmetric, the linear systems K d = −R. The product
+//! with K is applied particle by particle and never assembled (30), (34), with δF = Σ_J u_J ⊗ ∇N_J:
 //!
 //! ```text
 //! K u = α₁ M̃ u                        inertia

@@ -134,6 +134,8 @@ pub struct Plan {
     pub active_nodes: usize,
     /// Free degrees of freedom of the first step.
     pub unknowns: usize,
+    /// The method that solves the linear systems, and why it does.
+    pub krylov: (Krylov, &'static str),
     /// Terms of the residual and parts of the step.
     pub terms: Vec<TermUse>,
     /// The large arrays.
@@ -160,6 +162,7 @@ impl Plan {
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
             unknowns: D * nodes.len() - prescribed.len(),
+            krylov: simulation.krylov(),
             terms: terms(simulation, &supports),
             arrays: arrays(simulation, &supports, nodes.len()),
             surfaces: SurfaceUse::of(simulation),
@@ -243,10 +246,10 @@ fn arrays<const D: usize, L: Law, A>(
     let consistent = moves && lumping < 1.0;
     let smooths = moves && simulation.settings.smoothing.is_some();
     let tiled = supports.is_tiled();
-    let krylov_vectors = match simulation.settings.newton.krylov {
+    let krylov_vectors = match simulation.krylov().0 {
         // The basis; residual, correction, trial and product.
         Krylov::Gmres { restart } => restart as usize + 5,
-        Krylov::ConjugateGradient => 5,
+        Krylov::Automatic | Krylov::ConjugateGradient => 5,
     };
     let precision = precision_used(supports);
     let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
@@ -284,6 +287,8 @@ impl Display for Plan {
         writeln!(f, "particles     {}", self.particles)?;
         writeln!(f, "active nodes  {} of {}", self.active_nodes, self.grid_nodes)?;
         writeln!(f, "unknowns      {}", self.unknowns)?;
+        let (method, why) = self.krylov;
+        writeln!(f, "solver        {method}: {why}")?;
         writeln!(f, "terms")?;
         for term in &self.terms {
             writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;

@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::material::{Law, Material};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::{Equilibrium, Inadmissible};
+use crate::mechanics::residual::{Equilibrium, Inadmissible, unsymmetric};
 use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::schemes::{Alphas, Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
@@ -18,7 +18,9 @@ use crate::nodes::Nodes;
 use crate::particles::{Body, Particles};
 use crate::phases::{Phase, Stopwatch};
 use crate::pooled::{Pool, Pooled};
-use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, Preconditioning, newton};
+use crate::solver::{
+    Krylov, LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, Preconditioning, newton,
+};
 use crate::tensor::{Deformation, Vector};
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -286,6 +288,28 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     }
 }
 
+impl<const D: usize, L: Law, A> Simulation<D, L, A> {
+    /// The method that solves the linear systems, and why it does.
+    ///
+    /// ```
+    /// use bfree::solver::Krylov;
+    ///
+    /// let mut simulation = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+    /// assert_eq!(simulation.krylov(), (Krylov::ConjugateGradient, "the tangent is symmetric"));
+    /// simulation.settings.newton.krylov = Krylov::Gmres { restart: 50 };
+    /// assert_eq!(simulation.krylov(), (Krylov::Gmres { restart: 50 }, "it was asked for"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn krylov(&self) -> (Krylov, &'static str) {
+        let (asked, unsymmetric) = (self.settings.newton.krylov, unsymmetric(&self.bodies, &self.loads));
+        let why = match asked {
+            Krylov::Automatic => unsymmetric.unwrap_or("the tangent is symmetric"),
+            Krylov::Gmres { .. } | Krylov::ConjugateGradient => "it was asked for",
+        };
+        (asked.chosen(unsymmetric.is_none()), why)
+    }
+}
+
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
     ///
@@ -371,7 +395,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.external_work += work;
         self.dissipated += dissipated;
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
-        self.clock.advance_and_grow_if(error.is_none_or(small));
+        // What took Newton's method long would take it longer in a longer step.
+        let easy = 2 * newton.history.iterations.len() <= self.settings.newton.max_iterations;
+        self.clock.advance_and_grow_if(easy && error.is_none_or(small));
         let active_nodes = nodes.len();
         Ok(StepReport {
             dt,

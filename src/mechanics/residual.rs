@@ -1,14 +1,24 @@
 //! The residual R(Δφ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 
 use crate::material::Law;
-use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
 use crate::mechanics::point::Part;
 use crate::mechanics::sweep::{Flow, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
+use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
 pub use crate::mechanics::point::{Inadmissible, compose};
+
+/// Why tangents are not symmetric, if they are not.
+pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Option<&'static str> {
+    if loads.surface.iter().any(|load| matches!(load.pressing, Pressing::Pressure(_))) {
+        return Some("pressures that follow a surface make the tangent unsymmetric");
+    }
+    let law = bodies.iter().any(|body| !body.law.is_symmetric());
+    law.then_some("a law makes the tangent unsymmetric")
+}
 
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
@@ -191,7 +201,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// Whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
-        self.terms.pressure.is_none() && self.step.bodies.iter().all(|body| body.law.is_symmetric())
+        unsymmetric(self.step.bodies, self.step.loads).is_none()
     }
 
     /// Sets the prescribed degrees of freedom of a field to zero.

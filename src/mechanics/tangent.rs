@@ -271,6 +271,10 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self::potential::<f64>(self, bytemuck::cast_slice(x))
     }
 
+    fn is_symmetric(&self) -> bool {
+        Self::is_symmetric(self)
+    }
+
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
         Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
     }

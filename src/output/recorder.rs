@@ -239,7 +239,23 @@ impl<const D: usize> Recorder<D> {
         let newton_limit = simulation.settings.newton.max_iterations;
         let failed = step.failed.iter().filter(|attempt| !attempt.inaccurate).count();
         let error = step.error.zip(simulation.settings.error_tolerance);
-        let seen = Watched { time, step: number, energies, cost, failed, error, newton_limit };
+        let attempts = step.failed.iter().map(|attempt| &attempt.newton).chain([newton]);
+        let [limited, stagnated] = attempts.fold([0, 0], |[limited, stagnated], one| {
+            [limited + one.counts.krylov_limited, stagnated + one.counts.krylov_stagnated]
+        });
+        let krylov_limit = simulation.settings.newton.max_krylov_iterations;
+        let seen = Watched {
+            time,
+            step: number,
+            energies,
+            cost,
+            failed,
+            error,
+            newton_limit,
+            limited,
+            stagnated,
+            krylov_limit,
+        };
         self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
         let Cost { newton, krylov, .. } = cost;
         self.progress.show(time, Shown { step: number, newton, krylov, balance: energies.balance });
@@ -274,6 +290,7 @@ impl<const D: usize> Recorder<D> {
             time,
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
+            krylov: simulation.krylov().0,
             momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
             counts,
             seconds,

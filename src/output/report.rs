@@ -81,6 +81,12 @@ pub struct Counts {
     pub max_newton_iterations: usize,
     /// Krylov iterations.
     pub krylov_iterations: u64,
+    /// Linear systems left unsolved at the limit on Krylov iterations.
+    #[serde(default)]
+    pub krylov_limited: u64,
+    /// Linear systems left unsolved because their residual no longer fell.
+    #[serde(default)]
+    pub krylov_stagnated: u64,
     /// Residuals evaluated by Newton's method.
     pub residual_evaluations: u64,
     /// Products with the tangent.
@@ -114,6 +120,8 @@ impl Counts {
     fn add_newton(&mut self, newton: &NewtonHistory) {
         self.newton_iterations += newton.iterations.len() as u64;
         self.krylov_iterations += newton.counts.krylov_iterations as u64;
+        self.krylov_limited += newton.counts.krylov_limited as u64;
+        self.krylov_stagnated += newton.counts.krylov_stagnated as u64;
         self.residual_evaluations += newton.counts.residuals as u64;
         self.tangent_products += newton.counts.tangent_products as u64;
     }

@@ -2,6 +2,7 @@
 
 use super::history::Energies;
 use super::report::{Counts, Seconds};
+use crate::solver::Krylov;
 use std::fmt::{Display, Formatter, Result};
 
 /// A run in a few lines.
@@ -15,6 +16,8 @@ pub struct Summary {
     pub momentum_change: f64,
     /// Σ m |v| at the end, to compare it with.
     pub momentum_scale: f64,
+    /// What solved the linear systems.
+    pub krylov: Krylov,
     /// What was done.
     pub counts: Counts,
     /// How long it took.
@@ -23,7 +26,7 @@ pub struct Summary {
 
 impl Display for Summary {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let Self { time, energies, counts, seconds, .. } = self;
+        let Self { time, energies, krylov, counts, seconds, .. } = self;
         let mean = |sum: u64| sum as f64 / counts.steps.max(1) as f64;
         writeln!(
             f,
@@ -38,7 +41,7 @@ impl Display for Summary {
         writeln!(f, "momentum  changed by {:.3e}; sum of m |v| is {:.3e}", self.momentum_change, self.momentum_scale)?;
         writeln!(
             f,
-            "Newton    {:.2} iterations a step, at most {}; {:.1} Krylov iterations a step",
+            "Newton    {:.2} iterations a step, at most {}; {:.1} of {krylov} a step",
             mean(counts.newton_iterations),
             counts.max_newton_iterations,
             mean(counts.krylov_iterations)

@@ -29,6 +29,10 @@ pub enum Kind {
     NewtonClimbs,
     /// The linear solver takes many more iterations than it used to.
     KrylovClimbs,
+    /// Linear systems are left unsolved at the limit on iterations.
+    KrylovLimited,
+    /// Linear systems are left unsolved because their residual no longer falls.
+    KrylovStagnated,
 }
 
 /// A warning.
@@ -71,6 +75,11 @@ pub(crate) struct Watched {
     pub error: Option<(f64, f64)>,
     /// Newton iterations allowed.
     pub newton_limit: usize,
+    /// Linear systems left unsolved at the limit, and because their residual no longer fell; failed attempts have some, too.
+    pub limited: usize,
+    pub stagnated: usize,
+    /// Krylov iterations allowed for one.
+    pub krylov_limit: usize,
 }
 
 impl Watch {
@@ -117,6 +126,23 @@ impl Watch {
                 format!("the linear solver took {krylov} iterations in a step; {usual:.0} had been usual")
             });
         }
+        let Watched { limited, stagnated, krylov_limit, .. } = *step;
+        if limited > 0 {
+            self.warn(step, Kind::KrylovLimited, || {
+                format!(
+                    "{limited} linear systems of a step were left unsolved after the {krylov_limit} iterations allowed: they are badly \
+                     conditioned; raise solver.krylov.max_iterations, shorten time.step, or give cut cells a ghost_stiffness"
+                )
+            });
+        }
+        if stagnated > 0 {
+            self.warn(step, Kind::KrylovStagnated, || {
+                format!(
+                    "{stagnated} linear systems of a step were left unsolved because their residual no longer fell: they are nearly \
+                     singular, or GMRES restarts too early; hold bodies that can move freely, or raise solver.krylov.method.gmres.restart"
+                )
+            });
+        }
         self.seen += 1;
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
         &self.warnings[known..]
@@ -138,7 +164,18 @@ mod tests {
         let energies =
             Energies { kinetic: 2.0, strain: 1.0, external: -1.0, dissipated: 0.0, total: 3.0, balance: -0.5 };
         let cost = Cost { dt: 0.1, newton: 3, krylov: 30 };
-        Watched { time: 0.1 * number as f64, step: number, energies, cost, failed: 0, error: None, newton_limit: 30 }
+        Watched {
+            time: 0.1 * number as f64,
+            step: number,
+            energies,
+            cost,
+            failed: 0,
+            error: None,
+            newton_limit: 30,
+            limited: 0,
+            stagnated: 0,
+            krylov_limit: 2000,
+        }
     }
 
     #[test]
@@ -164,7 +201,14 @@ mod tests {
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
         // 27 steps of 30 before, and that of 150
         assert!(watch.see(&krylov(180)).iter().any(|warning| warning.message.contains("180 iterations in a step; 34")));
-        assert_eq!(watch.warnings().len(), 5);
+        let limited = Watched { limited: 2, ..step(25) };
+        assert!(watch.see(&limited).iter().any(
+            |warning| warning.message.starts_with("2 linear systems") && warning.message.contains("the 2000 iter")
+        ));
+        let stagnated = Watched { stagnated: 3, ..step(26) };
+        assert!(watch.see(&stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
+        assert!(watch.see(&stagnated).is_empty() && watch.see(&limited).is_empty(), "once");
+        assert_eq!(watch.warnings().len(), 7);
         // what it knows survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);

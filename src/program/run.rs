@@ -133,6 +133,8 @@ impl Run {
             let sets = serde_json::to_value(&scene.chosen).map_err(Failure::run)?;
             asked.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
         }
+        let (method, why) = simulation.krylov();
+        asked.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
         asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {

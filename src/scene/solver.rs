@@ -39,7 +39,7 @@ impl Default for Newton {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Krylov {
-    /// The method.
+    /// The method. Default "automatic".
     pub method: Method,
     /// How far each linear problem is solved.
     pub forcing: Forcing,
@@ -64,6 +64,7 @@ impl Solver {
         problems.whole("solver.krylov.max_iterations", self.krylov.max_iterations, 1, 1_000_000);
         match self.krylov.method {
             Method::Gmres { restart } => problems.whole("solver.krylov.method.gmres.restart", restart, 1, 1000),
+            Method::Automatic => {}
             Method::ConjugateGradient => {
                 let allowed = "pressures make the tangent unsymmetric: use {\"gmres\": {}}";
                 problems.require(!with_pressures, "solver.krylov.method", "\"conjugate_gradient\"", allowed);

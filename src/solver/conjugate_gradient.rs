@@ -35,7 +35,9 @@ impl Default for ConjugateGradientSettings {
 /// 5. When the recurrence meets the tolerance the residual is computed anew; if that one does not meet it, back to 1 as
 ///    long as this halves the true residual.
 ///
-/// Returned is the iterate with the least residual. `solution` is overwritten; b = 0 gives x = 0 without iterating.
+/// Returned is the iterate with the least residual, at negative curvature the last one or, before there is one, M⁻¹b times the inverse of
+/// its curvature's size: directions in which ½ x·Ax − b·x falls (Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, Numerical
+/// Optimization, 2nd ed., alg. 7.1). `solution` is overwritten; b = 0 gives x = 0 without iterating.
 /// If A is singular and b in its range, x is the solution of least norm x·Mx (least length for M = I), for the iteration never
 /// leaves M⁻¹ range(A).
 ///
@@ -149,9 +151,16 @@ fn descend<S: Entry>(
         let curvature = p_a_p / p_m_p;
         largest = largest.max(curvature);
         let unresolved = UNRESOLVED * S::EPSILON * largest;
+        if curvature < -unresolved {
+            if x.iter().all(|x| *x == S::zero()) {
+                // As far as if the curvature had the other sign.
+                axpy(-rz / p_a_p, &p, &mut x);
+            }
+            solution.copy_from_slice(&x);
+            return stop(LinearOutcome::NegativeCurvature, run);
+        }
         if curvature <= unresolved {
-            let negative = curvature < -unresolved;
-            return stop(if negative { LinearOutcome::NegativeCurvature } else { LinearOutcome::Stagnated }, run);
+            return stop(LinearOutcome::Stagnated, run);
         }
         // α = r·z / p·Ap
         let length = rz / p_a_p;
@@ -248,8 +257,16 @@ mod tests {
             let mut x = vec![0.0; n];
             let report = conjugate_gradient(&a, &Identity, &b, &mut x, &TIGHT).unwrap();
             assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
-            assert!(report.relative_residual <= 1.0);
+            // Along what it has found ½ x·Ax − b·x falls from the start.
+            let (along, curvature) = (dot(&b, &x), dot(&x, &a.times(&x)));
+            assert!(along > 0.0 && 0.5 * curvature < along, "{along} {curvature}");
         }
+        // Where there is nothing before it, M⁻¹b over the size of its curvature.
+        let a = Dense::from_fn(n, |i, j| if i == j { -4.0 } else { 0.0 });
+        let mut x = vec![0.0; n];
+        let report = conjugate_gradient(&a, &Identity, &exact, &mut x, &TIGHT).unwrap();
+        assert_eq!((report.outcome, report.iterations), (LinearOutcome::NegativeCurvature, 0));
+        assert!(x.iter().zip(&exact).all(|(x, b)| *x == b / 4.0), "{x:?}");
         // An indefinite preconditioner under a definite operator.
         let m = Dense::from_fn(n, |i, j| if i == j { [1.0, -3.0][i % 2] } else { 0.0 });
         let mut x = vec![0.0; n];

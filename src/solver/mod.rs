@@ -183,6 +183,11 @@ pub trait NonlinearProblem {
     /// potential (follower loads).
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>>;
 
+    /// Whether every tangent is symmetric; nothing less than certainty counts.
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+
     /// The tangent at x.
     ///
     /// # Errors
@@ -238,7 +243,7 @@ impl LinearReport {
     }
 }
 
-/// How a Krylov method ended. Whatever the outcome, the solution is the best one it has seen.
+/// How a Krylov method ended. The solution is the best one it has seen, but for negative curvature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinearOutcome {
     /// The true residual meets the tolerance.
@@ -247,7 +252,8 @@ pub enum LinearOutcome {
     IterationLimit,
     /// The residual no longer falls: round-off, a singular operator, or a restart that is too short.
     Stagnated,
-    /// Conjugate gradients only: the operator (pᵀAp < 0) or the preconditioner (rᵀM⁻¹r ≤ 0) is not positive definite.
+    /// Conjugate gradients only: the operator (pᵀAp < 0) or the preconditioner (rᵀM⁻¹r ≤ 0) is not positive definite. The solution is
+    /// then an x along which ½ x·Ax − b·x falls, the first direction if it has negative curvature; zero if not even that falls.
     NegativeCurvature,
 }
 

@@ -315,6 +315,28 @@ fn a_run_warns_once_of_halved_steps_and_many_iterations() -> Result<(), Failure>
 }
 
 #[test]
+fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Result<(), Failure> {
+    const METHOD: &str = "solver.krylov.method=\"automatic\"";
+    let directory = tempfile::tempdir()?;
+    let arguments = ["--steps", "2", "--set", "solver.krylov.max_iterations=2", "--set", METHOD];
+    let mut run = program();
+    let output =
+        run.arg("run").arg(scene("compaction.json")).arg("--out").arg(directory.path()).args(arguments).output()?;
+    let (text, told) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
+    assert!(output.status.success(), "{told}");
+    assert!(text.contains("of conjugate gradients a step"), "{text}");
+    assert_eq!(told.matches("left unsolved after the 2 iterations allowed").count(), 1, "{told}");
+    let report = report(directory.path())?;
+    assert_eq!(report["counts"]["krylov_limited"], report["counts"]["newton_iterations"]);
+    let krylov = serde_json::json!({ "method": "conjugate gradients", "why": "the tangent is symmetric" });
+    assert_eq!((&report["krylov"], &report["warnings"][0]["kind"]), (&krylov, &"krylov_limited".into()));
+    let output = program().arg("check").arg(scene("compaction.json")).output()?;
+    let text = String::from_utf8(output.stdout)?;
+    assert!(text.contains("solver        GMRES(30): it was asked for"), "{text}");
+    Ok(())
+}
+
+#[test]
 fn a_cause_is_told_once() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     let file = directory.path().join("file");

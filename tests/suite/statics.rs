@@ -7,7 +7,8 @@ use bfree::material::Law;
 use bfree::output::Reference;
 use bfree::scene;
 use bfree::simulation::{Simulation, StepError};
-use bfree::tensor::Tensor;
+use bfree::solver::Merit;
+use bfree::tensor::{Tensor, Vector};
 
 const COLUMN: &str = "column_static.json";
 const FREE: &str = r#"boundary={"left":"free"}"#;
@@ -243,6 +244,86 @@ fn units_do_not_matter_to_load_steps() -> Result<(), Failure> {
     assert_eq!(plain.particles.displacement_gradient, scaled.particles.displacement_gradient);
     for (x, y) in plain.particles.position.iter().zip(&scaled.particles.position) {
         assert_eq!(x.map(|x| (x * length).to_bits()), y.map(f64::to_bits));
+    }
+    Ok(())
+}
+
+/// u/L and w/L of the middle of the beam's end, half a particle beyond the last ones.
+fn end_of_beam(simulation: &Simulation<2>, start: &[Vector<f64, 2>]) -> [f64; 2] {
+    let (length, now) = (20.0, simulation.particles.by_id().position);
+    let last = start.iter().fold(0.0_f64, |last, x| last.max(x[0]));
+    let spacing = 2.0 * (length - last);
+    let mean = |x: f64| {
+        let at: Vec<_> = (0..now.len()).filter(|&p| (start[p][0] - x).abs() < 0.1 * spacing).collect();
+        at.iter().map(|&p| now[p] - start[p]).sum::<Vector<f64, 2>>() / at.len() as f64
+    };
+    let end = mean(last) * 1.5 - mean(last - spacing) * 0.5;
+    [-end[0] / length, -end[1] / length]
+}
+
+/// PL²/EI = 1, 2, 5, 10 on the way: the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J. Numer. Methods Eng. 17,
+/// 1981). One with L/h = 20 shears and stretches, too, by h²/5L² PL²/EI of its length at first: at 8 cells deep a percent of w is allowed,
+/// at the scene's 4 a fifth more.
+#[test]
+fn the_elastica_is_reached_with_what_a_scene_has_that_says_nothing() -> Result<(), Failure> {
+    let exact = [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (5, 0.38763, 0.71379), (10, 0.55500, 0.81061)];
+    let right = |part: f64, [u, w]: [f64; 2], (load, u_exact, w_exact): (u64, f64, f64)| {
+        let bound = part * w_exact;
+        assert!((w - w_exact).abs() < bound && (u - u_exact).abs() < bound, "{load}: {u} {w}");
+    };
+    let mut simulation = scene::<2>("elastica.json", &[])?;
+    let start = simulation.particles.by_id().position;
+    for case in exact {
+        while simulation.clock.nominal_steps() < case.0 {
+            let step = simulation.advance()?;
+            assert!(step.failed.is_empty(), "{:?}", step.failed);
+        }
+        right(0.012, end_of_beam(&simulation, &start), case);
+    }
+    // And at once: the residual grows thirtyfold on the way, and only the potential finds it.
+    let mut at_once = scene::<2>("elastica.json", &["time.step=1", "grid.spacing=0.125", "output.probes=[]"])?;
+    let start = at_once.particles.by_id().position;
+    let step = at_once.advance()?;
+    assert!(step.failed.is_empty() && step.newton.history.iterations.iter().any(|i| i.merit == Merit::Potential));
+    right(0.01, end_of_beam(&at_once, &start), exact[3]);
+    Ok(())
+}
+
+#[test]
+fn the_krylov_method_is_chosen_by_the_symmetry_of_the_tangent() -> Result<(), Failure> {
+    let pressure = r#"pressures=[{"body":"column","region":{"box":{"min":[0,0.999],"max":[0.4,1.1]}},"pressure":1e3}]"#;
+    let (conjugate, gmres) = (r#""conjugate_gradient""#, r#"{"gmres":{}}"#);
+    for (load, forced, other, why) in [
+        ("pressures=[]", conjugate, Some(gmres), "the tangent is symmetric"),
+        (pressure, gmres, None, "pressures that follow a surface make the tangent unsymmetric"),
+    ] {
+        let first = |method: &str| -> Result<_, Failure> {
+            let mut simulation = scene::<2>(COLUMN, &[load, &format!("solver.krylov.method={method}")])?;
+            let history = simulation.advance()?.newton.history;
+            Ok((simulation.krylov(), simulation.particles, history))
+        };
+        let (chosen, automatic) = (first(r#""automatic""#)?, first(forced)?);
+        assert_eq!((chosen.0.0, chosen.0.1, automatic.0.1), (automatic.0.0, why, "it was asked for"));
+        assert_eq!((chosen.1, &chosen.2), (automatic.1, &automatic.2));
+        if let Some(other) = other {
+            assert_ne!(first(other)?.2.counts.tangent_products, chosen.2.counts.tangent_products);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_step_that_was_hard_is_not_made_longer() -> Result<(), Failure> {
+    // A column that is given its weight at once, in quarters of a step.
+    let mut simulation = scene::<2>(COLUMN, &["time.step=1"])?;
+    assert!(simulation.clock.halve() && simulation.clock.halve());
+    simulation.advance()?;
+    let iterations = simulation.clone().advance()?.newton.history.iterations.len();
+    for (limit, dt) in [(2 * iterations - 1, 0.25), (2 * iterations, 0.5)] {
+        let mut simulation = simulation.clone();
+        simulation.settings.newton.max_iterations = limit;
+        simulation.advance()?;
+        assert_eq!((simulation.clock.time(), simulation.clock.step()), (0.5, dt));
     }
     Ok(())
 }

@@ -2,12 +2,12 @@
 
 use super::failure::LinearSolverFailure;
 use super::report::NewtonCounts;
-use super::settings::{FALLBACK_RESTART, Krylov, NewtonSettings};
+use super::settings::{DEFAULT_RESTART, Krylov, NewtonSettings};
 use crate::pooled::Pooled;
 use crate::solver::conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
 use crate::solver::forcing::LOOSEST;
 use crate::solver::gmres::{GmresSettings, gmres};
-use crate::solver::vector::{Entry, norm};
+use crate::solver::vector::{Entry, dot, norm};
 use crate::solver::{LinearOperator, LinearOutcome, LinearReport, Linearization};
 
 /// The least relative residual asked for in single precision: what a recurrence of vectors rounded to 6e-8 can still reach.
@@ -17,21 +17,30 @@ pub(super) const SINGLE_TOLERANCE: f64 = 1e-5;
 pub(super) struct Solved {
     /// d
     pub step: Pooled<f64>,
-    /// The report of the solve that gave d.
+    /// The report of the solve that gave d; negative curvature if that ended it early.
     pub krylov: LinearReport,
     /// That of conjugate gradients given up before.
     pub negative_curvature: Option<LinearReport>,
+}
+
+/// A linear system, and how it is to be solved.
+pub(super) struct System<'a> {
+    pub r: &'a Pooled<f64>,
+    pub method: Krylov,
+    pub relative_tolerance: f64,
+    /// Whether there is a potential that a truncated step may lower.
+    pub has_potential: &'a dyn Fn() -> bool,
 }
 
 /// `K d = −r` as (K/s) d' = −r/ρ with ρ = 2ᵏ ≤ ‖r‖ and d = (ρ/s) d', so that single precision neither over- nor underflows.
 pub(super) fn solve<S: Entry>(
     tangent: &dyn Linearization<S>,
     preconditioner: &dyn LinearOperator<S>,
-    r: &Pooled<f64>,
-    relative_tolerance: f64,
+    system: &System<'_>,
     settings: &NewtonSettings,
     counts: &mut NewtonCounts,
 ) -> Result<Solved, LinearSolverFailure> {
+    let System { r, method, relative_tolerance, has_potential } = *system;
     let workspace = r.pool();
     let size = norm(r).log2().floor().exp2();
     let rhs = workspace.collect(r.iter().map(|r| S::lit(-r / size)));
@@ -40,17 +49,22 @@ pub(super) fn solve<S: Entry>(
     let mut count = |report: LinearReport| {
         counts.tangent_products += report.products;
         counts.krylov_iterations += report.iterations;
+        counts.krylov_limited += usize::from(report.outcome == LinearOutcome::IterationLimit);
+        counts.krylov_stagnated += usize::from(report.outcome == LinearOutcome::Stagnated);
         report
     };
-    let (restart, descended) = match settings.krylov {
+    let (restart, descended) = match method {
         Krylov::Gmres { restart } => (restart, None),
-        Krylov::ConjugateGradient => {
+        Krylov::Automatic | Krylov::ConjugateGradient => {
             let settings = ConjugateGradientSettings { relative_tolerance, max_iterations };
             let report = count(conjugate_gradient(tangent, preconditioner, &rhs, &mut d, &settings, workspace)?);
-            (FALLBACK_RESTART, Some(report))
+            (DEFAULT_RESTART, Some(report))
         }
     };
-    let given_up = descended.filter(|report| report.outcome == LinearOutcome::NegativeCurvature);
+    let negative = descended.filter(|report| report.outcome == LinearOutcome::NegativeCurvature);
+    // −R·d > 0: the potential falls along what there is of a step.
+    let truncated = negative.filter(|_| dot(&rhs, &d) > 0.0 && has_potential());
+    let given_up = negative.filter(|_| truncated.is_none());
     let krylov = match descended {
         Some(report) if given_up.is_none() => report,
         _ => {
@@ -59,7 +73,7 @@ pub(super) fn solve<S: Entry>(
         }
     };
     // Less accurate than wanted is still a direction in which ‖R‖ falls.
-    if krylov.relative_residual >= LOOSEST {
+    if krylov.relative_residual >= LOOSEST && truncated.is_none() {
         return Err(LinearSolverFailure::NoProgress { report: krylov, wanted: relative_tolerance });
     }
     let unit = size / tangent.scale();

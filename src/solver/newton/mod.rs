@@ -16,7 +16,7 @@ use super::forcing::Progress;
 use super::vector::{dot, norm};
 use super::{NonlinearProblem, Preconditioner};
 use crate::pooled::Pool;
-use linear::{SINGLE_TOLERANCE, Solved, solve};
+use linear::{SINGLE_TOLERANCE, Solved, System, solve};
 use search::{Search, Step, search};
 
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
@@ -36,9 +36,10 @@ const DIVERGED: f64 = 1e8;
 /// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude), the magnitude being that of the initial guess.
 /// 2. K = linearize(x), of which the preconditioner is told.
 /// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`](super::Forcing), at least 1e-5 in single precision. A
-///    solve that ends early is still used if it is below 0.9.
+///    solve that ends early is still used if it is below 0.9, and one that negative curvature ends where there is a potential, which falls
+///    along what it has found (line-search Newton-CG: Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, alg. 7.1).
 /// 4. s = 1.
-/// 5. Accept x + s d if ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
+/// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
 /// 6. Otherwise, or where x + s d is inadmissible or R not finite, halve s and go to 5.
 /// 7. If no step is found or accepted, or none of the last 8 reduced ‖R‖ by a percent: converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, now
@@ -94,6 +95,7 @@ fn iterate<E: std::error::Error + 'static>(
     let mut progress = None;
     let mut stalled = 0;
     let mut single = settings.precision == Precision::Mixed;
+    let method = settings.krylov.chosen(problem.is_symmetric());
     loop {
         if residual <= target {
             return Ok(Convergence::Tolerance);
@@ -106,13 +108,15 @@ fn iterate<E: std::error::Error + 'static>(
         let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
         let tangent = if single { problem.linearize_single(x).map_err(inadmissible)? } else { None };
         single = tangent.is_some();
+        let has_potential = &|| problem.potential(x).is_some();
         let mut solved = None;
         if let Some(tangent) = tangent {
             history.counts.linearizations += 1;
             preconditioner.prepare(&*tangent);
             let reachable = forcing.max(SINGLE_TOLERANCE);
+            let system = System { r: &r, method, relative_tolerance: reachable, has_potential };
             // What single precision cannot solve, double precision may.
-            solved = solve::<f32>(&*tangent, preconditioner, &r, reachable, settings, &mut history.counts).ok();
+            solved = solve::<f32>(&*tangent, preconditioner, &system, settings, &mut history.counts).ok();
             forcing = if solved.is_some() { reachable } else { forcing };
         }
         let Solved { step, krylov, negative_curvature } = match solved {
@@ -121,7 +125,8 @@ fn iterate<E: std::error::Error + 'static>(
                 history.counts.linearizations += 1;
                 let tangent = problem.linearize(x).map_err(inadmissible)?;
                 preconditioner.prepare(&*tangent);
-                match solve::<f64>(&*tangent, preconditioner, &r, forcing, settings, &mut history.counts) {
+                let system = System { r: &r, method, relative_tolerance: forcing, has_potential };
+                match solve::<f64>(&*tangent, preconditioner, &system, settings, &mut history.counts) {
                     Ok(solved) => solved,
                     Err(source) => {
                         // What is left of R may be nothing that K could have made.

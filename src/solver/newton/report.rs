@@ -24,7 +24,7 @@ pub struct NewtonIteration {
     pub merit: Merit,
     /// The wanted relative residual of the linear system.
     pub forcing: f64,
-    /// The linear solve that gave the step.
+    /// The linear solve that gave the step; negative curvature where the step is what conjugate gradients had until then.
     pub krylov: LinearReport,
     /// The conjugate gradients given up before it because of negative curvature, if any.
     pub negative_curvature: Option<LinearReport>,
@@ -47,6 +47,10 @@ pub struct NewtonCounts {
     pub tangent_products: usize,
     /// Krylov iterations.
     pub krylov_iterations: usize,
+    /// Linear systems left unsolved at the limit on Krylov iterations.
+    pub krylov_limited: usize,
+    /// Linear systems left unsolved because their residual no longer fell.
+    pub krylov_stagnated: usize,
 }
 
 /// The course of the iteration, complete or not.

@@ -85,7 +85,8 @@ pub(super) fn search<E: std::error::Error + 'static>(
                 let residual = norm(r_trial);
                 if !residual.is_finite() {
                     failed.not_finite += 1;
-                } else if residual <= (1.0 - SUFFICIENT * length * (1.0 - at.linear)) * at.residual
+                } else if at.linear < 1.0
+                    && residual <= (1.0 - SUFFICIENT * length * (1.0 - at.linear)) * at.residual
                     && residual < at.residual
                 {
                     return Search::Accepted(Accepted { length, residual, merit: Merit::Residual });

@@ -3,15 +3,19 @@
 use crate::solver::{Forcing, InvalidSetting};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
 
-/// Restart of the GMRES that takes over from conjugate gradients.
-pub(super) const FALLBACK_RESTART: u32 = 30;
+/// Restart of the GMRES that is not asked for.
+pub(super) const DEFAULT_RESTART: u32 = 30;
 
 /// The Krylov method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(rename = "Method")]
 pub enum Krylov {
+    /// Conjugate gradients where the tangent is symmetric, GMRES(30) where it is not: with pressures, or laws that have no symmetric one.
+    #[default]
+    Automatic,
     /// Restarted GMRES, for any tangent.
     Gmres {
         /// Basis vectors kept before a restart, 1 to 1000. Default 30.
@@ -19,20 +23,42 @@ pub enum Krylov {
         #[schemars(range(min = 1, max = 1000))]
         restart: u32,
     },
-    /// Conjugate gradients, for symmetric tangents: not with pressures. Where one turns out not to be positive definite, GMRES(30)
-    /// solves that system instead.
+    /// Conjugate gradients, for symmetric tangents: not with pressures. Where one turns out not to be positive definite, the step found
+    /// until then is taken if there is a potential that it lowers; without a potential GMRES(30) solves that system instead.
     ConjugateGradient,
 }
 
 impl Krylov {
     fn default_restart() -> u32 {
-        FALLBACK_RESTART
+        DEFAULT_RESTART
+    }
+
+    /// What is used for tangents that are `symmetric`, or are not.
+    ///
+    /// ```
+    /// use bfree::solver::Krylov;
+    ///
+    /// let chosen = [true, false].map(|symmetric| Krylov::Automatic.chosen(symmetric).to_string());
+    /// assert_eq!(chosen, ["conjugate gradients", "GMRES(30)"]);
+    /// // What is asked for is used.
+    /// assert_eq!(Krylov::Gmres { restart: 50 }.chosen(true), Krylov::Gmres { restart: 50 });
+    /// ```
+    pub fn chosen(self, symmetric: bool) -> Self {
+        match self {
+            Self::Automatic if symmetric => Self::ConjugateGradient,
+            Self::Automatic => Self::Gmres { restart: DEFAULT_RESTART },
+            asked => asked,
+        }
     }
 }
 
-impl Default for Krylov {
-    fn default() -> Self {
-        Self::Gmres { restart: FALLBACK_RESTART }
+impl Display for Krylov {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Automatic => f.write_str("automatic"),
+            Self::Gmres { restart } => write!(f, "GMRES({restart})"),
+            Self::ConjugateGradient => f.write_str("conjugate gradients"),
+        }
     }
 }
 

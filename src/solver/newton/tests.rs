@@ -247,6 +247,64 @@ fn negative_curvature_falls_back_to_gmres_and_says_so() {
     assert!(report.history.iterations.iter().all(|i| i.negative_curvature.is_none()));
 }
 
+/// Π = Σ ¼ x⁴ − ½ x² + ½ i y²: hills between two valleys each, and directions that only rise.
+fn hills(n: usize, with_potential: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
+    Problem {
+        residual: move |x: &[f64]| {
+            Ok((0..n).map(|i| if i.is_multiple_of(2) { x[i].powi(3) - x[i] } else { i as f64 * x[i] }).collect())
+        },
+        magnitude: |_: &[f64]| 1.0,
+        potential: move |x: &[f64]| {
+            let of = |i: usize| {
+                if i.is_multiple_of(2) { 0.25 * x[i].powi(4) - 0.5 * x[i] * x[i] } else { 0.5 * i as f64 * x[i] * x[i] }
+            };
+            with_potential.then(|| ((0..n).map(of).sum(), (0..n).map(|i| of(i).abs()).sum()))
+        },
+        tangent: move |x: &[f64]| {
+            let of = |i: usize| if i.is_multiple_of(2) { 3.0 * x[i] * x[i] - 1.0 } else { i as f64 };
+            Dense::from_fn(n, |i, j| if i == j { of(i) } else { 0.0 })
+        },
+    }
+}
+
+#[test]
+fn negative_curvature_leads_downhill_where_there_is_a_potential() {
+    let n = 6;
+    let solve = |problem: &dyn NonlinearProblem<Inadmissible = Outside>, krylov| {
+        // Close to the tops, where Newton's own step leads back to them.
+        let mut x: Vec<f64> = (0..n).map(|i| 0.1 + 0.02 * i as f64).collect();
+        let settings = NewtonSettings { krylov, ..NewtonSettings::default() };
+        let preconditioner = &mut crate::solver::Identity;
+        let history = super::newton(problem, preconditioner, &mut x, &settings, &Pool::default()).unwrap().history;
+        (x, history)
+    };
+    let (x, history) = solve(&hills(n, true), Krylov::ConjugateGradient);
+    assert!(x.iter().step_by(2).all(|x| (x - 1.0).abs() < 1e-6), "a valley of each: {x:?}");
+    let truncated = |i: &&NewtonIteration| i.krylov.outcome == LinearOutcome::NegativeCurvature;
+    assert!(history.iterations.iter().filter(truncated).all(|i| i.negative_curvature.is_none()));
+    assert!(history.iterations.iter().filter(truncated).count() > 0);
+    // Without one, and by GMRES, R = 0 is found where it is near: on the top.
+    for (problem, krylov) in
+        [(hills(n, false), Krylov::ConjugateGradient), (hills(n, true), Krylov::Gmres { restart: 10 })]
+    {
+        let (x, _) = solve(&problem, krylov);
+        assert!(x.iter().all(|x| x.abs() < 1e-6), "{x:?}");
+    }
+}
+
+#[test]
+fn systems_left_unsolved_are_counted() {
+    // Three iterations for twelve springs in a row are too few.
+    let settings =
+        NewtonSettings { krylov: Krylov::ConjugateGradient, max_krylov_iterations: 3, ..NewtonSettings::default() };
+    let counts = failure(&springs(3.0, 1.0, 1.2, 12), &mut [0.0; 12], &settings).history.counts;
+    assert!(counts.krylov_limited > 0 && counts.krylov_stagnated == 0, "{counts:?}");
+    // A tangent without anything in it.
+    let counts = failure(&scalar(|x| Ok(x - 1.0), |_| 0.0), &mut [0.0], &settings).history.counts;
+    assert_eq!((counts.krylov_limited, counts.krylov_stagnated), (0, 1));
+    assert_eq!(solved(&springs(3.0, 1.0, 1.2, 12), &mut [0.0; 12]).history.counts.krylov_limited, 0);
+}
+
 #[test]
 fn potential_accepts_what_the_residual_norm_refuses() {
     // Along Rosenbrock's curved valley every useful step raises the residual, while Π falls.

@@ -134,7 +134,7 @@ pub(super) const KNOBS: &[Knob] = &[
     },
     Knob {
         key: "solver.krylov.method",
-        values: &[r#""conjugate_gradient""#, r#"{"gmres":{"restart":30}}"#],
+        values: &[r#"{"gmres":{"restart":30}}"#],
         short: 1,
         dimensions: 1..=3,
     },
