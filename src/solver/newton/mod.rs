@@ -109,10 +109,10 @@ fn iterate<E: std::error::Error + 'static>(
         let mut solved = None;
         if let Some(tangent) = tangent {
             history.counts.linearizations += 1;
-            preconditioner.prepare(&*tangent);
+            let inverse = preconditioner.prepare_single(&*tangent);
             let reachable = forcing.max(SINGLE_TOLERANCE);
             // What single precision cannot solve, double precision may.
-            solved = solve::<f32>(&*tangent, preconditioner, &r, reachable, settings, &mut history.counts).ok();
+            solved = solve::<f32>(&*tangent, &*inverse, &r, reachable, settings, &mut history.counts).ok();
             forcing = if solved.is_some() { reachable } else { forcing };
         }
         let Solved { step, krylov, negative_curvature } = match solved {
@@ -120,8 +120,8 @@ fn iterate<E: std::error::Error + 'static>(
             None => {
                 history.counts.linearizations += 1;
                 let tangent = problem.linearize(x).map_err(inadmissible)?;
-                preconditioner.prepare(&*tangent);
-                match solve::<f64>(&*tangent, preconditioner, &r, forcing, settings, &mut history.counts) {
+                let inverse = preconditioner.prepare(&*tangent);
+                match solve::<f64>(&*tangent, &*inverse, &r, forcing, settings, &mut history.counts) {
                     Ok(solved) => solved,
                     Err(source) => {
                         // What is left of R may be nothing that K could have made.

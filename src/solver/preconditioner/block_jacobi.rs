@@ -2,7 +2,7 @@
 
 use super::{DiagonalBlocks, Preconditioner};
 use crate::pooled::Pooled;
-use crate::solver::LinearOperator;
+use crate::solver::{LinearOperator, Linearization};
 use crate::solver::vector::Entry;
 use crate::tensor::{Tensor, Vector, determinant, inverse};
 
@@ -16,8 +16,14 @@ pub struct BlockJacobi<const D: usize> {
     inverse: Pooled<f64>,
 }
 
-impl<const D: usize> Preconditioner for BlockJacobi<D> {
-    fn prepare(&mut self, tangent: &dyn DiagonalBlocks) {
+impl<const D: usize> BlockJacobi<D> {
+    /// Unknowns.
+    pub(super) fn len(&self) -> usize {
+        self.inverse.len() / D
+    }
+
+    /// Takes the blocks of the first tangent it is shown.
+    pub(super) fn take(&mut self, tangent: &dyn DiagonalBlocks) {
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
             let blocks: &mut [Tensor<f64, D>] = bytemuck::cast_slice_mut(&mut self.inverse);
@@ -26,8 +32,20 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
     }
 }
 
+impl<const D: usize> Preconditioner for BlockJacobi<D> {
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
+        self.take(tangent);
+        Box::new(&*self)
+    }
+
+    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
+        self.take(tangent);
+        Box::new(&*self)
+    }
+}
+
 /// In double precision; single precision is rounded to at the end.
-impl<S: Entry, const D: usize> LinearOperator<S> for BlockJacobi<D> {
+impl<S: Entry, const D: usize> LinearOperator<S> for &BlockJacobi<D> {
     fn apply(&self, r: &[S], z: &mut [S]) {
         z.copy_from_slice(r);
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&self.inverse);
