@@ -10,6 +10,7 @@ use crate::pooled::Pooled;
 use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, LocalForm, NonlinearProblem, Precision};
 use crate::tensor::{Tensor, Vector, determinant, identity};
 use num_dual::Dual64;
+use std::collections::HashMap;
 
 /// K(Δφ), frozen: an operator in double or, divided by a power of two, in single precision.
 ///
@@ -247,7 +248,7 @@ impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
     /// What the particles of a cell make of ∇u, summed; and what nodes make of motions that are the same everywhere.
     fn local_form(&self) -> Option<LocalForm> {
         let (grid, active) = (self.supports.grid(), self.supports.active());
-        let (tiles, volume) = (D * D * D * D, grid.spacing.powi(D as i32));
+        let (tiles, volume) = (D.pow(4), grid.spacing.powi(D as i32));
         let mut form = LocalForm {
             grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
             nodes: active.ids().iter().map(|&id| padded(grid.index(id))).collect(),
@@ -258,18 +259,14 @@ impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
         let terms: Vec<_> = self.terms.iter().filter_map(|term| term.product_at_points()).map(|(_, add)| add).collect();
         // Gradients are counted in units of 1/h.
         let factor = (self.unit.length / grid.spacing).powi(2);
-        let mut places = std::collections::HashMap::new();
+        let mut places = HashMap::new();
         self.supports.each_group(|group| {
             let mut cells = [0; LANES];
             for (cell, &p) in cells.iter_mut().zip(group.particles) {
                 let x = &self.particles.position[p as usize];
                 let at = grid.cell(x).unwrap_or([0; D]);
                 *cell = *places.entry(at).or_insert_with(|| {
-                    form.cells.push(padded(at));
-                    form.tangents.extend(std::iter::repeat_n(0.0, tiles));
-                    form.masses.push(0.0);
-                    form.filled.push(0.0);
-                    form.centres.push([0.0; 3]);
+                    form.push_cell(padded(at), tiles);
                     form.cells.len() - 1
                 });
                 let h = self.particles.displacement_gradient[p as usize];
@@ -297,14 +294,13 @@ impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
                 let sums = probe(&at);
                 for (lane, &cell) in cells.iter().enumerate().take(group.particles.len()) {
                     for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
-                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] += factor * sums.gradient[i][k][lane].value();
+                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
+                            factor * sums.gradient[i][k][lane].value();
                     }
                 }
             }
         });
-        for (centre, &filled) in form.centres.iter_mut().zip(&form.filled) {
-            centre.iter_mut().for_each(|x| *x /= filled);
-        }
+        form.finish_centres();
         let mut blocks = vec![Tensor::<f64, D>::zeros(); active.len()];
         for k in 0..D {
             let uniform = vec![Vector::<X, D>::from_fn(|i, _| if i == k { X::one() } else { X::zero() }); active.len()];

@@ -2,8 +2,8 @@
 
 use super::{DiagonalBlocks, Preconditioner};
 use crate::pooled::Pooled;
-use crate::solver::{LinearOperator, Linearization};
 use crate::solver::vector::Entry;
+use crate::solver::{LinearOperator, Linearization};
 use crate::tensor::{Tensor, Vector, determinant, inverse};
 
 /// The inverse D×D diagonal blocks of the first tangent it is prepared with, one block for each node: making them costs as much as a
@@ -23,7 +23,7 @@ impl<const D: usize> BlockJacobi<D> {
     }
 
     /// Takes the blocks of the first tangent it is shown.
-    pub(super) fn take(&mut self, tangent: &dyn DiagonalBlocks) {
+    pub fn take(&mut self, tangent: &dyn DiagonalBlocks) {
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
             let blocks: &mut [Tensor<f64, D>] = bytemuck::cast_slice_mut(&mut self.inverse);
@@ -45,7 +45,7 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
 }
 
 /// In double precision; single precision is rounded to at the end.
-impl<S: Entry, const D: usize> LinearOperator<S> for &BlockJacobi<D> {
+impl<S: Entry, const D: usize> LinearOperator<S> for BlockJacobi<D> {
     fn apply(&self, r: &[S], z: &mut [S]) {
         z.copy_from_slice(r);
         let blocks: &[Tensor<f64, D>] = bytemuck::cast_slice(&self.inverse);
@@ -121,8 +121,8 @@ mod tests {
             z
         };
         assert_eq!(applied(&jacobi, &a, &b), [1.0, 2.0, -3.0, 0.5]);
-        jacobi.prepare(&Given(vec![first, second]));
-        jacobi.prepare(&Given(vec![second, first]));
+        jacobi.take(&Given(vec![first, second]));
+        jacobi.take(&Given(vec![second, first]));
         let z = applied(&jacobi, &(first * a), &(second * b));
         assert!(z.iter().zip([1.0, 2.0, -3.0, 0.5]).all(|(z, exact)| (z - exact).abs() < 1e-14), "{z:?}");
     }

@@ -13,17 +13,23 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use std::collections::HashMap;
 
 /// Degree of the smoothing polynomials, and the part of the spectrum they see: [λ/PART, λ].
-fn env(name: &str, default: f64) -> f64 { std::env::var(name).ok().and_then(|x| x.parse().ok()).unwrap_or(default) }
+const DEGREE: usize = 3;
+const PART: f64 = 12.0;
 
-/// Products that estimate the largest eigenvalue, and what is added to it.
+/// Products that estimate the largest eigenvalue λ of D⁻¹K, and what is added to the estimate, which is from below.
 const ESTIMATE: usize = 10;
 const MARGIN: f64 = 1.15;
 
-/// Unknowns that are solved for directly.
+/// Unknowns that are solved for directly, and the most that ever are.
 const BOTTOM: usize = 400;
+const MOST: usize = 2000;
 
-/// The least share of a coarse cell that is counted as filled: a body that has less of it holds its nodes as if it had that.
+/// The least share of a coarse cell that counts as filled: less of a body holds its nodes as if it were that much.
 const LEAST: f64 = 0.25;
+
+/// The middle of a stencil, and a neighbour that is not there.
+const MIDDLE: usize = 13;
+const NONE: u32 = u32::MAX;
 
 /// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, and Σ_nodes w·B u. Lengths are in cells.
 #[derive(Clone, Debug, Default)]
@@ -72,8 +78,6 @@ struct Level<const D: usize> {
     largest: f64,
 }
 
-const NONE: u32 = u32::MAX;
-
 impl<const D: usize> LinearOperator for Level<D> {
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         for ((entries, neighbours), y) in self.entries.iter().zip(&self.neighbours).zip(y.chunks_exact_mut(D)) {
@@ -89,11 +93,67 @@ impl<const D: usize> LinearOperator for Level<D> {
     }
 }
 
-/// Where an index lies on the grid of twice the spacing, along one axis.
-fn coarse_axis(index: u32) -> impl Iterator<Item = (u32, f64)> {
-    let half = index / 2;
-    let odd = index % 2 == 1;
-    [(half, if odd { 0.5 } else { 1.0 }), (half + 1, if odd { 0.5 } else { 0.0 })].into_iter().filter(|(_, weight)| *weight > 0.0)
+impl LocalForm {
+    /// Room for one more cell.
+    pub(crate) fn push_cell(&mut self, index: [u32; 3], tiles: usize) {
+        self.cells.push(index);
+        self.centres.push([0.0; 3]);
+        self.filled.push(0.0);
+        self.masses.push(0.0);
+        self.tangents.extend(std::iter::repeat_n(0.0, tiles));
+    }
+
+    /// Divides the sums of places by what they were weighted with.
+    pub(crate) fn finish_centres(&mut self) {
+        for (centre, &filled) in self.centres.iter_mut().zip(&self.filled) {
+            centre.iter_mut().for_each(|x| *x /= filled);
+        }
+    }
+
+    /// The cells of the next grid; of each of these, which it lies in.
+    fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<usize> {
+        let (tiles, mut places) = (D.pow(4), HashMap::new());
+        let mut of_coarse = Vec::with_capacity(self.cells.len());
+        for (cell, index) in self.cells.iter().enumerate() {
+            let coarse = index.map(|i| i / 2);
+            let at = *places.entry(coarse).or_insert_with(|| {
+                next.push_cell(coarse, tiles);
+                next.cells.len() - 1
+            });
+            of_coarse.push(at);
+            // Lengths are in cells: volumes are smaller numbers by 2^D, gradients larger ones by 2.
+            let share = self.filled[cell] / f64::from(1 << D);
+            next.filled[at] += share;
+            next.masses[at] += self.masses[cell];
+            (0..D).for_each(|k| next.centres[at][k] += share * 0.5 * self.centres[cell][k]);
+            (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
+        }
+        next.finish_centres();
+        of_coarse
+    }
+}
+
+/// The nodes of the grid of twice the spacing between which an index lies, with weights.
+fn between<const D: usize>(index: [u32; 3]) -> Vec<([u32; 3], f64)> {
+    let mut all = vec![([0; 3], 1.0)];
+    for k in 0..D {
+        let (half, odd) = (index[k] / 2, index[k] % 2 == 1);
+        let upper = all.clone().into_iter().filter(|_| odd).map(|(mut node, weight)| {
+            node[k] = half + 1;
+            (node, 0.5 * weight)
+        });
+        let upper: Vec<_> = upper.collect();
+        all.iter_mut()
+            .for_each(|(node, weight)| (node[k], *weight) = (half, if odd { 0.5 * *weight } else { *weight }));
+        all.extend(upper);
+    }
+    all
+}
+
+/// Where in the stencil of a node another one is.
+fn place(from: [u32; 3], to: [u32; 3]) -> usize {
+    let [x, y, z] = [0, 1, 2].map(|k| (to[k] + 1 - from[k]) as usize);
+    x + 3 * y + 9 * z
 }
 
 impl<const D: usize> Level<D> {
@@ -101,32 +161,44 @@ impl<const D: usize> Level<D> {
     fn of(form: &LocalForm) -> (Self, LocalForm) {
         let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), ..LocalForm::default() };
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
-        let axis = |k: usize, index: u32| if k < D { coarse_axis(index).collect::<Vec<_>>() } else { vec![(0, 1.0)] };
-        let corners = |index: [u32; 3]| {
-            let [x, y, z] = [0, 1, 2].map(|k| axis(k, index[k]));
-            let mut all = Vec::with_capacity(8);
-            for &(k, c) in &z {
-                for &(j, b) in &y {
-                    for &(i, a) in &x {
-                        all.push(([i, j, k], a * b * c));
-                    }
-                }
-            }
-            all
-        };
         let mut above = Vec::with_capacity(form.nodes.len());
         for &index in &form.nodes {
-            let list = corners(index).into_iter().map(|(coarse, weight)| {
+            let list = between::<D>(index).into_iter().map(|(coarse, weight)| {
                 let number = *numbers.entry(coarse).or_insert_with(|| {
                     next.nodes.push(coarse);
                     next.nodes.len() as u32 - 1
                 });
                 (number, weight)
             });
-            above.push(list.collect::<Vec<_>>());
+            above.push(list.collect());
         }
-        let count = next.nodes.len();
-        // Held is what is held where both grids have a node; elsewhere, what any neighbour is.
+        let neighbour = |index: [u32; 3], place: usize| {
+            let steps = [place % 3, place / 3 % 3, place / 9];
+            let to = [0, 1, 2].map(|k| (index[k] + steps[k] as u32).checked_sub(1).unwrap_or(NONE));
+            numbers.get(&to).copied().unwrap_or(NONE)
+        };
+        let neighbours = next.nodes.iter().map(|&index| std::array::from_fn(|place| neighbour(index, place)));
+        let mut level = Self {
+            held: Self::held(form, &above, next.nodes.len()),
+            neighbours: neighbours.collect(),
+            entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
+            held_above: form.prescribed.clone(),
+            above,
+            ..Self::default()
+        };
+        level.add_nodes(form, &mut next);
+        let of_coarse = form.add_cells_to::<D>(&mut next);
+        for (cell, &at) in of_coarse.iter().enumerate() {
+            level.add_cell(form, cell, &next, at, &numbers);
+        }
+        level.hold();
+        next.prescribed.clone_from(&level.held);
+        level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
+        (level, next)
+    }
+
+    /// What is held where both grids have a node; elsewhere, what any node is that lies between.
+    fn held(form: &LocalForm, above: &[Vec<(u32, f64)>], count: usize) -> Vec<bool> {
         let (mut held, mut same) = (vec![false; D * count], vec![false; count]);
         for (fine, list) in above.iter().enumerate() {
             if let [(coarse, _)] = list[..] {
@@ -139,131 +211,96 @@ impl<const D: usize> Level<D> {
                 (0..D).for_each(|i| held[coarse as usize * D + i] |= form.prescribed[fine * D + i]);
             }
         }
-        // Neighbours
-        let offset = |from: [u32; 3], to: [u32; 3]| {
-            let [x, y, z] = [0, 1, 2].map(|k| (i64::from(to[k]) - i64::from(from[k]) + 1) as usize);
-            x + 3 * y + 9 * z
-        };
-        let neighbours: Vec<[u32; 27]> = next.nodes.iter().map(|&index| {
-            std::array::from_fn(|place| {
-                let [dx, dy, dz] = [place % 3, place / 3 % 3, place / 9].map(|d| d as i64 - 1);
-                let to = [dx, dy, dz].into_iter().zip(index).map(|(d, i)| u32::try_from(i64::from(i) + d).unwrap_or(NONE));
-                let to: Vec<u32> = to.collect();
-                numbers.get(&[to[0], to[1], to[2]]).copied().unwrap_or(NONE)
-            })
-        }).collect();
-        let mut entries = vec![[Tensor::<f64, D>::zeros(); 27]; count];
-        // What nodes have.
-        let block = |n: usize| Tensor::<f64, D>::from_column_slice(&form.blocks[n * D * D..(n + 1) * D * D]);
-        let mut lumped = vec![Tensor::<f64, D>::zeros(); count];
-        for (fine, list) in above.iter().enumerate() {
-            let own = block(fine);
-            for &(a, wa) in list {
-                lumped[a as usize] += own * wa;
-                for &(b, wb) in list {
-                    entries[a as usize][offset(next.nodes[a as usize], next.nodes[b as usize])] += own * (wa * wb);
+        held
+    }
+
+    /// Adds what nodes have: Pᵀ B P, and for the next level its row sums.
+    fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
+        let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
+        for (fine, list) in self.above.iter().enumerate() {
+            let own = Tensor::<f64, D>::from_column_slice(&form.blocks[fine * D * D..(fine + 1) * D * D]);
+            for &(a, of_a) in list {
+                lumped[a as usize] += own * of_a;
+                for &(b, of_b) in list {
+                    let at = place(next.nodes[a as usize], next.nodes[b as usize]);
+                    self.entries[a as usize][at] += own * (of_a * of_b);
                 }
             }
         }
         next.blocks = lumped.iter().flat_map(|block| block.iter().copied()).collect();
-        // What cells have.
-        let tiles = D * D * D * D;
-        let mut places: HashMap<[u32; 3], usize> = HashMap::new();
-        let mut of_coarse: Vec<usize> = Vec::with_capacity(form.cells.len());
-        for (cell, &index) in form.cells.iter().enumerate() {
-            let coarse = index.map(|i| i / 2);
-            let at = *places.entry(coarse).or_insert_with(|| {
-                next.cells.push(coarse);
-                next.centres.push([0.0; 3]);
-                next.filled.push(0.0);
-                next.masses.push(0.0);
-                next.tangents.extend(std::iter::repeat_n(0.0, tiles));
-                next.cells.len() - 1
-            });
-            of_coarse.push(at);
-            // ∇ in coarse cells is twice as large a number; volumes are shares of a coarse cell.
-            let share = form.filled[cell] / f64::from(1 << D);
-            next.filled[at] += share;
-            next.masses[at] += form.masses[cell];
-            (0..D).for_each(|k| next.centres[at][k] += share * 0.5 * form.centres[cell][k]);
-            for t in 0..tiles {
-                next.tangents[at * tiles + t] += 0.25 * form.tangents[cell * tiles + t];
-            }
-        }
-        for (centre, &filled) in next.centres.iter_mut().zip(&next.filled) {
-            centre.iter_mut().for_each(|x| *x /= filled);
-        }
-        for (cell, &at) in of_coarse.iter().enumerate() {
-            let index = next.cells[at];
-            let local: [f64; 3] = std::array::from_fn(|k| (0.5 * form.centres[cell][k] - f64::from(index[k])).clamp(0.0, 1.0));
-            let held_up = (env("LEAST", 0.25) / next.filled[at]).max(1.0);
-            let mut list: Vec<(u32, f64, [f64; D])> = Vec::with_capacity(8);
-            for corner in 0..1_usize << D {
-                let side = |k: usize| corner >> k & 1 == 1;
-                let to: [u32; 3] = std::array::from_fn(|k| index[k] + u32::from(k < D && side(k)));
-                let Some(&node) = numbers.get(&to) else { continue };
-                let hat = |k: usize| if side(k) { local[k] } else { 1.0 - local[k] };
-                let n: f64 = (0..D).map(hat).product();
-                let grad = std::array::from_fn(|k| {
-                    let others: f64 = (0..D).filter(|&l| l != k).map(hat).product();
-                    if side(k) { others } else { -others }
-                });
-                list.push((node, n, grad));
-            }
-            let tangent = &form.tangents[cell * tiles..(cell + 1) * tiles];
-            for &(b, nb, gb) in &list {
-                // A ∇N_b: three indices left.
-                let mut with = [[[0.0; D]; D]; D];
-                for i in 0..D {
-                    for k in 0..D {
-                        for j in 0..D {
-                            let row = ((i * D + k) * D + j) * D;
-                            with[i][k][j] = (0..D).map(|l| tangent[row + l] * gb[l]).sum::<f64>() * 0.25 * held_up;
-                        }
+    }
+
+    /// Adds a cell of the finer grid, one point in the coarse cell `at`.
+    fn add_cell(
+        &mut self,
+        form: &LocalForm,
+        cell: usize,
+        next: &LocalForm,
+        at: usize,
+        numbers: &HashMap<[u32; 3], u32>,
+    ) {
+        let (index, tiles) = (next.cells[at], D.pow(4));
+        let held_up = (LEAST / next.filled[at]).max(1.0);
+        let local = |k: usize| (0.5 * form.centres[cell][k] - f64::from(index[k])).clamp(0.0, 1.0);
+        let corner = |corner: usize| {
+            let upper = |k: usize| corner >> k & 1 == 1;
+            let hat = |k: usize| if upper(k) { local(k) } else { 1.0 - local(k) };
+            let slope = |k: usize| {
+                let others: f64 = (0..D).filter(|&other| other != k).map(hat).product();
+                if upper(k) { others } else { -others }
+            };
+            let node = numbers.get(&std::array::from_fn(|k| index[k] + u32::from(k < D && upper(k))))?;
+            Some((*node as usize, (0..D).map(hat).product::<f64>(), std::array::from_fn::<f64, D, _>(slope)))
+        };
+        let corners: Vec<_> = (0..1_usize << D).filter_map(corner).collect();
+        let tangent = &form.tangents[cell * tiles..(cell + 1) * tiles];
+        for &(b, n_b, slope_b) in &corners {
+            for &(a, n_a, slope_a) in &corners {
+                let entry = &mut self.entries[a][place(next.nodes[a], next.nodes[b])];
+                for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                    for (k, l) in (0..D).flat_map(|k| (0..D).map(move |l| (k, l))) {
+                        let a_ikjl = tangent[((i * D + k) * D + j) * D + l];
+                        entry[(i, j)] += 0.25 * held_up * slope_a[k] * a_ikjl * slope_b[l];
                     }
                 }
-                let mass = form.masses[cell] * nb * held_up;
-                for &(a, na, ga) in &list {
-                    let entry = &mut entries[a as usize][offset(next.nodes[a as usize], next.nodes[b as usize])];
-                    for i in 0..D {
-                        for j in 0..D {
-                            entry[(i, j)] += (0..D).map(|k| ga[k] * with[i][k][j]).sum::<f64>();
-                        }
-                        entry[(i, i)] += mass * na;
+                (0..D).for_each(|i| entry[(i, i)] += held_up * form.masses[cell] * n_a * n_b);
+            }
+        }
+    }
+
+    /// The identity's row and column where nothing moves, or nothing is; inverts the blocks.
+    fn hold(&mut self) {
+        let Self { entries, neighbours, held, inverse: inverses, .. } = self;
+        for (held, row) in held.chunks_exact_mut(D).zip(entries.iter()) {
+            held.iter_mut().enumerate().for_each(|(i, held)| *held |= row[MIDDLE][(i, i)] == 0.0);
+        }
+        for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
+            for (entry, &mut other) in row.iter_mut().zip(neighbours) {
+                for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
+                    if held[node * D + i] || (other != NONE && held[other as usize * D + j]) {
+                        entry[(i, j)] = f64::from(other as usize == node && i == j);
                     }
                 }
             }
+            let inverse = inverse(&row[MIDDLE]);
+            let usable = inverse.iter().all(|x| x.is_finite());
+            inverses.push(if usable { inverse } else { Tensor::identity() });
         }
-        // Held unknowns.
-        for (node, row) in entries.iter_mut().enumerate() {
-            for (entry, &other) in row.iter_mut().zip(&neighbours[node]) {
-                for i in 0..D {
-                    for j in 0..D {
-                        if held[node * D + i] || (other != NONE && held[other as usize * D + j]) {
-                            entry[(i, j)] = if other as usize == node && i == j { 1.0 } else { 0.0 };
-                        }
-                    }
-                }
+    }
+
+    /// The whole matrix.
+    fn assembled(&self) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(D * self.entries.len(), D * self.entries.len());
+        for (node, (row, neighbours)) in self.entries.iter().zip(&self.neighbours).enumerate() {
+            for (entry, &other) in row.iter().zip(neighbours).filter(|(_, other)| **other != NONE) {
+                matrix.view_mut((node * D, other as usize * D), (D, D)).copy_from(entry);
             }
         }
-        for row in &mut entries {
-            for i in 0..D {
-                if row[13][(i, i)] <= 0.0 {
-                    row[13][(i, i)] = 1.0;
-                }
-            }
-        }
-        let identity = Tensor::<f64, D>::identity();
-        let usable = |block: Tensor<f64, D>| if block.iter().all(|x| x.is_finite()) { block } else { identity };
-        let inverses = entries.iter().map(|row| usable(inverse(&row[13]))).collect();
-        next.prescribed = held.clone();
-        let mut level = Self { above, held_above: form.prescribed.clone(), held, neighbours, entries, inverse: inverses, largest: 0.0 };
-        level.largest = largest(&level, &|r, z| level.smooth_once(r, z), D * count);
-        (level, next)
+        matrix
     }
 
     /// z = D⁻¹ r
-    fn smooth_once(&self, r: &[f64], z: &mut [f64]) {
+    fn precondition(&self, r: &[f64], z: &mut [f64]) {
         for ((inverse, r), z) in self.inverse.iter().zip(r.chunks_exact(D)).zip(z.chunks_exact_mut(D)) {
             let product = inverse * Vector::<f64, D>::from_column_slice(r);
             z.copy_from_slice(product.as_slice());
@@ -309,7 +346,7 @@ fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n
     jacobi(&r, &mut z);
     let mut beta = dot(&r, &z).max(0.0).sqrt();
     for step in 0..ESTIMATE {
-        if !(beta > 0.0) {
+        if beta.is_nan() || beta <= 0.0 {
             break;
         }
         // r = D v, z = v
@@ -328,14 +365,20 @@ fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n
             (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta, beta);
         }
     }
-    if std::env::var("SHOW").is_ok() { eprintln!("lambda {:?} n {n}", matrix.symmetric_eigenvalues().max()); }
     MARGIN * matrix.symmetric_eigenvalues().max()
 }
 
 /// x ← x + p(D⁻¹K) D⁻¹ (b − K x), p a Chebyshev polynomial; from x = 0 if `zero`.
-fn chebyshev(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), largest: f64, b: &[f64], x: &mut [f64], zero: bool) {
+fn chebyshev(
+    operator: &dyn LinearOperator,
+    jacobi: &dyn Fn(&[f64], &mut [f64]),
+    largest: f64,
+    b: &[f64],
+    x: &mut [f64],
+    zero: bool,
+) {
     let n = b.len();
-    let (upper, lower) = (largest, largest / env("PART", 12.0));
+    let (upper, lower) = (largest, largest / PART);
     let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
     let sigma = theta / delta;
     let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
@@ -346,10 +389,9 @@ fn chebyshev(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]),
     jacobi(&r, &mut z);
     p.iter_mut().zip(&z).for_each(|(p, z)| *p = z / theta);
     let mut rho = 1.0 / sigma;
-    let degree = env("DEG", 3.0) as usize;
-    for step in 0..degree {
+    for step in 0..DEGREE {
         x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
-        if step + 1 == degree {
+        if step + 1 == DEGREE {
             break;
         }
         operator.apply(&p, &mut z);
@@ -362,27 +404,16 @@ fn chebyshev(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]),
 }
 
 impl<const D: usize> Multigrid<D> {
-    /// Levels, from the first tangent.
-    fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator, n: usize) {
-        let blocks = &self.blocks;
-        self.largest = largest(fine, &|r, z| blocks.apply(r, z), n);
+    /// The levels of a tangent.
+    fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
+        self.largest = largest(fine, &|r, z| self.blocks.apply(r, z), self.blocks.len());
         let Some(mut form) = form else { return };
         loop {
             let (level, next) = Level::<D>::of(&form);
             let size = D * next.nodes.len();
             let last = size <= BOTTOM || next.grid.iter().all(|&cells| cells <= 1);
-            if last && size <= 4 * BOTTOM {
-                let mut matrix = DMatrix::<f64>::zeros(size, size);
-                for (node, row) in level.entries.iter().enumerate() {
-                    for (entry, &other) in row.iter().zip(&level.neighbours[node]).filter(|(_, other)| **other != NONE) {
-                        for i in 0..D {
-                            for j in 0..D {
-                                matrix[(node * D + i, other as usize * D + j)] = entry[(i, j)];
-                            }
-                        }
-                    }
-                }
-                self.bottom = Some(matrix.lu());
+            if last && size <= MOST {
+                self.bottom = Some(level.assembled().lu());
             }
             self.levels.push(level);
             form = next;
@@ -399,11 +430,11 @@ impl<const D: usize> Multigrid<D> {
         if from + 1 == self.levels.len() {
             match self.bottom.as_ref().and_then(|lu| lu.solve(&DVector::from_column_slice(b))) {
                 Some(solved) => x.copy_from_slice(solved.as_slice()),
-                None => level.smooth_once(b, &mut x),
+                None => level.precondition(b, &mut x),
             }
             return x;
         }
-        let jacobi = |r: &[f64], z: &mut [f64]| level.smooth_once(r, z);
+        let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
         chebyshev(level, &jacobi, level.largest, b, &mut x, true);
         self.correct(from + 1, level, b, &mut x);
         chebyshev(level, &jacobi, level.largest, b, &mut x, false);
@@ -442,7 +473,7 @@ impl<S: Entry, const D: usize> LinearOperator<S> for Cycle<'_, D, S> {
         let b: Vec<f64> = r.iter().map(|r| r.value()).collect();
         let mut x = vec![0.0; b.len()];
         let (fine, levels) = (Doubled(self.tangent), self.levels);
-        let jacobi = |r: &[f64], z: &mut [f64]| (&levels.blocks).apply(r, z);
+        let jacobi = |r: &[f64], z: &mut [f64]| levels.blocks.apply(r, z);
         chebyshev(&fine, &jacobi, levels.largest, &b, &mut x, true);
         levels.correct(0, &fine, &b, &mut x);
         chebyshev(&fine, &jacobi, levels.largest, &b, &mut x, false);
@@ -454,8 +485,7 @@ impl<const D: usize> Multigrid<D> {
     fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
         if self.levels.is_empty() {
             self.blocks.take(tangent);
-            let n = self.blocks.len();
-            self.build(tangent.local_form(), &Doubled(tangent), n);
+            self.build(tangent.local_form(), &Doubled(tangent));
         }
         Box::new(Cycle { levels: self, tangent })
     }
