@@ -17,7 +17,9 @@ pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
-pub use preconditioner::{BlockJacobi, DiagonalBlocks, Identity, Preconditioner, Preconditioning};
+pub use preconditioner::{
+    BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning,
+};
 
 use vector::Entry;
 
@@ -48,6 +50,12 @@ use vector::Entry;
 pub trait LinearOperator<S = f64> {
     /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
     fn apply(&self, x: &[S], y: &mut [S]);
+}
+
+impl<S, T: LinearOperator<S> + ?Sized> LinearOperator<S> for &T {
+    fn apply(&self, x: &[S], y: &mut [S]) {
+        (**self).apply(x, y);
+    }
 }
 
 /// The derivative of a residual frozen at one x, over a power of two: its product, and what preconditioners are made from.
@@ -346,7 +354,7 @@ fn true_residual<S: Entry>(operator: &dyn LinearOperator<S>, rhs: &[S], x: &[S],
 mod testing {
     //! Dense matrices for the tests of this folder.
 
-    use super::{BlockJacobi, DiagonalBlocks, LinearOperator, Preconditioner};
+    use super::{BlockJacobi, DiagonalBlocks, LinearOperator};
     use crate::pooled::Pooled;
 
     /// A dense matrix by rows.
@@ -360,7 +368,7 @@ mod testing {
         /// Its diagonal as preconditioner.
         pub fn jacobi(&self) -> BlockJacobi<1> {
             let mut inverse = BlockJacobi::default();
-            inverse.prepare(self);
+            inverse.take(self);
             inverse
         }
 

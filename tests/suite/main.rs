@@ -14,6 +14,7 @@ mod ladder;
 mod laws;
 mod loads;
 mod memory;
+mod multigrid;
 mod output;
 mod points;
 mod program;

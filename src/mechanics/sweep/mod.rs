@@ -436,6 +436,11 @@ impl<const D: usize> Supports<D> {
         matches!(self.way, Way::Tiled(_))
     }
 
+    /// Visits all groups, in the order of their numbers.
+    pub(crate) fn each_group(&self, mut visit: impl FnMut(Group<'_>)) {
+        either!(self, way => way.each_group(&mut visit));
+    }
+
     /// Number of groups.
     pub(crate) fn groups(&self) -> usize {
         either!(self, way => way.groups())

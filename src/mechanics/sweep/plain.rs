@@ -69,6 +69,10 @@ impl<const D: usize> Plain<D> {
         self.particles.len()
     }
 
+    pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
+        (0..self.blocks.len()).for_each(|b| self.groups_of(b).for_each(&mut *visit));
+    }
+
     pub(super) fn groups(&self) -> usize {
         self.particles.len().div_ceil(LANES)
     }

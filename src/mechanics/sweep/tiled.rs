@@ -3,7 +3,7 @@
 //! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
-use super::block::Block;
+use super::block::{Block, Group};
 use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::lanes::LANES;
@@ -98,6 +98,12 @@ impl<const D: usize> Tiled<D> {
     /// As if particles had been put in [`Self::order`], for the next step to start from.
     pub(super) fn rearrange(&mut self) {
         self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
+    }
+
+    pub(super) fn each_group(&self, visit: &mut dyn FnMut(Group<'_>)) {
+        for block in &self.blocks {
+            (0..block.groups.len()).for_each(|group| visit(block.groups.group(group)));
+        }
     }
 
     /// Number of groups.

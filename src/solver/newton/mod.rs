@@ -112,11 +112,11 @@ fn iterate<E: std::error::Error + 'static>(
         let mut solved = None;
         if let Some(tangent) = tangent {
             history.counts.linearizations += 1;
-            preconditioner.prepare(&*tangent);
+            let inverse = preconditioner.prepare_single(&*tangent);
             let reachable = forcing.max(SINGLE_TOLERANCE);
             let system = System { r: &r, method, relative_tolerance: reachable, has_potential };
             // What single precision cannot solve, double precision may.
-            solved = solve::<f32>(&*tangent, preconditioner, &system, settings, &mut history.counts).ok();
+            solved = solve::<f32>(&*tangent, &*inverse, &system, settings, &mut history.counts).ok();
             forcing = if solved.is_some() { reachable } else { forcing };
         }
         let Solved { step, krylov, negative_curvature } = match solved {
@@ -124,9 +124,9 @@ fn iterate<E: std::error::Error + 'static>(
             None => {
                 history.counts.linearizations += 1;
                 let tangent = problem.linearize(x).map_err(inadmissible)?;
-                preconditioner.prepare(&*tangent);
+                let inverse = preconditioner.prepare(&*tangent);
                 let system = System { r: &r, method, relative_tolerance: forcing, has_potential };
-                match solve::<f64>(&*tangent, preconditioner, &system, settings, &mut history.counts) {
+                match solve::<f64>(&*tangent, &*inverse, &system, settings, &mut history.counts) {
                     Ok(solved) => solved,
                     Err(source) => {
                         // What is left of R may be nothing that K could have made.

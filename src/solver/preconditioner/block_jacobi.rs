@@ -2,8 +2,8 @@
 
 use super::{DiagonalBlocks, Preconditioner};
 use crate::pooled::Pooled;
-use crate::solver::LinearOperator;
 use crate::solver::vector::Entry;
+use crate::solver::{LinearOperator, Linearization};
 use crate::tensor::{Tensor, Vector, determinant, inverse};
 
 /// The inverse D×D diagonal blocks of the first tangent it is prepared with, one block for each node: making them costs as much as a
@@ -16,13 +16,31 @@ pub struct BlockJacobi<const D: usize> {
     inverse: Pooled<f64>,
 }
 
-impl<const D: usize> Preconditioner for BlockJacobi<D> {
-    fn prepare(&mut self, tangent: &dyn DiagonalBlocks) {
+impl<const D: usize> BlockJacobi<D> {
+    /// Unknowns.
+    pub(super) fn len(&self) -> usize {
+        self.inverse.len() / D
+    }
+
+    /// Takes the blocks of the first tangent it is shown.
+    pub fn take(&mut self, tangent: &dyn DiagonalBlocks) {
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
             let blocks: &mut [Tensor<f64, D>] = bytemuck::cast_slice_mut(&mut self.inverse);
             blocks.iter_mut().for_each(|block| *block = invert_block(block));
         }
+    }
+}
+
+impl<const D: usize> Preconditioner for BlockJacobi<D> {
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
+        self.take(tangent);
+        Box::new(&*self)
+    }
+
+    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
+        self.take(tangent);
+        Box::new(&*self)
     }
 }
 
@@ -103,8 +121,8 @@ mod tests {
             z
         };
         assert_eq!(applied(&jacobi, &a, &b), [1.0, 2.0, -3.0, 0.5]);
-        jacobi.prepare(&Given(vec![first, second]));
-        jacobi.prepare(&Given(vec![second, first]));
+        jacobi.take(&Given(vec![first, second]));
+        jacobi.take(&Given(vec![second, first]));
         let z = applied(&jacobi, &(first * a), &(second * b));
         assert!(z.iter().zip([1.0, 2.0, -3.0, 0.5]).all(|(z, exact)| (z - exact).abs() < 1e-14), "{z:?}");
     }

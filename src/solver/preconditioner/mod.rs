@@ -1,10 +1,12 @@
 //! Approximate inverses for Krylov methods, one file each.
 
 mod block_jacobi;
+mod multigrid;
 
 pub use block_jacobi::BlockJacobi;
+pub use multigrid::{LocalForm, Multigrid};
 
-use super::LinearOperator;
+use super::{LinearOperator, Linearization};
 use crate::pooled::Pooled;
 
 /// What a tangent tells of its entries, in double precision even where its products are not.
@@ -12,10 +14,14 @@ pub trait DiagonalBlocks {
     /// The square blocks on the diagonal, one after the other, each column by column, with the identity's row and column at prescribed
     /// degrees of freedom. A positive factor that all have in common does not matter.
     fn diagonal_blocks(&self) -> Pooled<f64>;
+
+    /// The operator as a form on the cells of a grid, from which coarser ones are made; `None` if it has no such form.
+    fn local_form(&self) -> Option<LocalForm> {
+        None
+    }
 }
 
-/// An approximate inverse M⁻¹ that [`newton()`](super::newton()) keeps up to date: `apply` is z = M⁻¹ r, the same linear map until it is
-/// prepared again. A positive factor does not matter.
+/// What makes approximate inverses of the tangents of a step: `apply` of one is z = M⁻¹ r. A positive factor does not matter.
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
@@ -38,15 +44,18 @@ pub trait DiagonalBlocks {
 ///
 /// // Blocks of one row are the whole matrix, M⁻¹A = I: one iteration, however far apart the entries lie.
 /// let (matrix, mut inverse, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), BlockJacobi::<1>::default(), [0.0; 3]);
-/// inverse.prepare(&matrix);
-/// let report = gmres(&matrix, &inverse, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default(), &Pool::default())?;
+/// let inverse = inverse.prepare(&matrix);
+/// let report = gmres(&matrix, &*inverse, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default(), &Pool::default())?;
 /// assert_eq!(report.iterations, 1);
 /// assert!(x.iter().zip([1.0, 2.0, 3.0]).all(|(x, exact)| (x - exact).abs() < 1e-15 * exact));
 /// # Ok::<(), bfree::solver::LinearError>(())
 /// ```
-pub trait Preconditioner: LinearOperator<f64> + LinearOperator<f32> {
-    /// Told of every tangent before the system with it is solved.
-    fn prepare(&mut self, tangent: &dyn DiagonalBlocks);
+pub trait Preconditioner {
+    /// The approximate inverse of a tangent, from the tangents that came before it if they serve.
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a>;
+
+    /// As [`Self::prepare`], in single precision.
+    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a>;
 }
 
 /// The preconditioners to choose from.
@@ -55,6 +64,8 @@ pub enum Preconditioning {
     /// [`BlockJacobi`]
     #[default]
     BlockJacobi,
+    /// [`Multigrid`]
+    Multigrid,
     /// [`Identity`]
     None,
 }
@@ -80,6 +91,7 @@ impl Preconditioning {
     pub fn anew<const D: usize>(self) -> Box<dyn Preconditioner> {
         match self {
             Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
+            Self::Multigrid => Box::new(Multigrid::<D>::default()),
             Self::None => Box::new(Identity),
         }
     }
@@ -96,5 +108,11 @@ impl<S: Copy> LinearOperator<S> for Identity {
 }
 
 impl Preconditioner for Identity {
-    fn prepare(&mut self, _: &dyn DiagonalBlocks) {}
+    fn prepare<'a>(&'a mut self, _: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
+        Box::new(Self)
+    }
+
+    fn prepare_single<'a>(&'a mut self, _: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
+        Box::new(Self)
+    }
 }

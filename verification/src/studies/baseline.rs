@@ -17,7 +17,7 @@ use bfree::solver::Precision;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{Settings, Simulation};
 use bfree::pooled::Pool;
-use bfree::solver::{BlockJacobi, GmresSettings, Preconditioner, gmres};
+use bfree::solver::{BlockJacobi, GmresSettings, gmres};
 use bfree::tensor::{Tensor, Vector};
 use std::hint::black_box;
 use std::time::Instant;
@@ -167,7 +167,7 @@ impl Study {
         equilibrium.clear_prescribed(&mut right);
         let right: &[f64] = bytemuck::cast_slice(&right);
         let (tangent, mut blocks, pool) = (equilibrium.tangent(dphi)?, BlockJacobi::<D>::default(), Pool::default());
-        blocks.prepare(&tangent);
+        blocks.take(&tangent);
         let settings = GmresSettings { relative_tolerance: SOLVE, max_iterations: 4000, restart: 100 };
         let mut x = vec![0.0; right.len()];
         let start = Instant::now();

@@ -11,7 +11,7 @@ use bfree::approximation::{Approximation, Bspline, Linear, Lme};
 use bfree::mechanics::tangent::Tangent;
 use bfree::simulation::Simulation;
 use bfree::pooled::Pool;
-use bfree::solver::{BlockJacobi, GmresSettings, Identity, LinearOperator, NonlinearProblem, Preconditioner, gmres};
+use bfree::solver::{BlockJacobi, GmresSettings, Identity, LinearOperator, NonlinearProblem, gmres};
 use bfree::tensor::{Tensor, Vector};
 use nalgebra::{DMatrix, SymmetricEigen};
 use plotters::prelude::SeriesLabelPosition;
@@ -148,7 +148,7 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<Solved, St
     NonlinearProblem::residual(&equilibrium, &dphi, &mut right)?;
     let tangent = equilibrium.tangent(bytemuck::cast_slice(&dphi))?;
     let (diagonal, mut blocks) = (Diagonal::new(&tangent), BlockJacobi::<2>::default());
-    blocks.prepare(&tangent);
+    blocks.take(&tangent);
     let settings = GmresSettings { relative_tolerance: TOLERANCE, max_iterations: 10_000, restart: 200 };
     let iterations = |with: &dyn LinearOperator| -> Result<f64, StudyError> {
         let mut solution = dphi.clone();

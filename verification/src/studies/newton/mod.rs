@@ -14,7 +14,7 @@ use bfree::material::Material;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, Preconditioner, gmres, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
 };
 use bfree::tensor::Vector;
 use difference::Difference;
@@ -411,7 +411,7 @@ fn step<E: std::error::Error + 'static>(problem: &dyn NonlinearProblem<Inadmissi
         let mut d = vec![0.0; x.len()];
         let settings = GmresSettings { relative_tolerance: 1e-13, restart: 200, max_iterations: 400 };
         let mut blocks = BlockJacobi::<2>::default();
-        blocks.prepare(&*tangent);
+        blocks.take(&*tangent);
         gmres(&*tangent, &blocks, &rhs, &mut d, &settings, &Pool::default())?;
         x.iter_mut().zip(d).for_each(|(x, d)| *x += d);
     }

@@ -1,0 +1,144 @@
+//! Multigrid: what it may not change, and what it saves.
+
+use crate::support::Failure;
+use bfree::mechanics::check::direction;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::Nodal;
+use bfree::scene;
+use bfree::simulation::Simulation;
+use bfree::solver::{Multigrid, Precision, Preconditioner, Preconditioning};
+use serde_json::{Value, json};
+
+/// A block that hangs between cell faces, on a fixed floor, under its weight.
+fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Value) -> Result<Simulation<D>, Failure> {
+    let (low, high) = (0.53, 1.53);
+    let (mut min, mut max, mut down) = (vec![low; D], vec![high; D], vec![0.0; D]);
+    (min[D - 1], max[D - 1], down[D - 1]) = (0.0, 1.0, -50.0);
+    let floor = ["left", "bottom", "back"][D - 1];
+    let mut scene = json!({
+        "grid": {"size": vec![2; D], "spacing": 1.0 / f64::from(cells)},
+        "approximation": family,
+        "time": {"step": 0.2, "end": 1, "inertia": inertia},
+        "bodies": [{
+            "name": "block", "shape": {"box": {"min": min, "max": max}}, "density": 1,
+            "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}, "particles_per_cell": 2
+        }],
+        "boundary": {floor: "fixed"},
+        "gravity": {"acceleration": down},
+        "solver": {"krylov": {"method": "conjugate_gradient", "forcing": {"fixed": 1e-8}}}
+    });
+    for (key, value) in more.as_object().into_iter().flatten() {
+        scene[key] = value.clone();
+    }
+    Ok(scene::read(&scene.to_string(), &[])?.build(".".as_ref())?)
+}
+
+/// One step: Krylov iterations a Newton iteration.
+fn iterations<const D: usize>(
+    mut simulation: Simulation<D>,
+    with: Preconditioning,
+) -> Result<(f64, Simulation<D>), Failure> {
+    simulation.settings.preconditioner = with;
+    let report = simulation.step()?;
+    let history = &report.newton.history;
+    Ok((history.counts.krylov_iterations as f64 / history.iterations.len() as f64, simulation))
+}
+
+fn families() -> [Value; 5] {
+    [
+        json!("linear"),
+        json!({"bspline": {"degree": 2}}),
+        json!({"bspline": {"degree": 3}}),
+        json!({"lme": {"gamma": 3}}),
+        json!({"lme": {"gamma": 3, "support": "circle"}}),
+    ]
+}
+
+/// Where the particles are does not depend on the preconditioner, by more than the tolerance of Newton's method.
+fn same<const D: usize>(one: &Simulation<D>, other: &Simulation<D>) -> bool {
+    let (one, other) = (one.particles.by_id(), other.particles.by_id());
+    one.position.iter().zip(&other.position).all(|(a, b)| (a - b).norm() < 1e-8)
+}
+
+#[test]
+fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(), Failure> {
+    fn compare<const D: usize>(cells: u32, share: f64) -> Result<(), Failure> {
+        for family in families() {
+            for inertia in ["none", "newmark"] {
+                let scene = || block::<D>(&family, cells, inertia, json!({}));
+                let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
+                let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
+                assert!(same(&one, &other), "{D}D, {family}, {inertia}");
+                let enough = by_levels < share * by_blocks || by_levels < 12.0;
+                assert!(enough, "{D}D, {family}, {inertia}: {by_levels} after {by_blocks}");
+            }
+        }
+        Ok(())
+    }
+    compare::<1>(64, 0.5)?;
+    compare::<2>(20, 0.4)?;
+    compare::<3>(6, 0.8)
+}
+
+/// Robust: iterations to 1e-8 do not grow with refinement.
+#[test]
+fn refinement_costs_no_more_iterations() -> Result<(), Failure> {
+    for (family, most) in families().into_iter().take(4).zip([20.0, 20.0, 30.0, 20.0]) {
+        let counts = [12, 24, 48].map(|cells| {
+            let scene = block::<2>(&family, cells, "none", json!({}))?;
+            Ok::<_, Failure>(iterations(scene, Preconditioning::Multigrid)?.0)
+        });
+        let [first, second, third] = counts;
+        let (first, second, third) = (first?, second?, third?);
+        assert!(third <= most && third <= 1.3 * second.max(first), "{family}: {first}, {second}, {third}");
+    }
+    Ok(())
+}
+
+#[test]
+fn bodies_laws_and_precisions_are_all_the_same_to_it() -> Result<(), Failure> {
+    let body = |name: &str, low: f64, high: f64, young: f64| {
+        json!({
+            "name": name, "shape": {"box": {"min": [0.3, low], "max": [1.4, high]}}, "density": 1,
+            "material": {"st_venant_kirchhoff": {"young": young, "poisson": 0.3}}, "particles_per_cell": 3
+        })
+    };
+    let more = json!({"bodies": [body("soft", 0.0, 0.52, 1e3), body("stiff", 0.52, 1.1, 1e5)]});
+    for precision in [Precision::Double, Precision::Mixed] {
+        let scene = || -> Result<_, Failure> {
+            let mut simulation = block::<2>(&json!({"bspline": {}}), 10, "none", more.clone())?;
+            simulation.settings.newton.precision = precision;
+            Ok(simulation)
+        };
+        let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
+        let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
+        assert!(same(&one, &other) && by_levels < 0.7 * by_blocks, "{precision:?}: {by_levels} after {by_blocks}");
+    }
+    Ok(())
+}
+
+/// M⁻¹ is symmetric and positive, as conjugate gradients need it.
+#[test]
+fn a_cycle_is_symmetric_and_positive() -> Result<(), Failure> {
+    let simulation = block::<2>(&json!({"lme": {}}), 15, "newmark", json!({}))?;
+    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    let (nodal, prescribed) = (Nodal::at_rest(&simulation.particles, &supports), simulation.prescribed(&nodes));
+    let equilibrium = simulation.equilibrium(&supports, &nodal, &prescribed, simulation.settings.scheme.end(0.2), 0.2);
+    let tangent = equilibrium.tangent(&vec![Default::default(); nodes.len()])?;
+    let mut multigrid = Multigrid::<2>::default();
+    let inverse = multigrid.prepare(&tangent);
+    let times = |number| {
+        let mut u = direction::<2>(nodes.len(), number);
+        prescribed.iter().for_each(|dof| u[dof.node][dof.component] = 0.0);
+        let u: Vec<f64> = u.iter().flat_map(|u| u.iter().copied()).collect();
+        let mut z = vec![0.0; u.len()];
+        inverse.apply(&u, &mut z);
+        (u, z)
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let ((a, of_a), (b, of_b)) = (times(1), times(2));
+    let size = (dot(&a, &of_a) * dot(&b, &of_b)).sqrt();
+    assert!(dot(&a, &of_a) > 0.0 && dot(&b, &of_b) > 0.0);
+    assert!((dot(&a, &of_b) - dot(&b, &of_a)).abs() < 1e-12 * size);
+    Ok(())
+}
