@@ -8,7 +8,7 @@ use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms};
 use crate::particles::Particles;
 use crate::simulation::Simulation;
-use crate::solver::{Krylov, Precision};
+use crate::solver::{Krylov, Precision, Preconditioning, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
 use serde::Serialize;
@@ -255,8 +255,9 @@ fn arrays<const D: usize, L: Law, A>(
     let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
+    let multigrid = simulation.settings.preconditioner == Preconditioning::Multigrid;
     // What is not there does not appear.
-    let used: [(bool, &'static str, usize); 14] = [
+    let used: [(bool, &'static str, usize); 15] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -274,6 +275,7 @@ fn arrays<const D: usize, L: Law, A>(
         (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
         (true, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
         (true, "Krylov vectors", nodes * vector / share * krylov_vectors),
     ];
     let used = used.into_iter().filter(|(used, ..)| *used);

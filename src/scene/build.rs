@@ -18,7 +18,7 @@ use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
 use crate::simulation::{InitialGuess, Settings, Simulation, StepError};
-use crate::solver::{NewtonSettings, Preconditioning};
+use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
 use std::path::Path;
@@ -284,7 +284,7 @@ impl Scene {
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },
-            preconditioner: Preconditioning::default(),
+            preconditioner: krylov.preconditioner,
             error_tolerance: self.time.adaptive.map(|adaptive| adaptive.tolerance),
             check_tangent: None,
         }

@@ -1,7 +1,7 @@
 //! Settings of Newton's method and of the linear solver.
 
 use crate::problems::Problems;
-use crate::solver::{Forcing, Krylov as Method, NewtonSettings, Precision};
+use crate::solver::{Forcing, Krylov as Method, NewtonSettings, Precision, Preconditioning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,8 @@ impl Default for Newton {
 pub struct Krylov {
     /// The method. Default "automatic".
     pub method: Method,
+    /// Its preconditioner. Default "block_jacobi".
+    pub preconditioner: Preconditioning,
     /// How far each linear problem is solved.
     pub forcing: Forcing,
     /// The numbers of Krylov vectors and tangent products. Default "double".
@@ -53,7 +55,13 @@ pub struct Krylov {
 impl Default for Krylov {
     fn default() -> Self {
         let NewtonSettings { krylov, forcing, precision, max_krylov_iterations, .. } = NewtonSettings::default();
-        Self { method: krylov, forcing, precision, max_iterations: max_krylov_iterations as u32 }
+        Self {
+            method: krylov,
+            preconditioner: Preconditioning::default(),
+            forcing,
+            precision,
+            max_iterations: max_krylov_iterations as u32,
+        }
     }
 }
 

@@ -17,6 +17,7 @@ pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
+pub(crate) use preconditioner::multigrid_bytes;
 pub use preconditioner::{
     BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning,
 };

@@ -65,7 +65,8 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
     fn compare<const D: usize>(cells: u32, share: f64) -> Result<(), Failure> {
         for family in families() {
             for inertia in ["none", "newmark"] {
-                let scene = || block::<D>(&family, cells, inertia, json!({}));
+                // In steps of many wave times cuts are as bad as in statics.
+                let scene = || block::<D>(&family, cells, inertia, json!({"ghost_stiffness": 1e-3}));
                 let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
                 let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
                 assert!(same(&one, &other), "{D}D, {family}, {inertia}");
@@ -80,17 +81,17 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
     compare::<3>(6, 0.8)
 }
 
-/// Robust: iterations to 1e-8 do not grow with refinement.
+/// Iterations to 1e-8 stay below twenty, and hardly grow with refinement, where those of diagonal blocks double.
 #[test]
 fn refinement_costs_no_more_iterations() -> Result<(), Failure> {
-    for (family, most) in families().into_iter().take(4).zip([20.0, 20.0, 30.0, 20.0]) {
+    for (family, most) in families().into_iter().take(4).map(|family| (family, 20.0)) {
         let counts = [12, 24, 48].map(|cells| {
             let scene = block::<2>(&family, cells, "none", json!({}))?;
             Ok::<_, Failure>(iterations(scene, Preconditioning::Multigrid)?.0)
         });
         let [first, second, third] = counts;
         let (first, second, third) = (first?, second?, third?);
-        assert!(third <= most && third <= 1.3 * second.max(first), "{family}: {first}, {second}, {third}");
+        assert!(third <= most && third <= 1.5 * second.max(first), "{family}: {first}, {second}, {third}");
     }
     Ok(())
 }

@@ -403,6 +403,15 @@ fn chebyshev(
     }
 }
 
+/// Bytes of the levels below so many nodes in `dimension` dimensions, and of the form that they are made from.
+pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
+    let (block, tangent) = (dimension.pow(2) * size_of::<f64>(), dimension.pow(4) * size_of::<f64>());
+    let transfer = 1.5_f64.powi(dimension as i32).ceil() as usize * size_of::<(u32, f64)>();
+    // Coarse grids have a half more nodes than their share, along surfaces.
+    let coarse = 2 * nodes.div_ceil(1 << dimension);
+    nodes * (tangent + transfer + size_of::<Vec<u32>>()) + coarse * (28 * block + 27 * size_of::<u32>())
+}
+
 impl<const D: usize> Multigrid<D> {
     /// The levels of a tangent.
     fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
