@@ -186,11 +186,12 @@ impl<const D: usize> Level<D> {
             above,
             ..Self::default()
         };
-        level.add_nodes(form, &mut next);
         let of_coarse = form.add_cells_to::<D>(&mut next);
         for (cell, &at) in of_coarse.iter().enumerate() {
             level.add_cell(form, cell, &next, at, &numbers);
         }
+        level.hold_empty();
+        level.add_nodes(form, &mut next);
         level.hold();
         next.prescribed.clone_from(&level.held);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
@@ -268,12 +269,16 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// The identity's row and column where nothing moves, or nothing is; inverts the blocks.
-    fn hold(&mut self) {
-        let Self { entries, neighbours, held, inverse: inverses, .. } = self;
-        for (held, row) in held.chunks_exact_mut(D).zip(entries.iter()) {
+    /// Holds the nodes of no cell: what finer nodes have of one there has hardly mass and no stiffness.
+    fn hold_empty(&mut self) {
+        for (held, row) in self.held.chunks_exact_mut(D).zip(&self.entries) {
             held.iter_mut().enumerate().for_each(|(i, held)| *held |= row[MIDDLE][(i, i)] == 0.0);
         }
+    }
+
+    /// The identity's row and column where nothing moves; inverts the blocks.
+    fn hold(&mut self) {
+        let Self { entries, neighbours, held, inverse: inverses, .. } = self;
         for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
             for (entry, &mut other) in row.iter_mut().zip(neighbours) {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {

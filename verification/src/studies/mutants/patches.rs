@@ -91,6 +91,7 @@ const IN_LANES: &str = "src/mechanics/sweep/laws.rs";
 const WAVES: &str = "src/mechanics/sweep/waves.rs";
 const BUILDER: &str = "src/mechanics/sweep/builder.rs";
 const PLAIN: &str = "src/mechanics/sweep/plain.rs";
+const ALPHAS: &str = "src/mechanics/schemes/mod.rs";
 const NEWMARK: &str = "src/mechanics/schemes/newmark.rs";
 const LOADING: &str = "src/mechanics/loads.rs";
 const STEP: &str = "src/simulation.rs";
@@ -142,11 +143,11 @@ pub(super) const PATCHES: &[Patch] = &[
         "form.mass[lane] += self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);",
         "let _ = (p, &form, lane);",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
-    patch("+ a3 a_n in the acceleration", NEWMARK,
+    patch("+ a3 a_n in the acceleration", ALPHAS,
         "v * self.dt + a * (self.a3 / self.a1)",
         "v * self.dt - a * (self.a3 / self.a1)",
         Killed(&[DYNAMICS, BALANCE], &[TANGENT])),
-    patch("a2 and a3 swapped", NEWMARK,
+    patch("a2 and a3 swapped", ALPHAS,
         "v * self.dt + a * (self.a3 / self.a1)",
         "a * self.dt + v * (self.a3 / self.a1)",
         Killed(&[DYNAMICS, BALANCE], &[TANGENT])),
@@ -371,11 +372,11 @@ pub(super) const PATCHES: &[Patch] = &[
         "mass < light",
         "false",
         Killed(&[BALANCE], &[DYNAMICS])),
-    patch("v for v - v_n in (51)", NEWMARK,
+    patch("v for v - v_n in (51)", ALPHAS,
         "bent * self.a4 + a * self.a6",
         "bent * self.a4 + v + a * self.a6",
         Killed(&[DYNAMICS, BALANCE, PATCH], &[TANGENT])),
-    patch("a3 for a3 + 1 in (50)", NEWMARK,
+    patch("a3 for a3 + 1 in (50)", ALPHAS,
         "a * (self.a3 + 1.0)",
         "a * self.a3",
         Killed(&[DYNAMICS, BALANCE], &[TANGENT])),
