@@ -50,7 +50,7 @@ pub struct LocalForm {
     pub filled: Vec<f64>,
     /// m
     pub masses: Vec<f64>,
-    /// A[i][k][j][l] of ∂w_i/∂x_k and ∂u_j/∂x_l.
+    /// `A[i][k][j][l]` of ∂w_i/∂x_k and ∂u_j/∂x_l.
     pub tangents: Vec<f64>,
 }
 
