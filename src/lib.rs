@@ -153,7 +153,7 @@ pub mod mechanics;
 pub mod memory;
 pub mod nodes;
 pub mod output;
-mod parallel;
+pub mod parallel;
 pub mod particles;
 pub mod phases;
 pub mod plan;

@@ -5,9 +5,22 @@
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// How many threads work, from now on; without it as many as there are cores.
+///
+/// # Errors
+/// They cannot be started, or it was said before.
+pub fn use_threads(count: usize) -> Result<(), rayon::ThreadPoolBuildError> {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build_global()
+}
+
+/// How many threads work.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// Whether there is more than one thread.
 pub(crate) fn several() -> bool {
-    rayon::current_num_threads() > 1
+    threads() > 1
 }
 
 /// `task(0)`, …, `task(count − 1)`, each on whichever thread is free.

@@ -1,7 +1,7 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
 use crate::material::{Law, Start};
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Deformation, Tensor, Vector};
 
 /// A body: a law and a density shared by its particles.
 #[derive(Clone, Debug)]
@@ -198,6 +198,11 @@ impl<const D: usize> Particles<D> {
     /// Σ m v
     pub fn momentum(&self) -> Vector<f64, D> {
         self.mass.iter().zip(&self.velocity).map(|(&m, v)| v * m).sum()
+    }
+
+    /// V₀ J, the volume that a particle has now.
+    pub(crate) fn present_volume(&self, p: usize) -> f64 {
+        self.volume[p] * Deformation::new(self.displacement_gradient[p]).jacobian
     }
 
     /// Σ ½ m v·v

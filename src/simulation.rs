@@ -22,16 +22,19 @@ use crate::solver::{
     Krylov, LinearError, NewtonError, NewtonHistory, NewtonReport, NewtonSettings, Preconditioning, newton,
 };
 use crate::tensor::{Deformation, Vector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::num::NonZeroU64;
 use std::sync::Arc;
 
-/// Where Newton starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Where Newton's iteration of a step starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum InitialGuess {
-    /// Δφ = 0, as in the paper's Table 3.
+    /// Δφ = 0, as in the paper's tables.
     #[default]
     Zero,
-    /// Δφ = Δt v_n; zero without inertia.
+    /// Δφ = Δt v.
     Velocity,
 }
 
@@ -121,7 +124,7 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub clock: Clock,
     /// Work of gravity, tractions, pressure and moving walls since the start.
     pub external_work: f64,
-    /// Energy that damping has taken since the start.
+    /// Energy that damping and ghost stiffness have taken since the start.
     pub dissipated: f64,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
@@ -289,6 +292,11 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
+    /// Whether something takes energy on purpose: damping, or ghost stiffness.
+    pub(crate) fn dissipates(&self) -> bool {
+        self.loads.damping.is_some() || self.settings.ghost > 0.0
+    }
+
     /// The method that solves the linear systems, and why it does.
     ///
     /// ```
@@ -374,13 +382,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        let at_end = (theta < 1.0).then(|| self.equilibrium(&supports, &nodal, &prescribed, end, t + dt));
-        let at_end = at_end.as_ref().unwrap_or(&equilibrium);
-        if theta < 1.0 {
-            // Nothing has asked yet whether this end is possible.
-            at_end.forces(Role::Stores, &dphi)?;
-        }
-        let (reactions, work, dissipated) = self.reactions_and_work(at_end, t, dt, &dphi, update.impulses())?;
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
         update.commit(&mut self.particles, &self.bodies, &supports, dt);
         let passes = supports.passes();
 
@@ -594,16 +596,25 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ over all external forces, the reactions of moving walls among them.
     fn reactions_and_work(
         &self,
-        end: &Equilibrium<'_, D, L>,
+        balanced: &Equilibrium<'_, D, L>,
         t: f64,
         dt: f64,
         dphi: &[Vector<f64, D>],
         impulses: &[f64],
     ) -> Result<(Vec<Vector<f64, D>>, f64, f64), StepError> {
+        let terms::Step { supports, nodal, .. } = balanced.step;
+        let mut end = balanced;
+        let after;
+        if self.settings.scheme.instant() < 1.0 {
+            after = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
+            // Nothing has asked yet whether this end is possible.
+            after.forces(Role::Stores, dphi)?;
+            end = &after;
+        }
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
-            let mut residual: Pooled<Vector<f64, D>> = end.step.supports.field();
+            let mut residual: Pooled<Vector<f64, D>> = supports.field();
             end.residual_into::<f64>(dphi, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(impulses) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
@@ -612,10 +623,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }
         }
         // At t_n: a = a_n and Δφ = 0.
-        let at_rest: Pooled<Vector<f64, D>> = end.step.supports.field();
-        let start = self.equilibrium(end.step.supports, end.step.nodal, end.prescribed, Alphas::START, t);
+        let at_rest: Pooled<Vector<f64, D>> = supports.field();
+        let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
-            let mut residual: Pooled<Vector<f64, D>> = end.step.supports.field();
+            let mut residual: Pooled<Vector<f64, D>> = supports.field();
             start.residual_into::<f64>(&at_rest, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
@@ -623,7 +634,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         work += mean_work(&end.external_force(dphi)?, &start.external_force(&at_rest)?, dphi);
         let mut dissipated = 0.0;
-        if self.loads.damping.is_some() || self.settings.ghost > 0.0 {
+        if self.dissipates() {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, dphi| equilibrium.forces(Role::Dissipates, dphi);
             dissipated = mean_work(&lost(end, dphi)?, &lost(&start, &at_rest)?, dphi);
         }

@@ -12,6 +12,8 @@ use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::LinearError;
 use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Lumped mass, velocity and acceleration at the active nodes: each array as long as there are nodes, or empty where nothing
 /// needs it.
@@ -145,13 +147,14 @@ impl<const D: usize> Nodal<D> {
     }
 }
 
-/// What resting walls do to the velocity of the particles near them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How particles see prescribed nodes in their update.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum WallUpdate {
-    /// Δv = Δa = 0 at a resting wall: Algorithm 1 read literally, as the paper's authors ran it.
+    /// As the paper's Algorithm 1 reads: a resting wall changes neither velocity nor acceleration of the particles.
     #[default]
     Literal,
-    /// Δv = −v_projected, Δa = −a_projected at a resting wall, as at a moving one.
+    /// The change is counted from what was projected, before the condition overwrote it.
     Consistent,
 }
 

@@ -6,6 +6,7 @@ use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
 use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
+use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
 use bfree::simulation::Simulation;
@@ -101,7 +102,7 @@ impl Run {
         }
         if let Some(threads) = self.threads {
             let threads = usize::try_from(threads).unwrap_or(usize::MAX);
-            rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::run)?;
+            parallel::use_threads(threads).map_err(Failure::run)?;
         }
         match scene.dimension() {
             1 => self.execute_in::<1>(&scene),
@@ -282,7 +283,7 @@ impl Run {
             "out": directory.display().to_string(),
             "until": self.until,
             "steps": self.steps,
-            "threads": rayon::current_num_threads(),
+            "threads": parallel::threads(),
             "check_tangent": self.check_tangent,
         })
     }

@@ -5,7 +5,7 @@ use super::boundary::{Face, Table};
 use super::load::{self, Loaded};
 use super::particle_file::{self, ParticleFileError};
 use super::transfer::Transfer;
-use super::{Problems, Scene, scale, time};
+use super::{Problems, Scene, scale};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -14,10 +14,9 @@ use crate::mechanics::loads::{
 };
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::terms::ForceField;
-use crate::mechanics::transfer::WallUpdate;
 use crate::particles::{self, Particles};
 use crate::shape::{FillError, Shape, fill};
-use crate::simulation::{InitialGuess, Settings, Simulation, StepError};
+use crate::simulation::{Settings, Simulation, StepError};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
 use indicatif::BinaryBytes;
@@ -261,14 +260,8 @@ impl Scene {
             scheme: self.time.inertia.scheme(self.time.newmark()),
             lumping: self.time.lumping(),
             ghost: self.ghost(),
-            initial_guess: match self.time.initial_guess.unwrap_or_default() {
-                time::InitialGuess::Zero => InitialGuess::Zero,
-                time::InitialGuess::Velocity => InitialGuess::Velocity,
-            },
-            wall_update: match self.time.wall_update.unwrap_or_default() {
-                time::WallUpdate::Literal => WallUpdate::Literal,
-                time::WallUpdate::Consistent => WallUpdate::Consistent,
-            },
+            initial_guess: self.time.initial_guess.unwrap_or_default(),
+            wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {
                 Transfer::Flip => None,
                 Transfer::Pic(pic) => Some(Smoothing::uniform(pic.order, f64::INFINITY)),

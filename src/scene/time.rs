@@ -4,7 +4,9 @@ use crate::clock::MAX_HALVINGS;
 pub use crate::mechanics::schemes::Parameters as Inertia;
 
 use crate::mechanics::schemes::Newmark;
+use crate::mechanics::transfer::WallUpdate;
 use crate::problems::{Number, Problems};
+use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -56,28 +58,6 @@ pub struct Adaptive {
     /// it, the next is twice as long. The time at the end of each whole `step` is met.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub tolerance: f64,
-}
-
-/// Where Newton's iteration of a step starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum InitialGuess {
-    /// Δφ = 0, as in the paper's tables.
-    #[default]
-    Zero,
-    /// Δφ = Δt v.
-    Velocity,
-}
-
-/// How particles see prescribed nodes in their update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum WallUpdate {
-    /// As the paper's Algorithm 1 reads: a resting wall changes neither velocity nor acceleration of the particles.
-    #[default]
-    Literal,
-    /// The change is counted from what was projected, before the condition overwrote it.
-    Consistent,
 }
 
 impl Time {

@@ -309,9 +309,8 @@ fn checkpointed(folder: &Path) -> Result<(Identity, Simulation<2>, Vec<u8>), Fai
     Ok((identity, simulation, bytes))
 }
 
-/// `BFREE_FUZZ=1000000 cargo test --release --test suite -- hostile::fuzz --ignored --nocapture`
+/// More inputs, and what became of them: `BFREE_FUZZ=1000000 cargo test --release --test suite hostile::fuzz -- --nocapture`
 #[test]
-#[ignore = "takes minutes; CONTRIBUTING.md has the last result"]
 fn fuzz() -> Result<(), Failure> {
     let inputs = std::env::var("BFREE_FUZZ").map_or(Ok(10_000), |inputs| inputs.parse::<u64>())?;
     let folder = tempfile::tempdir()?;

@@ -65,6 +65,7 @@ fn shipped_scenes_are_sound() {
         names,
         [
             "ball_drop",
+            "block_static",
             "cantilever",
             "collision",
             "column_static",

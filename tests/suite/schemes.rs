@@ -101,7 +101,7 @@ impl Scheme for BackwardEuler {
 #[test]
 fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
     let mut own = scene::<2>("rebound.json", &[])?;
-    // β = 1 and γ = 1 are the same relations between Δφ and a, and other ones between Δφ and v.
+    // Another scheme of order one.
     own.settings.scheme = Arc::new(BackwardEuler);
     let mut newmark = own.clone();
     newmark.settings.scheme = Arc::new(Newmark { beta: 0.5, gamma: 1.0 });

@@ -21,6 +21,26 @@ pub fn piola<const D: usize>(law: &impl Law, h: Tensor<f64, D>) -> Result<Tensor
     Ok(at.f * law.stress(&at, &Start::NONE))
 }
 
+/// λ with P(λ) = `stress` in uniaxial strain, by bisection.
+pub fn stretch(law: &impl Law, stress: f64) -> f64 {
+    let piola = |stretch: f64| piola(law, Tensor::<f64, 1>::new(stretch - 1.0)).map_or(f64::NAN, |p| p[0]);
+    let (mut low, mut high) = (0.01, 10.0);
+    for _ in 0..100 {
+        let middle: f64 = 0.5 * (low + high);
+        if piola(middle) < stress { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// How far the point X of a column of this height moves under its weight ρ₀ g, by Simpson's rule: P = −ρ₀ g (H − X), u = ∫ (λ − 1) dX.
+pub fn moved_in_column(law: &impl Law, weight: f64, height: f64, x: f64) -> f64 {
+    let n = 200;
+    let share = |k: usize| if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
+    let strain = |x: f64| stretch(law, -weight * (height - x)) - 1.0;
+    let sum: f64 = (0..=n).map(|k| share(k) * strain(x * k as f64 / n as f64)).sum();
+    sum * x / (3.0 * n as f64)
+}
+
 /// The rows of a reference table, without its header.
 pub fn rows(text: &str) -> impl Iterator<Item = Vec<f64>> + '_ {
     text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())

@@ -108,8 +108,8 @@ mod tests {
                 let eigenvalues = amplification(&scheme, omega, 1.0).complex_eigenvalues();
                 eigenvalues.iter().map(|z| z.norm()).fold(0.0, f64::max)
             };
-            // A triple eigenvalue: the root of the distance 1/ω from the limit.
-            assert!((radius(1e7) - rho).abs() < 2e-2, "ρ = {rho}: {}", radius(1e7));
+            // A triple eigenvalue: the third root of the distance 1/ω² from the limit, 2e-5.
+            assert!((radius(1e7) - rho).abs() < 1e-4, "ρ = {rho}: {}", radius(1e7));
             assert!([0.1, 1.0, 3.0, 30.0].into_iter().all(|omega| radius(omega) < 1.0 + 1e-9), "ρ = {rho} is unstable");
         }
     }
@@ -128,7 +128,8 @@ mod tests {
                 (end[0] - 1f64.cos()).abs().max((end[1] + 1f64.sin()).abs())
             });
             let order = (errors[0] / errors[1]).log2();
-            assert!((order - 2.0).abs() < 0.1, "ρ = {rho}: order {order}");
+            // The next term of the error's series is smaller by Δt.
+            assert!((order - 2.0).abs() < 0.02, "ρ = {rho}: order {order}");
             // One step from t = 1, where the third derivative is sin 1.
             let dt = 1e-3;
             let (inertia, force) = scheme.weights();

@@ -6,11 +6,11 @@
 //!
 //! It is zero for every affine Δφ: momentum, moment of momentum, turning as a whole and the patch test stay exact.
 
-use super::{Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
+use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit, summed};
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::sweep::{Laned, Number};
-use crate::tensor::{Tensor, Vector, determinant, identity, scaled};
+use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// Second differences at nodes with little of a body, with their stiffness.
 pub struct Ghost {
@@ -35,8 +35,7 @@ impl Ghost {
         let (grid, nodes) = (step.supports.grid(), step.supports.active());
         // Volume, and volume times modulus, of what each node has of the bodies.
         let moduli: Vec<f64> = (0..step.bodies.len()).map(|body| step.modulus(body)).collect();
-        let volume =
-            |p: usize| step.particles.volume[p] * determinant(&(identity() + step.particles.displacement_gradient[p]));
+        let volume = |p: usize| step.particles.present_volume(p);
         let spread = |value: &(dyn Fn(usize) -> f64 + Sync)| {
             let mut share: Vec<Vector<f64, 1>> = vec![Vector::zeros(); nodes.len()];
             step.supports.spread(&mut share, |p| Vector::from([value(p)]));
@@ -110,14 +109,11 @@ impl<const D: usize> Term<D> for Ghost {
     }
 
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let (mut sum, mut magnitude) = (T::zero(), 0.0);
-        for triple in &self.triples {
+        let energy = |triple: &Triple| {
             let bend = triple.bend(dphi);
-            let energy = T::lit(0.5 * triple.stiffness) * bend.dot(&bend);
-            sum += energy;
-            magnitude += energy.value();
-        }
-        Some(Ok((sum, magnitude)))
+            T::lit(0.5 * triple.stiffness) * bend.dot(&bend)
+        };
+        Some(Ok(summed(self.triples.iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
@@ -130,12 +126,7 @@ impl<const D: usize> Term<D> for Ghost {
         }
     }
 
-    fn freeze<X: Laned>(
-        &self,
-        _: &[Vector<f64, D>],
-        _: Part,
-        unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
         Ok(Some(Box::new(FrozenGhost { triples: &self.triples, factor: 1.0 / unit.scale })))
     }
 }

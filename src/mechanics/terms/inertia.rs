@@ -1,6 +1,8 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{AtPoints, BlocksAtPoints, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit};
+use super::{
+    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
+};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
@@ -79,19 +81,18 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     /// ½ a·M̃ a/α₁
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
         let half_over_a1 = T::lit(0.5 / self.alphas.a1);
-        let (mut sum, mut magnitude) = (T::zero(), 0.0);
-        let mut add = |energy: T| {
-            sum += energy;
-            magnitude += energy.value().abs();
-        };
-        self.motion(dphi).for_each(|(m, a)| add(half_over_a1 * m * a.dot(&a)));
+        let of_nodes = self.motion(dphi).map(|(m, a)| half_over_a1 * m * a.dot(&a));
+        let (mut sum, mut magnitude) = summed(of_nodes);
         if self.mass.lumping < 1.0 {
             let half_a1 = T::lit(0.5 * self.alphas.a1);
             let energy = |p: usize, u: Vector<T, D>, _: Tensor<T, D>| {
                 let u = u - self.predicted[p].map(T::lit);
                 half_a1 * T::lit(self.mass.consistent(p).unwrap_or(0.0)) * u.dot(&u)
             };
-            self.mass.supports.each_particle(dphi, energy, |_, energy| add(energy));
+            self.mass.supports.each_particle(dphi, energy, |_, energy| {
+                sum += energy;
+                magnitude += energy.value().abs();
+            });
         }
         Some(Ok((sum, magnitude)))
     }
@@ -105,12 +106,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         }
     }
 
-    fn freeze<X: Laned>(
-        &self,
-        _: &[Vector<f64, D>],
-        _: Part,
-        unit: Unit,
-    ) -> Result<Option<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+    fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
         Ok(Some(Box::new(FrozenMass { mass: self.mass, factor: self.alphas.a1 / unit.scale })))
     }
 }

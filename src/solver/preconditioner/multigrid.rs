@@ -58,6 +58,8 @@ pub struct LocalForm {
 #[derive(Clone, Debug, Default)]
 pub struct Multigrid<const D: usize> {
     blocks: BlockJacobi<D>,
+    /// What the tangent was divided by that the levels are made from.
+    scale: f64,
     largest: f64,
     levels: Vec<Level<D>>,
     bottom: Option<LU<f64, Dyn, Dyn>>,
@@ -370,7 +372,9 @@ fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n
             (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta, beta);
         }
     }
-    MARGIN * matrix.symmetric_eigenvalues().max()
+    let finite = matrix.iter().all(|x| x.is_finite());
+    let largest = if finite { MARGIN * matrix.symmetric_eigenvalues().max() } else { 0.0 };
+    if largest > 0.0 { largest } else { 1.0 }
 }
 
 /// x ← x + p(D⁻¹K) D⁻¹ (b − K x), p a Chebyshev polynomial; from x = 0 if `zero`.
@@ -468,17 +472,17 @@ impl<const D: usize> Multigrid<D> {
 /// A V-cycle with the present tangent.
 struct Cycle<'a, const D: usize, S> {
     levels: &'a Multigrid<D>,
-    tangent: &'a dyn LinearOperator<S>,
+    tangent: Doubled<'a, S>,
 }
 
-/// The tangent in double precision, whatever its own.
-struct Doubled<'a, S>(&'a dyn LinearOperator<S>);
+/// The tangent in double precision, whatever its own, and times what brings it to the levels' scale.
+struct Doubled<'a, S>(&'a dyn Linearization<S>, f64);
 
 impl<S: Entry> LinearOperator for Doubled<'_, S> {
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         let (x, mut out) = (x.iter().map(|&x| S::lit(x)).collect::<Vec<_>>(), vec![S::zero(); y.len()]);
         self.0.apply(&x, &mut out);
-        y.iter_mut().zip(&out).for_each(|(y, out)| *y = out.value());
+        y.iter_mut().zip(&out).for_each(|(y, out)| *y = self.1 * out.value());
     }
 }
 
@@ -486,11 +490,11 @@ impl<S: Entry, const D: usize> LinearOperator<S> for Cycle<'_, D, S> {
     fn apply(&self, r: &[S], z: &mut [S]) {
         let b: Vec<f64> = r.iter().map(|r| r.value()).collect();
         let mut x = vec![0.0; b.len()];
-        let (fine, levels) = (Doubled(self.tangent), self.levels);
+        let (fine, levels) = (&self.tangent, self.levels);
         let jacobi = |r: &[f64], z: &mut [f64]| levels.blocks.apply(r, z);
-        chebyshev(&fine, &jacobi, levels.largest, &b, &mut x, true);
-        levels.correct(0, &fine, &b, &mut x);
-        chebyshev(&fine, &jacobi, levels.largest, &b, &mut x, false);
+        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, true);
+        levels.correct(0, fine, &b, &mut x);
+        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);
         z.iter_mut().zip(&x).for_each(|(z, x)| *z = S::lit(*x));
     }
 }
@@ -499,8 +503,11 @@ impl<const D: usize> Multigrid<D> {
     fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
         if self.levels.is_empty() {
             self.blocks.take(tangent);
-            self.build(tangent.local_form(), &Doubled(tangent));
+            self.scale = tangent.scale();
+            self.build(tangent.local_form(), &Doubled(tangent, 1.0));
         }
+        // Systems that single precision could not solve come again in double.
+        let tangent = Doubled(tangent, tangent.scale() / self.scale);
         Box::new(Cycle { levels: self, tangent })
     }
 }

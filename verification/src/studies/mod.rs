@@ -102,6 +102,7 @@ studies!(
     riemann,
     compaction,
     column,
+    robust,
     rebound,
     tradeoff,
     mutants

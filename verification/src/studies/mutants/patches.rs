@@ -34,12 +34,14 @@ const SWEEP: Check = Check::Test("sweep::");
 const LAWS: Check = Check::Test("laws::");
 const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
+const GHOSTS: Check = Check::Test("ghost::");
+const LEVELS: Check = Check::Test("multigrid::");
 const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP, LAWS,
-    SOLVER,
+    GHOSTS, LEVELS, SOLVER,
 ];
 
 /// What is to become of a patch.
@@ -83,6 +85,7 @@ const STRESS: &str = "src/mechanics/terms/stress.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
+const GHOST: &str = "src/mechanics/terms/ghost.rs";
 const PRESSURE: &str = "src/mechanics/terms/pressure.rs";
 const KERNEL: &str = "src/mechanics/sweep/kernel.rs";
 const DIAGONAL: &str = "src/mechanics/sweep/blocks.rs";
@@ -109,6 +112,7 @@ const FORCING: &str = "src/solver/forcing.rs";
 const SEARCH: &str = "src/solver/newton/search.rs";
 const LINEAR: &str = "src/solver/newton/linear.rs";
 const BLOCKS: &str = "src/solver/preconditioner/block_jacobi.rs";
+const MULTIGRID: &str = "src/solver/preconditioner/multigrid.rs";
 
 use Fate::{Equivalent, Killed};
 
@@ -604,4 +608,40 @@ pub(super) const PATCHES: &[Patch] = &[
         "self.inverse.is_empty()",
         "true",
         Killed(&[SOLVER], &[POINTS])),
+    patch("half of the middle node's force in the ghost stiffness's product", GHOST,
+        "out[b][i] -= force + force;",
+        "out[b][i] -= force;",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("diagonal blocks of the ghost stiffness by the weight, not its square", GHOST,
+        "self.factor * triple.stiffness * weight * weight",
+        "self.factor * triple.stiffness * weight",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("the ghost stiffness's potential twice as large", GHOST,
+        "T::lit(0.5 * triple.stiffness)",
+        "T::lit(triple.stiffness)",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("ghost stiffness by the first difference", GHOST,
+        "a - b - b + c",
+        "a - b",
+        Killed(&[GHOSTS, TANGENT], &[POINTS])),
+    patch("no ghost stiffness where there is nothing of a body", GHOST,
+        "filled(node) < 0.5",
+        "(0.25..0.5).contains(&filled(node))",
+        Killed(&[GHOSTS], &[POINTS])),
+    patch("no coarse levels", MULTIGRID,
+        "levels.correct(0, fine, &b, &mut x);",
+        "{}",
+        Killed(&[LEVELS], &[GHOSTS])),
+    patch("smoothing before the coarse levels alone", MULTIGRID,
+        "chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);",
+        "{}",
+        Killed(&[LEVELS], &[GHOSTS])),
+    patch("a double-precision system with levels in the units of a single one", MULTIGRID,
+        "tangent.scale() / self.scale",
+        "1.0",
+        Killed(&[LEVELS], &[GHOSTS])),
+    patch("coarse nodes that are held move", MULTIGRID,
+        "held[coarse as usize * D + i] = form.prescribed[fine * D + i]",
+        "held[coarse as usize * D + i] = false",
+        Killed(&[LEVELS], &[GHOSTS])),
 ];

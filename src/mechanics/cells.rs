@@ -1,0 +1,80 @@
+//! A frozen tangent as a form on the cells of the grid, from which coarser grids are made.
+
+use crate::mechanics::sweep::{At, LANES, Laned};
+use crate::mechanics::tangent::Tangent;
+use crate::solver::LocalForm;
+use crate::tensor::{Tensor, Vector};
+use std::collections::HashMap;
+
+impl<X: Laned, const D: usize> Tangent<'_, D, X> {
+    /// What the particles of a cell make of ∇u, summed; and what nodes make of motions that are the same everywhere.
+    pub(super) fn on_cells(&self) -> LocalForm {
+        let (grid, active) = (self.supports.grid(), self.supports.active());
+        let (tiles, volume) = (D.pow(4), grid.spacing.powi(D as i32));
+        let mut form = LocalForm {
+            grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
+            nodes: active.ids().iter().map(|&id| padded(grid.index(id))).collect(),
+            prescribed: vec![false; D * active.len()],
+            ..LocalForm::default()
+        };
+        self.prescribed.iter().for_each(|dof| form.prescribed[dof.node * D + dof.component] = true);
+        let terms: Vec<_> = self.terms.iter().filter_map(|term| term.product_at_points()).map(|(_, add)| add).collect();
+        // Gradients are counted in units of 1/h.
+        let factor = (self.unit.length / grid.spacing).powi(2);
+        let mut places = HashMap::new();
+        self.supports.each_group(|group| {
+            let mut cells = [0; LANES];
+            for (cell, &p) in cells.iter_mut().zip(group.particles) {
+                let x = &self.particles.position[p as usize];
+                let at = grid.cell(x).unwrap_or([0; D]);
+                *cell = *places.entry(at).or_insert_with(|| {
+                    form.push_cell(padded(at), tiles);
+                    form.cells.len() - 1
+                });
+                let share = self.particles.present_volume(p as usize) / volume;
+                form.filled[*cell] += share;
+                for k in 0..D {
+                    let local = (x[k] - grid.origin[k]) / grid.spacing;
+                    form.centres[*cell][k] += share * local;
+                }
+            }
+            let probe = |at: &At<X, D, D>| {
+                let mut sums = At::<X, D, D>::zero();
+                terms.iter().for_each(|add| add(group, at, &mut sums));
+                sums
+            };
+            let mut at = At::<X, D, D>::zero();
+            at.value[0] = [X::one(); LANES];
+            let sums = probe(&at);
+            for (lane, &cell) in cells.iter().enumerate().take(group.particles.len()) {
+                form.masses[cell] += sums.value[0][lane].value();
+            }
+            for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
+                let mut at = At::<X, D, D>::zero();
+                at.gradient[j][l] = [X::one(); LANES];
+                let sums = probe(&at);
+                for (lane, &cell) in cells.iter().enumerate().take(group.particles.len()) {
+                    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
+                        form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
+                            factor * sums.gradient[i][k][lane].value();
+                    }
+                }
+            }
+        });
+        form.finish_centres();
+        let mut blocks = vec![Tensor::<f64, D>::zeros(); active.len()];
+        for k in 0..D {
+            let uniform = vec![Vector::<X, D>::from_fn(|i, _| if i == k { X::one() } else { X::zero() }); active.len()];
+            let mut out = vec![Vector::<X, D>::zeros(); active.len()];
+            self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
+            blocks.iter_mut().zip(&out).for_each(|(block, out)| (0..D).for_each(|i| block[(i, k)] = out[i].value()));
+        }
+        form.blocks = bytemuck::cast_slice(&blocks).to_vec();
+        form
+    }
+}
+
+/// An index of three axes.
+fn padded<const D: usize>(index: [u32; D]) -> [u32; 3] {
+    std::array::from_fn(|k| index.get(k).copied().unwrap_or(0))
+}
