@@ -136,6 +136,8 @@ pub struct Plan {
     pub unknowns: usize,
     /// The method that solves the linear systems, and why it does.
     pub krylov: (Krylov, &'static str),
+    /// Their preconditioner, and why it is.
+    pub preconditioner: (Preconditioning, &'static str),
     /// Terms of the residual and parts of the step.
     pub terms: Vec<TermUse>,
     /// The large arrays.
@@ -163,6 +165,7 @@ impl Plan {
             active_nodes: nodes.len(),
             unknowns: D * nodes.len() - prescribed.len(),
             krylov: simulation.krylov(),
+            preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports),
             arrays: arrays(simulation, &supports, nodes.len()),
             surfaces: SurfaceUse::of(simulation),
@@ -233,7 +236,7 @@ fn precision_used<const D: usize>(supports: &Supports<D>) -> Precision {
     supports.unit().map_or(Precision::Double, |_| Precision::Mixed)
 }
 
-fn arrays<const D: usize, L: Law, A>(
+fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
     nodes: usize,
@@ -255,7 +258,7 @@ fn arrays<const D: usize, L: Law, A>(
     let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
-    let multigrid = simulation.settings.preconditioner == Preconditioning::Multigrid;
+    let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
     // What is not there does not appear.
     let used: [(bool, &'static str, usize); 15] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
@@ -291,6 +294,8 @@ impl Display for Plan {
         writeln!(f, "unknowns      {}", self.unknowns)?;
         let (method, why) = self.krylov;
         writeln!(f, "solver        {method}: {why}")?;
+        let (preconditioner, why) = self.preconditioner;
+        writeln!(f, "conditioned   {preconditioner}: {why}")?;
         writeln!(f, "terms")?;
         for term in &self.terms {
             writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;

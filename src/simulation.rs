@@ -1,15 +1,15 @@
 //! The step on one page: the paper's Algorithm 1.
 
-use crate::approximation::{Approximation, ShapeFunction};
+use crate::approximation::{Approximation, ShapeFunction, Shipped};
 use crate::causes;
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{Law, Material};
+use crate::material::{Law, Material, p_wave_modulus};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Equilibrium, Inadmissible, unsymmetric};
 use crate::mechanics::rigid::{Loose, loose};
-use crate::mechanics::schemes::{Alphas, Newmark, Scheme};
+use crate::mechanics::schemes::{Alphas, LONG_STEPS, Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::{self, Role};
@@ -319,6 +319,24 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// The preconditioner of the linear systems, and why it is.
+    ///
+    /// ```
+    /// use bfree::solver::Preconditioning;
+    ///
+    /// let simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+    /// assert_eq!(simulation.preconditioner(), (Preconditioning::BlockJacobi, "inertia dominates"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn preconditioner(&self) -> (Preconditioning, &'static str) {
+        let across = self.clock.nominal() / self.grid.spacing;
+        let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
+        let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
+        let shipped = self.approximation.separable().and_then(|functions| functions.shipped());
+        let splines = matches!(shipped, Some(Shipped::Bspline(_)));
+        self.settings.preconditioner.chosen::<D>(self.particles.len(), splines, long)
+    }
+
     /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
     ///
     /// ```
@@ -366,7 +384,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         for dof in &prescribed {
             dphi[dof.node][dof.component] = theta * dof.step.increment;
         }
-        let (mut preconditioner, x) = (self.settings.preconditioner.anew::<D>(), bytemuck::cast_slice_mut(&mut dphi));
+        let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut dphi));
         let newton = newton(&equilibrium, &mut *preconditioner, x, &self.settings.newton, &pool)
             .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
         watch.lap(Phase::Newton, supports.passes());

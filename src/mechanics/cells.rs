@@ -69,6 +69,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
             blocks.iter_mut().zip(&out).for_each(|(block, out)| (0..D).for_each(|i| block[(i, k)] = out[i].value()));
         }
+        self.terms.iter().for_each(|term| term.add_bends(&mut form.bends));
         form.blocks = bytemuck::cast_slice(&blocks).to_vec();
         form
     }

@@ -136,6 +136,8 @@ impl Run {
         }
         let (method, why) = simulation.krylov();
         asked.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
+        let (preconditioner, why) = simulation.preconditioner();
+        asked.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
         asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {

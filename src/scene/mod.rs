@@ -31,6 +31,7 @@ pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
 use crate::mechanics::loads::Loads;
+use crate::mechanics::schemes::LONG_STEPS;
 use crate::mechanics::terms::Rayleigh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -74,7 +75,7 @@ pub struct Scene {
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
     /// Ghost stiffness γ (no unit), 0 to 1: holds nodes that have little of a body, by this share of its stiffness against bending from
-    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia, unless functions are linear; else 0.
+    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia and in steps of Courant numbers above 10; else 0.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
@@ -219,10 +220,17 @@ impl Scene {
         problems
     }
 
-    /// γ of the ghost stiffness. Hat functions have no small cuts that matter; with inertia, mass holds what stiffness does not.
+    /// γ of the ghost stiffness. In shorter steps, mass holds what stiffness does not.
     fn ghost(&self) -> f64 {
-        let needed = !self.time.inertia.has_inertia() && self.approximation.key() != "linear";
-        self.ghost_stiffness.unwrap_or(if needed { GHOST } else { 0.0 })
+        self.ghost_stiffness.unwrap_or(if self.courant() > LONG_STEPS { GHOST } else { 0.0 })
+    }
+
+    /// The largest Courant number, that of waves of pressure; infinite without inertia.
+    fn courant(&self) -> f64 {
+        if !self.time.inertia.has_inertia() {
+            return f64::INFINITY;
+        }
+        accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0)
     }
 
     /// Loads that need nothing of grid and particles.

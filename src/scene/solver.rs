@@ -41,7 +41,7 @@ impl Default for Newton {
 pub struct Krylov {
     /// The method. Default "automatic".
     pub method: Method,
-    /// Its preconditioner. Default "block_jacobi".
+    /// Its preconditioner. Default "automatic".
     pub preconditioner: Preconditioning,
     /// How far each linear problem is solved.
     pub forcing: Forcing,

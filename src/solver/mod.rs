@@ -19,7 +19,7 @@ pub use newton::{
 };
 pub(crate) use preconditioner::multigrid_bytes;
 pub use preconditioner::{
-    BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning,
+    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning,
 };
 
 use vector::Entry;

@@ -77,7 +77,8 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
         }
         Ok(())
     }
-    compare::<1>(64, 0.5)?;
+    // Smoothing alone needs a tenth of the iterations, too, and its own double with each refinement.
+    compare::<1>(512, 0.04)?;
     compare::<2>(20, 0.5)?;
     compare::<3>(6, 0.8)
 }
@@ -144,8 +145,8 @@ fn a_cycle_is_symmetric_and_positive_and_of_no_scale() -> Result<(), Failure> {
     assert!(scale > 2.0, "nothing to see at {scale}");
     drop(of_single.prepare_single(&single));
     let [_, again] = of(&*of_single.prepare(&tangent), 1);
-    // M⁻¹ of K/s, to what single precision knows of K.
+    // M⁻¹ of K/s, to a hundredth: single precision knows 1e-7 of K, whose softest motions have a thousandth of its stiffness or less.
     let apart: Vec<f64> = again.iter().zip(&of_a).map(|(again, z)| again / scale - z).collect();
-    assert!(dot(&apart, &apart) < 1e-6 * dot(&of_a, &of_a), "{} of {}", dot(&apart, &apart), dot(&of_a, &of_a));
+    assert!(dot(&apart, &apart) < 1e-4 * dot(&of_a, &of_a), "{} of {}", dot(&apart, &apart), dot(&of_a, &of_a));
     Ok(())
 }

@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
 
+/// Courant numbers, of pressure waves, beyond which inertia hardly holds a node.
+pub const LONG_STEPS: f64 = 10.0;
+
 /// How a step goes from t_n to t_{n+1}. Reports call it by its [`Display`].
 ///
 /// Newton's unknown is the motion to t_n + θ Δt, where forces are in balance; the step ends with Δφ, which is 1/θ of it.

@@ -10,22 +10,13 @@ use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit, summed
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::sweep::{Laned, Number};
+use crate::solver::Bend;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
 /// Second differences at nodes with little of a body, with their stiffness.
 pub struct Ghost {
-    triples: Vec<Triple>,
+    bends: Vec<Bend>,
 }
-
-/// Three neighbours along an axis, and k.
-#[derive(Clone, Copy, Debug)]
-struct Triple {
-    nodes: [u32; 3],
-    stiffness: f64,
-}
-
-/// The second difference's weights.
-const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
 
 impl Ghost {
     pub(super) fn of<const D: usize, L: Law>(step: &Step<'_, D, L>) -> Option<Self> {
@@ -51,7 +42,7 @@ impl Ghost {
         };
         let modulus =
             |node: usize| if volumes[node][0] > 0.0 { stiff[node][0] / volumes[node][0] } else { f64::INFINITY };
-        let mut triples = Vec::new();
+        let mut bends = Vec::new();
         for axis in 0..D {
             let beside = |node: usize, by: i64| {
                 let mut index = grid.index(nodes.ids()[node]);
@@ -71,20 +62,18 @@ impl Ghost {
                 let softest = all.into_iter().map(modulus).fold(f64::INFINITY, f64::min);
                 if softest.is_finite() {
                     let stiffness = step.ghost * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
-                    triples.push(Triple { nodes: all.map(|node| node as u32), stiffness });
+                    bends.push(Bend { nodes: all.map(|node| node as u32), stiffness });
                 }
             }
         }
-        Some(Self { triples })
+        Some(Self { bends })
     }
 }
 
-impl Triple {
-    /// The second difference of a field.
-    fn bend<T: Number, const D: usize>(&self, field: &[Vector<T, D>]) -> Vector<T, D> {
-        let [a, b, c] = self.nodes.map(|node| field[node as usize]);
-        a - b - b + c
-    }
+/// The second difference of a field.
+fn difference<T: Number, const D: usize>(bend: &Bend, field: &[Vector<T, D>]) -> Vector<T, D> {
+    let [a, b, c] = bend.nodes.map(|node| field[node as usize]);
+    a - b - b + c
 }
 
 impl<const D: usize> Term<D> for Ghost {
@@ -100,48 +89,48 @@ impl<const D: usize> Term<D> for Ghost {
     }
 
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-        for triple in &self.triples {
-            let force = triple.bend(dphi) * T::lit(triple.stiffness);
-            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
+        for bend in &self.bends {
+            let force = difference(bend, dphi) * T::lit(bend.stiffness);
+            for (node, weight) in bend.nodes.into_iter().zip(Bend::WEIGHTS) {
                 out[node as usize] += force * T::lit(weight);
             }
         }
     }
 
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
-        let energy = |triple: &Triple| {
-            let bend = triple.bend(dphi);
-            T::lit(0.5 * triple.stiffness) * bend.dot(&bend)
+        let energy = |bend: &Bend| {
+            let difference = difference(bend, dphi);
+            T::lit(0.5 * bend.stiffness) * difference.dot(&difference)
         };
-        Some(Ok(summed(self.triples.iter().map(energy))))
+        Some(Ok(summed(self.bends.iter().map(energy))))
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for triple in &self.triples {
-            let [a, b, c] = triple.nodes.map(|node| dphi[node as usize].abs());
-            let size = (a + b * 2.0 + c) * triple.stiffness;
-            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
+        for bend in &self.bends {
+            let [a, b, c] = bend.nodes.map(|node| dphi[node as usize].abs());
+            let size = (a + b * 2.0 + c) * bend.stiffness;
+            for (node, weight) in bend.nodes.into_iter().zip(Bend::WEIGHTS) {
                 out[node as usize] += size * weight.abs();
             }
         }
     }
 
     fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
-        Ok(Some(Box::new(FrozenGhost { triples: &self.triples, factor: 1.0 / unit.scale })))
+        Ok(Some(Box::new(FrozenGhost { bends: &self.bends, factor: 1.0 / unit.scale })))
     }
 }
 
 /// It is linear: its tangent is itself.
 struct FrozenGhost<'a> {
-    triples: &'a [Triple],
+    bends: &'a [Bend],
     factor: f64,
 }
 
 impl<X: Laned, const D: usize> Frozen<X, D> for FrozenGhost<'_> {
     fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
-        for triple in self.triples {
-            let k = X::lit(self.factor * triple.stiffness);
-            let [a, b, c] = triple.nodes.map(|node| node as usize);
+        for bend in self.bends {
+            let k = X::lit(self.factor * bend.stiffness);
+            let [a, b, c] = bend.nodes.map(|node| node as usize);
             for i in 0..D {
                 let force = (u[a][i] - u[b][i] - u[b][i] + u[c][i]) * k;
                 out[a][i] += force;
@@ -151,10 +140,14 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenGhost<'_> {
         }
     }
 
+    fn add_bends(&self, bends: &mut Vec<Bend>) {
+        bends.extend(self.bends.iter().map(|bend| Bend { stiffness: self.factor * bend.stiffness, ..*bend }));
+    }
+
     fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
-        for triple in self.triples {
-            for (node, weight) in triple.nodes.into_iter().zip(WEIGHTS) {
-                blocks[node as usize] += scaled(&identity(), self.factor * triple.stiffness * weight * weight);
+        for bend in self.bends {
+            for (node, weight) in bend.nodes.into_iter().zip(Bend::WEIGHTS) {
+                blocks[node as usize] += scaled(&identity(), self.factor * bend.stiffness * weight * weight);
             }
         }
     }

@@ -28,6 +28,7 @@ use crate::mechanics::schemes::{Alphas, Scheme};
 use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
+use crate::solver::Bend;
 use crate::tensor::{Deformation, Tensor, Vector};
 
 /// What all terms of a step are made from.
@@ -196,6 +197,9 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
 
     /// Adds to the diagonal blocks what acts at the nodes.
     fn add_blocks_at_nodes(&self, _blocks: &mut [Tensor<f64, D>]) {}
+
+    /// Adds the second differences that it holds, for coarser grids.
+    fn add_bends(&self, _bends: &mut Vec<Bend>) {}
 
     /// What adds to the diagonal blocks at the particles.
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {

@@ -86,6 +86,11 @@ impl Display for Chosen {
 /// of LME beside free faces are held by next to nothing but inertia.
 const NEED_INERTIA: [&str; 3] = ["time.", "transfer", "approximation"];
 
+/// Cells that the fastest wave of pressure crosses in a time; `None` if there is none.
+pub(super) fn courant(bodies: &[Body], spacing: f64, time: f64) -> Option<f64> {
+    Some(spacing::speed(bodies).ok()? * time / spacing)
+}
+
 /// Lays what the key `accuracy` sets under a scene. A scene that is not of the types of a scene is left as it is: whoever reads it
 /// says why.
 ///

@@ -5,12 +5,13 @@ mod multigrid;
 
 pub use block_jacobi::BlockJacobi;
 pub(crate) use multigrid::bytes as multigrid_bytes;
-pub use multigrid::{LocalForm, Multigrid};
+pub use multigrid::{Bend, LocalForm, Multigrid};
 
 use super::{LinearOperator, Linearization};
 use crate::pooled::Pooled;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
 
 /// What a tangent tells of its entries, in double precision even where its products are not.
 pub trait DiagonalBlocks {
@@ -65,17 +66,46 @@ pub trait Preconditioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// The inverses of the diagonal blocks: cheap, and enough where inertia dominates.
+    /// Multigrid for large bodies without inertia or in steps of Courant numbers above 10, else the diagonal blocks.
     #[default]
+    Automatic,
+    /// The inverses of the diagonal blocks: cheap, and enough where inertia dominates.
     BlockJacobi,
-    /// One V-cycle of multigrid: iterations hardly grow as the grid is refined. It pays without inertia, and in steps of many wave times, from
-    /// some thousand nodes on in 2D, and with linear functions in 3D.
+    /// One V-cycle of multigrid: iterations hardly grow as the grid is refined.
     Multigrid,
     /// Nothing.
     None,
 }
 
+/// Particles in 1D, 2D and 3D from which on multigrid was the faster one; and with splines, which diagonal blocks serve better: in 3D it is
+/// not at half a million (README, "Speed").
+const MANY: [usize; 3] = [500, 10_000, 50_000];
+const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
+
 impl Preconditioning {
+    /// What is used for so many particles in `D` dimensions, with B-splines or other functions, in steps that are `long` or not; and why.
+    ///
+    /// ```
+    /// use bfree::solver::Preconditioning::{Automatic, BlockJacobi, Multigrid};
+    ///
+    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, true).0, Multigrid);
+    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, false), (BlockJacobi, "inertia dominates"));
+    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true), (BlockJacobi, "faster for so many particles and these functions"));
+    /// // What is asked for is used.
+    /// assert_eq!(Multigrid.chosen::<3>(1_000, false, false), (Multigrid, "it was asked for"));
+    /// ```
+    pub fn chosen<const D: usize>(self, particles: usize, splines: bool, long: bool) -> (Self, &'static str) {
+        let many = if splines { MANY_OF_SPLINES } else { MANY };
+        match self {
+            Self::Automatic if long && particles >= many[(D - 1).min(2)] => {
+                (Self::Multigrid, "many particles, and inertia does not dominate")
+            }
+            Self::Automatic if long => (Self::BlockJacobi, "faster for so many particles and these functions"),
+            Self::Automatic => (Self::BlockJacobi, "inertia dominates"),
+            asked => (asked, "it was asked for"),
+        }
+    }
+
     /// That preconditioner for `D` unknowns a node, prepared with nothing yet.
     ///
     /// ```
@@ -95,10 +125,21 @@ impl Preconditioning {
     /// ```
     pub fn anew<const D: usize>(self) -> Box<dyn Preconditioner> {
         match self {
-            Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
+            Self::Automatic | Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
             Self::Multigrid => Box::new(Multigrid::<D>::default()),
             Self::None => Box::new(Identity),
         }
+    }
+}
+
+impl Display for Preconditioning {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Automatic => "automatic",
+            Self::BlockJacobi => "diagonal blocks",
+            Self::Multigrid => "multigrid",
+            Self::None => "none",
+        })
     }
 }
 

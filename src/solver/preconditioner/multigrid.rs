@@ -1,20 +1,21 @@
 //! Multigrid on the background grid: one V-cycle as preconditioner.
 //!
 //! The finest level is the tangent itself, known by its product. Coarser ones are hat functions on grids of twice the spacing each, with the
-//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils. Motions go
-//! down by linear interpolation of nodal values, forces go up by its transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the
-//! same before and after, so that the whole is symmetric where the tangent is.
+//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils; second
+//! differences that something holds are held on each of them. Motions go down by linear interpolation of nodal values, forces go up by its
+//! transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the same before and after, so that the whole is symmetric where the
+//! tangent is.
 
 use super::{BlockJacobi, Preconditioner};
 use crate::solver::vector::{Entry, dot};
 use crate::solver::{LinearOperator, Linearization};
-use crate::tensor::{Tensor, Vector, inverse};
+use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use std::collections::HashMap;
 
 /// Degree of the smoothing polynomials, and the part of the spectrum they see: [λ/PART, λ].
-const DEGREE: usize = 3;
-const PART: f64 = 12.0;
+const DEGREE: usize = 5;
+const PART: f64 = 30.0;
 
 /// Products that estimate the largest eigenvalue λ of D⁻¹K, and what is added to the estimate, which is from below.
 const ESTIMATE: usize = 10;
@@ -24,14 +25,11 @@ const MARGIN: f64 = 1.15;
 const BOTTOM: usize = 400;
 const MOST: usize = 2000;
 
-/// The least share of a coarse cell that counts as filled: less of a body holds its nodes as if it were that much.
-const LEAST: f64 = 0.25;
-
 /// The middle of a stencil, and a neighbour that is not there.
 const MIDDLE: usize = 13;
 const NONE: u32 = u32::MAX;
 
-/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, and Σ_nodes w·B u. Lengths are in cells.
+/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, Σ_nodes w·B u, and bends. Lengths are in cells.
 #[derive(Clone, Debug, Default)]
 pub struct LocalForm {
     /// Cells along each axis; 0 along axes that do not exist.
@@ -50,8 +48,24 @@ pub struct LocalForm {
     pub filled: Vec<f64>,
     /// m
     pub masses: Vec<f64>,
+    /// Second differences that are held.
+    pub bends: Vec<Bend>,
     /// `A[i][k][j][l]` of ∂w_i/∂x_k and ∂u_j/∂x_l.
     pub tangents: Vec<f64>,
+}
+
+/// The energy ½ k |u_a − 2 u_b + u_c|² of three neighbours along an axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Bend {
+    /// a, b, c
+    pub nodes: [u32; 3],
+    /// k
+    pub stiffness: f64,
+}
+
+impl Bend {
+    /// The weights of a, b and c.
+    pub const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
 }
 
 /// One V-cycle, of levels made from the first tangent that is shown; smoothed by the present one.
@@ -76,6 +90,8 @@ struct Level<const D: usize> {
     /// The neighbours of each node, and the entries.
     neighbours: Vec<[u32; 27]>,
     entries: Vec<[Tensor<f64, D>; 27]>,
+    /// What a stencil does not reach: the outer two unknowns of bends, and their entry.
+    far: Vec<(usize, usize, f64)>,
     inverse: Vec<Tensor<f64, D>>,
     largest: f64,
 }
@@ -91,6 +107,10 @@ impl<const D: usize> LinearOperator for Level<D> {
                 }
             }
             y.copy_from_slice(sum.as_slice());
+        }
+        for &(a, c, entry) in &self.far {
+            y[a] += entry * x[c];
+            y[c] += entry * x[a];
         }
     }
 }
@@ -192,9 +212,10 @@ impl<const D: usize> Level<D> {
         for (cell, &at) in of_coarse.iter().enumerate() {
             level.add_cell(form, cell, &next, at, &numbers);
         }
+        level.add_bends(form, &mut next, &numbers);
         level.hold_empty();
         level.add_nodes(form, &mut next);
-        level.hold();
+        level.hold(&next.bends);
         next.prescribed.clone_from(&level.held);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
         (level, next)
@@ -243,7 +264,6 @@ impl<const D: usize> Level<D> {
         numbers: &HashMap<[u32; 3], u32>,
     ) {
         let (index, tiles) = (next.cells[at], D.pow(4));
-        let held_up = (LEAST / next.filled[at]).max(1.0);
         let local = |k: usize| (0.5 * form.centres[cell][k] - f64::from(index[k])).clamp(0.0, 1.0);
         let corner = |corner: usize| {
             let upper = |k: usize| corner >> k & 1 == 1;
@@ -263,10 +283,36 @@ impl<const D: usize> Level<D> {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
                     for (k, l) in (0..D).flat_map(|k| (0..D).map(move |l| (k, l))) {
                         let a_ikjl = tangent[((i * D + k) * D + j) * D + l];
-                        entry[(i, j)] += 0.25 * held_up * slope_a[k] * a_ikjl * slope_b[l];
+                        entry[(i, j)] += 0.25 * slope_a[k] * a_ikjl * slope_b[l];
                     }
                 }
-                (0..D).for_each(|i| entry[(i, i)] += held_up * form.masses[cell] * n_a * n_b);
+                (0..D).for_each(|i| entry[(i, i)] += form.masses[cell] * n_a * n_b);
+            }
+        }
+    }
+
+    /// Adds what holds second differences, as much as it would on this grid: none between coarse nodes, a half at them; k is as h^{D−2}.
+    fn add_bends(&mut self, form: &LocalForm, next: &mut LocalForm, numbers: &HashMap<[u32; 3], u32>) {
+        let mut places = HashMap::new();
+        for bend in &form.bends {
+            let [before, centre, _] = bend.nodes.map(|node| form.nodes[node as usize]);
+            let Some(axis) = (0..D).find(|&k| before[k] != centre[k] && centre[k] % 2 == 0) else { continue };
+            for &(centre, weight) in &self.above[bend.nodes[1] as usize] {
+                let mut ends = [next.nodes[centre as usize]; 2];
+                (ends[0][axis], ends[1][axis]) = (ends[0][axis] - 1, ends[1][axis] + 1);
+                let [Some(&before), Some(&after)] = ends.map(|end| numbers.get(&end)) else { continue };
+                let at = *places.entry((centre, axis)).or_insert_with(|| {
+                    next.bends.push(Bend { nodes: [before, centre, after], stiffness: 0.0 });
+                    next.bends.len() - 1
+                });
+                next.bends[at].stiffness += 0.5 * weight * bend.stiffness;
+            }
+        }
+        for bend in &next.bends {
+            let nodes = bend.nodes.map(|node| node as usize);
+            for (k, l) in [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2), (2, 1), (2, 2)] {
+                let entry = &mut self.entries[nodes[k]][place(next.nodes[nodes[k]], next.nodes[nodes[l]])];
+                *entry += scaled(&identity(), bend.stiffness * Bend::WEIGHTS[k] * Bend::WEIGHTS[l]);
             }
         }
     }
@@ -279,8 +325,13 @@ impl<const D: usize> Level<D> {
     }
 
     /// The identity's row and column where nothing moves; inverts the blocks.
-    fn hold(&mut self) {
-        let Self { entries, neighbours, held, inverse: inverses, .. } = self;
+    fn hold(&mut self, bends: &[Bend]) {
+        let Self { entries, neighbours, held, inverse: inverses, far, .. } = self;
+        let outer = bends.iter().flat_map(|bend| {
+            let [a, _, c] = bend.nodes.map(|node| node as usize * D);
+            (0..D).map(move |i| (a + i, c + i, bend.stiffness))
+        });
+        far.extend(outer.filter(|&(a, c, _)| !held[a] && !held[c]));
         for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
             for (entry, &mut other) in row.iter_mut().zip(neighbours) {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
@@ -295,13 +346,15 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// The whole matrix.
+    /// The whole matrix, column by column.
     fn assembled(&self) -> DMatrix<f64> {
-        let mut matrix = DMatrix::zeros(D * self.entries.len(), D * self.entries.len());
-        for (node, (row, neighbours)) in self.entries.iter().zip(&self.neighbours).enumerate() {
-            for (entry, &other) in row.iter().zip(neighbours).filter(|(_, other)| **other != NONE) {
-                matrix.view_mut((node * D, other as usize * D), (D, D)).copy_from(entry);
-            }
+        let size = D * self.entries.len();
+        let mut matrix = DMatrix::zeros(size, size);
+        let mut unit = vec![0.0; size];
+        for (k, mut column) in matrix.column_iter_mut().enumerate() {
+            unit[k] = 1.0;
+            self.apply(&unit, column.as_mut_slice());
+            unit[k] = 0.0;
         }
         matrix
     }
