@@ -127,6 +127,18 @@ pub const KNOWN: &[Known] = &[
         cells: &[short_effort(&["linear, D = 3", "eps = 0: momentum"], 1.1e-12)],
     },
     Known {
+        study: "robust",
+        what: "linear iterations with multigrid: the last refinement's over those before; 1.3 asked",
+        why: "Smoothing by diagonal blocks sees the checkerboards of wide functions poorly, and the more so the finer \
+              the grid; a filter of nodal values would mend it. The counts themselves keep to their bounds.",
+        since: "22 November 2026",
+        factor: 1.2,
+        cells: &[
+            full_effort(&["growth", "block", "3", "cubic"], 1.472),
+            full_effort(&["growth", "block", "2", "LME 1.4"], 1.326),
+        ],
+    },
+    Known {
         study: "tradeoff",
         what: "Newton's default tolerance of 1e-9 beside 1e-4, whose error is not larger: work of 1e-4 over that of \
                1e-9; 1 asked",
