@@ -6,6 +6,7 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
+use crate::shipped;
 use bfree::scene;
 use bfree::simulation::{Simulation, StepError};
 use bfree::solver::Preconditioning;
@@ -147,7 +148,43 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         cuts(name, &family, *effort, &mut others)?;
         materials(name, &family, &mut others)?;
     }
-    Ok(Outcome { reports: vec![refined, others], ..Outcome::default() })
+    Ok(Outcome { reports: vec![refined, others, elastica()?], ..Outcome::default() })
+}
+
+/// PL²/EI, u/L and w/L of the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J. Numer. Methods Eng. 17, 1981), reached in
+/// the tenths of the load that they are.
+const ELASTICA: [(u64, f64, f64); 4] =
+    [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (5, 0.38763, 0.71379), (10, 0.55500, 0.81061)];
+
+/// A beam of L/h = 20 shears and stretches, too: a percent is allowed.
+const BEAM: f64 = 0.01;
+
+/// The shipped scene, 8 cells deep, with what it says nothing about.
+fn elastica() -> Result<Report, StudyError> {
+    let mut report = Report::new("the elastica in ten load steps, by default settings", &["quantity", "PL²/EI"]);
+    let overrides = ["grid.spacing=0.125", "output.probes=[]"];
+    let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
+    let start = simulation.particles.by_id().position;
+    let last = start.iter().fold(0.0_f64, |last, x| last.max(x[0]));
+    let (length, distance) = (20.0, 2.0 * (20.0 - last));
+    for (load, along, down) in ELASTICA {
+        while simulation.clock.nominal_steps() < load {
+            simulation.advance()?;
+        }
+        let now = simulation.particles.by_id().position;
+        let mean = |x: f64| {
+            let at: Vec<_> = (0..now.len()).filter(|&p| (start[p][0] - x).abs() < 0.1 * distance).collect();
+            at.iter().map(|&p| now[p] - start[p]).sum::<Vector<f64, 2>>() / at.len() as f64
+        };
+        // The end is half a particle beyond the last ones.
+        let end = (mean(last) * 1.5 - mean(last - distance) * 0.5) / -length;
+        for (quantity, found, exact) in [("u/L", end[0], along), ("w/L", end[1], down)] {
+            let labels = [&format!("{quantity}: error over w/L")[..], &load.to_string()];
+            report.push(&labels, (found - exact).abs() / down, Bound::AtMost(BEAM));
+        }
+        report.push(&["load steps", &load.to_string()], simulation.clock.steps() as f64, Bound::AtMost(20.0));
+    }
+    Ok(report)
 }
 
 fn refinement<const D: usize>(
