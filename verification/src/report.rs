@@ -292,11 +292,14 @@ impl Report {
         self.cells.push(Cell { labels, value, bound, listed: None });
     }
 
-    /// Marks the cells whose labels begin with `labels` as known to fail, and says how many there are.
+    /// Marks the worst of the cells whose labels begin with `labels`, which may be several samples, as known to fail, and says how many
+    /// are marked.
     pub fn list_known(&mut self, labels: &[&str], listed: Listed) -> usize {
         let named =
             |cell: &&mut Cell| cell.labels.iter().map(String::as_str).take(labels.len()).eq(labels.iter().copied());
-        self.cells.iter_mut().filter(named).map(|cell| cell.listed = Some(listed)).count()
+        let used = |cell: &&mut Cell| cell.bound.used(cell.value);
+        let worst = self.cells.iter_mut().filter(named).max_by(|a, b| used(a).total_cmp(&used(b)));
+        worst.map(|cell| cell.listed = Some(listed)).into_iter().count()
     }
 
     /// Adds a cell that could not be measured, and why: it fails.
