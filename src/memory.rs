@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-/// Bytes that can still be had without swapping: what Linux calls available, or what is left of the control group's limit if that
-/// is less. `None` where the system does not say.
+/// Bytes that can still be had without swapping: what Linux calls available, or what is left of the limits of the control group and of the
+/// shell (`ulimit -v`) if that is less. `None` where the system does not say.
 ///
 /// ```
 /// assert!(bfree::memory::available().is_none_or(|bytes| bytes > 0));
@@ -12,7 +12,17 @@ use std::path::Path;
 pub fn available() -> Option<u64> {
     let of_machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| meminfo(&text));
     let of_group = limit_left(Path::new("/sys/fs/cgroup"));
-    [of_machine, of_group].into_iter().flatten().min()
+    let read = |path| fs::read_to_string(path).ok();
+    let of_shell = read("/proc/self/limits").zip(read("/proc/self/status")).and_then(|(a, b)| address_space(&a, &b));
+    [of_machine, of_group, of_shell].into_iter().flatten().min()
+}
+
+/// What `Max address space` of /proc/self/limits leaves of `VmSize` of /proc/self/status, in bytes.
+fn address_space(limits: &str, status: &str) -> Option<u64> {
+    let value =
+        |text: &str, key| text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok();
+    let (limit, used): (u64, u64) = (value(limits, "Max address space")?, value(status, "VmSize:")?);
+    Some(limit.saturating_sub(used.saturating_mul(1024)))
 }
 
 /// `MemAvailable:  123 kB` of /proc/meminfo, in bytes.
@@ -42,6 +52,9 @@ mod tests {
         assert_eq!(meminfo(text), Some(23_489_008 * 1024));
         assert_eq!(meminfo("MemTotal: 5 kB\n"), None);
         assert_eq!(meminfo("MemAvailable: many kB\n"), None);
+        let limits = "Limit                     Soft Limit           Hard Limit           Units\nMax address space         409600000            unlimited            bytes\n";
+        assert_eq!(address_space(limits, "Name: x\nVmSize:\t  100000 kB\n"), Some(409_600_000 - 102_400_000));
+        assert_eq!(address_space("Max address space  unlimited  unlimited  bytes\n", "VmSize: 1 kB\n"), None);
     }
 
     #[test]

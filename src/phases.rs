@@ -41,10 +41,17 @@ impl Phase {
 /// let seconds = watch.seconds();
 /// assert!(sum > 9.0 && seconds[Phase::Newton as usize] > 0.0 && seconds[Phase::Projection as usize] == 0.0);
 /// assert!(seconds.iter().sum::<f64>() <= start.elapsed().as_secs_f64());
+/// // A step that fails after the projection has failed in Newton's method.
+/// let mut watch = Stopwatch::start();
+/// watch.lap(Phase::Projection, 2);
+/// watch.give_up();
+/// assert!(watch.seconds()[Phase::Newton as usize] > 0.0);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     last: (Instant, u64),
+    /// Phases that are over.
+    over: usize,
     seconds: [f64; Phase::ALL.len()],
     passes: [u64; Phase::ALL.len()],
 }
@@ -52,7 +59,7 @@ pub struct Stopwatch {
 impl Stopwatch {
     /// Starts now.
     pub fn start() -> Self {
-        Self { last: (Instant::now(), 0), seconds: [0.0; Phase::ALL.len()], passes: [0; Phase::ALL.len()] }
+        Self { last: (Instant::now(), 0), over: 0, seconds: [0.0; Phase::ALL.len()], passes: [0; Phase::ALL.len()] }
     }
 
     /// Books the time since the last lap to `phase`, and the passes over the particles, of which there were `passes` so far.
@@ -61,6 +68,14 @@ impl Stopwatch {
         self.seconds[phase as usize] += (now - self.last.0).as_secs_f64();
         self.passes[phase as usize] += passes - self.last.1;
         self.last = (now, passes);
+        self.over = phase as usize + 1;
+    }
+
+    /// Books the time since the last lap to the phase that then began: it was not brought to its end.
+    pub fn give_up(&mut self) {
+        if let Some(&(phase, _)) = Phase::ALL.get(self.over) {
+            self.lap(phase, self.last.1);
+        }
     }
 
     /// Seconds booked to each of [`Phase::ALL`].

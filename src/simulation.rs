@@ -180,17 +180,33 @@ pub struct FailedAttempt {
     pub projection_iterations: usize,
     /// What Newton's method did; empty if it was not reached.
     pub newton: NewtonHistory,
+    /// Seconds, by phase.
+    pub seconds: Stopwatch,
+}
+
+/// What an attempt has spent so far.
+struct Spent {
+    watch: Stopwatch,
+    projection_iterations: usize,
+}
+
+impl Spent {
+    fn nothing() -> Self {
+        Self { watch: Stopwatch::start(), projection_iterations: 0 }
+    }
 }
 
 impl FailedAttempt {
-    fn new(dt: f64, projection_iterations: usize, error: &StepError) -> Self {
+    fn new(dt: f64, mut spent: Spent, error: &StepError) -> Self {
+        spent.watch.give_up();
         let newton = match error {
             StepError::Newton(source) | StepError::Loose { source, .. } => (*source.history).clone(),
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
         let inaccurate = matches!(error, StepError::Inaccurate { .. });
-        Self { dt, inaccurate, why: causes::on_one_line(error), projection_iterations, newton }
+        let Spent { watch: seconds, projection_iterations } = spent;
+        Self { dt, inaccurate, why: causes::on_one_line(error), projection_iterations, newton, seconds }
     }
 }
 
@@ -354,15 +370,15 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Errors
     /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
-        self.attempt(&mut 0)
+        self.attempt(&mut Spent::nothing())
     }
 
-    /// As [`Self::step`]; a step that fails leaves its iterations of the projection, too.
-    fn attempt(&mut self, projection_iterations: &mut usize) -> Result<StepReport<D>, StepError> {
+    /// As [`Self::step`]; a step that fails leaves what it has spent.
+    fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.remember(&self.bodies);
         let (t, dt) = (self.clock.time(), self.clock.step());
         let scheme = &*self.settings.scheme;
-        let mut watch = Stopwatch::start();
+        let watch = &mut spent.watch;
 
         let precision = self.settings.newton.precision;
         let Particles { position, id, .. } = &self.particles;
@@ -373,7 +389,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
         let projected = self.project(&supports)?;
-        *projection_iterations = projected.iterations;
+        spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
 
@@ -423,10 +439,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             dt,
             active_nodes,
             newton,
-            projection_iterations: *projection_iterations,
+            projection_iterations: projected.iterations,
             reactions,
             error,
-            seconds: watch,
+            seconds: *watch,
             failed: Vec::new(),
         })
     }
@@ -454,12 +470,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut failed = Vec::new();
         loop {
             let (time, dt) = (self.clock.time(), self.clock.step());
-            let mut projection_iterations = 0;
-            let cause = match self.attempt(&mut projection_iterations) {
+            let mut spent = Spent::nothing();
+            let cause = match self.attempt(&mut spent) {
                 Ok(report) => return Ok(StepReport { failed, ..report }),
                 Err(cause) => cause,
             };
-            failed.push(FailedAttempt::new(dt, projection_iterations, &cause));
+            failed.push(FailedAttempt::new(dt, spent, &cause));
             let mended = match cause {
                 StepError::Newton(_) | StepError::Inaccurate { .. } => true,
                 // A step too long to see a wall.

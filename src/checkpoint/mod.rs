@@ -345,15 +345,24 @@ pub struct Unfinished {
 /// The run in `directory` that was killed or interrupted, if there is one with a checkpoint that can be read.
 pub fn unfinished(directory: &Path) -> Option<Unfinished> {
     // A run that was killed wrote no report.
-    let ended = std::fs::read(directory.join("report.json")).is_ok_and(|text| {
-        serde_json::from_slice::<Value>(&text).is_ok_and(|report| report["outcome"] != "interrupted")
-    });
+    let over = outcome(directory).is_some_and(|outcome| outcome != "interrupted");
     let readable = NAMES.iter().filter_map(|name| {
         let path = directory.join(name);
         let (content, _) = read(&path).ok()?;
         Some(Unfinished { path, steps: content.clock.steps() })
     });
-    readable.max_by_key(|one| one.steps).filter(|_| !ended)
+    readable.max_by_key(|one| one.steps).filter(|_| !over)
+}
+
+/// Whether `directory` holds a run that came to its end.
+pub fn ended(directory: &Path) -> bool {
+    outcome(directory).is_some_and(|outcome| outcome == "finished")
+}
+
+/// What the report of the run in `directory` says of its end.
+fn outcome(directory: &Path) -> Option<Value> {
+    let text = std::fs::read(directory.join("report.json")).ok()?;
+    Some(serde_json::from_slice::<Value>(&text).ok()?["outcome"].take())
 }
 
 /// Removes the checkpoints of an earlier run: a new one in the same directory must not be continued from them.

@@ -114,6 +114,9 @@ impl Lame {
     }
 }
 
+/// Λ/G from which on a stress has less than four digits of G.
+const APART: f64 = 1e12;
+
 /// The constants of an isotropic law: exactly one of the pairs `lambda` and `shear`, `young` and `poisson`, `bulk` and
 /// `shear`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -158,7 +161,9 @@ impl LameParameters {
         let given: Vec<(&str, f64)> = keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect();
         let mut sensible = true;
         for (key, value) in &given {
-            sensible &= problems.number(&format!("{path}.{key}"), *value);
+            let (path, modulus) = (format!("{path}.{key}"), matches!(*key, "shear" | "young" | "bulk"));
+            sensible &=
+                if modulus && *value > 0.0 { problems.positive(&path, *value) } else { problems.number(&path, *value) };
         }
         let lame = match (lambda, shear, young, poisson, bulk) {
             (Some(lambda), Some(shear), None, None, None) => Lame::new(lambda, shear),
@@ -176,9 +181,10 @@ impl LameParameters {
         let (key, value, allowed) = match lame {
             _ if !sensible => return None,
             Ok(lame) => {
-                let finite = lame.lambda.is_finite() && lame.shear.is_finite();
-                problems.require(finite, path, "a solid with infinite moduli", "the moduli must be finite");
-                return finite.then_some(lame);
+                let ratio = lame.lambda / lame.shear;
+                let allowed = format_args!("the smaller modulus must not be lost in the larger one: at most {APART:e}");
+                problems.require(ratio <= APART, path, format_args!("lambda / shear = {}", Number(ratio)), allowed);
+                return (ratio <= APART).then_some(lame);
             }
             Err(LameError::Shear(shear)) => match young {
                 Some(young) => {

@@ -1,7 +1,7 @@
 //! Tables of comma-separated values with a header line, that grow row by row.
 
 use super::OutputError;
-use super::files::Stream;
+use super::files::{Stream, Written};
 use std::collections::HashSet;
 use std::fmt::Write;
 use std::fs::File;
@@ -17,7 +17,7 @@ impl Table {
     ///
     /// # Errors
     /// The system refuses, two columns have the same name, or the file to be continued has others.
-    pub(crate) fn open(path: PathBuf, columns: &[String], kept: Option<u64>) -> Result<Self, OutputError> {
+    pub(crate) fn open(path: PathBuf, columns: &[String], kept: Option<Written>) -> Result<Self, OutputError> {
         let mut seen = HashSet::new();
         if let Some(column) = columns.iter().find(|&column| !seen.insert(column)) {
             return Err(OutputError::DuplicateColumn { path, column: column.clone() });

@@ -1,8 +1,10 @@
 //! Two ways to put a file on disk: all at once or not at all, and line by line as it grows.
 
 use super::OutputError;
+use crc32fast::Hasher;
+use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
@@ -38,20 +40,55 @@ pub(crate) fn write_atomically(
     write().map_err(OutputError::io("write", path))
 }
 
+/// What a growing file held at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Written {
+    bytes: u64,
+    crc32: u32,
+}
+
+impl Written {
+    /// Whether the file at `path` begins with it.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), OutputError> {
+        let mut sum = Hasher::new();
+        let read = || -> std::io::Result<u64> {
+            let (mut file, mut bytes) = (BufReader::new(File::open(path)?).take(self.bytes), 0);
+            loop {
+                let part = file.fill_buf()?;
+                let length = part.len();
+                if length == 0 {
+                    return Ok(bytes);
+                }
+                sum.update(part);
+                file.consume(length);
+                bytes += length as u64;
+            }
+        };
+        let bytes = { read }().map_err(OutputError::io("continue", path))?;
+        if bytes < self.bytes {
+            return Err(OutputError::Shorter { path: path.to_owned() });
+        }
+        if sum.finalize() == self.crc32 { Ok(()) } else { Err(OutputError::Changed { path: path.to_owned() }) }
+    }
+}
+
 /// A text file that grows line by line and is flushed every [`FLUSH_INTERVAL`], on [`Stream::flush`] and when dropped.
 #[derive(Debug)]
 pub(crate) struct Stream {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Bytes so far.
+    /// Of all bytes so far.
+    sum: Hasher,
     length: u64,
     flushed: Instant,
 }
 
 impl Stream {
-    /// Creates or empties the file; or, to continue it, keeps its first `kept` bytes, which must be there.
-    pub(crate) fn open(path: PathBuf, kept: Option<u64>) -> Result<Self, OutputError> {
-        let length = kept.unwrap_or(0);
+    /// Creates or empties the file; or, to continue it, keeps what is `kept`, which must be there.
+    pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
+        let Written { bytes: length, crc32 } = kept.unwrap_or(Written { bytes: 0, crc32: 0 });
+        let sum = Hasher::new_with_initial_len(crc32, length);
         let open = || -> std::io::Result<File> {
             let mut file = OpenOptions::new().write(true).create(kept.is_none()).truncate(false).open(&path)?;
             file.set_len(length)?;
@@ -60,7 +97,7 @@ impl Stream {
         };
         let action = if kept.is_some() { "continue" } else { "create" };
         let file = open().map_err(OutputError::io(action, &path))?;
-        Ok(Self { path, writer: BufWriter::new(file), length, flushed: Instant::now() })
+        Ok(Self { path, writer: BufWriter::new(file), sum, length, flushed: Instant::now() })
     }
 
     /// Where it is.
@@ -71,6 +108,8 @@ impl Stream {
     /// Appends a line.
     pub(crate) fn line(&mut self, line: &str) -> Result<(), OutputError> {
         writeln!(self.writer, "{line}").map_err(OutputError::io("write", &self.path))?;
+        self.sum.update(line.as_bytes());
+        self.sum.update(b"\n");
         self.length += line.len() as u64 + 1;
         if self.flushed.elapsed() >= FLUSH_INTERVAL { self.flush() } else { Ok(()) }
     }
@@ -81,12 +120,12 @@ impl Stream {
         self.writer.flush().map_err(OutputError::io("write", &self.path))
     }
 
-    /// Puts everything on the disk; the name of the file, and its bytes.
-    pub(crate) fn mark(&mut self) -> Result<(String, u64), OutputError> {
+    /// Puts everything on the disk; the name of the file, and what it holds.
+    pub(crate) fn mark(&mut self) -> Result<(String, Written), OutputError> {
         self.flush()?;
         self.writer.get_ref().sync_data().map_err(OutputError::io("write", &self.path))?;
         let name = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok((name, self.length))
+        Ok((name, Written { bytes: self.length, crc32: self.sum.clone().finalize() }))
     }
 }
 

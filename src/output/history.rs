@@ -1,6 +1,7 @@
 //! `history.csv`: energies, momentum and iterations of every step.
 
 use super::csv::{Row, Table};
+use super::files::Written;
 use super::{OutputError, Reference};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -97,7 +98,7 @@ impl History {
     ///
     /// # Errors
     /// The system refuses, or the file to be continued has other columns.
-    pub fn open(path: PathBuf, dimension: usize, damped: bool, kept: Option<u64>) -> Result<Self, OutputError> {
+    pub fn open(path: PathBuf, dimension: usize, damped: bool, kept: Option<Written>) -> Result<Self, OutputError> {
         let fixed = ["step", "time", "dt", "kinetic", "strain", "external"];
         let mut columns: Vec<String> = fixed.map(str::to_owned).into();
         columns.extend(damped.then(|| "dissipated".into()));

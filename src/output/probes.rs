@@ -1,6 +1,7 @@
 //! `probes.csv`: fields at chosen particles or points against time.
 
 use super::csv::{Row, Table};
+use super::files::Written;
 use super::{OutputError, Reference};
 use crate::field::Field;
 use crate::material::Law;
@@ -92,7 +93,7 @@ pub(crate) struct Probes<const D: usize> {
 
 impl<const D: usize> Probes<D> {
     /// Creates the file with its header; or continues one whose first `kept` bytes are good.
-    pub(crate) fn open(path: PathBuf, probes: Vec<Probe<D>>, kept: Option<u64>) -> Result<Self, OutputError> {
+    pub(crate) fn open(path: PathBuf, probes: Vec<Probe<D>>, kept: Option<Written>) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for probe in &probes {
             columns.extend(probe.field.columns(&probe.name, D));

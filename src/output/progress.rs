@@ -69,8 +69,8 @@ pub struct Shown {
     pub newton: usize,
     /// Krylov iterations of the last step.
     pub krylov: usize,
-    /// The balance of energy: what was gained (> 0) or lost so far.
-    pub balance: f64,
+    /// The balance of energy, with inertia: what was gained (> 0) or lost so far.
+    pub balance: Option<f64>,
 }
 
 /// For whom progress is shown.
@@ -112,7 +112,7 @@ enum Display {
 /// for step in 1..=10 {
 ///     energy *= 1.01;
 ///     let balance = energy - 1.0;
-///     progress.show(0.1 * step as f64, Shown { step, newton: 2, krylov: 12, balance });
+///     progress.show(0.1 * step as f64, Shown { step, newton: 2, krylov: 12, balance: Some(balance) });
 /// }
 /// assert!(energy > 1.1);
 /// let message = format!("{energy} of 1");
@@ -166,9 +166,8 @@ impl Progress {
         let (left, end) = (self.pace.left(self.end), self.end);
         let text = || {
             let left = left.map_or_else(|| "unknown".to_owned(), readable);
-            format!(
-                "t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, balance {balance:+.1e}, {left} left"
-            )
+            let balance = balance.map_or_else(String::new, |balance| format!("balance {balance:+.1e}, "));
+            format!("t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, {balance}{left} left")
         };
         match &mut self.display {
             Display::Bar(bar) => {
@@ -182,7 +181,7 @@ impl Progress {
             Display::Json { last, held } => {
                 let text = json!({
                     "event": "step", "step": step, "time": Number(time), "end": Number(end), "newton": newton, "krylov": krylov,
-                    "balance": Number(balance), "seconds": elapsed, "seconds_left": left,
+                    "balance": balance.map(Number), "seconds": elapsed, "seconds_left": left,
                 })
                 .to_string();
                 if last.is_none_or(|last| last.elapsed() >= JSON_INTERVAL) {

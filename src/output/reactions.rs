@@ -2,6 +2,7 @@
 
 use super::OutputError;
 use super::csv::{Row, Table};
+use super::files::Written;
 use super::history::AXES;
 use crate::mechanics::loads::Loads;
 use crate::tensor::Vector;
@@ -17,7 +18,7 @@ impl Reactions {
     pub(crate) fn open<const D: usize>(
         path: PathBuf,
         loads: &Loads<D>,
-        kept: Option<u64>,
+        kept: Option<Written>,
     ) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for condition in &loads.prescribed {

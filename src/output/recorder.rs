@@ -1,6 +1,6 @@
 //! Everything that is written about a run, in one place.
 
-use super::files::{Stream, TEMPORARY};
+use super::files::{Stream, TEMPORARY, Written};
 use super::history::{Cost, Energies, History};
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
@@ -96,13 +96,18 @@ pub struct Recorder<const D: usize> {
 /// // A file that has lost some of what it had cannot be continued.
 /// std::fs::write(&history, "step\n")?;
 /// assert!(mark.check(folder.path()).is_err());
+/// // Nor one in which a digit is another.
+/// let mut text = std::fs::read(&history)?;
+/// text.resize(length as usize, b'7');
+/// std::fs::write(&history, text)?;
+/// assert!(mark.check(folder.path()).unwrap_err().to_string().contains("not what it was"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
-    /// Bytes of each file that grows.
-    lengths: BTreeMap<String, u64>,
+    /// What each file held that grows.
+    files: BTreeMap<String, Written>,
     snapshots: Option<SnapshotMark>,
     watch: Watch,
     counts: Counts,
@@ -113,15 +118,9 @@ impl Mark {
     /// Whether the files in `directory` still hold what they held then.
     ///
     /// # Errors
-    /// One of them is gone, or shorter.
+    /// One of them is gone, shorter, or another.
     pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
-        for (name, &length) in &self.lengths {
-            let path = directory.join(name);
-            let found = std::fs::metadata(&path).map_err(OutputError::io("continue", &path))?.len();
-            if found < length {
-                return Err(OutputError::Shorter { path });
-            }
-        }
+        self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
     }
 }
@@ -171,7 +170,7 @@ impl<const D: usize> Recorder<D> {
         remove_later_files(&directory, mark)?;
         let at = |name: &str| directory.join(name);
         // A file that the mark does not know begins anew.
-        let kept = |name: &str| mark.and_then(|mark| mark.lengths.get(name).copied());
+        let kept = |name: &str| mark.and_then(|mark| mark.files.get(name).copied());
         let loads = &simulation.loads;
         let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
         let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
@@ -207,10 +206,10 @@ impl<const D: usize> Recorder<D> {
     /// The system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
-        let lengths = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
+        let files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
         let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
         let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
-        Ok(Mark { lengths, snapshots, watch, counts, seconds })
+        Ok(Mark { files, snapshots, watch, counts, seconds })
     }
 
     fn seconds_so_far(&self) -> Seconds {
@@ -244,10 +243,12 @@ impl<const D: usize> Recorder<D> {
             [limited + one.counts.krylov_limited, stagnated + one.counts.krylov_stagnated]
         });
         let krylov_limit = simulation.settings.newton.max_krylov_iterations;
+        let moves = simulation.settings.scheme.has_inertia();
         let seen = Watched {
             time,
             step: number,
             energies,
+            moves,
             cost,
             failed,
             error,
@@ -258,7 +259,7 @@ impl<const D: usize> Recorder<D> {
         };
         self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
         let Cost { newton, krylov, .. } = cost;
-        self.progress.show(time, Shown { step: number, newton, krylov, balance: energies.balance });
+        self.progress.show(time, Shown { step: number, newton, krylov, balance: moves.then_some(energies.balance) });
         Ok(())
     }
 
@@ -275,6 +276,7 @@ impl<const D: usize> Recorder<D> {
     ) -> Result<Summary, OutputError> {
         if let Outcome::Failed(error) = outcome {
             self.counts.add_failed(&error.failed);
+            self.seconds.add_failed(&error.failed);
         }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write(simulation, &self.reference)?;
@@ -288,6 +290,7 @@ impl<const D: usize> Recorder<D> {
         let particles = &simulation.particles;
         Ok(Summary {
             time,
+            moves: simulation.settings.scheme.has_inertia(),
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
             krylov: simulation.krylov().0,
@@ -330,9 +333,9 @@ fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), Outpu
     let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
     let continued = |name: &str| match name {
         SERIES => mark.is_some(),
-        _ => mark.is_some_and(|mark| mark.lengths.contains_key(name)),
+        _ => mark.is_some_and(|mark| mark.files.contains_key(name)),
     };
-    let own = ["reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
+    let own = ["history.csv", "reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
     let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
     for entry in entries {
         let entry = entry.map_err(OutputError::io("read", directory))?;

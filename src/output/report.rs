@@ -1,11 +1,11 @@
 //! `report.json`: what was asked for, how it ended, what it cost, and what Newton's method did in every step.
 
 use super::OutputError;
-use super::files::{Stream, write_atomically};
+use super::files::{Stream, Written, write_atomically};
 use super::history::Energies;
 use super::warnings::Warning;
 use crate::causes;
-use crate::phases::Phase;
+use crate::phases::{Phase, Stopwatch};
 use crate::simulation::{AdvanceError, FailedAttempt, StepReport};
 use crate::solver::NewtonHistory;
 use serde::{Deserialize, Serialize, Serializer};
@@ -55,7 +55,8 @@ impl Outcome<'_> {
 /// let newton = step.newton.history.clone();
 /// let before = counts.residual_evaluations;
 /// let why = "no equilibrium was found".into();
-/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton }]);
+/// let seconds = bfree::phases::Stopwatch::start();
+/// counts.add_failed(&[FailedAttempt { dt: 0.05, inaccurate: false, why, projection_iterations: 7, newton, seconds }]);
 /// assert_eq!((counts.steps, counts.failed_attempts), (2, 1));
 /// assert_eq!(counts.residual_evaluations, before + step.newton.history.counts.residuals as u64);
 /// assert_eq!(counts.projection_iterations, 7); // none by the steps, whose mass is lumped
@@ -73,6 +74,10 @@ pub struct Counts {
     /// Attempts at a step that failed, or erred more than the tolerance allows: it was repeated with half of its length, or the run
     /// ended.
     pub failed_attempts: u64,
+    /// Of the iterations, those of these attempts.
+    pub failed_newton_iterations: u64,
+    /// Likewise.
+    pub failed_krylov_iterations: u64,
     /// Passes over all particles, of steps that succeeded.
     pub particle_passes: u64,
     /// Newton iterations.
@@ -113,6 +118,8 @@ impl Counts {
         self.failed_attempts += attempts.len() as u64;
         for attempt in attempts {
             self.projection_iterations += attempt.projection_iterations as u64;
+            self.failed_newton_iterations += attempt.newton.iterations.len() as u64;
+            self.failed_krylov_iterations += attempt.newton.counts.krylov_iterations as u64;
             self.add_newton(&attempt.newton);
         }
     }
@@ -155,9 +162,17 @@ pub struct Seconds {
 impl Seconds {
     /// Adds the phases of a step.
     pub fn add<const D: usize>(&mut self, step: &StepReport<D>) {
-        for (sum, seconds) in self.phases.iter_mut().zip(step.seconds.seconds()) {
-            *sum += seconds;
-        }
+        self.add_phases(&step.seconds);
+        self.add_failed(&step.failed);
+    }
+
+    /// Adds the phases of attempts that failed.
+    pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
+        attempts.iter().for_each(|attempt| self.add_phases(&attempt.seconds));
+    }
+
+    fn add_phases(&mut self, watch: &Stopwatch) {
+        self.phases.iter_mut().zip(watch.seconds()).for_each(|(sum, seconds)| *sum += seconds);
     }
 
     /// The phases by name, and what is in none of them.
@@ -243,7 +258,7 @@ pub(crate) struct NewtonLog(pub(crate) Stream);
 
 impl NewtonLog {
     /// Creates the file, or continues one whose first `kept` bytes are good.
-    pub(crate) fn open(path: PathBuf, kept: Option<u64>) -> Result<Self, OutputError> {
+    pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
         Stream::open(path, kept).map(Self)
     }
 

@@ -36,11 +36,20 @@ pub(crate) struct SnapshotMark {
     passed: Option<f64>,
 }
 
+/// The file of a snapshot.
+fn name(number: usize) -> String {
+    format!("particles_{number:06}.vtu")
+}
+
 impl SnapshotMark {
     /// Whether the series in `directory` still holds all of them.
     pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         // Nothing is written before the first snapshot.
-        if self.written > 0 { first_entries(&directory.join(SERIES), self.written).map(|_| ()) } else { Ok(()) }
+        if self.written > 0 {
+            first_entries(&directory.join(SERIES), self.written)?;
+        }
+        let gone = (0..self.written).map(|number| directory.join(name(number))).find(|path| !path.is_file());
+        gone.map_or(Ok(()), |path| Err(OutputError::Gone { path }))
     }
 
     /// Whether a file of this name is a snapshot, and one written later.
@@ -104,7 +113,7 @@ impl Snapshots {
         if self.mark.last == Some(step) {
             return Ok(());
         }
-        let file = format!("particles_{:06}.vtu", self.mark.written);
+        let file = name(self.mark.written);
         snapshot(simulation, reference, &self.fields)?.write(&self.directory.join(&file))?;
         self.series.push(simulation.clock.time(), &file)?;
         self.mark.written += 1;

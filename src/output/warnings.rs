@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Energy created, as a part of the largest energy so far, above which there is a warning.
 const CREATED: f64 = 0.01;
 
+/// Energy lost, likewise: an impact of the paper's bodies, a few cells wide, takes a fifth.
+const LOST: f64 = 0.3;
+
 /// Steps whose mean is what iterations usually are.
 const MEMORY: u64 = 50;
 
@@ -21,6 +24,8 @@ const CLIMB: (f64, f64) = (5.0, 100.0);
 pub enum Kind {
     /// The balance of energy is positive.
     EnergyCreated,
+    /// With inertia, the balance of energy is far below zero.
+    EnergyLost,
     /// A step was taken with less than its nominal length, because a longer one failed.
     StepHalved,
     /// The local error of a step is above the tolerance, and it could not be halved.
@@ -68,6 +73,8 @@ pub(crate) struct Watched {
     pub time: f64,
     pub step: u64,
     pub energies: Energies,
+    /// Whether there is inertia: load steps take work from loads that are there at once.
+    pub moves: bool,
     pub cost: Cost,
     /// Attempts before it that failed for another reason than their error.
     pub failed: usize,
@@ -101,6 +108,15 @@ impl Watch {
             let part = 100.0 * balance / self.most_energy;
             self.warn(step, Kind::EnergyCreated, || {
                 format!("energy was created: the balance is {balance:+.3e}, {part:.1} % of the most energy so far")
+            });
+        }
+        if step.moves && -balance > LOST * self.most_energy {
+            let part = -100.0 * balance / self.most_energy;
+            self.warn(step, Kind::EnergyLost, || {
+                format!(
+                    "energy was lost, beyond what damping took: the balance is {balance:+.3e}, {part:.1} % of the most energy so far; \
+                     shorten time.step or grid.spacing, or tighten time.adaptive.tolerance"
+                )
             });
         }
         if failed > 0 {
@@ -168,6 +184,7 @@ mod tests {
             time: 0.1 * number as f64,
             step: number,
             energies,
+            moves: true,
             cost,
             failed: 0,
             error: None,
@@ -190,6 +207,9 @@ mod tests {
         assert_eq!((warning.kind, warning.step, warning.time), (Kind::EnergyCreated, 21, 2.1));
         assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
         assert!(watch.see(&balance(3.0)).is_empty(), "once");
+        assert!(watch.see(&balance(-1.19)).is_empty(), "30 % of 4 are not reached");
+        assert!(watch.see(&Watched { moves: false, ..balance(-1.3) }).is_empty(), "without inertia");
+        assert!(watch.see(&balance(-1.3)).iter().any(|warning| warning.message.contains("-1.300e0, 32.5 %")));
         let halved = Watched { failed: 2, ..step(22) };
         assert!(watch.see(&halved).iter().any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1")));
         let inaccurate = Watched { error: Some((2e-3, 1e-3)), ..step(22) };
@@ -199,7 +219,7 @@ mod tests {
         assert!(watch.see(&newton).iter().any(|warning| warning.message.contains("16 of 30")));
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
-        // 27 steps of 30 before, and that of 150
+        // 30 steps of 30 before, and that of 150
         assert!(watch.see(&krylov(180)).iter().any(|warning| warning.message.contains("180 iterations in a step; 34")));
         let limited = Watched { limited: 2, ..step(25) };
         assert!(watch.see(&limited).iter().any(
@@ -208,7 +228,7 @@ mod tests {
         let stagnated = Watched { stagnated: 3, ..step(26) };
         assert!(watch.see(&stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
         assert!(watch.see(&stagnated).is_empty() && watch.see(&limited).is_empty(), "once");
-        assert_eq!(watch.warnings().len(), 7);
+        assert_eq!(watch.warnings().len(), 8);
         // what it knows survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);

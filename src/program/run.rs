@@ -12,6 +12,10 @@ use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
 use bfree::simulation::Simulation;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::flag;
+use std::fs::{File, TryLockError, create_dir_all};
+use std::io::ErrorKind;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -41,7 +45,7 @@ pub struct Run {
     /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
     #[arg(long)]
     restart: bool,
-    /// Begin anew in a directory that holds a run which was killed or interrupted, and lose that run.
+    /// Begin anew in a directory that holds a run, and lose that run.
     #[arg(long, conflicts_with = "restart")]
     discard: bool,
     /// Draw the results at the end, as `bfree plot` does.
@@ -76,15 +80,33 @@ enum Form {
     Json,
 }
 
-/// A run that could be continued is in the way.
+/// Another run is in the way.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "{} holds a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, \
-     or write elsewhere by --out", directory.display(), found.steps, found.path.display()
-)]
+#[error("{} holds {why}", directory.display())]
 struct WouldBeLost {
     directory: PathBuf,
-    found: Unfinished,
+    why: Lost,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum Lost {
+    #[error(
+        "a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, or write \
+         elsewhere by --out", .0.steps, .0.path.display()
+    )]
+    Unfinished(Unfinished),
+    #[error("the results of a run: give them up by --discard, or write elsewhere by --out")]
+    Ended,
+    #[error("a run that another program is just writing: write elsewhere by --out")]
+    Alive,
+}
+
+/// No place for results.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot create the directory {}", directory.display())]
+struct Unmade {
+    directory: PathBuf,
+    source: std::io::Error,
 }
 
 impl Run {
@@ -150,15 +172,18 @@ impl Run {
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
         let reference = Reference::of(&simulation);
+        let _claim = self.claim(&directory)?;
         let restored = match self.restart {
             true => Some(self.restore(&directory, &identity, &mut simulation)?),
             false => self.begin(&directory).map(|()| None)?,
         };
         let mut recorder = match &restored {
-            Some(restored) => Recorder::resume(output, &simulation, reference, &restored.mark),
-            None => Recorder::start(output, &simulation, reference),
-        }
-        .map_err(Failure::run)?;
+            // What cannot be continued is left as it is.
+            Some(restored) => {
+                Recorder::resume(output, &simulation, reference, &restored.mark).map_err(Failure::scene)?
+            }
+            None => Recorder::start(output, &simulation, reference).map_err(Failure::run)?,
+        };
         let mut checkpoints = scene.output.checkpoint.map(|every| {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
@@ -234,9 +259,27 @@ impl Run {
 
     /// Makes room for a new run; one that could be continued is lost only on request.
     fn begin(&self, directory: &Path) -> Result<(), Failure> {
+        let lost = |why| Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why }));
         match checkpoint::unfinished(directory) {
-            Some(found) if !self.discard => Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), found })),
+            Some(found) if !self.discard => lost(Lost::Unfinished(found)),
+            None if !self.discard && checkpoint::ended(directory) => lost(Lost::Ended),
             _ => checkpoint::forget(directory).map_err(Failure::run),
+        }
+    }
+
+    /// Keeps other runs out of the directory until what is returned is dropped, where the file system knows how.
+    fn claim(&self, directory: &Path) -> Result<Option<File>, Failure> {
+        if !self.restart {
+            let not_there = directory.exists() && !directory.is_dir();
+            let made = if not_there { Err(ErrorKind::NotADirectory.into()) } else { create_dir_all(directory) };
+            made.map_err(|source| Failure::run(Unmade { directory: directory.to_owned(), source }))?;
+        }
+        let Ok(handle) = File::open(directory) else { return Ok(None) };
+        match handle.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why: Lost::Alive }))
+            }
+            _ => Ok(Some(handle)),
         }
     }
 
@@ -291,14 +334,14 @@ impl Run {
     }
 }
 
-/// Set by Ctrl-C: the run then ends after the current step. A second Ctrl-C ends it at once.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+/// Set by Ctrl-C and by what batch systems send: the run then ends after the current step. A second signal ends it at once.
+fn stop_on_interrupt() -> std::io::Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
-    })?;
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), Arc::clone(&interrupted))?;
+        flag::register(signal, Arc::clone(&interrupted))?;
+    }
+    // A limit on the size of files is an error of writing, and does not end the program without a word.
+    flag::register(SIGXFSZ, Arc::default())?;
     Ok(interrupted)
 }

@@ -58,6 +58,12 @@ impl Body {
             "an empty name",
             "must have at least one letter",
         );
+        problems.require(
+            !self.name.contains(char::is_control),
+            &format!("{path}.name"),
+            format_args!("{:?}", self.name),
+            "must be of letters that can be printed",
+        );
         match (&self.shape, &self.particles) {
             (Some(shape), None) => {
                 let path = format!("{path}.shape");

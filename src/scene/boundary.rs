@@ -130,10 +130,10 @@ impl Prescribed {
             }
             (None, Some(table)) => table.check(problems, &format!("{path}.velocity"), dimension, Quantity::Velocity),
             (Some(_), Some(_)) => {
-                problems.refuse(path, "both displacement and velocity", "must have exactly one of the two");
+                problems.refuse(path, "a displacement and a velocity", "give one of the two");
             }
             (None, None) => {
-                problems.refuse(path, "neither displacement nor velocity", "must have exactly one of the two");
+                problems.refuse(path, "a region alone", "give its displacement or its velocity");
             }
         }
     }

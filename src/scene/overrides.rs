@@ -57,10 +57,8 @@ impl FromStr for Override {
     fn from_str(argument: &str) -> Result<Self, OverrideError> {
         let form = || OverrideError::Form(argument.to_owned());
         let (key, text) = argument.split_once('=').ok_or_else(form)?;
-        let steps = steps(key.trim());
-        if steps.is_empty() || steps.len() > MAX_STEPS {
-            return Err(form());
-        }
+        let steps = Some(key.trim()).filter(|key| is_path(key)).map(steps);
+        let steps = steps.filter(|steps| steps.len() <= MAX_STEPS).ok_or_else(form)?;
         let value = match parse(text) {
             Ok(value) => value,
             Err(_) if is_word(text.trim()) => Value::String(text.trim().to_owned()),
@@ -119,6 +117,16 @@ impl Override {
         *here = self.value.clone();
         Ok(())
     }
+}
+
+/// Whether keys are there between all dots, and a number between all brackets.
+fn is_path(text: &str) -> bool {
+    text.split('.').all(|word| {
+        let (key, indices) = word.split_at(word.find('[').unwrap_or(word.len()));
+        let numbers = indices.strip_prefix('[').map(|rest| rest.strip_suffix(']').unwrap_or("").split("]["));
+        let closed = numbers.is_none_or(|mut all| all.all(|number| number.parse::<usize>().is_ok()));
+        !key.is_empty() && !key.contains(']') && closed
+    })
 }
 
 /// What a shell user means by text without quotes.

@@ -95,6 +95,12 @@ impl Display for Malformed {
 pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
     let failed = |source| SceneError::File { path: path.to_owned(), source };
     let mut bytes = Vec::new();
+    if waits(path) {
+        return Err(failed(std::io::Error::new(
+            std::io::ErrorKind::InvalidInput,
+            "it is a named pipe, which may wait for ever",
+        )));
+    }
     let file = File::open(path).map_err(failed)?;
     // A pipe or a device does not say how long it is; of a file that does, nothing needs to be read.
     let length = file.metadata().map_err(failed)?.len();
@@ -145,6 +151,7 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     for replaced in overrides {
         replaced.apply(&mut json)?;
     }
+    make_whole(&mut json);
     if !json.is_object() {
         let place = Some(Place::at(text, 0));
         return Err(Malformed { path: String::new(), message: SHAPE.to_owned(), place, others: Vec::new() }.into());
@@ -185,6 +192,34 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     }
     let problems = scene.check();
     if problems.is_empty() { Ok(Scene { chosen, ..scene.complete() }) } else { Err(placed(problems)) }
+}
+
+/// Whether to open it may wait for somebody who writes: what is given as standard input is open already.
+#[cfg(unix)]
+fn waits(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    !path.starts_with("/dev") && std::fs::metadata(path).is_ok_and(|file| file.file_type().is_fifo())
+}
+
+#[cfg(not(unix))]
+fn waits(_: &Path) -> bool {
+    false
+}
+
+/// 2.0 is a whole number in JSON Schema, too.
+fn make_whole(json: &mut Value) {
+    match json {
+        Value::Array(list) => list.iter_mut().for_each(make_whole),
+        Value::Object(object) => object.values_mut().for_each(make_whole),
+        Value::Number(number) => {
+            // All whole numbers below 2⁵³ are there in double precision; -0.0 is no whole number.
+            let whole = number.as_f64().filter(|x| x.fract() == 0.0 && x.abs() < 9e15 && x.is_sign_positive());
+            if let Some(whole) = whole.filter(|_| number.is_f64()) {
+                *number = (whole as u64).into();
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::String(_) => {}
+    }
 }
 
 /// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in

@@ -31,8 +31,8 @@ fn a_reader_who_has_seen_enough_is_no_failure() -> Result<(), Failure> {
     let out = directory.path().join("run");
     rebound(&out, &["--steps", "2", "--quiet"])?;
     let (run, rebound) = (out.display().to_string(), scene("rebound.json").display().to_string());
-    let commands: [&[&str]; 4] =
-        [&["check", &rebound], &["schema"], &["plot", &run], &["run", &rebound, "--steps", "1", "--out", &run]];
+    let again: &[&str] = &["run", &rebound, "--steps", "1", "--discard", "--out", &run];
+    let commands: [&[&str]; 4] = [&["check", &rebound], &["schema"], &["plot", &run], again];
     for arguments in commands {
         // Both pipes are closed before the program starts, so that its first line meets a broken one.
         let (_, out) = std::io::pipe()?;
@@ -95,6 +95,118 @@ fn ctrl_c_ends_the_run_after_a_step_with_everything_written() -> Result<(), Fail
     let steps = report["steps"].as_array().map_or(0, Vec::len);
     assert!(steps > 0 && time < 1e6, "{steps} steps");
     assert_eq!(text.lines().count(), steps + 2, "a header, the initial state and a row a step");
+    Ok(())
+}
+
+/// A run with further arguments that ends by itself: its code, and what it told.
+fn told(arguments: &[&str], directory: &Path) -> Result<(Option<i32>, String), Failure> {
+    let output = rebound(directory, &[&["--steps", "2"], arguments].concat())?;
+    Ok((output.status.code(), String::from_utf8(output.stderr)?))
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_there_is_not_lost() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let out = folder.path().join("run");
+    assert_eq!(told(&[], &out)?.0, Some(0));
+    let history = std::fs::read(out.join("history.csv"))?;
+    let (code, text) = told(&["--set", "time.step=0.01"], &out)?;
+    assert!(code == Some(2) && text.contains("holds the results of a run") && text.contains("--discard"), "{text}");
+    assert_eq!(std::fs::read(out.join("history.csv"))?, history);
+    // What a link leads to is somebody else's.
+    let foreign = folder.path().join("foreign");
+    std::fs::write(&foreign, "mine")?;
+    std::fs::remove_file(out.join("history.csv"))?;
+    std::os::unix::fs::symlink(&foreign, out.join("history.csv"))?;
+    assert_eq!(told(&["--discard"], &out)?.0, Some(0));
+    assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
+    assert_eq!(std::fs::read(out.join("history.csv"))?, history);
+    let (code, text) = told(&[], &foreign)?;
+    assert!(code == Some(1) && text.contains("not a directory"), "{text}");
+    assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn two_runs_share_no_directory_and_a_batch_system_may_end_one() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let mut first = program();
+    first.arg("run").arg(scene("rebound.json")).arg("--out").arg(directory.path()).args(["--until", "1e6", "--quiet"]);
+    let mut first = first.spawn()?;
+    let history = directory.path().join("history.csv");
+    let start = Instant::now();
+    while std::fs::read_to_string(&history).map_or(0, |text| text.lines().count()) < 5 {
+        assert!(start.elapsed() < Duration::from_secs(60), "no step");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    for argument in [&[][..], &["--discard"], &["--restart"]] {
+        let (code, text) = told(argument, directory.path())?;
+        assert!(code == Some(2) && text.contains("another program is just writing"), "{argument:?}: {text}");
+    }
+    assert!(Command::new("kill").args(["-TERM", &first.id().to_string()]).status()?.success());
+    assert_eq!(first.wait()?.code(), Some(130));
+    assert_eq!(report(directory.path())?["outcome"], "interrupted");
+    Ok(())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn limits_of_the_shell_are_told_in_a_sentence() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let under = |limit: &str, name: &str, more: &str| -> Result<(Option<i32>, String), Failure> {
+        let (bfree, scene, out) = (env!("CARGO_BIN_EXE_bfree"), scene(name), directory.path().join(name));
+        let line = format!("{limit}; exec {bfree} run {} --threads 1 --out {} {more}", scene.display(), out.display());
+        let output = Command::new("sh").args(["-c", &line]).stdin(Stdio::null()).output()?;
+        Ok((output.status.code(), String::from_utf8(output.stderr)?))
+    };
+    let (code, text) = under("ulimit -f 4", "rebound.json", "--steps 100")?;
+    assert!(code == Some(1) && text.contains("cannot write") && text.contains("File too large"), "{text}");
+    let (code, text) = under("ulimit -v 400000", "block_static.json", "--set grid.spacing=0.02")?;
+    assert!(code == Some(2) && text.contains("memory"), "{text}");
+    // Nobody writes into it.
+    let pipe = directory.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status()?.success());
+    let output = program().arg("check").arg(&pipe).output()?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.code() == Some(2) && text.contains("named pipe"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn keys_are_refused_that_are_not_written_as_keys_are() -> Result<(), Failure> {
+    let check = |argument: &str| -> Result<(Option<i32>, String), Failure> {
+        let output = program().arg("check").arg(scene("rebound.json")).args(["--set", argument]).output()?;
+        Ok((output.status.code(), String::from_utf8(output.stderr)?))
+    };
+    for argument in [
+        "bodies[0.density=2",
+        "bodies0].density=2",
+        "bodies[].density=2",
+        "bodies[0]x.density=2",
+        "time..step=1",
+        ".time.step=1",
+        "time.step.=1",
+        "=1",
+    ] {
+        let (code, text) = check(argument)?;
+        assert!(code == Some(2) && text.contains("must read KEY.PATH=JSON"), "{argument}: {text}");
+    }
+    for argument in
+        ["bodies[0].density=2", "bodies.0.density=2", " time.step = 0.01", "bodies.0.particles_per_cell=2.0"]
+    {
+        assert_eq!(check(argument)?, (Some(0), String::new()), "{argument}");
+    }
+    for (poisson, young) in [("0.49999999999999994", "100"), ("0.3", "1e-308")] {
+        let (code, text) =
+            check(&format!(r#"bodies.0.material={{"neo_hookean":{{"young":{young},"poisson":{poisson}}}}}"#))?;
+        assert!(code == Some(2) && text.contains("bodies[0].material.neo_hookean"), "{text}");
+    }
+    let (code, text) = check("bodies.0.particles_per_cell=2.5")?;
+    assert!(code == Some(2) && text.contains("2.5"), "{text}");
+    let (code, text) = check(r#"bodies.0.name="a\u0000b""#)?;
+    assert!(code == Some(2) && text.contains("bodies[0].name"), "{text}");
     Ok(())
 }
 
@@ -243,7 +355,7 @@ fn a_new_scene_is_checked_runs_and_is_never_overwritten() -> Result<(), Failure>
         assert!(serde_json::from_slice::<Value>(&std::fs::read(&schema)?)?["$defs"].is_object());
         let output = program().arg("check").arg(&file).output()?;
         assert!(output.status.success(), "{}", String::from_utf8(output.stderr)?);
-        let out = folder.path().join("out");
+        let out = folder.path().join(problem);
         let output = program().arg("run").arg(&file).args(["--steps", "3", "--quiet", "--out"]).arg(&out).output()?;
         assert_eq!((output.status.code(), String::from_utf8(output.stderr)?.as_str()), (Some(0), ""));
         assert_eq!(report(&out)?["counts"]["steps"], 3);

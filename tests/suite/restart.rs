@@ -247,12 +247,21 @@ fn what_cannot_be_continued_is_refused_with_its_reason() -> Result<(), Failure> 
     refused(&[&set("bodies.0.density=5")], &["bodies[0].density was 4.0 and is 5.0"])?;
     refused(&[&set("gravity.acceleration=[0, 1]")], &["gravity was null and is {"])?;
     refused(&[&set("output.probes=[]")], &["output.probes[0] was {"])?;
+    // A digit of a row is another; a snapshot is gone.
+    let (history, snapshot) = (directory.join("history.csv"), directory.join("particles_000000.vtu"));
+    let (rows, particles) = (std::fs::read_to_string(&history)?, std::fs::read(&snapshot)?);
+    std::fs::write(&history, rows.replacen("0.05,", "0.06,", 1))?;
+    refused(&[&SMOOTHED, &["--restart"]], &["history.csv is not what it was"])?;
+    std::fs::write(&history, &rows)?;
+    std::fs::remove_file(&snapshot)?;
+    refused(&[&SMOOTHED, &["--restart"]], &["particles_000000.vtu is not there any more"])?;
+    std::fs::write(&snapshot, &particles)?;
     for name in ["checkpoint_0.bfree", "checkpoint_1.bfree"] {
         std::fs::write(directory.join(name), "rubbish")?;
     }
     refused(&[&SMOOTHED, &["--restart"]], &["no checkpoint in", "checkpoint_0.bfree: it is no", "checkpoint_1.bfree"])?;
     // A new run in the same directory does not leave them to be continued from.
-    assert!(run("rebound.json", &directory, &[&["--steps", "1", "--quiet"]])?.status.success());
+    assert!(run("rebound.json", &directory, &[&["--steps", "1", "--quiet", "--discard"]])?.status.success());
     assert_eq!(checkpoints(&directory).len(), 0);
     Ok(())
 }
@@ -310,8 +319,8 @@ fn a_run_that_could_be_continued_is_lost_on_request_only() -> Result<(), Failure
     let folder = tempfile::tempdir()?;
     let directory = folder.path().join("killed");
     assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "50"]])?.status.success());
-    // It ended: a new run may take its place. Without the report it is one that was killed.
-    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60"]])?.status.success());
+    // It ended, and is given up on request, too. Without the report it is one that was killed.
+    assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60", "--discard"]])?.status.success());
     std::fs::remove_file(directory.join("report.json"))?;
     let kept: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;
     let output = run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "10"]])?;
