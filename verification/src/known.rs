@@ -32,14 +32,20 @@ pub struct KnownCell {
     pub labels: &'static [&'static str],
     /// The value measured.
     pub value: f64,
+    /// Whether seconds decide.
+    pub timed: bool,
 }
 
 const fn short_effort(labels: &'static [&'static str], value: f64) -> KnownCell {
-    KnownCell { effort: Effort::Short, labels, value }
+    KnownCell { effort: Effort::Short, labels, value, timed: false }
 }
 
 const fn full_effort(labels: &'static [&'static str], value: f64) -> KnownCell {
-    KnownCell { effort: Effort::Full, labels, value }
+    KnownCell { effort: Effort::Full, labels, value, timed: false }
+}
+
+const fn timed(labels: &'static [&'static str], value: f64) -> KnownCell {
+    KnownCell { effort: Effort::Full, labels, value, timed: true }
 }
 
 /// The list.
@@ -170,15 +176,24 @@ pub const KNOWN: &[Known] = &[
     },
     Known {
         study: "tradeoff",
-        what: "Newton's default tolerance of 1e-9 beside 1e-4, whose error is not larger: work of 1e-4 over that of \
-               1e-9; 1 asked",
-        why: "1e-9 is kept so that quadratic convergence shows, and so that what is left of a residual is near \
-              round-off in balances of momentum and energy.",
+        what: "a default beside what errs no more, in work: the work of that over the default's, beyond its scatter; 1 asked \
+               (seconds decide: on a busy machine they may pass)",
+        why: "Newton's tolerance is kept so that quadratic convergence shows and balances end near round-off; the paper starts \
+              from zero, and steps by its transfer. Fixed forcing of 1e-6, the guess by velocity, and other defaults for each \
+              kind of problem are not decided yet.",
         since: "22 November 2026",
-        factor: 3.0,
+        factor: 1.5,
         cells: &[
-            full_effort(&["solver.newton.tolerance", "manufactured 2D"], 0.75),
-            full_effort(&["solver.newton.tolerance", "compaction 2D"], 0.56),
+            timed(&["solver.newton.tolerance", "manufactured 2D"], 0.43),
+            timed(&["solver.newton.tolerance", "manufactured 3D"], 0.93),
+            timed(&["solver.krylov.forcing", "manufactured 2D"], 0.93),
+            timed(&["solver.krylov.forcing", "compaction 2D"], 0.88),
+            timed(&["time.initial_guess", "manufactured 2D"], 0.76),
+            timed(&["approximation.lme.tolerance", "manufactured 2D"], 0.993),
+            timed(&["transfer", "Riemann 1D"], 0.995),
+            timed(&["combinations", "Riemann 1D"], 0.66),
+            timed(&["combinations", "compaction 2D"], 0.87),
+            timed(&["combinations", "manufactured 3D"], 0.73),
         ],
     },
     Known {
@@ -209,7 +224,7 @@ pub(crate) fn mark(known: &[Known], study: &str, effort: Effort, reports: &mut V
     let mut astray = Report::new("known failures that are not exactly one cell of the study: cells found", &["cell"]);
     for entry in known.iter().filter(|entry| entry.study == study) {
         for cell in entry.cells.iter().filter(|cell| cell.effort <= effort) {
-            let listed = Listed { value: cell.value, factor: entry.factor };
+            let listed = Listed { value: cell.value, factor: entry.factor, timed: cell.timed };
             let found: usize = reports.iter_mut().map(|report| report.list_known(cell.labels, listed)).sum();
             if found != 1 {
                 astray.push(&[&cell.labels.join(", ")], found as f64, Bound::Between(1.0, 1.0));
@@ -240,6 +255,7 @@ pub fn markdown() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::Verdict;
 
     const LIST: &[Known] = &[Known {
         study: "one",
@@ -249,6 +265,23 @@ mod tests {
         factor: 2.0,
         cells: &[short_effort(&["a", "b"], 3.0), full_effort(&["c"], 3.0)],
     }];
+
+    /// What seconds decide may pass, and may not get much worse; the rest may not pass either.
+    #[test]
+    fn seconds_may_be_kind() {
+        for (timed, value, verdict) in [
+            (true, 3.5, Verdict::Known),
+            (true, 0.5, Verdict::Met),
+            (true, 6.5, Verdict::Failed),
+            (false, 3.5, Verdict::Known),
+            (false, 0.5, Verdict::Failed),
+        ] {
+            let mut report = Report::new("", &["what"]);
+            report.push(&["a"], value, Bound::AtMost(1.0));
+            report.list_known(&["a"], Listed { value: 3.0, factor: 2.0, timed });
+            assert_eq!(report.cells()[0].verdict(), verdict, "{timed} {value}");
+        }
+    }
 
     fn marked(study: &str, effort: Effort, labels: &[&[&str]]) -> bool {
         let mut report = Report::new("", &["what", "where", "how"]);

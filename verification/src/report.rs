@@ -100,6 +100,8 @@ pub struct Listed {
     pub value: f64,
     /// A value that misses the bound so many times further is a new failure.
     pub factor: f64,
+    /// Whether seconds decide: on a busy machine their scatter is wider, and the cell may pass.
+    pub timed: bool,
 }
 
 /// What is to be said of a cell.
@@ -149,6 +151,9 @@ impl Cell {
             None => Verdict::Met,
             Some(listed) => {
                 let allowed = listed.factor * self.bound.used(listed.value);
+                if holds && listed.timed {
+                    return Verdict::Met;
+                }
                 if !holds && self.bound.used(self.value) <= allowed { Verdict::Known } else { Verdict::Failed }
             }
         }
@@ -504,8 +509,8 @@ mod tests {
         let mut report = Report::new("known", &["what", "where"]);
         report.push(&["a", "here"], 1.0, Bound::AtMost(2.0));
         report.push(&["b", "there"], value, bound);
-        assert_eq!(report.list_known(&["b"], Listed { value: 30.0, factor: 10.0 }), 1);
-        assert_eq!(report.list_known(&["c"], Listed { value: 30.0, factor: 10.0 }), 0);
+        assert_eq!(report.list_known(&["b"], Listed { value: 30.0, factor: 10.0, timed: false }), 1);
+        assert_eq!(report.list_known(&["c"], Listed { value: 30.0, factor: 10.0, timed: false }), 0);
         report
     }
 
