@@ -13,7 +13,6 @@ use bfree::approximation::{ApproximationError, AxisWeights, Bspline, Linear, Sep
 use bfree::clock::Clock;
 use bfree::grid::{Axis, Grid};
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::Loads;
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::Vector;
@@ -71,17 +70,10 @@ fn stretched(lame: Lame) -> Simulation<1, Material, Mixed> {
             h[(0, 0)] = gradient;
         }
     }
+    let bodies = vec![Body { name: "bar".into(), law: NeoHookean::ciarlet(lame).into(), density: DENSITY }];
     Simulation {
-        grid,
-        approximation: Mixed(0.5),
-        bodies: vec![Body { name: "bar".into(), law: NeoHookean::ciarlet(lame).into(), density: DENSITY }],
-        particles,
-        loads: Loads::default(),
         settings: Settings { lumping: 0.02, ..Settings::default() },
-        clock: Clock::new(0.01, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
+        ..Simulation::new(grid, Mixed(0.5), bodies, particles, Clock::new(0.01, 0))
     }
 }
 

@@ -37,20 +37,14 @@ pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
         motion: [None, Some(Motion::Rest)],
     };
     let gravity = Gravity { acceleration: Vector::from([0.0, GRAVITY]), curve: Curve::constant(1.0) };
+    let bodies = vec![Body { name: "square".into(), law, density: DENSITY }];
     let mut simulation = Simulation {
-        grid,
-        approximation: Approximation::from(Lme::new(3.0, 1e-6)),
-        bodies: vec![Body { name: "square".into(), law, density: DENSITY }],
-        particles,
         loads: Loads { gravity: Some(gravity), prescribed: vec![floor], ..Loads::default() },
         settings: Settings {
             newton: NewtonSettings { relative_tolerance: 1e-10, ..NewtonSettings::default() },
             ..Settings::default()
         },
-        clock: Clock::new(0.01, 10),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
+        ..Simulation::new(grid, Approximation::from(Lme::new(3.0, 1e-6)), bodies, particles, Clock::new(0.01, 10))
     };
     // Gravity acts from t = 0 on.
     simulation.set_initial_acceleration()?;

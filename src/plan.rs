@@ -2,6 +2,7 @@
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
+use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
@@ -134,6 +135,8 @@ pub struct Plan {
     pub active_nodes: usize,
     /// Free degrees of freedom of the first step.
     pub unknowns: usize,
+    /// When the grid is made anew.
+    pub renewal: Renewal,
     /// The method that solves the linear systems, and why it does.
     pub krylov: (Krylov, &'static str),
     /// Their preconditioner, and why it is.
@@ -164,6 +167,7 @@ impl Plan {
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
             unknowns: D * nodes.len() - prescribed.len(),
+            renewal: simulation.settings.renewal,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports),
@@ -260,7 +264,8 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
     let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
     // What is not there does not appear.
-    let used: [(bool, &'static str, usize); 15] = [
+    let keeps = simulation.settings.renewal != Renewal::EveryStep;
+    let used: [(bool, &'static str, usize); 17] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -275,6 +280,8 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         // Both as projected, and with prescribed values in place.
         (weighs, "nodal mass", nodes * 2 * size_of::<f64>()),
         (moves, "nodal fields: v, a", nodes * 4 * vector),
+        (keeps, "particles: x, H when the grid was new", particles * (vector + tensor)),
+        (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
         (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
         (true, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
@@ -292,6 +299,7 @@ impl Display for Plan {
         writeln!(f, "particles     {}", self.particles)?;
         writeln!(f, "active nodes  {} of {}", self.active_nodes, self.grid_nodes)?;
         writeln!(f, "unknowns      {}", self.unknowns)?;
+        writeln!(f, "grid          {}", self.renewal)?;
         let (method, why) = self.krylov;
         writeln!(f, "solver        {method}: {why}")?;
         let (preconditioner, why) = self.preconditioner;

@@ -2,14 +2,16 @@
 
 use super::container::Array;
 use crate::clock::Reached;
+use crate::mechanics::kept::Kept;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
+use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
 
 /// The arrays a step inherits, by name. A field of the simulation that is added later does not compile here until somebody has
 /// decided on which side it belongs; a new array has its place in [`inherited`] and in [`restore`].
-pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> [(&'static str, Cow<'_, [f64]>); 8] {
+pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<(&'static str, Cow<'_, [f64]>)> {
     let Simulation {
         grid: _,
         approximation: _,
@@ -20,6 +22,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         clock: _,
         external_work,
         dissipated,
+        kept,
         workspace: _,
     } = simulation;
     let Particles {
@@ -35,7 +38,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         remembered: _,
     } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
-    [
+    let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
         ("id", id.into()),
         ("position", bytemuck::cast_slice(position).into()),
         ("velocity", bytemuck::cast_slice(velocity).into()),
@@ -44,7 +47,38 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("memory", memory.as_slice().into()),
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
-    ]
+    ];
+    if let Some(Kept { position, displacement_gradient, motion, rate, velocity, acceleration }) = kept {
+        let vectors = [position, motion, rate, velocity, acceleration].map(|field| bytemuck::cast_slice(field));
+        arrays.extend(KEPT.into_iter().zip(vectors).map(|(name, numbers)| (name, numbers.into())));
+        arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
+    }
+    arrays
+}
+
+/// Of a grid that is kept: x of the particles, then φ, its rate, v and a of the nodes.
+const KEPT: [&str; 5] = ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration"];
+
+/// H of the particles when it was new.
+const KEPT_GRADIENT: &str = "kept_displacement_gradient";
+
+/// The grid that was kept, if one was; how many nodes it has only a step can tell.
+///
+/// # Errors
+/// Numbers that are not those of so many particles, or fields of different length.
+fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kept<D>>, String> {
+    let of = |name: &str| arrays.iter().find(|array| array.name == name).map(|array| array.values.as_slice());
+    let vectors = |name: &str| -> Vec<Vector<f64, D>> {
+        of(name).unwrap_or_default().chunks_exact(D).map(Vector::from_column_slice).collect()
+    };
+    let Some(gradient) = of(KEPT_GRADIENT) else { return Ok(None) };
+    let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
+    let [position, motion, rate, velocity, acceleration] = KEPT.map(vectors);
+    let fits = [position.len(), displacement_gradient.len()] == [particles; 2]
+        && rate.len() == motion.len()
+        && [velocity.len(), acceleration.len()].into_iter().all(|length| length == 0 || length == motion.len());
+    let kept = Kept { position, displacement_gradient, motion, rate, velocity, acceleration };
+    if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
 }
 
 /// The order in which particles lie in `ids`, by their present places; `None` if they are not the same particles.
@@ -66,7 +100,7 @@ pub(super) fn restore<const D: usize, L, A>(
     reached: Reached,
     arrays: &[Array],
 ) -> Result<(), String> {
-    for (name, values) in inherited(simulation) {
+    for (name, values) in inherited(simulation).into_iter().filter(|(name, _)| !name.starts_with("kept_")) {
         let found = arrays.iter().find(|array| array.name == name).ok_or_else(|| format!("no array {name}"))?;
         if found.values.len() != values.len() {
             return Err(format!("{} numbers of {name} instead of {}", found.values.len(), values.len()));
@@ -75,9 +109,12 @@ pub(super) fn restore<const D: usize, L, A>(
     let ids =
         arrays.iter().filter(|array| array.name == "id").flat_map(|array| &array.values).copied().collect::<Vec<_>>();
     let order = order(&simulation.particles.id, &ids).ok_or("ids that are not those of the particles")?;
+    let kept = kept(arrays, simulation.particles.len())?;
     simulation.clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     // What no array holds goes where it was, too.
+    simulation.kept = None;
     simulation.rearrange(&order);
+    simulation.kept = kept;
     let particles = &mut simulation.particles;
     for Array { name, values } in arrays {
         let into: &mut [f64] = match name.as_str() {

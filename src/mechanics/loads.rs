@@ -198,7 +198,7 @@ pub enum Selection<const D: usize> {
 }
 
 impl<const D: usize> Selection<D> {
-    fn holds(&self, grid: &Grid<D>, index: [u32; D], position: &Vector<f64, D>) -> bool {
+    pub(crate) fn holds(&self, grid: &Grid<D>, index: [u32; D], position: &Vector<f64, D>) -> bool {
         match self {
             Self::Face { axis, upper } => index[*axis] == if *upper { grid.cells[*axis] } else { 0 },
             Self::Region(shape) => shape.contains(position),

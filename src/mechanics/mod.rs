@@ -2,6 +2,7 @@
 
 mod cells;
 pub mod check;
+pub mod kept;
 pub mod loads;
 pub mod mass;
 mod point;

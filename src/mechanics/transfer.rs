@@ -46,6 +46,8 @@ pub struct Nodal<const D: usize> {
     pub velocity: Pooled<Vector<f64, D>>,
     /// a_n; empty without inertia.
     pub acceleration: Pooled<Vector<f64, D>>,
+    /// φ_n, the motion since the grid was new; empty where it is.
+    pub motion: Pooled<Vector<f64, D>>,
     /// Iterations the projection took (0 for a lumped mass).
     pub iterations: usize,
 }
@@ -60,7 +62,7 @@ impl<const D: usize> Nodal<D> {
         let lumped = lumped(particles, supports);
         let mass = Mass { particles, supports, lumped: &lumped, lumping };
         let ([velocity, acceleration], iterations) = mass.project([&particles.velocity, &particles.acceleration])?;
-        Ok(Self { mass: lumped, velocity, acceleration, iterations })
+        Ok(Self { mass: lumped, velocity, acceleration, iterations, ..Self::default() })
     }
 
     /// The lumped mass, and no motion.
@@ -93,6 +95,18 @@ impl<const D: usize> Nodal<D> {
     /// Example: [`Self::mass_alone`].
     pub fn is_static(&self) -> bool {
         self.velocity.is_empty()
+    }
+
+    /// φ_n of every node, zero where the grid is new.
+    pub fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
+        let motion = self.motion.iter().copied().chain(std::iter::repeat(Vector::zeros()));
+        motion.take(count)
+    }
+
+    /// φ_n + Δφ̂ of every node: the motion that ends without acceleration. None without inertia.
+    pub fn predicted(&self, alphas: &Alphas) -> impl Iterator<Item = Vector<f64, D>> {
+        let state = self.velocity.iter().zip(&self.acceleration).zip(self.moved(self.velocity.len()));
+        state.map(|((v, a), motion)| motion + alphas.predicted(v, a))
     }
 
     /// a_I = −R_I / m_I, from the residual of the same state at rest.
@@ -188,6 +202,8 @@ pub enum WallUpdate {
 /// ```
 pub struct Update<'a, const D: usize> {
     dphi: &'a [Vector<f64, D>],
+    /// φ = φ_n + Δφ, where the grid is kept.
+    kept: Option<Pooled<Vector<f64, D>>>,
     /// Δv and Δa of the nodes; empty without inertia.
     delta_velocity: Pooled<Vector<f64, D>>,
     delta_acceleration: Pooled<Vector<f64, D>>,
@@ -203,6 +219,8 @@ impl<'a, const D: usize> Update<'a, D> {
     /// v_p += Σ N Δv,  Δv = α₄(Δφ − Δt v_n) + α₆a_n           (51), both as in [`Alphas`]
     /// x_p += Σ N Δφ                                           (52)
     /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
+    ///
+    /// Where the grid is kept, x_p and F_p are those of when it was new, and φ_n + Δφ stands for Δφ in the last two.
     pub fn new(
         alphas: &Alphas,
         projected: &Nodal<D>,
@@ -231,7 +249,12 @@ impl<'a, const D: usize> Update<'a, D> {
             };
             *impulse = nodal.mass[node] * (*delta_v - by_forces);
         }
-        Self { dphi, delta_velocity, delta_acceleration, impulses, smoothed: None }
+        let mut kept = None;
+        if !nodal.motion.is_empty() {
+            let sums = nodal.motion.iter().zip(dphi).map(|(motion, dphi)| motion + dphi);
+            kept = Some(nodal.motion.pool().collect(sums));
+        }
+        Self { dphi, kept, delta_velocity, delta_acceleration, impulses, smoothed: None }
     }
 
     /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it for Newmark's step: what it differs from Taylor's
@@ -287,6 +310,24 @@ impl<'a, const D: usize> Update<'a, D> {
         &self.impulses
     }
 
+    /// φ, the motion of the nodes since the grid was new.
+    pub fn motion(&self) -> &[Vector<f64, D>] {
+        self.kept.as_deref().unwrap_or(self.dphi)
+    }
+
+    /// φ, v and a of the nodes at the end, from v and a as `projected`.
+    pub fn end(&self, projected: &Nodal<D>) -> Nodal<D> {
+        let sum = |field: &Pooled<Vector<f64, D>>, delta: &Pooled<Vector<f64, D>>| {
+            field.pool().collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
+        };
+        Nodal {
+            velocity: sum(&projected.velocity, &self.delta_velocity),
+            acceleration: sum(&projected.acceleration, &self.delta_acceleration),
+            motion: projected.velocity.pool().collect(self.motion().iter().copied()),
+            ..Nodal::default()
+        }
+    }
+
     /// The particle with the smallest id that would leave the grid, by its id, and where it would be.
     pub fn leaving(
         &self,
@@ -295,7 +336,7 @@ impl<'a, const D: usize> Update<'a, D> {
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
         let mut first: Option<(usize, Vector<f64, D>)> = None;
-        supports.each_value(self.dphi, |p, delta_x| {
+        supports.each_value(self.motion(), |p, delta_x| {
             let (id, x) = (particles.id[p] as usize, particles.position[p] + delta_x);
             if !grid.contains(&x) && first.is_none_or(|(one, _)| id < one) {
                 first = Some((id, x));
@@ -304,15 +345,23 @@ impl<'a, const D: usize> Update<'a, D> {
         first
     }
 
-    /// Writes to the particles, in place: the only place that does, once per step.
-    pub fn commit<L: Law>(self, particles: &mut Particles<D>, bodies: &[Body<L>], supports: &Supports<D>, dt: f64) {
-        let remembered = particles.remembered;
+    /// Writes to the particles, in place: the only place that does, once per step. Returns the largest ‖½ (F_rᵀ F_r − I)‖, of the
+    /// deformation since the grid was new.
+    pub fn commit<L: Law>(
+        self,
+        particles: &mut Particles<D>,
+        bodies: &[Body<L>],
+        supports: &Supports<D>,
+        dt: f64,
+    ) -> f64 {
+        let (remembered, mut largest) = (particles.remembered, 0.0_f64);
         let mut next = vec![0.0; remembered];
         let Particles { position, velocity, acceleration, displacement_gradient, memory, body, .. } = particles;
         supports.each_particle(
-            self.dphi,
+            self.motion(),
             |_, delta_x, g| (delta_x, g),
             |p, (delta_x, g)| {
+                largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
                 position[p] += delta_x;
                 displacement_gradient[p] = compose(&g, &displacement_gradient[p]);
                 if remembered > 0 {
@@ -325,7 +374,7 @@ impl<'a, const D: usize> Update<'a, D> {
             },
         );
         if self.delta_velocity.is_empty() {
-            return;
+            return largest;
         }
         let [changed_v, changed_a] = self.smoothed.unwrap_or_default();
         for (field, delta, changed) in
@@ -335,5 +384,6 @@ impl<'a, const D: usize> Update<'a, D> {
                 field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
             });
         }
+        largest
     }
 }

@@ -71,6 +71,8 @@ pub struct Counts {
     pub max_active_nodes: usize,
     /// Steps taken.
     pub steps: u64,
+    /// Steps that began with a new grid.
+    pub grids: u64,
     /// Attempts at a step that failed, or erred more than the tolerance allows: it was repeated with half of its length, or the run
     /// ended.
     pub failed_attempts: u64,
@@ -106,6 +108,7 @@ impl Counts {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
+        self.grids += u64::from(step.renewed);
         self.particle_passes += step.seconds.passes().iter().sum::<u64>();
         self.max_newton_iterations = self.max_newton_iterations.max(newton.iterations.len());
         self.projection_iterations += step.projection_iterations as u64;

@@ -228,16 +228,15 @@ impl Scene {
         particles.remember_rest(&bodies);
         let loads = self.loads(&grid, &particles)?;
         let mut simulation = Simulation {
-            grid,
-            approximation,
-            bodies,
-            particles,
             loads,
             settings: self.settings(),
-            clock: Clock::new(self.time.step, self.time.max_halvings),
-            external_work: 0.0,
-            dissipated: 0.0,
-            workspace: Default::default(),
+            ..Simulation::new(
+                grid,
+                approximation,
+                bodies,
+                particles,
+                Clock::new(self.time.step, self.time.max_halvings),
+            )
         };
         self.set_initial_velocity(&mut simulation)?;
         scale::check(self, &simulation)?;
@@ -260,7 +259,8 @@ impl Scene {
             scheme: self.time.inertia.scheme(self.time.newmark()),
             lumping: self.time.lumping(),
             ghost: self.ghost(),
-            initial_guess: self.time.initial_guess.unwrap_or_default(),
+            renewal: self.grid.renewed(self.time.inertia),
+            initial_guess: self.time.initial_guess(),
             wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {
                 Transfer::Flip => None,

@@ -1,6 +1,8 @@
 //! The box and its background grid.
 
+use super::time::Inertia;
 use crate::grid::Grid;
+use crate::mechanics::kept::Renewal;
 use crate::problems::{Number, Problems, sensible};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -11,6 +13,9 @@ const MAX_CELLS: f64 = 1e6;
 
 /// How far, relative to itself, the number of cells of an axis may be from a whole number.
 const WHOLE: f64 = 1e-9;
+
+/// The strain up to which load steps keep a grid by themselves.
+const MOST_STRAIN: f64 = 1.0;
 
 /// How well neighbouring nodes must be told apart, relative to their distance.
 const DISTINCT: f64 = 1e-6;
@@ -30,6 +35,9 @@ pub struct GridBox {
     /// 1e-9 relative, into at most a million cells.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing: f64,
+    /// When the background grid is made anew. A grid that is kept makes the answer independent of the number of steps and its stresses
+    /// smooth; it holds bodies to the walls they touch. Default: `{"strain": 1}` in load steps, `"every_step"` with inertia.
+    pub renewed: Option<Renewal>,
 }
 
 impl GridBox {
@@ -99,7 +107,16 @@ impl GridBox {
             .then_some(whole as u32)
     }
 
+    /// When it is made anew.
+    pub(super) fn renewed(&self, inertia: Inertia) -> Renewal {
+        let by_itself = if inertia.has_inertia() { Renewal::EveryStep } else { Renewal::Strain(MOST_STRAIN) };
+        self.renewed.unwrap_or(by_itself)
+    }
+
     pub(super) fn check(&self, problems: &mut Problems) {
+        if let Some(Renewal::Strain(most)) = self.renewed {
+            problems.positive("grid.renewed.strain", most);
+        }
         if !(1..=3).contains(&self.size.len()) {
             let found = format!("a vector of length {}", self.size.len());
             problems.refuse("grid.size", found, "must have 1, 2 or 3 components: the dimension of the scene");

@@ -257,6 +257,7 @@ impl Scene {
     /// Gives every key its value, of those that mean something.
     fn complete(mut self) -> Self {
         self.time.complete();
+        self.grid.renewed = Some(self.grid.renewed(self.time.inertia));
         if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
         }

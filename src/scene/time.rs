@@ -36,7 +36,7 @@ pub struct Time {
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lumping: Option<f64>,
-    /// Where Newton's iteration of a step starts. Default: `"zero"`.
+    /// Where Newton's iteration of a step starts. Default: `"last_step"` in load steps, `"zero"` with inertia.
     pub initial_guess: Option<InitialGuess>,
     /// How particles see prescribed nodes in their update. Default: `"literal"`.
     pub wall_update: Option<WallUpdate>,
@@ -90,15 +90,21 @@ impl Time {
         self.lumping.unwrap_or(1.0)
     }
 
+    /// Where Newton's method starts.
+    pub(super) fn initial_guess(&self) -> InitialGuess {
+        let by_itself = if self.inertia.has_inertia() { InitialGuess::Zero } else { InitialGuess::LastStep };
+        self.initial_guess.unwrap_or(by_itself)
+    }
+
     /// Gives every key its value, of those that mean something.
     pub(super) fn complete(&mut self) {
+        self.initial_guess = Some(self.initial_guess());
         if self.inertia == Inertia::Newmark {
             let Newmark { beta, gamma } = self.newmark();
             (self.beta, self.gamma) = (Some(beta), Some(gamma));
         }
         if self.inertia.has_inertia() {
             self.lumping = Some(self.lumping());
-            self.initial_guess.get_or_insert_default();
             self.wall_update.get_or_insert_default();
         }
     }
@@ -110,7 +116,7 @@ impl Time {
             ("time.beta", number(self.beta)),
             ("time.gamma", number(self.gamma)),
             ("time.lumping", number(self.lumping)),
-            ("time.initial_guess", self.initial_guess.map(word)),
+            ("time.initial_guess", self.initial_guess.filter(|&guess| guess == InitialGuess::Velocity).map(word)),
             ("time.wall_update", self.wall_update.map(word)),
             ("time.adaptive", self.adaptive.map(word)),
         ]

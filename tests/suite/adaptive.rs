@@ -28,21 +28,16 @@ fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
         on: Selection::Face { axis: 0, upper },
         motion: [Some(Motion::Rest)],
     };
+    let grid = Grid { origin: Vector::zeros(), spacing: h, cells: [cells] };
+    let bodies = vec![Body {
+        name: "bar".into(),
+        law: Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?)),
+        density: 1.0,
+    }];
     Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: h, cells: [cells] },
-        approximation: Approximation::from(Bspline::Quadratic),
-        bodies: vec![Body {
-            name: "bar".into(),
-            law: Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?)),
-            density: 1.0,
-        }],
-        particles,
         loads: Loads { prescribed: vec![wall(false), wall(true)], ..Loads::default() },
         settings: Settings { lumping: 0.0, error_tolerance: Some(1.0), ..Settings::default() },
-        clock: Clock::new(dt, 10),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
+        ..Simulation::new(grid, Approximation::from(Bspline::Quadratic), bodies, particles, Clock::new(dt, 10))
     })
 }
 

@@ -48,7 +48,9 @@ const LADDER: [(&str, &str); 9] = [
 ];
 
 /// A block with everything.
-const ALL: [&str; 5] = [
+const ALL: [&str; 6] = [
+    // Load steps would keep it by themselves.
+    r#"grid.renewed="every_step""#,
     r#"transfer={"limited":{"rate":1}}"#,
     "time.lumping=0.5",
     r#"boundary={"bottom":{"velocity":[[0,[null,0]],[1,[null,0.01]]]},"left":"sliding","right":"sliding"}"#,

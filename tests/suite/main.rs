@@ -10,6 +10,7 @@ mod equilibrium;
 mod examples;
 mod ghost;
 mod hostile;
+mod kept;
 mod ladder;
 mod laws;
 mod loads;

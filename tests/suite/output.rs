@@ -5,19 +5,15 @@ use bfree::clock::Clock;
 use bfree::field::Field;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
+use bfree::mechanics::loads::{Curve, Gravity, Motion, Prescribed, Selection};
 use bfree::output::plot::plot_run;
 use bfree::output::vtu::{Snapshot, Values};
 use bfree::output::{Audience, Outcome, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::particles::{Body, Particles};
-use bfree::simulation::{AdvanceError, InitialGuess, Settings, Simulation, StepError};
-use bfree::solver::NewtonSettings;
+use bfree::simulation::{AdvanceError, Simulation, StepError};
 use bfree::tensor::{Tensor, Vector};
 use serde_json::{Map, Value, json};
 use std::path::Path;
-use std::sync::Arc;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -29,33 +25,10 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
     let mut particles = Particles::default();
     particles.push(Vector::repeat(0.5), Vector::zeros(), 0.25, 0.5, 0);
     particles.displacement_gradient[0] = h;
-    Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: 0.25, cells: [4; D] },
-        approximation: Approximation::from(Linear),
-        bodies: vec![Body {
-            name: "body".into(),
-            law: Material::from(NeoHookean::ciarlet(Lame::new(LAMBDA, SHEAR)?)),
-            density: 2.0,
-        }],
-        particles,
-        loads: Loads::default(),
-        settings: Settings {
-            scheme: Arc::new(Newmark::default()),
-            ghost: 0.0,
-            lumping: 1.0,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::Literal,
-            smoothing: None,
-            error_tolerance: None,
-            check_tangent: None,
-            newton: NewtonSettings::default(),
-            preconditioner: Default::default(),
-        },
-        clock: Clock::new(0.01, 3),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    })
+    let law = Material::from(NeoHookean::ciarlet(Lame::new(LAMBDA, SHEAR)?));
+    let bodies = vec![Body { name: "body".into(), law, density: 2.0 }];
+    let grid = Grid { origin: Vector::zeros(), spacing: 0.25, cells: [4; D] };
+    Ok(Simulation::new(grid, Approximation::from(Linear), bodies, particles, Clock::new(0.01, 3)))
 }
 
 /// A square falls onto a sliding floor.

@@ -2,8 +2,7 @@
 //!
 //! Gauss points stand for particles and never move from X; the nodes of serendipity elements (three in 1D, eight in 2D, twenty
 //! in 3D) are those of a grid of half the element's size. With F_n = I and Δφ the whole displacement u, the residual of a
-//! step is that of the total-Lagrangian method; what the nodes carried from the step before enters by their velocity:
-//! a = α₁ (u − u_n) − α₂ v_n − α₃ a_n = α₁ u − α₂ (v_n + u_n α₁/α₂) − α₃ a_n.
+//! step is that of the total-Lagrangian method, on a grid that is kept.
 
 use bfree::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use bfree::clock::Clock;
@@ -180,14 +179,14 @@ impl<const D: usize, L: Law> Elements<D, L> {
     pub fn step(&mut self) -> Result<NewtonReport, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
         let (theta, alphas, end) = (self.scheme.instant(), self.scheme.balance(dt), self.scheme.end(dt));
-        let carried: Vec<_> = self.velocity.iter().zip(&self.displacement).map(|(v, u)| v + u / alphas.dt).collect();
         let nodal = Nodal {
             mass: self.mass.clone().into(),
-            velocity: carried.into(),
+            velocity: self.velocity.clone().into(),
             acceleration: self.acceleration.clone().into(),
-            iterations: 0,
+            motion: self.displacement.clone().into(),
+            ..Nodal::default()
         };
-        // Walls at rest alone: u = 0 there, whatever was carried.
+        // Walls at rest alone: u = 0 there.
         let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, t, dt);
         let nodal = nodal.with_prescribed(&prescribed);
         let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);

@@ -147,15 +147,6 @@ pub const KNOWN: &[Known] = &[
     },
     Known {
         study: "column",
-        what: "the column of linear functions in ten load steps: error of the displacement of the top; 0.015 asked",
-        why: "Particles cross cells between the steps, and the gradients of linear functions leap there. In one step it \
-              is 0.0018.",
-        since: "22 November 2026",
-        factor: 1.2,
-        cells: &[short_effort(&["top, 10 cells", "linear", "10"], 0.0794)],
-    },
-    Known {
-        study: "column",
         what: "the column of LME 1.4 in one load step: order of the stress from 40 to 80 cells; 0.95 asked, 1 by theory",
         why: "Not known: it falls from 1.27 and 1.13 before. The displacement keeps to order 2.",
         since: "22 November 2026",
@@ -189,8 +180,6 @@ pub const KNOWN: &[Known] = &[
             timed(&["solver.krylov.forcing", "manufactured 2D"], 0.93),
             timed(&["solver.krylov.forcing", "compaction 2D"], 0.88),
             timed(&["time.initial_guess", "manufactured 2D"], 0.76),
-            timed(&["approximation.lme.tolerance", "manufactured 2D"], 0.993),
-            timed(&["transfer", "Riemann 1D"], 0.995),
             timed(&["combinations", "Riemann 1D"], 0.66),
             timed(&["combinations", "compaction 2D"], 0.87),
             timed(&["combinations", "manufactured 3D"], 0.73),

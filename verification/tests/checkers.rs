@@ -4,7 +4,6 @@ use bfree::approximation::{Approximation, ApproximationError, AxisWeights, Bspli
 use bfree::clock::Clock;
 use bfree::grid::{Axis, Grid};
 use bfree::material::{Elastic, Lame, LameError, Law, Material, NeoHookean, Remembered, Start};
-use bfree::mechanics::loads::Loads;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
@@ -150,17 +149,11 @@ fn patch<L: Law>(law: L) -> Simulation<2, L> {
         let position = Vector::from([1.1 + 0.31 * i + 0.05 * k, 1.2 + 0.27 * k]);
         particles.push(position, Vector::from([0.4 * k - i, 0.7 * i]), 0.09, 0.09, 0);
     }
+    let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6, 6] };
+    let bodies = vec![Body { name: "patch".into(), law, density: 1.0 }];
     Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: 0.5, cells: [6, 6] },
-        approximation: Bspline::Quadratic.into(),
-        bodies: vec![Body { name: "patch".into(), law, density: 1.0 }],
-        particles,
-        loads: Loads::default(),
         settings: Settings { lumping: 0.5, ..Settings::default() },
-        clock: Clock::new(0.01, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
+        ..Simulation::new(grid, Bspline::Quadratic.into(), bodies, particles, Clock::new(0.01, 0))
     }
 }
 

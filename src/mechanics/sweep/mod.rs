@@ -381,6 +381,12 @@ impl<const D: usize> Supports<D> {
         self
     }
 
+    /// The same, to count passes anew.
+    pub(crate) fn again(self) -> Self {
+        self.passes.store(0, Ordering::Relaxed);
+        self
+    }
+
     /// Number of particles.
     pub fn particles(&self) -> usize {
         either!(self, way => way.particles())

@@ -10,6 +10,7 @@ use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Flow, Laned, Number};
+use crate::mechanics::transfer::Nodal;
 use crate::problems::Problems;
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
@@ -77,13 +78,12 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
 
     /// v = v_n + Δv at the nodes.
     fn velocity<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
-        let state = self.step.nodal.velocity.iter().zip(&self.step.nodal.acceleration);
+        let Nodal { velocity, acceleration, .. } = self.step.nodal;
         let Alphas { dt, a4, a6, .. } = self.step.alphas;
-        let one = |(dphi, (v, a)): (&Vector<T, D>, (&Vector<f64, D>, &Vector<f64, D>))| {
-            let known = v - v * (dt * a4) + a * a6;
-            Vector::from_fn(|i, _| dphi[i] * T::lit(a4) + T::lit(known[i]))
-        };
-        dphi.iter().zip(state).map(one).collect()
+        let state = velocity.iter().zip(acceleration).zip(self.step.nodal.moved(dphi.len()));
+        let known = state.map(|((v, a), motion)| v - v * (dt * a4) + a * a6 - motion * a4);
+        let all = dphi.iter().zip(known);
+        all.map(|(dphi, known)| Vector::from_fn(|i, _| dphi[i] * T::lit(a4) + T::lit(known[i]))).collect()
     }
 
     /// (a M̃ + b K_n) v, for every number: it is linear in v.
@@ -122,10 +122,7 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     }
 
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        let Alphas { dt, a4, a6, .. } = self.step.alphas;
-        let state = self.step.nodal.velocity.iter().zip(&self.step.nodal.acceleration);
-        let sizes = dphi.iter().zip(state).map(|(dphi, (v, a))| dphi * a4 + v * (1.0 - dt * a4) + a * a6);
-        let force = self.force(&sizes.collect::<Vec<_>>());
+        let force = self.force(&self.velocity(dphi));
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 

@@ -28,8 +28,7 @@ impl<'a, const D: usize> Inertia<'a, D> {
         }
         let mut predicted = Pooled::default();
         if mass.lumping < 1.0 {
-            let state = nodal.velocity.iter().zip(&nodal.acceleration);
-            let of_nodes = mass.supports.pool().collect(state.map(|(v, a)| alphas.predicted(v, a)));
+            let of_nodes = mass.supports.pool().collect(nodal.predicted(&alphas));
             predicted = mass.supports.pool().filled(mass.particles.len(), Vector::zeros());
             mass.supports.each_value(&of_nodes, |p, value| predicted[p] = value);
         }
@@ -38,9 +37,7 @@ impl<'a, const D: usize> Inertia<'a, D> {
 
     /// ε m_I and a_I of every node.
     fn motion<T: Number>(&self, dphi: &[Vector<T, D>]) -> impl Iterator<Item = (T, Vector<T, D>)> {
-        let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration);
-        dphi.iter().zip(state).zip(self.mass.lumped).map(|((dphi, (v, a)), m)| {
-            let predicted = self.alphas.predicted(v, a);
+        dphi.iter().zip(self.nodal.predicted(&self.alphas)).zip(self.mass.lumped).map(|((dphi, predicted), m)| {
             let a = Vector::from_fn(|i, _| T::lit(self.alphas.a1) * (dphi[i] - T::lit(predicted[i])));
             (T::lit(self.mass.lumping * m), a)
         })

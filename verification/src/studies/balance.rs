@@ -76,13 +76,9 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
         ..Loads::default()
     };
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1000.0, 0.3)?));
-    Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: SPACING, cells: [12; D] },
-        approximation: shape.clone(),
-        bodies: vec![Body { name: "block".into(), law, density: DENSITY }],
-        particles,
-        loads,
-        settings: Settings {
+    let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [12; D] };
+    let bodies = vec![Body { name: "block".into(), law, density: DENSITY }];
+    Ok(Simulation { loads, settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,
             newton: NewtonSettings {
@@ -91,12 +87,7 @@ fn block<const D: usize>(shape: &Approximation, lumping: f64) -> Result<Simulati
                 ..NewtonSettings::default()
             },
             ..Settings::default()
-        },
-        clock: Clock::new(STEP, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    })
+        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(STEP, 0)) })
 }
 
 /// Σ m x / Σ m

@@ -294,16 +294,7 @@ fn strained_block<const D: usize>(approximation: Approximation, law: Material, c
     let mut motion = std::array::from_fn(|_| None);
     motion[D - 1] = Some(Motion::Rest);
     let floor = Prescribed { name: "floor".into(), on: Selection::Face { axis: D - 1, upper: false }, motion };
-    Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] },
-        approximation,
-        bodies: vec![Body { name: "block".into(), law, density: 1.0 }],
-        particles,
-        loads: Loads { prescribed: vec![floor], ..Loads::default() },
-        settings: Settings { lumping: 0.5, ..Settings::default() },
-        clock: Clock::new(5.0 / 1346.0_f64.sqrt(), 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    }
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] };
+    let bodies = vec![Body { name: "block".into(), law, density: 1.0 }];
+    Simulation { loads: Loads { prescribed: vec![floor], ..Loads::default() }, settings: Settings { lumping: 0.5, ..Settings::default() }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(5.0 / 1346.0_f64.sqrt(), 0)) }
 }

@@ -139,27 +139,17 @@ fn simulate<P: Problem>(
     } else {
         Vec::new()
     };
-    let mut simulation = Simulation {
-        grid,
-        approximation: shape.clone(),
-        bodies: vec![Body { name: "body".into(), law: law.clone(), density }],
-        particles,
-        loads: Loads {
+    let bodies = vec![Body { name: "body".into(), law: law.clone(), density }];
+    let mut simulation = Simulation { loads: Loads {
             prescribed,
             field: Some(force_field(*problem, law, density, reference.clone())),
             ..Loads::default()
-        },
-        settings: Settings {
+        }, settings: Settings {
             lumping,
             wall_update: WallUpdate::Consistent,
             newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
             ..Settings::default()
-        },
-        clock: Clock::new(1.0 / f64::from(steps), 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    };
+        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(1.0 / f64::from(steps), 0)) };
     for _ in 0..steps {
         simulation.step()?;
     }

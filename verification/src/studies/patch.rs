@@ -320,13 +320,9 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
         }
     }
     let law = Material::from(NeoHookean::ciarlet(Lame::new(15.0, 10.0)?));
-    Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: 1.0, cells: [12, 12] },
-        approximation: shape.clone(),
-        bodies: vec![Body { name: "square".into(), law, density: 4.0 }],
-        particles,
-        loads: Loads::default(),
-        settings: Settings {
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [12, 12] };
+    let bodies = vec![Body { name: "square".into(), law, density: 4.0 }];
+    Ok(Simulation { settings: Settings {
             lumping,
             initial_guess: InitialGuess::Velocity,
             newton: NewtonSettings {
@@ -335,12 +331,7 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
                 ..NewtonSettings::default()
             },
             ..Settings::default()
-        },
-        clock: Clock::new(dt, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    })
+        }, ..Simulation::new(grid, shape.clone(), bodies, particles, Clock::new(dt, 0)) })
 }
 
 /// Σ m x × v about the centre of mass.

@@ -178,12 +178,9 @@ pub(super) fn cloud<const D: usize, L: Law>(
     }
     let mut motion = std::array::from_fn(|_| None);
     motion[0] = Some(Motion::Rest);
-    Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] },
-        approximation,
-        bodies: vec![Body { name: "cloud".into(), law, density }],
-        particles,
-        loads: Loads {
+    let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] };
+    let bodies = vec![Body { name: "cloud".into(), law, density }];
+    Ok(Simulation { loads: Loads {
             gravity: Some(Gravity { acceleration: random.vector() * (speed / dt), curve: Curve::constant(1.0) }),
             surface: vec![SurfaceLoad {
                 pressing: Pressing::Pressure(0.1 * YOUNG),
@@ -197,17 +194,11 @@ pub(super) fn cloud<const D: usize, L: Law>(
             }],
             damping: Some(Rayleigh { mass: 0.4 / dt, stiffness: 0.3 * dt }),
             ..Loads::default()
-        },
-        // Not a half, where ε and 1 − ε are the same.
+        }, // Not a half, where ε and 1 − ε are the same.
         settings: Settings {
             lumping: 0.3,
             ghost: 0.02,
             newton: NewtonSettings { precision: Precision::Mixed, ..NewtonSettings::default() },
             ..Settings::default()
-        },
-        clock: Clock::new(dt, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    })
+        }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0)) })
 }

@@ -4,7 +4,7 @@ use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
-use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
+use bfree::mechanics::loads::{Curve, Gravity, Motion, Prescribed, Selection};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{Settings, Simulation, StepReport};
 use bfree::solver::{Forcing, Krylov, NewtonSettings};
@@ -83,18 +83,7 @@ pub(super) fn simulation<const D: usize>(
     bodies: Vec<Body<Material>>,
     dt: f64,
 ) -> Simulation<D> {
-    Simulation {
-        grid,
-        approximation,
-        bodies,
-        particles,
-        loads: Loads::default(),
-        settings: settings(1.0),
-        clock: Clock::new(dt, 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    }
+    Simulation { settings: settings(1.0), ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0)) }
 }
 
 /// A block of 2ᴰ particles a cell, `cells` cells wide, in the middle of a box three times as wide, of spacing 1.

@@ -36,12 +36,13 @@ const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
 const GHOSTS: Check = Check::Test("ghost::");
 const LEVELS: Check = Check::Test("multigrid::");
+const KEPT: Check = Check::Test("kept::");
 const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP, LAWS,
-    GHOSTS, LEVELS, SOLVER,
+    GHOSTS, LEVELS, KEPT, SOLVER,
 ];
 
 /// What is to become of a patch.
@@ -82,6 +83,7 @@ const MASS: &str = "src/mechanics/mass.rs";
 const TERMS: &str = "src/mechanics/terms/mod.rs";
 const INERTIA: &str = "src/mechanics/terms/inertia.rs";
 const STRESS: &str = "src/mechanics/terms/stress.rs";
+const KEPT_GRID: &str = "src/mechanics/kept.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
@@ -97,7 +99,7 @@ const PLAIN: &str = "src/mechanics/sweep/plain.rs";
 const ALPHAS: &str = "src/mechanics/schemes/mod.rs";
 const NEWMARK: &str = "src/mechanics/schemes/newmark.rs";
 const LOADING: &str = "src/mechanics/loads.rs";
-const STEP: &str = "src/simulation.rs";
+const STEP: &str = "src/simulation/mod.rs";
 const GENERALIZED: &str = "src/mechanics/schemes/generalized_alpha.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
@@ -461,8 +463,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "a3",
         Killed(&[SCHEMES], &[TANGENT, DYNAMICS])),
     patch("Δφ taken for the motion to the instant of the balance", STEP,
-        "*dphi /= theta",
-        "*dphi /= 1.0",
+        "(*dphi - before) / theta",
+        "*dphi - before",
         Killed(&[SCHEMES], &[TANGENT, DYNAMICS])),
     patch("prescribed nodes at their end before the step's", STEP,
         "theta * dof.step.increment",
@@ -644,4 +646,24 @@ pub(super) const PATCHES: &[Patch] = &[
         "held[coarse as usize * D + i] = form.prescribed[fine * D + i]",
         "held[coarse as usize * D + i] = false",
         Killed(&[LEVELS], &[GHOSTS])),
+    patch("a prediction that forgets the motion on a grid that is kept", TRANSFER,
+        "motion + alphas.predicted(v, a)",
+        "motion * 0.0 + alphas.predicted(v, a)",
+        Killed(&[KEPT], &[DYNAMICS, SCHEMES])),
+    patch("a damping that forgets it", DAMPING,
+        "v - v * (dt * a4) + a * a6 - motion * a4",
+        "v - v * (dt * a4) + a * a6 - motion * (0.0 * a4)",
+        Killed(&[KEPT], &[DYNAMICS])),
+    patch("a commit that forgets it", TRANSFER,
+        "motion + dphi",
+        "motion * 0.0 + dphi",
+        Killed(&[KEPT], &[DYNAMICS])),
+    patch("no strain makes a grid anew", TRANSFER,
+        "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5)",
+        "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.0)",
+        Killed(&[KEPT], &[DYNAMICS])),
+    patch("no wall that is met makes it anew", KEPT_GRID,
+        "met.is_empty()",
+        "(met.len() < usize::MAX)",
+        Killed(&[KEPT], &[DYNAMICS])),
 ];

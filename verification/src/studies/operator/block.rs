@@ -7,14 +7,11 @@ use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Elastic, Lame, Law, Material, NeoHookean, Start};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
-use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::transfer::WallUpdate;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
-use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, Krylov, NewtonSettings};
 use bfree::tensor::{Deformation, Tensor, Vector};
-use std::sync::Arc;
 
 /// E = 1000, ν = 0.3, ρ = 1, h = 1.
 pub(super) fn lame() -> Result<Lame, StudyError> {
@@ -71,40 +68,24 @@ pub(super) fn block<const D: usize>(
     motion[D - 1] = Some(Motion::Rest);
     let floor = Prescribed { name: "floor".into(), on: Selection::Face { axis: D - 1, upper: false }, motion };
     let acceleration = Vector::from_fn(|i, _| if i == D - 1 { -0.05 } else { 0.0 });
-    Ok(Simulation {
-        grid: Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] },
-        approximation,
-        bodies: vec![Body {
+    let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] };
+    let bodies = vec![Body {
             name: "block".into(),
             law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()),
             density: 1.0,
-        }],
-        particles,
-        loads: Loads {
+        }];
+    Ok(Simulation { loads: Loads {
             gravity: Some(Gravity { acceleration, curve: Curve::constant(1.0) }),
             prescribed: vec![floor],
             ..Loads::default()
-        },
-        settings: Settings {
-            scheme: Arc::new(Newmark::default()),
-            ghost: 0.0,
+        }, settings: Settings {
             lumping,
-            initial_guess: InitialGuess::Zero,
-            wall_update: WallUpdate::default(),
-            smoothing: None,
-            error_tolerance: None,
-            check_tangent: None,
-            preconditioner: Default::default(),
             newton: NewtonSettings {
                 relative_tolerance: 1e-8,
                 forcing: Forcing::EisenstatWalker,
                 krylov: Krylov::Gmres { restart: 20 },
                 ..NewtonSettings::default()
             },
-        },
-        clock: Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0),
-        external_work: 0.0,
-        dissipated: 0.0,
-        workspace: Default::default(),
-    })
+            ..Settings::default()
+        }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0)) })
 }

@@ -87,11 +87,11 @@ fn defaults(all: &[Measured], effort: Effort) -> Report {
                  Newton's method quadratic";
     let mut report = Report::new(title, &["knob", "problem", "by"]);
     for measured in all {
-        let base = &measured.base;
+        let (base, scatter) = (&measured.base, measured.scatter());
         let mut least = |what: &str, base: Option<&Point>, chosen: &dyn Fn(&Point) -> bool| {
             let others = measured.points.iter().filter(|point| point.cost.tally.quadratic() && chosen(point));
             // Defaults that do not come to their end are dominated by all.
-            let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other));
+            let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other, scatter));
             let nearest = others.min_by(|a, b| dominated(a).total_cmp(&dominated(b)));
             if let Some(nearest) = nearest {
                 let by = base.map_or_else(|| nearest.setting.name(), |base| by_how_much(base, nearest));
@@ -103,8 +103,7 @@ fn defaults(all: &[Measured], effort: Effort) -> Report {
         }
         least("combinations", Some(base), &|point| matches!(point.setting.origin, Origin::Design(..)));
         let quadratic = if base.cost.tally.quadratic() { 1.0 } else { 0.0 };
-        let [least, greatest] = base.scatter;
-        report.push(&["scatter of the defaults' work, greatest over least", measured.problem, "-"], greatest / least, Bound::Reported);
+        report.push(&["how well the least of a setting's five times is found again", measured.problem, "-"], scatter, Bound::Reported);
         report.push(&["Newton quadratic with the defaults", measured.problem, "-"], quadratic, Bound::AtLeast(1.0));
     }
     report

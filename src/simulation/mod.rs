@@ -6,6 +6,7 @@ use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{Law, Material, p_wave_modulus};
 use crate::mechanics::check::{CheckError, direction};
+use crate::mechanics::kept::{Kept, Renewal};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
 use crate::mechanics::residual::{Equilibrium, Inadmissible, unsymmetric};
 use crate::mechanics::rigid::{Loose, loose};
@@ -36,6 +37,8 @@ pub enum InitialGuess {
     Zero,
     /// Δφ = Δt v.
     Velocity,
+    /// Δφ goes on as in the last step, where the grid is kept; Δφ = 0 where it is new.
+    LastStep,
 }
 
 /// A step grows only if its error is at most this part of the tolerance: one of twice the length has eight times the error.
@@ -52,6 +55,8 @@ pub struct Settings {
     /// γ of the ghost stiffness, as a share of Λ + 2G; 0 for none. It holds nodes that have little of a body: without inertia nothing else
     /// does, and with smooth shape functions the answer needs it.
     pub ghost: f64,
+    /// When the grid is made anew.
+    pub renewal: Renewal,
     /// Where Newton starts.
     pub initial_guess: InitialGuess,
     /// What resting walls do to particle velocities.
@@ -76,6 +81,7 @@ impl Default for Settings {
             scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
             ghost: 0.0,
+            renewal: Renewal::default(),
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
             smoothing: None,
@@ -126,6 +132,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub external_work: f64,
     /// Energy that damping and ghost stiffness have taken since the start.
     pub dissipated: f64,
+    /// The grid that is kept, if it is: a step then goes on from there, and not from the places and deformations that are written into the
+    /// particles by hand. Put `None` here first.
+    pub kept: Option<Kept<D>>,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
 }
@@ -136,6 +145,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
+    /// Whether they serve again as they are: those of a grid that is kept.
+    serves: bool,
     pool: Pool,
 }
 
@@ -161,6 +172,8 @@ pub struct StepReport<const D: usize> {
     pub reactions: Vec<Vector<f64, D>>,
     /// Its local error in units of the grid spacing, where a tolerance asks for it; above the tolerance only if it could not be halved.
     pub error: Option<f64>,
+    /// Whether the grid was new.
+    pub renewed: bool,
     /// Seconds, and passes over the particles, by phase.
     pub seconds: Stopwatch,
     /// The attempts before it, each of which failed or was too long, and was repeated with half of its length.
@@ -222,6 +235,17 @@ pub enum StepError {
     /// Newton found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
+    /// What was kept is not of these particles and functions.
+    #[error(
+        "the grid that was kept has {kept} nodes, and the particles have {nodes}: after a change by hand, put None into \
+         Simulation::kept"
+    )]
+    OtherGrid {
+        /// Nodes that have moved.
+        kept: usize,
+        /// Active nodes.
+        nodes: usize,
+    },
     /// Without inertia, bodies are pushed where nothing holds them.
     #[error(
         "{loose}: without inertia there is no equilibrium; hold them with a boundary condition, or give the scene inertia"
@@ -276,6 +300,47 @@ pub struct AdvanceError {
 }
 
 impl<const D: usize, L, A> Simulation<D, L, A> {
+    /// Bodies at their start, with no loads and [`Settings::default`]: what is to be otherwise is written beside it.
+    ///
+    /// ```
+    /// use bfree::approximation::Bspline;
+    /// use bfree::clock::Clock;
+    /// use bfree::grid::Grid;
+    /// use bfree::material::{Lame, Material, NeoHookean};
+    /// use bfree::mechanics::schemes::Statics;
+    /// use bfree::particles::{Body, Particles};
+    /// use bfree::simulation::{Settings, Simulation};
+    /// use bfree::tensor::Vector;
+    /// use std::sync::Arc;
+    ///
+    /// let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [4] };
+    /// let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
+    /// let mut particles = Particles::default();
+    /// particles.push_without_inertia(Vector::from([1.75]), 0.5, 0.5, 0);
+    /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0 }];
+    /// let simulation = Simulation {
+    ///     settings: Settings { scheme: Arc::new(Statics), ..Settings::default() },
+    ///     ..Simulation::new(grid, Bspline::Quadratic, bodies, particles, Clock::new(1.0, 0))
+    /// };
+    /// assert!(simulation.external_work == 0.0 && simulation.loads.prescribed.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn new(grid: Grid<D>, approximation: A, bodies: Vec<Body<L>>, particles: Particles<D>, clock: Clock) -> Self {
+        Self {
+            grid,
+            approximation,
+            bodies,
+            particles,
+            loads: Loads::default(),
+            settings: Settings::default(),
+            clock,
+            external_work: 0.0,
+            dissipated: 0.0,
+            kept: None,
+            workspace: Workspace::default(),
+        }
+    }
+
     /// Puts the particle that lies at `order[i]` in memory to the place `i`, wherever places are known; `order` must be a permutation.
     /// [`Self::step`] does it where it saves time. Sums over nodes do not depend on it, sums over all particles, such as energies, in their
     /// last bits.
@@ -298,6 +363,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace.supports = None;
         self.particles.rearrange(order);
+        self.kept.iter_mut().for_each(|kept| kept.rearrange(order));
         let mut points = self.loads.surface.iter_mut().flat_map(|load| &mut load.points).peekable();
         if points.peek().is_some() {
             let mut places = vec![0; order.len()];
@@ -375,20 +441,36 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// As [`Self::step`]; a step that fails leaves what it has spent.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
+        // Over a grid that is kept, a step starts where that was new.
+        let mut kept = self.kept.take();
+        kept.iter_mut().for_each(|kept| kept.exchange(&mut self.particles));
+        let report = self.attempt_from(&mut kept, spent);
+        if report.is_err() {
+            kept.iter_mut().for_each(|kept| kept.exchange(&mut self.particles));
+            self.kept = kept;
+        }
+        report
+    }
+
+    fn attempt_from(&mut self, kept: &mut Option<Kept<D>>, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.remember(&self.bodies);
         let (t, dt) = (self.clock.time(), self.clock.step());
-        let scheme = &*self.settings.scheme;
+        let scheme = self.settings.scheme.clone();
         let watch = &mut spent.watch;
 
-        let precision = self.settings.newton.precision;
-        let Particles { position, id, .. } = &self.particles;
-        let (spare, pool) = (self.workspace.supports.take(), self.workspace.pool.clone());
-        let (supports, nodes) =
-            Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, &pool)?;
+        let pool = self.workspace.pool.clone();
+        let supports = self.supports(kept.is_some())?;
+        let nodes = supports.active().clone();
         let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
-        let projected = self.project(&supports)?;
+        let projected = match kept {
+            Some(kept) if kept.motion.len() != nodes.len() => {
+                return Err(StepError::OtherGrid { kept: kept.motion.len(), nodes: nodes.len() });
+            }
+            Some(kept) => kept.state(self.masses(&supports), &pool),
+            None => self.project(&supports)?,
+        };
         spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());
@@ -396,16 +478,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         // To t_n + θ Δt, where forces are in balance; for θ = 1 that is the end.
         let theta = scheme.instant();
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, scheme.balance(dt), t + theta * dt);
-        let mut dphi = self.initial_guess(&supports, &nodal, theta * dt);
+        let mut phi = self.initial_guess(&supports, &nodal, kept.as_ref(), theta * dt);
         for dof in &prescribed {
-            dphi[dof.node][dof.component] = theta * dof.step.increment;
+            phi[dof.node][dof.component] = theta * dof.step.increment;
         }
-        let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut dphi));
+        phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
+        let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
         let newton = newton(&equilibrium, &mut *preconditioner, x, &self.settings.newton, &pool)
             .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
         watch.lap(Phase::Newton, supports.passes());
-        self.check_tangent(&equilibrium, &dphi)?;
-        dphi.iter_mut().for_each(|dphi| *dphi /= theta);
+        self.check_tangent(&equilibrium, &phi)?;
+        let mut dphi = phi;
+        dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
 
         let (end, walls) = (scheme.end(dt), self.settings.wall_update);
         let mut update = Update::new(&end, &projected, &nodal, &prescribed, walls, &dphi);
@@ -416,17 +500,22 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, update.impulses())?;
-        update.commit(&mut self.particles, &self.bodies, &supports, dt);
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, &update)?;
+        let was_kept = kept.is_some();
+        let mut next = kept.take().unwrap_or_default();
+        if self.settings.renewal != Renewal::EveryStep {
+            next.renew(&self.particles, &update.end(&projected), &dphi, dt);
+        }
+        let strain = update.commit(&mut self.particles, &self.bodies, &supports, dt);
+        let keeps = self.settings.renewal.keeps(strain)
+            && !next.meets(&self.particles.position, &self.loads.prescribed, &self.grid, &nodes);
+        self.kept = keeps.then_some(next);
         let passes = supports.passes();
 
-        self.workspace.supports = Some(match supports.leaping() {
-            Some(order) => {
-                self.rearrange(&order);
-                supports.rearranged()
-            }
-            None => supports,
-        });
+        let leaping = supports.leaping();
+        leaping.iter().for_each(|order| self.rearrange(order));
+        self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
+        self.workspace.serves = keeps;
         watch.lap(Phase::Update, passes);
         self.external_work += work;
         self.dissipated += dissipated;
@@ -442,9 +531,24 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             projection_iterations: projected.iterations,
             reactions,
             error,
+            renewed: !was_kept,
             seconds: *watch,
             failed: Vec::new(),
         })
+    }
+
+    /// The shape functions of a step, those of the last one if the grid is kept.
+    fn supports(&mut self, kept: bool) -> Result<Supports<D>, SupportError> {
+        let (Workspace { supports, serves, pool }, Particles { position, id, .. }) =
+            (&mut self.workspace, &self.particles);
+        let spare = supports.take();
+        match spare {
+            Some(supports) if kept && *serves => Ok(supports.again()),
+            spare => {
+                let precision = self.settings.newton.precision;
+                Ok(Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, pool)?.0)
+            }
+        }
     }
 
     /// As [`Self::step`], halving Δt while Newton fails or the error is too large, down to the clock's limit; Δt grows back afterwards.
@@ -582,15 +686,30 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.settings.scheme.has_inertia() {
             return Nodal::project(&self.particles, supports, self.settings.lumping);
         }
-        let weighs = self.loads.gravity.is_some();
-        Ok(if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() })
+        Ok(self.masses(supports))
     }
 
-    fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
+    /// The mass of the nodes, where something asks for it.
+    fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
+        let weighs = self.settings.scheme.has_inertia() || self.loads.gravity.is_some();
+        if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
+    }
+
+    /// The Δφ that Newton's method starts from.
+    fn initial_guess(
+        &self,
+        supports: &Supports<D>,
+        nodal: &Nodal<D>,
+        kept: Option<&Kept<D>>,
+        dt: f64,
+    ) -> Pooled<Vector<f64, D>> {
         let mut dphi: Pooled<Vector<f64, D>> = supports.field();
-        if self.settings.initial_guess == InitialGuess::Velocity {
-            dphi.iter_mut().zip(&nodal.velocity).for_each(|(dphi, v)| *dphi = v * dt);
-        }
+        let rate: &[Vector<f64, D>] = match self.settings.initial_guess {
+            InitialGuess::Zero => &[],
+            InitialGuess::Velocity => &nodal.velocity,
+            InitialGuess::LastStep => kept.map_or(&[], |kept| &kept.rate),
+        };
+        dphi.iter_mut().zip(rate).for_each(|(dphi, rate)| *dphi = rate * dt);
         dphi
     }
 
@@ -634,43 +753,43 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         t: f64,
         dt: f64,
         dphi: &[Vector<f64, D>],
-        impulses: &[f64],
+        update: &Update<'_, D>,
     ) -> Result<(Vec<Vector<f64, D>>, f64, f64), StepError> {
-        let terms::Step { supports, nodal, .. } = balanced.step;
+        let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
         let mut end = balanced;
         let after;
         if self.settings.scheme.instant() < 1.0 {
             after = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
             // Nothing has asked yet whether this end is possible.
-            after.forces(Role::Stores, dphi)?;
+            after.forces(Role::Stores, phi)?;
             end = &after;
         }
         let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            end.residual_into::<f64>(dphi, &mut residual)?;
-            for (dof, impulse) in end.prescribed.iter().zip(impulses) {
+            end.residual_into::<f64>(phi, &mut residual)?;
+            for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
                 reactions[dof.owner][dof.component] += reaction + blow;
                 work += (0.5 * reaction + blow) * dof.step.increment;
             }
         }
         // At t_n: a = a_n and Δφ = 0.
-        let at_rest: Pooled<Vector<f64, D>> = supports.field();
+        let before = supports.pool().collect(nodal.moved(supports.nodes()));
         let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
         if end.prescribed.iter().any(|dof| dof.moving) {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
-            start.residual_into::<f64>(&at_rest, &mut residual)?;
+            start.residual_into::<f64>(&before, &mut residual)?;
             for dof in end.prescribed {
                 work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
             }
         }
-        work += mean_work(&end.external_force(dphi)?, &start.external_force(&at_rest)?, dphi);
+        work += mean_work(&end.external_force(phi)?, &start.external_force(&before)?, dphi);
         let mut dissipated = 0.0;
         if self.dissipates() {
-            let lost = |equilibrium: &Equilibrium<'_, D, L>, dphi| equilibrium.forces(Role::Dissipates, dphi);
-            dissipated = mean_work(&lost(end, dphi)?, &lost(&start, &at_rest)?, dphi);
+            let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
+            dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
         }
         Ok((reactions, work, dissipated))
     }
@@ -717,16 +836,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let mut particles = self.particles;
         particles.remember_rest(&bodies);
         Simulation {
-            grid: self.grid,
-            approximation: self.approximation,
-            bodies,
-            particles,
             loads: self.loads,
             settings: self.settings,
-            clock: self.clock,
             external_work: self.external_work,
             dissipated: self.dissipated,
-            workspace: Workspace::default(),
+            kept: self.kept,
+            ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
     }
 

@@ -1,0 +1,220 @@
+//! A grid that is kept: answers that do not depend on the number of steps, and when it is made anew all the same.
+
+use crate::support::{Failure, scene};
+use bfree::mechanics::kept::Renewal;
+use bfree::simulation::{Simulation, StepError};
+use bfree::tensor::Vector;
+use std::num::NonZeroU64;
+
+const BEAM: &str = "elastica.json";
+const NO_BETA: &str = "time.beta=null";
+const NO_GAMMA: &str = "time.gamma=null";
+
+/// A short beam, bent by half of its length in `steps` load steps.
+fn beam(steps: u32, more: &[&str]) -> Result<Simulation<2>, Failure> {
+    let step = format!("time.step={}", 1.0 / f64::from(steps));
+    let short = [
+        "grid.size=[8, 8]",
+        "grid.spacing=0.5",
+        r#"bodies.0.shape={"box":{"min":[0,6],"max":[6,7]}}"#,
+        r#"tractions=[{"body":"beam","region":{"half_space":{"point":[6,0],"normal":[-1,0]}},"traction":[0,-10],"curve":[[0,0],[1,1]]}]"#,
+        "output={}",
+        "solver.newton.tolerance=1e-12",
+        &step,
+    ];
+    scene(BEAM, &[&short, more].concat())
+}
+
+fn run<const D: usize>(simulation: &mut Simulation<D>) -> Result<Vec<bool>, Failure> {
+    let mut renewed = Vec::new();
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        renewed.push(simulation.advance()?.renewed);
+    }
+    Ok(renewed)
+}
+
+/// The largest difference of places.
+fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
+    let (a, b) = (a.particles.by_id(), b.particles.by_id());
+    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_load_steps() -> Result<(), Failure> {
+    for family in [r#"{"bspline": {"degree": 3}}"#, r#""linear""#, r#"{"lme": {"gamma": 3}}"#, r#""gimp""#] {
+        let family = format!("approximation={family}");
+        let mut one = beam(1, &[&family])?;
+        run(&mut one)?;
+        let lowest = one.particles.position.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min);
+        assert!(lowest < 4.0, "bent by half of its length: {lowest}");
+        for steps in [2, 7] {
+            let mut more = beam(steps, &[&family])?;
+            let renewed = run(&mut more)?;
+            assert_eq!(renewed.iter().filter(|&&renewed| renewed).count(), 1, "the first one alone");
+            // Newton's tolerance of 1e-12 in residuals, of a beam 6 long and soft in bending.
+            assert!(apart(&one, &more) < 1e-8, "{family}, {steps} steps: {:e}", apart(&one, &more));
+            let ratio = more.strain_energy() / one.strain_energy();
+            assert!((ratio - 1.0).abs() < 1e-8, "{family}, {steps} steps: {ratio}");
+        }
+        // Renewed, it does.
+        let mut renewed = beam(7, &[&family, r#"grid.renewed="every_step""#])?;
+        assert!(run(&mut renewed)?.iter().all(|&renewed| renewed) && renewed.kept.is_none());
+        assert!(apart(&one, &renewed) > 1e-5, "{family}: {:e}", apart(&one, &renewed));
+    }
+    Ok(())
+}
+
+#[test]
+fn the_work_along_the_path_is_what_is_stored() -> Result<(), Failure> {
+    // Ghost stiffness stores too, and gives it back: it is in `dissipated`.
+    let balance = |steps| -> Result<f64, Failure> {
+        let mut simulation = beam(steps, &[])?;
+        run(&mut simulation)?;
+        let (stored, work) = (simulation.strain_energy() + simulation.dissipated, simulation.external_work);
+        Ok((stored / work - 1.0).abs())
+    };
+    let (few, many) = (balance(8)?, balance(16)?);
+    // The trapezoidal rule in the load.
+    assert!(few < 0.02 && few / many > 3.0, "{few} {many}");
+    Ok(())
+}
+
+#[test]
+fn a_strain_makes_it_anew() -> Result<(), Failure> {
+    let mut simulation = beam(10, &[r#"grid.renewed={"strain": 0.05}"#])?;
+    let renewed = run(&mut simulation)?;
+    let count = renewed.iter().filter(|&&renewed| renewed).count();
+    assert!(renewed[0] && count > 1 && count < 10, "{renewed:?}");
+    assert!(!Renewal::Strain(0.05).keeps(f64::NAN));
+    let error = beam(1, &[r#"grid.renewed={"strain": 0}"#]).err().ok_or("no strain")?.to_string();
+    assert!(error.contains("grid.renewed.strain") && error.contains("> 0"), "{error}");
+    Ok(())
+}
+
+/// A block that hangs from its top and is lowered onto a floor at which nothing was.
+#[test]
+fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
+    let lowered = r#"prescribed=[{"region":{"half_space":{"point":[0,1.3],"normal":[0,-1]}},"displacement":[[0,[0,0]],[1,[0,-0.4]]]}]"#;
+    let hanging = [
+        "grid={\"size\":[2,2],\"spacing\":0.1}",
+        r#"bodies.0.shape={"box":{"min":[0.5,0.3],"max":[1.5,1.4]}}"#,
+        r#"boundary={"bottom":"sliding"}"#,
+        "tractions=[]",
+        lowered,
+        "output={}",
+        "time.step=0.05",
+        r#"grid.renewed="never""#,
+    ];
+    let mut simulation: Simulation<2> = scene(BEAM, &hanging)?;
+    let mut by_floor = Vec::new();
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        let step = simulation.advance()?;
+        by_floor.push((step.renewed, step.reactions[0][1]));
+    }
+    let renewals: Vec<usize> = (0..by_floor.len()).filter(|&step| by_floor[step].0).collect();
+    // Within a cell of the floor after 0.2 and some, and from the next step on the floor carries.
+    assert!(renewals.len() >= 2 && renewals.len() <= 4 && (10..=13).contains(&renewals[1]), "{renewals:?}");
+    assert!(by_floor[..renewals[1]].iter().all(|(_, force)| *force == 0.0), "{by_floor:?}");
+    assert!(by_floor[by_floor.len() - 1].1 > 1.0, "{by_floor:?}");
+    let lowest = simulation.particles.position.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min);
+    assert!(lowest > 0.0, "{lowest}");
+    Ok(())
+}
+
+#[test]
+fn a_step_that_fails_leaves_it_as_it_was() -> Result<(), Failure> {
+    let mut simulation = beam(4, &[])?;
+    simulation.step()?;
+    let (particles, kept) = (simulation.particles.clone(), simulation.kept.clone());
+    simulation.settings.newton.max_iterations = 1;
+    assert!(matches!(simulation.step(), Err(StepError::Newton(_))));
+    assert_eq!((&simulation.particles, &simulation.kept), (&particles, &kept));
+    // And goes on to the same bits, with functions that are there or made again, and particles in another order.
+    simulation.settings.newton.max_iterations = 30;
+    let mut other = simulation.clone();
+    let backwards: Vec<u32> = (0..other.particles.len() as u32).rev().collect();
+    other.rearrange(&backwards);
+    simulation.step()?;
+    other.step()?;
+    assert_eq!(simulation.particles.by_id(), other.particles.by_id());
+    Ok(())
+}
+
+#[test]
+fn what_was_changed_by_hand_is_noticed() -> Result<(), Failure> {
+    let mut simulation = beam(4, &[])?;
+    simulation.step()?;
+    if let Some(kept) = &mut simulation.kept {
+        *kept = Default::default();
+    }
+    simulation.kept = None;
+    simulation.step()?;
+    simulation.approximation = bfree::approximation::Approximation::from(bfree::approximation::Linear);
+    let error = simulation.clone().step().expect_err("other functions, other nodes").to_string();
+    assert!(error.contains("put None into Simulation::kept"), "{error}");
+    simulation.kept = None;
+    simulation.step()?;
+    Ok(())
+}
+
+/// Every piece of the tangent, on a grid that is kept, by dual numbers: with both masses, damping and a scheme that balances within the step.
+#[test]
+fn the_tangent_is_the_derivative_on_a_grid_that_is_kept() -> Result<(), Failure> {
+    for scheme in [r#""newmark""#, r#"{"generalized_alpha": {"spectral_radius": 0.6}}"#] {
+        let (inertia, more) = (format!("time.inertia={scheme}"), r#"damping={"mass": 0.1, "stiffness": 0.01}"#);
+        let kept = r#"grid.renewed="never""#;
+        let overrides = [&inertia, more, kept, "time.lumping=0.4", "ghost_stiffness=0.01", NO_BETA, NO_GAMMA];
+        let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
+        simulation.settings.check_tangent = NonZeroU64::new(1);
+        for step in 0..4 {
+            assert_eq!(simulation.step()?.renewed, step == 0);
+        }
+    }
+    Ok(())
+}
+
+/// A disc in flight that turns and vibrates: the same with a grid that is kept and with a new one in every step, but for what projections take.
+#[test]
+fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
+    let damped = r#"damping={"mass": 0.3, "stiffness": 0.01}"#;
+    for (scheme, damping) in [
+        (r#""newmark""#, "damping=null"),
+        (r#""newmark""#, damped),
+        (r#"{"generalized_alpha": {"spectral_radius": 0.6}}"#, damped),
+    ] {
+        let flown = |renewed: &str| -> Result<Simulation<2>, Failure> {
+            let overrides = [
+                &format!("time.inertia={scheme}"),
+                &format!("grid.renewed=\"{renewed}\""),
+                "time.step=0.01",
+                "time.lumping=0.05",
+                damping,
+                NO_BETA,
+                NO_GAMMA,
+                "solver.newton.tolerance=1e-12",
+                r#"gravity={"acceleration": [0, -0.1]}"#,
+            ];
+            let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
+            let centre = Vector::from([2.5, 2.5]);
+            simulation.set_velocity_on_nodes(|x| Vector::from([1.0 - 0.2 * (x - centre)[1], 0.2 * (x - centre)[0]]))?;
+            for _ in 0..100 {
+                simulation.step()?;
+            }
+            Ok(simulation)
+        };
+        let (kept, renewed) = (flown("never")?, flown("every_step")?);
+        let mass: f64 = kept.particles.mass.iter().sum();
+        // Momentum: weight times time, less what damping takes of it, whatever the grid.
+        let change = kept.particles.momentum() - renewed.particles.momentum();
+        assert!(change.norm() < 1e-9 * mass, "{scheme}: {change}");
+        let gained = kept.particles.momentum() / mass - Vector::from([1.0, -0.1]);
+        assert!((gained.norm() < 1e-9) == (damping != damped), "{scheme}: {gained}");
+        let difference = apart(&kept, &renewed);
+        assert!(difference < 2e-3, "{scheme}: {difference:e}");
+        let energy = |of: &Simulation<2>| of.particles.kinetic_energy() + of.strain_energy();
+        assert!((energy(&kept) / energy(&renewed) - 1.0).abs() < 1e-2, "{scheme}");
+        let lost = kept.dissipated / renewed.dissipated - 1.0;
+        assert!(damping != damped || lost.abs() < 1e-2, "{scheme}: {lost}");
+    }
+    Ok(())
+}
