@@ -3,6 +3,7 @@
 use super::container::Array;
 use crate::clock::Reached;
 use crate::mechanics::kept::Kept;
+use crate::mechanics::path::Path;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crate::tensor::{Tensor, Vector};
@@ -22,6 +23,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         clock: _,
         external_work,
         dissipated,
+        path: Path { load, increment, speed, weight },
         kept,
         workspace: _,
     } = simulation;
@@ -47,6 +49,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("memory", memory.as_slice().into()),
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
+        ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
     if let Some(Kept { position, displacement_gradient, motion, rate, velocity, acceleration }) = kept {
         let vectors = [position, motion, rate, velocity, acceleration].map(|field| bytemuck::cast_slice(field));
@@ -115,6 +118,11 @@ pub(super) fn restore<const D: usize, L, A>(
     simulation.kept = None;
     simulation.rearrange(&order);
     simulation.kept = kept;
+    let path = &mut simulation.path;
+    let mut numbers = arrays.iter().filter(|array| array.name == "path").flat_map(|array| &array.values);
+    for number in [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight] {
+        numbers.next().iter().for_each(|&&value| *number = value);
+    }
     let particles = &mut simulation.particles;
     for Array { name, values } in arrays {
         let into: &mut [f64] = match name.as_str() {

@@ -5,6 +5,7 @@ pub mod check;
 pub mod kept;
 pub mod loads;
 pub mod mass;
+pub mod path;
 mod point;
 pub mod residual;
 pub mod rigid;

@@ -133,6 +133,13 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(force)
     }
 
+    /// The same on the free degrees of freedom alone.
+    pub(crate) fn free_external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let mut force = self.external_force(dphi)?;
+        self.clear_prescribed(&mut force);
+        Ok(force)
+    }
+
     /// The sum of the terms of one role.
     pub(crate) fn forces(&self, role: Role, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.step.supports.field();

@@ -77,7 +77,7 @@ pub struct Cost {
 /// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
 /// let path = folder.path().join("history.csv");
-/// let mut history = History::open(path.clone(), 2, false, None)?;
+/// let mut history = History::open(path.clone(), &simulation, None)?;
 /// let energies = history.write(&simulation, &Reference::of(&simulation), Cost::default())?;
 /// history.flush()?;
 /// // The same bits come back from the file.
@@ -91,21 +91,28 @@ pub struct Cost {
 pub struct History {
     pub(crate) table: Table,
     damped: bool,
+    follows_path: bool,
 }
 
 impl History {
-    /// Creates the file, with the header for `dimension` components of momentum; or continues one whose first `kept` bytes are good.
+    /// Creates the file, with the columns that a simulation has; or continues one whose first `kept` bytes are good.
     ///
     /// # Errors
     /// The system refuses, or the file to be continued has other columns.
-    pub fn open(path: PathBuf, dimension: usize, damped: bool, kept: Option<Written>) -> Result<Self, OutputError> {
-        let fixed = ["step", "time", "dt", "kinetic", "strain", "external"];
-        let mut columns: Vec<String> = fixed.map(str::to_owned).into();
+    pub fn open<const D: usize, L: Law, A>(
+        path: PathBuf,
+        simulation: &Simulation<D, L, A>,
+        kept: Option<Written>,
+    ) -> Result<Self, OutputError> {
+        let (damped, follows_path) = (simulation.dissipates(), simulation.settings.scheme.follows_path());
+        let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
+        columns.extend(follows_path.then(|| "load".into()));
+        columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));
         columns.extend(damped.then(|| "dissipated".into()));
         columns.extend(["total", "balance"].map(str::to_owned));
-        columns.extend(AXES.iter().take(dimension).map(|axis| format!("momentum_{axis}")));
+        columns.extend(AXES.iter().take(D).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
-        Ok(Self { table: Table::open(path, &columns, kept)?, damped })
+        Ok(Self { table: Table::open(path, &columns, kept)?, damped, follows_path })
     }
 
     /// Appends the present state; returns its energies.
@@ -121,7 +128,9 @@ impl History {
         let energies = Energies::of(simulation, reference);
         let mut row = Row::default();
         row.push(simulation.clock.steps());
-        row.extend([simulation.clock.time(), cost.dt]);
+        row.push(simulation.clock.time());
+        row.extend(self.follows_path.then_some(simulation.path.load));
+        row.push(cost.dt);
         row.extend([energies.kinetic, energies.strain, energies.external]);
         row.extend(self.damped.then_some(energies.dissipated));
         row.extend([energies.total, energies.balance]);

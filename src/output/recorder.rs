@@ -175,7 +175,7 @@ impl<const D: usize> Recorder<D> {
         let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
         let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
         Ok(Self {
-            history: History::open(at("history.csv"), D, simulation.dissipates(), kept("history.csv"))?,
+            history: History::open(at("history.csv"), simulation, kept("history.csv"))?,
             reactions: (!loads.prescribed.is_empty())
                 .then(|| Reactions::open(at("reactions.csv"), loads, kept("reactions.csv")))
                 .transpose()?,

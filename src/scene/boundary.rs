@@ -62,6 +62,23 @@ pub struct Prescribed {
     pub velocity: Option<Table>,
 }
 
+impl Face {
+    /// The motion it follows.
+    pub(super) fn table(&self) -> Option<&Table> {
+        match self {
+            Self::Displacement(table) | Self::Velocity(table) => Some(table),
+            _ => None,
+        }
+    }
+}
+
+impl Table {
+    /// Whether anything in it is not zero.
+    pub(super) fn moves(&self) -> bool {
+        self.0.iter().flat_map(|row| &row.1).flatten().any(|&value| value != 0.0)
+    }
+}
+
 /// What a table holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Quantity {

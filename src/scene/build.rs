@@ -425,7 +425,7 @@ impl Scene {
             })?;
             if read.velocities.is_some() {
                 let why = if !self.time.inertia.has_inertia() {
-                    Some("time.inertia is \"none\"; remove its columns vx, … or that key")
+                    Some("there is no inertia; remove its columns vx, … or the key time.inertia")
                 } else {
                     let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
                     self.initial_velocity.as_ref().map(|_| twice)

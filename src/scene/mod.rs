@@ -30,6 +30,7 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
+use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::schemes::LONG_STEPS;
 use crate::mechanics::terms::Rayleigh;
@@ -217,6 +218,9 @@ impl Scene {
         if !self.time.inertia.has_inertia() {
             self.refuse_inertia(&mut problems);
         }
+        if self.time.inertia == time::Inertia::ArcLength {
+            self.refuse_off_path(&mut problems);
+        }
         problems
     }
 
@@ -241,7 +245,9 @@ impl Scene {
     /// Without inertia, keys that speak of it say what nobody would do.
     fn refuse_inertia(&self, problems: &mut Problems) {
         let mut refuse = |path: &str, value: &str| {
-            let allowed = "time.inertia is \"none\", and without inertia it means nothing: remove one of the two";
+            let inertia = time::word(self.time.inertia);
+            let allowed =
+                format!("time.inertia is {inertia}, and without inertia it means nothing: remove one of the two");
             problems.refuse(path, value, allowed);
         };
         self.time.of_inertia().for_each(|(path, value)| refuse(path, &value));
@@ -252,6 +258,28 @@ impl Scene {
         self.initial_velocity.iter().for_each(|_| refuse("initial_velocity", "a velocity"));
         self.damping.iter().for_each(|_| refuse("damping", "a damping"));
         self.output.of_inertia().for_each(|(path, value)| refuse(&path, &value));
+    }
+
+    /// What a path of equilibria cannot have: loads that turn with the body, motions in time, a grid that forgets the direction.
+    fn refuse_off_path(&self, problems: &mut Problems) {
+        let allowed = "time.inertia is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
+        for i in 0..self.pressures.len() {
+            problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
+        }
+        let faces = self.boundary.faces().into_iter().filter_map(|(name, face)| Some((name, face?)));
+        for (name, _) in faces.filter(|(_, face)| face.table().is_some_and(boundary::Table::moves)) {
+            problems.refuse(&format!("boundary.{name}"), "a motion", allowed);
+        }
+        for (i, prescribed) in self.prescribed.iter().enumerate() {
+            let moves =
+                [&prescribed.displacement, &prescribed.velocity].into_iter().flatten().any(boundary::Table::moves);
+            if moves {
+                problems.refuse(&format!("prescribed[{i}]"), "a motion", allowed);
+            }
+        }
+        if self.grid.renewed == Some(Renewal::EveryStep) {
+            problems.refuse("grid.renewed", "\"every_step\"", allowed);
+        }
     }
 
     /// Gives every key its value, of those that mean something.

@@ -8,6 +8,7 @@ use crate::material::{Law, Material, p_wave_modulus};
 use crate::mechanics::check::{CheckError, direction};
 use crate::mechanics::kept::{Kept, Renewal};
 use crate::mechanics::loads::{Loads, PrescribedDof, prescribed_dofs};
+use crate::mechanics::path::{OnPath, Path};
 use crate::mechanics::residual::{Equilibrium, Inadmissible, unsymmetric};
 use crate::mechanics::rigid::{Loose, loose};
 use crate::mechanics::schemes::{Alphas, LONG_STEPS, Newmark, Scheme};
@@ -132,6 +133,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub external_work: f64,
     /// Energy that damping and ghost stiffness have taken since the start.
     pub dissipated: f64,
+    /// Where on its path it is, for a scheme that follows one.
+    pub path: Path,
     /// The grid that is kept, if it is: a step then goes on from there, and not from the places and deformations that are written into the
     /// particles by hand. Put `None` here first.
     pub kept: Option<Kept<D>>,
@@ -246,6 +249,14 @@ pub enum StepError {
         /// Active nodes.
         nodes: usize,
     },
+    /// A path of equilibria, along which loads no longer change.
+    #[error(
+        "the path ends at load = {load}: no load changes there; give the curves of the loads points on both sides of it"
+    )]
+    PathEnds {
+        /// λ
+        load: f64,
+    },
     /// Without inertia, bodies are pushed where nothing holds them.
     #[error(
         "{loose}: without inertia there is no equilibrium; hold them with a boundary condition, or give the scene inertia"
@@ -336,6 +347,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
             clock,
             external_work: 0.0,
             dissipated: 0.0,
+            path: Path::default(),
             kept: None,
             workspace: Workspace::default(),
         }
@@ -391,7 +403,11 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn krylov(&self) -> (Krylov, &'static str) {
-        let (asked, unsymmetric) = (self.settings.newton.krylov, unsymmetric(&self.bodies, &self.loads));
+        let mut unsymmetric = unsymmetric(&self.bodies, &self.loads);
+        if self.settings.scheme.follows_path() {
+            unsymmetric = Some("on a path of equilibria, the load is unknown too");
+        }
+        let asked = self.settings.newton.krylov;
         let why = match asked {
             Krylov::Automatic => unsymmetric.unwrap_or("the tangent is symmetric"),
             Krylov::Gmres { .. } | Krylov::ConjugateGradient => "it was asked for",
@@ -416,7 +432,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
         let shipped = self.approximation.separable().and_then(|functions| functions.shipped());
         let splines = matches!(shipped, Some(Shipped::Bspline(_)));
-        self.settings.preconditioner.chosen::<D>(self.particles.len(), splines, long)
+        let on_path = self.settings.scheme.follows_path();
+        self.settings.preconditioner.chosen::<D>(self.particles.len(), splines, long, on_path)
     }
 
     /// One step of Algorithm 1, from t_n to t_{n+1} = t_n + Δt.
@@ -477,15 +494,33 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         // To t_n + θ Δt, where forces are in balance; for θ = 1 that is the end.
         let theta = scheme.instant();
-        let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, scheme.balance(dt), t + theta * dt);
+        let (from, mut to) =
+            if scheme.follows_path() { (self.path.load, self.path.load_step(dt)) } else { (t, t + theta * dt) };
+        let under = |load: f64| self.equilibrium(&supports, &nodal, &prescribed, scheme.balance(dt), load);
+        let mut equilibrium = under(to);
         let mut phi = self.initial_guess(&supports, &nodal, kept.as_ref(), theta * dt);
         for dof in &prescribed {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
-        let newton = newton(&equilibrium, &mut *preconditioner, x, &self.settings.newton, &pool)
-            .map_err(|error| self.explained(error, &equilibrium, &nodes))?;
+        let settings = &self.settings.newton;
+        let newton = match kept.as_ref().filter(|_| scheme.follows_path()) {
+            None => newton(&equilibrium, &mut *preconditioner, x, settings, &pool)
+                .map_err(|error| self.explained(error, &equilibrium, &nodes))?,
+            Some(kept) => {
+                let start = under(from);
+                let force = |load| under(load).free_external_force(&nodal.motion);
+                let path = OnPath::new(self.path, &start, &force, &kept.rate, dt)?;
+                let report = newton(&path, &mut *preconditioner, x, settings, &pool)?;
+                to = path.load(&phi);
+                if path.ends(to)? {
+                    return Err(StepError::PathEnds { load: to });
+                }
+                equilibrium = under(to);
+                report
+            }
+        };
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &phi)?;
         let mut dphi = phi;
@@ -500,22 +535,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
             return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
         }
-        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, t, dt, &dphi, &update)?;
-        let was_kept = kept.is_some();
+        let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, from, dt, &dphi, &update)?;
+        let renewed = kept.is_none();
         let mut next = kept.take().unwrap_or_default();
         if self.settings.renewal != Renewal::EveryStep {
             next.renew(&self.particles, &update.end(&projected), &dphi, dt);
         }
         let strain = update.commit(&mut self.particles, &self.bodies, &supports, dt);
-        let keeps = self.settings.renewal.keeps(strain)
-            && !next.meets(&self.particles.position, &self.loads.prescribed, &self.grid, &nodes);
-        self.kept = keeps.then_some(next);
+        if scheme.follows_path() {
+            self.path = self.path.after(to, &dphi, dt);
+        }
         let passes = supports.passes();
-
-        let leaping = supports.leaping();
-        leaping.iter().for_each(|order| self.rearrange(order));
-        self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
-        self.workspace.serves = keeps;
+        self.keep(next, supports, strain);
         watch.lap(Phase::Update, passes);
         self.external_work += work;
         self.dissipated += dissipated;
@@ -531,7 +562,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             projection_iterations: projected.iterations,
             reactions,
             error,
-            renewed: !was_kept,
+            renewed,
             seconds: *watch,
             failed: Vec::new(),
         })
@@ -549,6 +580,18 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Ok(Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, pool)?.0)
             }
         }
+    }
+
+    /// Keeps the grid, unless a strain or a wall makes it anew; and its functions, or their memory, with the particles in their order.
+    fn keep(&mut self, kept: Kept<D>, supports: Supports<D>, strain: f64) {
+        let (position, loads) = (&self.particles.position, &self.loads.prescribed);
+        let keeps = self.settings.renewal.keeps(strain) && !kept.meets(position, loads, &self.grid, supports.active());
+        self.kept = keeps.then_some(kept);
+        let leaping = supports.leaping();
+        leaping.iter().for_each(|order| self.rearrange(order));
+        self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
+        // Those of particles that lie elsewhere now are good for their memory alone.
+        self.workspace.serves = keeps && leaping.is_none();
     }
 
     /// As [`Self::step`], halving Δt while Newton fails or the error is too large, down to the clock's limit; Δt grows back afterwards.
@@ -840,6 +883,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             settings: self.settings,
             external_work: self.external_work,
             dissipated: self.dissipated,
+            path: self.path,
             kept: self.kept,
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }

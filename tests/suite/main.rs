@@ -17,6 +17,7 @@ mod loads;
 mod memory;
 mod multigrid;
 mod output;
+mod path;
 mod points;
 mod program;
 mod rebound;

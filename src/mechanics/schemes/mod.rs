@@ -3,10 +3,12 @@
 //! All of them make a and v functions of the increment of motion, affine and of one form ([`Alphas`]), so that no term of the residual
 //! knows which of them it is evaluated for.
 
+mod arc_length;
 mod generalized_alpha;
 mod newmark;
 mod statics;
 
+pub use arc_length::ArcLength;
 pub use generalized_alpha::GeneralizedAlpha;
 pub use newmark::Newmark;
 pub use statics::Statics;
@@ -45,6 +47,11 @@ pub trait Scheme: Debug + Display + Send + Sync {
     fn has_inertia(&self) -> bool {
         true
     }
+
+    /// Whether a step has a length on the path of equilibria, and what loads act at its end is found.
+    fn follows_path(&self) -> bool {
+        false
+    }
 }
 
 /// What a scene writes: the key of a scheme, with its parameters if it has some.
@@ -59,6 +66,10 @@ pub enum Parameters {
     GeneralizedAlpha(GeneralizedAlpha),
     /// Quasi-statics: time only says which loads act and how far prescribed motions have come.
     None,
+    /// Quasi-statics along the path of equilibria, where loads may fall after they have risen (snap-through). The first step brings the loads of
+    /// the time `step`; all others are as long as it, in motion, and the column `load` of `history.csv` says which time's loads act. For dead
+    /// loads and walls at rest.
+    ArcLength,
 }
 
 impl Parameters {
@@ -68,12 +79,13 @@ impl Parameters {
             Self::Newmark => Arc::new(newmark),
             Self::GeneralizedAlpha(scheme) => Arc::new(scheme),
             Self::None => Arc::new(Statics),
+            Self::ArcLength => Arc::new(ArcLength),
         }
     }
 
     /// As [`Scheme::has_inertia`].
     pub fn has_inertia(&self) -> bool {
-        *self != Self::None
+        !matches!(self, Self::None | Self::ArcLength)
     }
 
     /// Adds what is wrong with them to `problems`, of the keys below `path`.

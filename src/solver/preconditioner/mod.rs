@@ -83,20 +83,29 @@ const MANY: [usize; 3] = [500, 10_000, 50_000];
 const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
 
 impl Preconditioning {
-    /// What is used for so many particles in `D` dimensions, with B-splines or other functions, in steps that are `long` or not; and why.
+    /// What is used for so many particles in `D` dimensions, with B-splines or other functions, in steps that are `long` or not, along a
+    /// path of equilibria (by GMRES) or not; and why.
     ///
     /// ```
     /// use bfree::solver::Preconditioning::{Automatic, BlockJacobi, Multigrid};
     ///
-    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, true).0, Multigrid);
-    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, false), (BlockJacobi, "inertia dominates"));
-    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true), (BlockJacobi, "faster for so many particles and these functions"));
+    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, true, false).0, Multigrid);
+    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, false, false), (BlockJacobi, "inertia dominates"));
+    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true, false).1, "faster for so many particles and these functions");
+    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true, true), (Multigrid, "restarts lose what few iterations keep"));
     /// // What is asked for is used.
-    /// assert_eq!(Multigrid.chosen::<3>(1_000, false, false), (Multigrid, "it was asked for"));
+    /// assert_eq!(Multigrid.chosen::<3>(1_000, false, false, false), (Multigrid, "it was asked for"));
     /// ```
-    pub fn chosen<const D: usize>(self, particles: usize, splines: bool, long: bool) -> (Self, &'static str) {
+    pub fn chosen<const D: usize>(
+        self,
+        particles: usize,
+        splines: bool,
+        long: bool,
+        on_path: bool,
+    ) -> (Self, &'static str) {
         let many = if splines { MANY_OF_SPLINES } else { MANY };
         match self {
+            Self::Automatic if on_path => (Self::Multigrid, "restarts lose what few iterations keep"),
             Self::Automatic if long && particles >= many[(D - 1).min(2)] => {
                 (Self::Multigrid, "many particles, and inertia does not dominate")
             }

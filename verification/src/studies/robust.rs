@@ -4,6 +4,8 @@
 //! A body of size one stands on what is fixed and carries its weight, one load step of it, each linear system to 1e-8. Iterations are counts:
 //! they are judged. The bounds: what a method whose work grows with the unknowns must keep to, and what users can plan with.
 
+mod snap;
+
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
 use crate::shipped;
@@ -15,6 +17,7 @@ use bfree::solver::vector::norm;
 use bfree::solver::{BlockJacobi, GmresSettings, NonlinearProblem, Preconditioner, Preconditioning, gmres};
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
+use snap::snap_through;
 
 /// What the study shows.
 pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and whether statics are right";
@@ -151,7 +154,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         cuts(name, &family, *effort, &mut others)?;
         materials(name, &family, &mut others)?;
     }
-    Ok(Outcome { reports: vec![refined, others, elastica()?, long_steps()?], ..Outcome::default() })
+    Ok(Outcome { reports: vec![refined, others, elastica()?, any_number_of_steps()?, long_steps()?, snap_through(*effort)?], ..Outcome::default() })
 }
 
 /// How much longer than those of plain Newton load steps may be.
@@ -247,6 +250,32 @@ fn elastica() -> Result<Report, StudyError> {
             report.push(&labels, (found - exact).abs() / down, Bound::AtMost(BEAM));
         }
         report.push(&["load steps", &load.to_string()], simulation.clock.steps() as f64, Bound::AtMost(20.0));
+    }
+    Ok(report)
+}
+
+/// The place of the beam's end under the whole load, in one load step and in more: over a grid that is kept it is the same, to what Newton's
+/// method leaves.
+fn any_number_of_steps() -> Result<Report, StudyError> {
+    const SAME: f64 = 1e-6;
+    let mut report = Report::new("the elastica's end, PL²/EI = 10, beside that of one load step, over its way", &["shape", "steps"]);
+    for (name, family) in families() {
+        let end = |steps: u32| -> Result<Vector<f64, 2>, StudyError> {
+            let (step, family) = (format!("time.step={}", 1.0 / f64::from(steps)), format!("approximation={family}"));
+            let overrides = [&step, &family, "output.probes=[]", "output.every=null"];
+            let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
+            let start = simulation.particles.by_id().position;
+            while simulation.clock.nominal_steps() < u64::from(steps) {
+                simulation.advance()?;
+            }
+            let last = (0..start.len()).max_by(|&a, &b| start[a][0].total_cmp(&start[b][0])).unwrap_or(0);
+            Ok(simulation.particles.by_id().position[last] - start[last])
+        };
+        let one = end(1)?;
+        for steps in [4, 16] {
+            let apart = (end(steps)? - one).norm() / one.norm();
+            report.push(&[name, &steps.to_string()], apart, Bound::AtMost(SAME));
+        }
     }
     Ok(report)
 }

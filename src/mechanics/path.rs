@@ -1,0 +1,163 @@
+//! A path of equilibria, along which loads may rise and fall: a step has a length, and how far the loads have come is found with the motion.
+//!
+//! d·Δφ + w Δλ = Δs  with d the direction of the last step: the plane of Riks (1979). The weight w is fixed, and so λ is a function of φ, and
+//! R(φ, λ(φ)) a residual like any other. Its tangent K + f′ dᵀ/w is regular at turning points, where K is not.
+
+use crate::material::Law;
+use crate::mechanics::residual::{Equilibrium, Inadmissible};
+use crate::pooled::Pooled;
+use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, LocalForm, NonlinearProblem, vector};
+use crate::tensor::Vector;
+
+/// The share of the loads in the length of a step, at most: where they fall steeply the plane still meets the path.
+const SHARE: f64 = 0.1;
+
+/// The loads' part of the difference by which their slope is measured: within a piece of a curve, what rounding leaves of it is all that it errs.
+const DIFFERENCE: f64 = 1e-3;
+
+/// Where on its path a simulation is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Path {
+    /// λ, the time in whose place the loads act.
+    pub load: f64,
+    /// Δλ of the last step; 0 before the first.
+    pub(crate) increment: f64,
+    /// Δs over Δt, that of the first step.
+    pub(crate) speed: f64,
+    /// w
+    pub(crate) weight: f64,
+}
+
+impl Path {
+    /// λ at the end of a load step of length `dt`: the first one, and the next over a grid that is new, which goes on as the last one did.
+    pub(crate) fn load_step(&self, dt: f64) -> f64 {
+        self.load + if self.increment < 0.0 { -dt } else { dt }
+    }
+
+    /// The same after a step of length `dt` along Δφ to the load λ.
+    pub(crate) fn after<const D: usize>(self, load: f64, dphi: &[Vector<f64, D>], dt: f64) -> Self {
+        let increment = load - self.load;
+        let length = vector::norm::<f64>(bytemuck::cast_slice(dphi));
+        let weight = SHARE * length / increment.abs();
+        let first = self.increment == 0.0;
+        Self {
+            load,
+            increment,
+            speed: if first { length / dt } else { self.speed },
+            weight: if first { weight } else { weight.min(self.weight) },
+        }
+    }
+}
+
+/// The equilibrium at the end of a step along a path.
+pub(crate) struct OnPath<'a, const D: usize, L> {
+    path: Path,
+    /// Under the loads at λ_n.
+    start: &'a Equilibrium<'a, D, L>,
+    /// f(λ), on the free degrees of freedom.
+    force: &'a dyn Fn(f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible>,
+    at_start: Pooled<Vector<f64, D>>,
+    /// φ_n
+    before: Pooled<Vector<f64, D>>,
+    /// d
+    direction: Vec<Vector<f64, D>>,
+    /// Δs
+    length: f64,
+}
+
+impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
+    /// A step of length `dt` in the direction of the last one, whose rate was `rate`.
+    ///
+    /// # Errors
+    /// det F ≤ 0 at the start.
+    pub fn new(
+        path: Path,
+        start: &'a Equilibrium<'a, D, L>,
+        force: &'a dyn Fn(f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible>,
+        rate: &[Vector<f64, D>],
+        dt: f64,
+    ) -> Result<Self, Inadmissible> {
+        let size = vector::norm::<f64>(bytemuck::cast_slice(rate));
+        let before = start.step.supports.pool().collect(start.step.nodal.moved(rate.len()));
+        let direction = rate.iter().map(|rate| rate / size).collect();
+        Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })
+    }
+
+    /// λ(φ) = λ_n + (Δs − d·(φ − φ_n))/w
+    pub fn load(&self, phi: &[Vector<f64, D>]) -> f64 {
+        let moved = phi.iter().zip(&self.before).zip(&self.direction).map(|((phi, before), d)| d.dot(&(phi - before)));
+        self.path.load + (self.length - moved.sum::<f64>()) / self.path.weight
+    }
+
+    /// f′(λ)
+    fn slope(&self, load: f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let by = DIFFERENCE * self.path.increment;
+        let mut slope = (self.force)(load + by)?;
+        slope.iter_mut().zip(&(self.force)(load)?).for_each(|(slope, force)| *slope = (*slope - force) / by);
+        Ok(slope)
+    }
+
+    /// Whether the loads stay as they are at λ: the path leads nowhere.
+    pub fn ends(&self, load: f64) -> Result<bool, Inadmissible> {
+        Ok(self.slope(load)?.iter().all(|slope| slope.norm() == 0.0))
+    }
+}
+
+impl<const D: usize, L: Law> NonlinearProblem for OnPath<'_, D, L> {
+    type Inadmissible = Inadmissible;
+
+    /// R(φ, λ_n) − (f(λ) − f(λ_n))
+    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Inadmissible> {
+        NonlinearProblem::residual(self.start, x, r)?;
+        let force = (self.force)(self.load(bytemuck::cast_slice(x)))?;
+        let out: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(r);
+        out.iter_mut().zip(&force).zip(&self.at_start).for_each(|((r, force), start)| *r -= force - start);
+        Ok(())
+    }
+
+    fn magnitude(&self, x: &[f64]) -> Result<f64, Inadmissible> {
+        NonlinearProblem::magnitude(self.start, x)
+    }
+
+    fn sensitivity(&self, x: &[f64]) -> Result<f64, Inadmissible> {
+        NonlinearProblem::sensitivity(self.start, x)
+    }
+
+    /// None: the tangent is not symmetric.
+    fn potential(&self, _: &[f64]) -> Option<Result<(f64, f64), Inadmissible>> {
+        None
+    }
+
+    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
+        let mut slope = self.slope(self.load(bytemuck::cast_slice(x)))?;
+        slope.iter_mut().for_each(|slope| *slope /= self.path.weight);
+        let tangent = NonlinearProblem::linearize(self.start, x)?;
+        Ok(Box::new(Bordered { tangent, slope, direction: &self.direction }))
+    }
+}
+
+/// K + (f′/w) dᵀ
+struct Bordered<'a, const D: usize> {
+    tangent: Box<dyn Linearization + 'a>,
+    slope: Pooled<Vector<f64, D>>,
+    direction: &'a [Vector<f64, D>],
+}
+
+impl<const D: usize> LinearOperator for Bordered<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        self.tangent.apply(x, y);
+        let along = vector::dot(bytemuck::cast_slice(self.direction), x);
+        vector::axpy(along, bytemuck::cast_slice(&self.slope), y);
+    }
+}
+
+/// Those of K.
+impl<const D: usize> DiagonalBlocks for Bordered<'_, D> {
+    fn diagonal_blocks(&self) -> Pooled<f64> {
+        self.tangent.diagonal_blocks()
+    }
+
+    fn local_form(&self) -> Option<LocalForm> {
+        self.tangent.local_form()
+    }
+}
