@@ -24,6 +24,7 @@ mod restart;
 mod runs;
 mod scenes;
 mod schemes;
+mod shapes;
 mod smoothing;
 mod statics;
 mod storage;
