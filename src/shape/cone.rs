@@ -61,7 +61,9 @@ impl<const D: usize> Cone<D> {
     fn in_profile(&self, x: &Vector<f64, D>) -> (Vector<f64, 2>, Vector<f64, D>) {
         let from_end = x - self.ends[0];
         let s = from_end.dot(&self.along);
-        let radial = from_end - self.along * s;
+        let off_axis = from_end - self.along * s;
+        // What round-off leaves near the axis may point along it: once more.
+        let radial = off_axis - self.along * off_axis.dot(&self.along);
         let rho = radial.norm();
         (Vector::from([s, rho]), if rho > 0.0 { radial / rho } else { self.across })
     }

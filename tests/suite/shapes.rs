@@ -167,6 +167,11 @@ proptest! {
             foot_and_normal(&shape, x)?;
         }
         bounded(&shape, &surface, 3e-3)?;
+        // On the axis, too, where no direction across is better than another.
+        for k in 0..=20 {
+            let x = from + e * (length * (f64::from(k) * 0.1 - 0.5));
+            foot_and_normal(&shape, &x)?;
+        }
     }
 
     #[test]
