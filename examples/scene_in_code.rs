@@ -12,7 +12,7 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::particles::{Body, Particles};
-use bfree::shape::{Fill, Shape, fill};
+use bfree::shape::{Block, Fill, fill};
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::NewtonSettings;
 use bfree::tensor::Vector;
@@ -24,7 +24,7 @@ const DENSITY: f64 = 1000.0;
 /// A square of 1 m, 1 m above the floor of a box of 3 m × 3 m.
 pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
     let grid = Grid { origin: Vector::zeros(), spacing: 0.25, cells: [12, 12] };
-    let shape = Shape::Box { min: Vector::from([1.0, 1.0]), max: Vector::from([2.0, 2.0]) };
+    let shape = Block { min: Vector::from([1.0, 1.0]), max: Vector::from([2.0, 2.0]) }.into();
     let mut particles = Particles::default();
     let volume = (grid.spacing / 2.0).powi(2);
     for x in fill(&grid, &shape, 2, Fill::Particles)? {

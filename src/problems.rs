@@ -12,7 +12,7 @@ pub(crate) const MOST: usize = 1000;
 const SHOWN: usize = 80;
 
 /// No length, time or modulus may be larger: squares and products of allowed numbers then stay finite.
-const LARGEST: f64 = 1e100;
+pub(crate) const LARGEST: f64 = 1e100;
 
 /// One thing wrong in a scene.
 #[derive(Clone, Debug, PartialEq)]

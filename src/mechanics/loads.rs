@@ -201,7 +201,7 @@ impl<const D: usize> Selection<D> {
     pub(crate) fn holds(&self, grid: &Grid<D>, index: [u32; D], position: &Vector<f64, D>) -> bool {
         match self {
             Self::Face { axis, upper } => index[*axis] == if *upper { grid.cells[*axis] } else { 0 },
-            Self::Region(shape) => shape.contains(position),
+            Self::Region(shape) => shape.holds(position, grid.spacing),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::grid::GridBox;
 use super::shape::Shape;
 use crate::material;
 use crate::problems::{Number, Problems};
-use crate::shape::Fill;
+use crate::shape::{EDGE, Fill};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -95,7 +95,7 @@ impl Body {
 fn check_inside<const D: usize>(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
     let (Some(grid), Some(shape)) = (grid.build::<D>(), shape.build::<D>()) else { return };
     let (min, max) = shape.bounding_box();
-    let slack = 1e-9 * grid.spacing;
+    let slack = EDGE * grid.spacing;
     for k in 0..D {
         let (lower, upper) = (grid.origin[k], grid.origin[k] + f64::from(grid.cells[k]) * grid.spacing);
         let beyond = (min[k].is_finite() && min[k] < lower - slack) || (max[k].is_finite() && max[k] > upper + slack);

@@ -15,7 +15,7 @@ use crate::mechanics::loads::{
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::terms::ForceField;
 use crate::particles::{self, Particles};
-use crate::shape::{FillError, Shape, fill};
+use crate::shape::{self, FillError, Shape, fill};
 use crate::simulation::{Settings, Simulation, StepError};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
@@ -343,6 +343,7 @@ impl Scene {
         let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
         let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| dimension::<D>(path));
         let region = on.region.as_ref().map(built).transpose()?;
+        let loaded = |x: &Vector<f64, D>| region.as_ref().is_none_or(|region| region.holds(x, grid.spacing));
         let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
             return Err(dimension::<D>(path));
         };
@@ -358,8 +359,8 @@ impl Scene {
             let x = &particles.position[particle];
             let near = shape.as_ref().map(|shape| shape.distance_and_normal(x));
             if let Some((normal, area)) = given {
-                let too_deep = near.is_some_and(|(distance, _)| distance <= -spacing * (1.0 - 1e-9));
-                if !too_deep && region.as_ref().is_none_or(|region| region.contains(x)) {
+                let too_deep = near.is_some_and(|(distance, _)| !shape::is_above(distance, spacing));
+                if !too_deep && loaded(x) {
                     let offset = near.map_or(0.0, |(distance, _)| -distance);
                     points.push(SurfacePoint { particle, normal, area, offset });
                 }
@@ -371,10 +372,8 @@ impl Scene {
                 (None, _) => Vec::new(),
             };
             for (distance, normal) in faces {
-                // The region says which part of the surface is loaded: the foot of the particle is on it. Round-off must not
-                // put the foot outside a region that ends on the surface.
-                let foot = x - normal * distance;
-                if region.as_ref().is_none_or(|region| region.signed_distance(&foot) <= 1e-9 * spacing) {
+                // The region says which part of the surface is loaded: the foot of the particle is on it.
+                if loaded(&(x - normal * distance)) {
                     let area = particles.volume[particle] / spacing;
                     points.push(SurfacePoint { particle, normal, area, offset: -distance });
                 }
@@ -456,9 +455,10 @@ impl Scene {
             let region = node.region.build().ok_or_else(|| dimension::<D>(&path))?;
             regions.push((region, vector(&format!("{path}.velocity"), &node.velocity)?));
         }
+        let spacing = simulation.grid.spacing;
         simulation
             .set_velocity_on_nodes(|x| {
-                let last = regions.iter().rev().find(|(region, _)| region.contains(x));
+                let last = regions.iter().rev().find(|(region, _)| region.holds(x, spacing));
                 last.map_or_else(Vector::zeros, |(_, velocity)| *velocity)
             })
             .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })

@@ -1,8 +1,8 @@
 //! Regions of space in a scene.
 
-use crate::problems::{MOST, Number, Problems};
-use crate::shape;
-use crate::tensor::Vector;
+use crate::problems::{LARGEST, MOST, Number, Problems};
+use crate::shape::{self, EDGE, PolygonError, rotation};
+use crate::tensor::{Vector, identity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,28 @@ pub enum Shape {
         /// The normal that points out of the region, of any length but zero.
         normal: Vec<f64>,
     },
+    /// A polygon (2D only), by its vertices (length) in either order, at least 3; it need not be convex, and is closed from the last
+    /// vertex to the first. Edges meet at the vertex they share and nowhere else.
+    Polygon(#[schemars(length(min = 3))] Vec<Vec<f64>>),
+    /// A cylinder of any direction (in 2D an oblique rectangle).
+    Cylinder {
+        /// The centre of one end (length).
+        from: Vec<f64>,
+        /// The centre of the other end (length).
+        to: Vec<f64>,
+        /// The radius (length), > 0.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    /// A cone of any direction, with its tip or truncated (in 2D an oblique triangle or trapezium).
+    Cone {
+        /// The centre of one end (length).
+        from: Vec<f64>,
+        /// The centre of the other end (length).
+        to: Vec<f64>,
+        /// The radii (length) at `from` and at `to`, ≥ 0; one of them may be 0.
+        radii: [f64; 2],
+    },
     /// What lies in any of these, at least one.
     Union(Vec<Shape>),
     /// What lies in one and not in another: a solid with a hole.
@@ -43,10 +65,31 @@ pub enum Shape {
     },
     /// What lies in all of these, at least one.
     Intersection(Vec<Shape>),
+    /// A shape turned about a point (2D and 3D).
+    Rotated {
+        /// The shape before.
+        of: Box<Shape>,
+        /// The point that stays (length).
+        about: Vec<f64>,
+        /// The angle (degrees): counter-clockwise in 2D, by the right-hand rule about `axis` in 3D.
+        angle: f64,
+        /// The direction of the axis, of any length but zero; in 3D, and only there.
+        axis: Option<Vec<f64>>,
+    },
+    /// A shape made larger or smaller, seen from a point.
+    Scaled {
+        /// The shape before.
+        of: Box<Shape>,
+        /// The point that stays (length).
+        about: Vec<f64>,
+        /// The factor (no unit), > 0, the same in all directions.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        factor: f64,
+    },
 }
 
 impl Shape {
-    /// The geometry; `None` unless every vector has `D` components.
+    /// The geometry; `None` unless every vector has `D` components and [`Scene::check`](super::Scene::check) finds nothing wrong.
     ///
     /// ```
     /// use bfree::scene::shape::Shape;
@@ -62,17 +105,27 @@ impl Shape {
     /// ```
     pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
         let all = |parts: &[Self]| parts.iter().map(Self::build).collect::<Option<Vec<_>>>();
+        let part = |part: &Self| part.build().map(Box::new);
         Some(match self {
-            Self::Box { min, max } => shape::Shape::Box { min: vector(min)?, max: vector(max)? },
-            Self::Ball { center, radius } => shape::Shape::Ball { center: vector(center)?, radius: *radius },
+            Self::Box { min, max } => shape::Block { min: vector(min)?, max: vector(max)? }.into(),
+            Self::Ball { center, radius } => shape::Ball { center: vector(center)?, radius: *radius }.into(),
             Self::HalfSpace { point, normal } => {
-                shape::Shape::HalfSpace { point: vector(point)?, normal: vector(normal)? }
+                shape::HalfSpace { point: vector(point)?, normal: vector(normal)? }.into()
             }
-            Self::Union(parts) => shape::Shape::Union(all(parts)?),
-            Self::Difference { of, minus } => {
-                shape::Shape::Difference { of: Box::new(of.build()?), minus: Box::new(minus.build()?) }
+            Self::Polygon(vertices) => polygon::<D>(vertices)?.ok()?.into(),
+            Self::Cylinder { from, to, radius } => cone(from, to, [*radius; 2])?.into(),
+            Self::Cone { from, to, radii } => cone(from, to, *radii)?.into(),
+            Self::Union(parts) => shape::Union(all(parts)?).into(),
+            Self::Difference { of, minus } => shape::Difference { of: part(of)?, minus: part(minus)? }.into(),
+            Self::Intersection(parts) => shape::Intersection(all(parts)?).into(),
+            Self::Rotated { of, about, angle, axis } => {
+                let axis = axis.as_ref().map(|axis| vector(axis).ok_or(())).transpose().ok()?;
+                let rotation = rotation(*angle, axis.as_ref())?;
+                shape::Similar { of: part(of)?, about: vector(about)?, rotation, factor: 1.0 }.into()
             }
-            Self::Intersection(parts) => shape::Shape::Intersection(all(parts)?),
+            Self::Scaled { of, about, factor } => {
+                shape::Similar { of: part(of)?, about: vector(about)?, rotation: identity(), factor: *factor }.into()
+            }
         })
     }
 
@@ -103,8 +156,101 @@ impl Shape {
                 let ok = of.check(problems, &format!("{path}.difference.of"), dimension);
                 minus.check(problems, &format!("{path}.difference.minus"), dimension) && ok
             }
+            Self::Polygon(vertices) => check_polygon(vertices, problems, &format!("{path}.polygon"), dimension),
+            Self::Cylinder { from, to, radius } => {
+                let path = format!("{path}.cylinder");
+                let ok = problems.positive(&format!("{path}.radius"), *radius);
+                check_axis(from, to, *radius, problems, &path, dimension) && ok
+            }
+            Self::Cone { from, to, radii } => {
+                let path = format!("{path}.cone");
+                let mut ok = true;
+                for (i, &radius) in radii.iter().enumerate() {
+                    ok &= problems.between(&format!("{path}.radii[{i}]"), radius, 0.0, LARGEST);
+                }
+                let largest = radii[0].max(radii[1]);
+                if ok && largest == 0.0 {
+                    ok = refused(problems, &format!("{path}.radii"), "[0, 0]", "one of the two must be > 0");
+                }
+                check_axis(from, to, largest, problems, &path, dimension) && ok
+            }
+            Self::Rotated { of, about, angle, axis } => {
+                let path = format!("{path}.rotated");
+                let mut ok = of.check(problems, &format!("{path}.of"), dimension);
+                ok &= problems.vector(&format!("{path}.about"), about, dimension);
+                ok &= problems.number(&format!("{path}.angle"), *angle);
+                ok && match (axis, dimension) {
+                    (Some(axis), 3) => check_normal(problems, &format!("{path}.axis"), axis, dimension),
+                    (None, 2) => true,
+                    (None, 3) => {
+                        refused(problems, &path, "a rotation without an axis", "give its \"axis\", a direction")
+                    }
+                    (Some(_), 2) => refused(
+                        problems,
+                        &format!("{path}.axis"),
+                        "an axis",
+                        "in 2 dimensions it is the third: remove it",
+                    ),
+                    _ => refused(problems, &path, "a rotation", "a line has no directions to turn in"),
+                }
+            }
+            Self::Scaled { of, about, factor } => {
+                let path = format!("{path}.scaled");
+                let mut ok = of.check(problems, &format!("{path}.of"), dimension);
+                ok &= problems.vector(&format!("{path}.about"), about, dimension);
+                problems.positive(&format!("{path}.factor"), *factor) && ok
+            }
         }
     }
+}
+
+fn refused(problems: &mut Problems, path: &str, value: &str, allowed: &str) -> bool {
+    problems.refuse(path, value, allowed);
+    false
+}
+
+/// The polygon, or what is wrong with it; `None` unless every vertex has `D` components.
+fn polygon<const D: usize>(vertices: &[Vec<f64>]) -> Option<Result<shape::Polygon<D>, PolygonError>> {
+    let vertices = vertices.iter().map(|x| vector(x)).collect::<Option<Vec<_>>>()?;
+    Some(shape::Polygon::new(vertices))
+}
+
+fn cone<const D: usize>(from: &[f64], to: &[f64], radii: [f64; 2]) -> Option<shape::Cone<D>> {
+    shape::Cone::new([vector(from)?, vector(to)?], radii)
+}
+
+fn check_polygon(vertices: &[Vec<f64>], problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    if dimension != 2 {
+        let allowed = format!("it needs a grid of 2 dimensions, and this one has {dimension}");
+        return refused(problems, path, "a polygon", &allowed);
+    }
+    let mut ok = vertices.len() <= MOST;
+    for (i, vertex) in problems.few(path, vertices).iter().enumerate() {
+        ok &= problems.vector(&format!("{path}[{i}]"), vertex, dimension);
+    }
+    match polygon::<2>(vertices).filter(|_| ok) {
+        Some(Err(error)) => {
+            let path = error.vertex().map_or(path.to_owned(), |vertex| format!("{path}[{vertex}]"));
+            refused(problems, &path, &error.to_string(), PolygonError::ALLOWED)
+        }
+        Some(Ok(_)) => true,
+        None => false,
+    }
+}
+
+/// The two ends of a cylinder or cone.
+fn check_axis(from: &[f64], to: &[f64], radius: f64, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    if dimension < 2 {
+        return refused(problems, path, "a solid around an axis", "a line has none: use a box");
+    }
+    let mut ok = problems.vector(&format!("{path}.from"), from, dimension);
+    ok &= problems.vector(&format!("{path}.to"), to, dimension);
+    let length = from.iter().zip(to).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
+    if ok && length <= EDGE * radius {
+        let allowed = "must differ from `from`: the two give the axis";
+        return refused(problems, &format!("{path}.to"), &format!("{to:?}"), allowed);
+    }
+    ok
 }
 
 fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: usize) -> bool {

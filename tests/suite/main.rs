@@ -25,6 +25,7 @@ mod restart;
 mod runs;
 mod scenes;
 mod schemes;
+mod shapes;
 mod smoothing;
 mod statics;
 mod storage;

@@ -19,7 +19,7 @@ const GOOD: &str = r#"{
   "bodies": [
     { "name": "soft", "shape": { "difference": { "of": { "box": { "min": [0, 0], "max": [1, 1] } }, "minus": { "ball": { "center": [0.5, 0.5], "radius": 0.2 } } } },
       "material": { "neo_hookean": { "young": 100, "poisson": 0.3 } }, "density": 2, "velocity": [1, 0], "particles_per_cell": 3, "fill": "cells" },
-    { "name": "stiff", "shape": { "intersection": [{ "half_space": { "point": [3, 0], "normal": [-1, 0] } }, { "union": [{ "box": { "min": [2, 0], "max": [4, 2] } }] }] },
+    { "name": "stiff", "shape": { "intersection": [{ "half_space": { "point": [3, 0], "normal": [-1, 0] } }, { "union": [{ "box": { "min": [2, 0], "max": [4, 2] } }, { "rotated": { "of": { "polygon": [[2, 0.5], [3, 0.5], [2.5, 1]] }, "about": [2.5, 1], "angle": 30 } }, { "scaled": { "of": { "cylinder": { "from": [3, 0.5], "to": [3, 1.5], "radius": 0.2 } }, "about": [3, 1], "factor": 0.5 } }, { "cone": { "from": [3, 0.5], "to": [3.5, 1], "radii": [0.2, 0] } }] }] },
       "material": { "st_venant_kirchhoff": { "lambda": 1000, "shear": 500 } }, "density": 8 },
     { "name": "grains", "particles": { "file": "grains.csv" }, "material": { "neo_hookean_logarithmic": { "bulk": 10, "shear": 1 } }, "density": 1, "particles_per_cell": 3 }
   ],
@@ -71,6 +71,7 @@ fn shipped_scenes_are_sound() {
             "column_static",
             "compaction",
             "compaction_confined",
+            "cook",
             "elastica",
             "rebound",
             "rebound_fast",
@@ -249,8 +250,8 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""radius": 0.2"#, r#""radius": 0"#, "bodies[0].shape.difference.minus.ball.radius", &["0 is not", "> 0"]),
     ("[-1, 0]", "[0, 0]", "bodies[1].shape.intersection[0].half_space.normal", &["zero vector"]),
     (
-        r#"[{ "box": { "min": [2, 0], "max": [4, 2] } }]"#,
-        "[]",
+        r#"{ "union": [{ "box": { "min": [2, 0], "max": [4, 2] } }, "#,
+        r#"{ "union": [] }, { "union": [ "#,
         "bodies[1].shape.intersection[1].union",
         &["empty", "at least one"],
     ),

@@ -63,11 +63,11 @@ const WIDEST: usize = 16;
 /// use bfree::approximation::Lme;
 /// use bfree::grid::Grid;
 /// use bfree::mechanics::sweep::Supports;
-/// use bfree::shape::{Fill, Shape, fill};
+/// use bfree::shape::{Ball, Fill, fill};
 /// use bfree::tensor::{Vector, identity};
 ///
 /// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
-/// let disc = Shape::Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 };
+/// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
 /// let positions = fill(&grid, &disc, 2, Fill::Particles)?;
 /// let (supports, nodes) = Supports::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
 /// assert_eq!(supports.particles(), positions.len());
@@ -304,11 +304,11 @@ impl<const D: usize> Supports<D> {
     /// use bfree::approximation::Lme;
     /// use bfree::grid::Grid;
     /// use bfree::mechanics::{check::direction, sweep::Supports};
-    /// use bfree::shape::{Fill, Shape, fill};
+    /// use bfree::shape::{Ball, Fill, fill};
     /// use bfree::tensor::Vector;
     ///
     /// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
-    /// let disc = Shape::Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 };
+    /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
     /// let (lme, positions) = (Lme::new(3.0, 1e-6), fill(&grid, &disc, 2, Fill::Particles)?);
     /// let (fast, nodes) = Supports::new(&lme, &grid, &positions)?;
     /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;

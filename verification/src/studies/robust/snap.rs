@@ -11,12 +11,12 @@ const RISE: f64 = 0.5;
 const DEPTH: f64 = 0.25;
 const YOUNG: f64 = 1e6;
 
-/// Shallow bars are so to β², and the joint is a point; the load reaches over one depth.
+/// Shallow bars are so to β², and the joint is a point; the load reaches over a quarter of the depth.
 const SHALLOW: f64 = 0.03;
 
 /// Half of the frame, from its clamped foot to the joint, which slides down the plane of symmetry under half of the load, 100 λ.
 fn toggle(cells: u32) -> Result<Simulation<2>, StudyError> {
-    let joint = json!({"box": {"min": [LENGTH - DEPTH, 2], "max": [LENGTH, 3]}});
+    let joint = json!({"box": {"min": [LENGTH - 0.25 * DEPTH, 2], "max": [LENGTH, 3]}});
     let scene = json!({
         "grid": {"size": [LENGTH, 4], "spacing": DEPTH / f64::from(cells)},
         "time": {"step": 0.02, "end": 1, "inertia": "arc_length"},
@@ -25,7 +25,7 @@ fn toggle(cells: u32) -> Result<Simulation<2>, StudyError> {
             "material": {"neo_hookean": {"young": YOUNG, "poisson": 0}}
         }],
         "boundary": {"left": "fixed", "right": "sliding"},
-        "tractions": [{"body": "bar", "region": joint, "traction": [0, -100.0 / DEPTH], "curve": [[-10, -10], [10, 10]]}]
+        "tractions": [{"body": "bar", "region": joint, "traction": [0, -400.0 / DEPTH], "curve": [[-10, -10], [10, 10]]}]
     });
     let mut simulation: Simulation<2> = scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
     // The bars rise: sheared, so that their ends stay on the walls.

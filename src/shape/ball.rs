@@ -1,0 +1,28 @@
+//! Balls.
+
+use super::{Face, Solid, axis};
+use crate::tensor::Vector;
+
+/// An interval, a disc or a ball.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ball<const D: usize> {
+    /// The centre.
+    pub center: Vector<f64, D>,
+    /// The radius, > 0.
+    pub radius: f64,
+}
+
+impl<const D: usize> Solid<D> for Ball<D> {
+    /// d = |x − c| − r,  ∇d = (x − c)/|x − c|
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let from_center = x - self.center;
+        let length = from_center.norm();
+        let normal = if length > 0.0 { from_center / length } else { axis(0, 1.0) };
+        (length - self.radius, normal)
+    }
+
+    /// n·c + r |n|
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        n.dot(&self.center) + self.radius * n.norm()
+    }
+}

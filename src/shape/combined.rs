@@ -1,0 +1,77 @@
+//! Unions, intersections and differences: the min or max of signed distances.
+
+use super::{Face, Shape, Solid, axis};
+use crate::tensor::Vector;
+
+/// What lies in any of the parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Union<const D: usize>(pub Vec<Shape<D>>);
+
+/// What lies in all of the parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Intersection<const D: usize>(pub Vec<Shape<D>>);
+
+/// What lies in `of` and not in `minus`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference<const D: usize> {
+    /// The solid.
+    pub of: Box<Shape<D>>,
+    /// The hole.
+    pub minus: Box<Shape<D>>,
+}
+
+impl<const D: usize> Solid<D> for Union<D> {
+    /// d = min dᵢ
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let nowhere = (f64::INFINITY, axis(0, 1.0));
+        self.0.iter().map(|part| part.solid().nearest(x)).fold(nowhere, |a, b| if b.0 < a.0 { b } else { a })
+    }
+
+    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+        self.0.iter().for_each(|part| part.solid().add_faces(x, faces));
+    }
+
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+impl<const D: usize> Solid<D> for Intersection<D> {
+    /// d = max dᵢ
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let everywhere = (f64::NEG_INFINITY, axis(0, 1.0));
+        self.0.iter().map(|part| part.solid().nearest(x)).fold(everywhere, |a, b| if b.0 > a.0 { b } else { a })
+    }
+
+    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+        self.0.iter().for_each(|part| part.solid().add_faces(x, faces));
+    }
+
+    /// An upper bound.
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.0.iter().map(|part| part.solid().reach(n)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl<const D: usize> Solid<D> for Difference<D> {
+    /// d = max(d_of, −d_minus)
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let (solid, hole) = (self.of.solid().nearest(x), self.minus.solid().nearest(x));
+        if solid.0 >= -hole.0 { solid } else { (-hole.0, -hole.1) }
+    }
+
+    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+        self.of.solid().add_faces(x, faces);
+        let outer = faces.len();
+        self.minus.solid().add_faces(x, faces);
+        // The faces of a hole look into it.
+        for (d, n) in faces.iter_mut().skip(outer) {
+            (*d, *n) = (-*d, -*n);
+        }
+    }
+
+    /// An upper bound.
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.of.solid().reach(n)
+    }
+}

@@ -1,0 +1,32 @@
+//! Half-spaces.
+
+use super::{Face, Solid};
+use crate::tensor::Vector;
+
+/// The sine of the angle below which two directions are one: what rotations leave of round-off.
+const PARALLEL: f64 = 1e-14;
+
+/// Everything behind a plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HalfSpace<const D: usize> {
+    /// A point of the plane.
+    pub point: Vector<f64, D>,
+    /// The outward normal, of any length but zero.
+    pub normal: Vector<f64, D>,
+}
+
+impl<const D: usize> Solid<D> for HalfSpace<D> {
+    /// d = (x − p)·n
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let n = self.normal / self.normal.norm();
+        ((x - self.point).dot(&n), n)
+    }
+
+    /// n·p along the normal, without end in all other directions.
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        let normal = self.normal / self.normal.norm();
+        let along = n.dot(&normal);
+        let parallel = along > 0.0 && (n - normal * along).norm() <= PARALLEL * along;
+        if parallel { n.dot(&self.point) } else { f64::INFINITY }
+    }
+}

@@ -1,0 +1,242 @@
+//! Solid geometry by signed distances, and its filling with particles: a file for each family of solids, and one list of them.
+
+mod ball;
+mod block;
+mod combined;
+mod cone;
+mod fill;
+mod half_space;
+mod polygon;
+mod similar;
+
+#[cfg(test)]
+mod tests;
+
+pub use ball::Ball;
+pub use block::Block;
+pub use combined::{Difference, Intersection, Union};
+pub use cone::Cone;
+pub use fill::{Fill, FillError, MAX_CANDIDATES, fill};
+pub use half_space::HalfSpace;
+pub use polygon::{Polygon, PolygonError};
+pub use similar::{Similar, rotation};
+
+use crate::tensor::Vector;
+
+/// Round-off in a length that is compared with others, relative to the spacing they have.
+pub(crate) const EDGE: f64 = 1e-9;
+
+/// A piece of surface: the signed distance d from it, negative inside, and the outward unit normal n = ∇d.
+type Face<const D: usize> = (f64, Vector<f64, D>);
+
+/// What each solid knows of itself.
+trait Solid<const D: usize> {
+    /// The surface nearest to `x`.
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D>;
+
+    /// Adds the pieces of surface that have a foot of `x`; flat ones may go on beyond their edges.
+    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+        faces.push(self.nearest(x));
+    }
+
+    /// How far it reaches in a direction of any length: the largest n·x, or more.
+    fn reach(&self, n: &Vector<f64, D>) -> f64;
+}
+
+macro_rules! shapes {
+    ($($(#[$about:meta])* $name:ident;)*) => {
+        /// A solid of `D` dimensions. All lengths are in the user's unit.
+        ///
+        /// The signed distance d is negative inside. It is the Euclidean distance, except that for combinations it is the min or max
+        /// of the parts', which has the right sign and the right zero set, and never exceeds the distance in size where it is positive.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Shape<const D: usize> {
+            $($(#[$about])* $name($name<D>),)*
+        }
+
+        impl<const D: usize> Shape<D> {
+            fn solid(&self) -> &dyn Solid<D> {
+                match self {
+                    $(Self::$name(solid) => solid,)*
+                }
+            }
+        }
+
+        $(impl<const D: usize> From<$name<D>> for Shape<D> {
+            fn from(solid: $name<D>) -> Self {
+                Self::$name(solid)
+            }
+        })*
+    };
+}
+
+shapes! {
+    /// An axis-parallel box.
+    Block;
+    /// An interval, a disc or a ball.
+    Ball;
+    /// Everything behind a plane.
+    HalfSpace;
+    /// A polygon of the plane.
+    Polygon;
+    /// A cylinder or a cone.
+    Cone;
+    /// What lies in any of the parts.
+    Union;
+    /// What lies in one solid and not in another.
+    Difference;
+    /// What lies in all of the parts.
+    Intersection;
+    /// A solid turned and scaled.
+    Similar;
+}
+
+impl<const D: usize> Shape<D> {
+    /// Whether `x` lies in the solid, its surface included.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, Difference, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A ring: its inner circle is part of its surface, its centre is not part of it.
+    /// let disc = |radius| Box::new(Ball { center: Vector::from([0.0, 0.0]), radius }.into());
+    /// let ring = Shape::from(Difference { of: disc(2.0), minus: disc(1.0) });
+    /// assert!(ring.contains(&Vector::from([1.5, 0.0])) && ring.contains(&Vector::from([0.0, 1.0])));
+    /// assert!(!ring.contains(&Vector::from([0.0, 0.0])));
+    /// ```
+    pub fn contains(&self, x: &Vector<f64, D>) -> bool {
+        self.signed_distance(x) <= 0.0
+    }
+
+    /// Whether `x`, a node or a particle of a grid of this spacing, lies in the solid: round-off puts none out that is meant to be on
+    /// its surface.
+    ///
+    /// ```
+    /// use bfree::shape::{HalfSpace, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // The node at y = −0.3 + 3 · 0.1 = 5.6e-17, and the half-space y ≤ 0.
+    /// let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([0.0, 1.0]) });
+    /// let node = Vector::from([0.0, -0.3 + 3.0 * 0.1]);
+    /// assert!(!below.contains(&node) && below.holds(&node, 0.1));
+    /// ```
+    pub fn holds(&self, x: &Vector<f64, D>, spacing: f64) -> bool {
+        self.signed_distance(x) <= EDGE * spacing
+    }
+
+    /// The signed distance d of `x` from the surface, negative inside; +∞ for an empty union, −∞ for an empty intersection.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let disc = Shape::from(Ball { center: Vector::from([0.0, 0.0]), radius: 5.0 });
+    /// assert_eq!(disc.signed_distance(&Vector::from([3.0, 4.0])), 0.0);
+    /// assert_eq!(disc.signed_distance(&Vector::from([6.0, 8.0])), 5.0);
+    /// assert_eq!(disc.normal(&Vector::from([6.0, 8.0])), Vector::from([0.6, 0.8]));
+    /// ```
+    pub fn signed_distance(&self, x: &Vector<f64, D>) -> f64 {
+        self.distance_and_normal(x).0
+    }
+
+    /// The outward unit normal ∇d of the surface nearest to `x`; at a hole it points into the hole.
+    ///
+    /// Where ∇d does not exist (the centre of a ball, points equally near to two faces) it is the normal of one of the
+    /// nearest surfaces.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, Block, Difference, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let hole = Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 };
+    /// let plate = Block { min: Vector::from([-2.0, -2.0]), max: Vector::from([2.0, 2.0]) };
+    /// let plate = Shape::from(Difference { of: Box::new(plate.into()), minus: Box::new(hole.into()) });
+    /// assert_eq!(plate.normal(&Vector::from([0.0, 1.9])), Vector::from([0.0, 1.0]));
+    /// assert_eq!(plate.normal(&Vector::from([0.0, 1.1])), Vector::from([0.0, -1.0]));
+    /// ```
+    pub fn normal(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
+        self.distance_and_normal(x).1
+    }
+
+    /// d and ∇d together.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // x − d ∇d is the nearest point of the surface.
+    /// let disc = Shape::from(Ball { center: Vector::from([1.0, 0.0]), radius: 5.0 });
+    /// let x = Vector::from([4.0, 4.0]);
+    /// let (d, n) = disc.distance_and_normal(&(x + Vector::from([3.0, 4.0])));
+    /// assert_eq!((d, n), (5.0, Vector::from([0.6, 0.8])));
+    /// assert_eq!(disc.signed_distance(&x), 0.0);
+    /// ```
+    pub fn distance_and_normal(&self, x: &Vector<f64, D>) -> (f64, Vector<f64, D>) {
+        self.solid().nearest(x)
+    }
+
+    /// The pieces of surface that a point `x` of the solid lies less than `depth` below: none deep inside, one below a face,
+    /// several in an edge or a corner. Each with its signed distance −`depth` < d ≤ 0 and its outward unit normal n; the foot
+    /// x − d n lies on the surface.
+    ///
+    /// ```
+    /// use bfree::shape::{Block, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let square = Shape::from(Block { min: Vector::from([0.0, 0.0]), max: Vector::from([1.0, 1.0]) });
+    /// assert_eq!(square.faces(&Vector::from([0.5, 0.5]), 0.25), []);
+    /// assert_eq!(square.faces(&Vector::from([0.5, 0.875]), 0.25), [(-0.125, Vector::from([0.0, 1.0]))]);
+    /// // A particle in a corner stands for a piece of both faces.
+    /// assert_eq!(square.faces(&Vector::from([0.875, 0.875]), 0.25).len(), 2);
+    /// ```
+    pub fn faces(&self, x: &Vector<f64, D>, depth: f64) -> Vec<(f64, Vector<f64, D>)> {
+        let mut candidates = Vec::new();
+        self.solid().add_faces(x, &mut candidates);
+        let hair = 1e-6 * depth;
+        let mut faces: Vec<Face<D>> = Vec::new();
+        for (d, n) in candidates {
+            if d > hair || !is_above(d, depth) {
+                continue;
+            }
+            let foot = x - n * d;
+            // A face of a part counts where the whole ends: not inside another part, nor where two parts touch.
+            let ends = !self.contains(&(foot + n * hair)) && self.contains(&(foot - n * hair));
+            // Parts may share a face.
+            let known = faces.iter().any(|(e, m)| (e - d).abs() <= hair && (m - n).norm() <= 1e-6);
+            if ends && !known {
+                faces.push((d.min(0.0), n));
+            }
+        }
+        faces
+    }
+
+    /// A box `(min, max)` that holds the solid: infinite for half-spaces, with `min > max` where nothing is left.
+    ///
+    /// Tight, but for differences and intersections, for which it is an upper bound, and half-spaces whose plane is oblique.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, HalfSpace, Intersection, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // The lower half of a disc; for an intersection the bound is that of the planes and balls in it.
+    /// let disc = Ball { center: Vector::from([0.0, 0.0]), radius: 1.0 };
+    /// let below = HalfSpace { point: Vector::from([0.0, 0.0]), normal: Vector::from([0.0, 3.0]) };
+    /// let half = Shape::from(Intersection(vec![disc.into(), below.into()]));
+    /// assert_eq!(half.bounding_box(), (Vector::from([-1.0, -1.0]), Vector::from([1.0, 0.0])));
+    /// ```
+    pub fn bounding_box(&self) -> (Vector<f64, D>, Vector<f64, D>) {
+        let solid = self.solid();
+        let min = Vector::from_fn(|k, _| 0.0 - solid.reach(&axis(k, -1.0)));
+        (min, Vector::from_fn(|k, _| solid.reach(&axis(k, 1.0))))
+    }
+}
+
+/// Whether a signed distance is that of a point less than `depth` below the surface, or above it.
+pub(crate) fn is_above(distance: f64, depth: f64) -> bool {
+    distance > -depth * (1.0 - EDGE)
+}
+
+/// ± e_k
+fn axis<const D: usize>(k: usize, sign: f64) -> Vector<f64, D> {
+    Vector::from_fn(|i, _| if i == k { sign } else { 0.0 })
+}

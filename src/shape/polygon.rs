@@ -1,0 +1,208 @@
+//! Polygons: distances from edges, which side of them, and which outlines are none.
+
+use super::{Face, Solid};
+use crate::tensor::Vector;
+
+/// Vertices and edges nearer to each other, relative to the size of the polygon, are taken to meet.
+const MEET: f64 = 1e-9;
+
+/// The inside of a closed outline of straight edges in 2D that does not meet itself; it need not be convex.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polygon<const D: usize> {
+    /// Counter-clockwise.
+    vertices: Vec<Vector<f64, D>>,
+}
+
+/// An outline that bounds no polygon. Vertices are counted from 0; edge i leads from vertex i to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PolygonError {
+    /// Not in the plane.
+    #[error("a polygon in {0} dimension(s)")]
+    Dimension(usize),
+    /// Fewer than three vertices.
+    #[error("a polygon of {0} vertices")]
+    TooFew(usize),
+    /// Two vertices at one place, the later one first.
+    #[error("vertex {0} at the place of vertex {1}")]
+    Repeated(usize, usize),
+    /// All vertices on a line.
+    #[error("a polygon without area")]
+    Flat,
+    /// Two edges that cross or touch, the later one first, each by the vertices at its ends.
+    #[error("the edge between vertices {} and {} that meets the one between {} and {}", .0[0], .0[1], .1[0], .1[1])]
+    Meeting([usize; 2], [usize; 2]),
+}
+
+impl PolygonError {
+    /// What is allowed.
+    pub const ALLOWED: &str = "a polygon of the plane has at least 3 vertices, no two at one place and not all on a line, and \
+                               edges that meet at the vertex they share and nowhere else (vertices are counted from 0)";
+
+    /// The vertex that makes it wrong, if it is one.
+    pub fn vertex(&self) -> Option<usize> {
+        match self {
+            Self::Dimension(_) | Self::TooFew(_) | Self::Flat => None,
+            Self::Repeated(vertex, _) | Self::Meeting([vertex, _], _) => Some(*vertex),
+        }
+    }
+}
+
+impl<const D: usize> Polygon<D> {
+    /// The polygon of these vertices, in either order; `D` must be 2.
+    ///
+    /// ```
+    /// use bfree::shape::{Polygon, PolygonError, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // Cook's membrane
+    /// let vertices = [[0.0, 0.0], [48.0, 44.0], [48.0, 60.0], [0.0, 44.0]].map(Vector::from);
+    /// let membrane = Shape::from(Polygon::new(vertices.to_vec())?);
+    /// assert_eq!(membrane.signed_distance(&Vector::from([47.0, 52.0])), -1.0);
+    /// // With two vertices exchanged its edges cross.
+    /// let [a, b, c, d] = vertices;
+    /// assert_eq!(Polygon::new(vec![a, b, d, c]), Err(PolygonError::Meeting([3, 0], [1, 2])));
+    /// # Ok::<(), PolygonError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// An outline that meets itself or bounds nothing; the first such place.
+    pub fn new(vertices: Vec<Vector<f64, D>>) -> Result<Self, PolygonError> {
+        let n = vertices.len();
+        if D != 2 {
+            return Err(PolygonError::Dimension(D));
+        }
+        if n < 3 {
+            return Err(PolygonError::TooFew(n));
+        }
+        let from_first = vertices.iter().map(|x| x - vertices[0]);
+        let diameter =
+            from_first.clone().fold(
+                Vector::zeros(),
+                |far: Vector<f64, D>, x| {
+                    if x.norm_squared() > far.norm_squared() { x } else { far }
+                },
+            );
+        let hair = MEET * diameter.norm();
+        for i in 0..n {
+            if let Some(k) = (0..i).find(|&k| (vertices[i] - vertices[k]).norm() <= hair) {
+                return Err(PolygonError::Repeated(i, k));
+            }
+        }
+        if !from_first.clone().any(|x| cross(&diameter, &x).abs() > hair * diameter.norm()) {
+            return Err(PolygonError::Flat);
+        }
+        let edge = |i: usize| [i, (i + 1) % n];
+        for i in 0..n {
+            if let Some(k) = (0..i).find(|&k| meet(&vertices, edge(i), edge(k), hair)) {
+                return Err(PolygonError::Meeting(edge(i), edge(k)));
+            }
+        }
+        Ok(Self::oriented(vertices))
+    }
+
+    /// Counter-clockwise, which an outline of positive area is; nothing else is checked.
+    pub(super) fn oriented(mut vertices: Vec<Vector<f64, D>>) -> Self {
+        // 2 A = Σ (xᵢ − x₀) × (xᵢ₊₁ − x₀)
+        let fan = vertices.windows(2).map(|pair| cross(&(pair[0] - vertices[0]), &(pair[1] - vertices[0])));
+        if fan.sum::<f64>() < 0.0 {
+            vertices.reverse();
+        }
+        Self { vertices }
+    }
+
+    /// Its vertices, counter-clockwise.
+    pub fn vertices(&self) -> &[Vector<f64, D>] {
+        &self.vertices
+    }
+
+    /// The ends of edge i.
+    fn edge(&self, i: usize) -> [&Vector<f64, D>; 2] {
+        [&self.vertices[i], &self.vertices[(i + 1) % self.vertices.len()]]
+    }
+
+    /// The outward normal of edge i.
+    fn normal(&self, i: usize) -> Vector<f64, D> {
+        let [a, b] = self.edge(i);
+        let along = (b - a) / (b - a).norm();
+        Vector::from_fn(|k, _| if k == 0 { along[1] } else { -along[0] })
+    }
+}
+
+impl<const D: usize> Solid<D> for Polygon<D> {
+    /// The nearest edge says the side, and where that is one of its ends, the two edges there together: d has the sign of
+    /// (x − v)·(n₁ + n₂).
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let n = self.vertices.len();
+        let (mut squared, mut nearest) = (f64::INFINITY, (0, 0.0));
+        for i in 0..n {
+            let (t, foot) = foot(x, self.edge(i));
+            let s = (x - foot).norm_squared();
+            if s < squared {
+                (squared, nearest) = (s, (i, t));
+            }
+        }
+        let (i, t) = nearest;
+        if t > 0.0 && t < 1.0 {
+            let normal = self.normal(i);
+            return ((x - self.vertices[i]).dot(&normal), normal);
+        }
+        let vertex = if t > 0.0 { (i + 1) % n } else { i };
+        let between = self.normal((vertex + n - 1) % n) + self.normal(vertex);
+        let away = x - self.vertices[vertex];
+        let distance = if away.dot(&between) < 0.0 { -away.norm() } else { away.norm() };
+        (distance, if distance == 0.0 { between / between.norm() } else { away / distance })
+    }
+
+    /// The edges that `x` has its foot on.
+    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+        for i in 0..self.vertices.len() {
+            let [a, b] = self.edge(i);
+            let (along, edge) = ((x - a).dot(&(b - a)), (b - a).norm_squared());
+            if (-MEET * edge..=(1.0 + MEET) * edge).contains(&along) {
+                let normal = self.normal(i);
+                faces.push(((x - a).dot(&normal), normal));
+            }
+        }
+    }
+
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        self.vertices.iter().map(|v| n.dot(v)).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// a × b
+fn cross<const D: usize>(a: &Vector<f64, D>, b: &Vector<f64, D>) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// The point a + t (b − a), 0 ≤ t ≤ 1, nearest to `x`, and t.
+fn foot<const D: usize>(x: &Vector<f64, D>, [a, b]: [&Vector<f64, D>; 2]) -> (f64, Vector<f64, D>) {
+    let t = (x - a).dot(&(b - a)) / (b - a).norm_squared();
+    if t >= 1.0 {
+        (1.0, *b)
+    } else if t > 0.0 {
+        (t, a + (b - a) * t)
+    } else {
+        (0.0, *a)
+    }
+}
+
+/// Whether two edges, given by the numbers of their vertices, cross, or come within a `hair` of each other off the vertex they share.
+fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [usize; 2], hair: f64) -> bool {
+    let ends = |edge: [usize; 2]| edge.map(|i| &vertices[i]);
+    let ([a, b], [c, d]) = (ends(one), ends(other));
+    // Most edges are far from each other.
+    if (0..D).any(|k| a[k].min(b[k]) > c[k].max(d[k]) + hair || c[k].min(d[k]) > a[k].max(b[k]) + hair) {
+        return false;
+    }
+    let apart = |a: &Vector<f64, D>, b: &Vector<f64, D>, c: &Vector<f64, D>, d: &Vector<f64, D>| {
+        let (left, right) = (cross(&(b - a), &(c - a)), cross(&(b - a), &(d - a)));
+        (left < 0.0 && right > 0.0) || (left > 0.0 && right < 0.0)
+    };
+    let touches = |end: usize, edge: [usize; 2]| {
+        !edge.contains(&end) && (vertices[end] - foot(&vertices[end], ends(edge)).1).norm() <= hair
+    };
+    (apart(a, b, c, d) && apart(c, d, a, b))
+        || one.into_iter().any(|end| touches(end, other))
+        || other.into_iter().any(|end| touches(end, one))
+}

@@ -1,0 +1,269 @@
+//! What solids promise, of each and of all together.
+
+use super::*;
+use crate::grid::Grid;
+use crate::tensor::Tensor;
+
+fn vector<const D: usize>(x: [f64; D]) -> Vector<f64, D> {
+    Vector::from_column_slice(&x)
+}
+
+fn ball<const D: usize>(center: [f64; D], radius: f64) -> Shape<D> {
+    Ball { center: vector(center), radius }.into()
+}
+
+fn block<const D: usize>(min: [f64; D], max: [f64; D]) -> Shape<D> {
+    Block { min: vector(min), max: vector(max) }.into()
+}
+
+fn oblique_cone(radii: [f64; 2]) -> Cone<3> {
+    Cone::new([vector([-0.4, 0.3, -0.5]), vector([0.5, -0.2, 0.3])], radii).unwrap()
+}
+
+fn turned_and_scaled(of: Shape<3>) -> Shape<3> {
+    let rotation = rotation(50.0, Some(&vector([1.0, 2.0, -0.5]))).unwrap();
+    Similar { of: Box::new(of), about: vector([0.1, 0.2, 0.3]), rotation, factor: 1.2 }.into()
+}
+
+fn solids() -> Vec<Shape<3>> {
+    let (a, b) = (block([-1.0, -0.5, -0.25], [1.0, 0.75, 0.5]), ball([0.8, 0.1, 0.2], 0.45));
+    let plane = Shape::from(HalfSpace { point: vector([0.1, 0.2, 0.0]), normal: vector([2.0, -1.0, 0.5]) });
+    vec![
+        a.clone(),
+        b.clone(),
+        plane.clone(),
+        Union(vec![a.clone(), b.clone()]).into(),
+        Difference { of: Box::new(a.clone()), minus: Box::new(b) }.into(),
+        Intersection(vec![a, plane]).into(),
+        oblique_cone([0.7, 0.3]).into(),
+        oblique_cone([0.0, 0.5]).into(),
+        turned_and_scaled(block([-0.5, -0.25, -0.125], [0.5, 0.25, 0.75])),
+    ]
+}
+
+/// Points without any symmetry, in [−1.5, 1.5]³.
+fn points() -> impl Iterator<Item = Vector<f64, 3>> {
+    (1..400).map(|i| Vector::from_fn(|k, _| 3.0 * (f64::from(i) * [0.618034, 0.414214, 0.732051][k]).fract() - 1.5))
+}
+
+#[test]
+fn the_paper_s_disc_has_112_particles() {
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [30, 10] };
+    let disc = ball([2.5, 2.5], 1.5);
+    // ½ ρ v² V₀ n = 3.5, the energy of the reference, with ρ = 4, v = ½, V₀ = h²/4
+    assert_eq!(fill(&grid, &disc, 2, Fill::Particles).unwrap().len(), 112);
+    // whole cells: centres at (¼, ¾, 5/4)², all but the four corners of the 6×6 square
+    let particles = fill(&grid, &disc, 2, Fill::Cells).unwrap();
+    assert_eq!(particles.len(), (36 - 4) * 4);
+    // quarter points, the first axis fastest
+    assert_eq!(particles[1] - particles[0], vector([0.25, 0.0]));
+    assert_eq!(((particles[0][0] / 0.5).fract(), (particles[0][1] / 0.5).fract()), (0.25, 0.25));
+}
+
+#[test]
+fn a_filled_box_has_its_volume_and_its_center() {
+    let grid = Grid { origin: vector([-0.3, 0.2, 0.0]), spacing: 0.1, cells: [10, 12, 9] };
+    let shape = block([-0.1, 0.4, 0.2], [0.5, 0.8, 0.5]);
+    for rule in [Fill::Particles, Fill::Cells] {
+        let particles = fill(&grid, &shape, 3, rule).unwrap();
+        assert_eq!(particles.len(), 6 * 4 * 3 * 27, "{rule:?}");
+        let center = particles.iter().sum::<Vector<f64, 3>>() / particles.len() as f64;
+        assert!((center - vector([0.2, 0.6, 0.35])).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn the_volume_of_a_filled_ball_converges() {
+    let shape = ball([0.5, 0.5, 0.5], 0.4);
+    let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.4_f64.powi(3);
+    for (cells, bound) in [(8, 0.03), (32, 0.003)] {
+        let h = 1.0 / f64::from(cells);
+        let grid = Grid { origin: vector([0.0; 3]), spacing: h, cells: [cells; 3] };
+        let volume = fill(&grid, &shape, 2, Fill::Particles).unwrap().len() as f64 * (h / 2.0).powi(3);
+        assert!((volume / exact - 1.0).abs() < bound, "{cells} cells: {volume} against {exact}");
+    }
+}
+
+#[test]
+fn an_unbounded_shape_is_clipped_to_the_grid() {
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 1.0, cells: [4, 3] };
+    let tilted = Shape::from(HalfSpace { point: vector([0.0, 3.0]), normal: vector([1.0, 1.0]) });
+    let particles = fill(&grid, &tilted, 1, Fill::Particles).unwrap();
+    // x + y ≤ 3 over the centres (½, ½), (1½, ½), …
+    assert_eq!(particles.len(), 6);
+}
+
+#[test]
+fn too_many_or_no_particles_are_refused() {
+    let grid = Grid { origin: vector([0.0; 3]), spacing: 1e-3, cells: [1000; 3] };
+    let all = Shape::from(HalfSpace { point: vector([1.0; 3]), normal: vector([1.0; 3]) });
+    assert!(
+        matches!(fill(&grid, &all, 2, Fill::Particles), Err(FillError::TooMany { candidates }) if candidates == 8e9)
+    );
+    for lost in [ball([7.0; 3], 0.1), ball([0.5; 3], 1e-5), Union(vec![]).into()] {
+        assert!(matches!(fill(&grid, &lost, 2, Fill::Particles), Err(FillError::Empty { .. })), "{lost:?}");
+    }
+}
+
+#[test]
+fn the_normal_is_the_unit_gradient_of_the_distance() {
+    for shape in solids() {
+        for x in points() {
+            let (_, n) = shape.distance_and_normal(&x);
+            assert!((n.norm() - 1.0).abs() < 1e-14);
+            let step = 1e-6;
+            let gradient: Vector<f64, 3> = Vector::from_fn(|k, _| {
+                (shape.signed_distance(&(x + axis(k, step))) - shape.signed_distance(&(x - axis(k, step))))
+                    / (2.0 * step)
+            });
+            assert!((gradient - n).norm() < 1e-5, "{shape:?} at {x}: {gradient} against {n}");
+        }
+    }
+}
+
+#[test]
+fn the_foot_point_lies_on_the_surface_of_a_primitive() {
+    let combined = 3..6;
+    for (_, shape) in solids().iter().enumerate().filter(|(i, _)| !combined.contains(i)) {
+        for x in points() {
+            let (d, n) = shape.distance_and_normal(&x);
+            assert!(shape.signed_distance(&(x - n * d)).abs() < 1e-14, "{shape:?} at {x}");
+        }
+    }
+}
+
+#[test]
+fn combinations_are_the_set_operations_and_lie_in_their_bounding_box() {
+    let solids = solids();
+    let (a, b, plane) = (&solids[0], &solids[1], &solids[2]);
+    for x in points() {
+        assert_eq!(solids[3].contains(&x), a.contains(&x) || b.contains(&x));
+        assert_eq!(solids[4].contains(&x), a.contains(&x) && !b.contains(&x));
+        assert_eq!(solids[5].contains(&x), a.contains(&x) && plane.contains(&x));
+        for shape in &solids {
+            let (min, max) = shape.bounding_box();
+            assert!(!shape.contains(&x) || (0..3).all(|k| min[k] <= x[k] && x[k] <= max[k]), "{shape:?} at {x}");
+        }
+    }
+}
+
+#[test]
+fn at_a_hole_the_normal_points_into_the_hole() {
+    let ring = Shape::from(Difference { of: Box::new(ball([0.0, 0.0], 2.0)), minus: Box::new(ball([0.0, 0.0], 1.0)) });
+    assert!((ring.normal(&vector([1.2, 0.0])) - vector([-1.0, 0.0])).norm() < 1e-15);
+    assert!((ring.normal(&vector([0.0, 1.9])) - vector([0.0, 1.0])).norm() < 1e-15);
+    assert!((ring.signed_distance(&vector([1.2, 0.0])) + 0.2).abs() < 1e-15);
+}
+
+#[test]
+fn a_corner_lies_below_all_its_faces_and_an_inner_face_below_none() {
+    let unit = block([0.0; 3], [1.0; 3]);
+    assert!(unit.faces(&vector([0.5; 3]), 0.1).is_empty());
+    assert_eq!(unit.faces(&vector([0.5, 0.98, 0.5]), 0.1), [(0.98 - 1.0, vector([0.0, 1.0, 0.0]))]);
+    let edge: Vec<_> = unit.faces(&vector([0.98, 0.02, 0.5]), 0.1).iter().map(|face| face.1).collect();
+    assert_eq!(edge, [vector([1.0, 0.0, 0.0]), vector([0.0, -1.0, 0.0])]);
+    assert_eq!(unit.faces(&vector([0.02; 3]), 0.1).len(), 3);
+    // two blocks that touch at x = 1, and two that overlap: their common bottom counts once, what lies inside not at all
+    for other in [block([1.0, 0.0], [2.0, 1.0]), block([0.5, 0.0], [2.0, 1.0])] {
+        let long = Shape::from(Union(vec![block([0.0, 0.0], [1.0, 1.0]), other]));
+        assert!(long.faces(&vector([0.99, 0.5]), 0.1).is_empty());
+        assert_eq!(long.faces(&vector([0.99, 0.01]), 0.1), [(-0.01, vector([0.0, -1.0]))]);
+        assert_eq!(long.faces(&vector([1.99, 0.01]), 0.1).len(), 2);
+    }
+    // beside a square hole: its faces point into it, and off its corner there is none
+    let hole = block([0.4, 0.4], [0.6, 0.6]);
+    let frame = Shape::from(Difference { of: Box::new(block([0.0, 0.0], [1.0, 1.0])), minus: Box::new(hole) });
+    assert_eq!(frame.faces(&vector([0.39, 0.5]), 0.1), [(0.39 - 0.4, vector([1.0, 0.0]))]);
+    assert!(frame.faces(&vector([0.39, 0.39]), 0.1).is_empty());
+}
+
+#[test]
+fn an_axis_parallel_half_space_is_bounded_on_its_side() {
+    let left: Shape<2> = Shape::from(HalfSpace { point: vector([0.5, 9.0]), normal: vector([3.0, 0.0]) });
+    let (min, max) = left.bounding_box();
+    assert_eq!((min[0], max[0], min[1], max[1]), (f64::NEG_INFINITY, 0.5, f64::NEG_INFINITY, f64::INFINITY));
+}
+
+#[test]
+fn what_round_off_puts_beside_an_edge_lies_in_the_shape() {
+    // The node at y = 5.6e-17, as −0.3 + 3 · 0.1 gives it, and the half-space y ≤ 0.
+    let grid = Grid { origin: vector([0.0, -0.3]), spacing: 0.1, cells: [4, 6] };
+    let below: Shape<2> = HalfSpace { point: vector([0.0, 0.0]), normal: vector([0.0, 1.0]) }.into();
+    let node = grid.position([2, 3]);
+    assert!(node[1] > 0.0 && !below.contains(&node) && below.holds(&node, grid.spacing));
+    assert!(!below.holds(&(node + vector([0.0, 1e-9])), grid.spacing));
+    // Filled with one particle a cell, whose centres are on the edge to within round-off, in any units.
+    for unit in [1e-6, 1.0, 1e6] {
+        let grid = Grid { origin: vector([0.0, -0.35 * unit]), spacing: 0.1 * unit, cells: [4, 6] };
+        assert_eq!(fill(&grid, &below, 1, Fill::Particles).unwrap().len(), 4 * 4, "{unit}");
+    }
+}
+
+#[test]
+fn a_right_angle_is_one_to_the_last_bit() {
+    for quarters in -9..9_i32 {
+        let turned: Tensor<f64, 2> = rotation(90.0 * f64::from(quarters), None).unwrap();
+        let (cos, sin) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarters.rem_euclid(4) as usize];
+        assert_eq!(turned, Tensor::<f64, 2>::new(cos, -sin, sin, cos), "{quarters}");
+    }
+    // A half-space turned so stays bounded on its side.
+    let left = HalfSpace { point: vector([0.5, 9.0]), normal: vector([3.0, 0.0]) }.into();
+    let rotation = rotation(90.0, None).unwrap();
+    let below: Shape<2> = Similar { of: Box::new(left), about: vector([0.0, 0.0]), rotation, factor: 2.0 }.into();
+    assert_eq!((below.bounding_box().1[1], below.bounding_box().0[1]), (1.0, f64::NEG_INFINITY));
+}
+
+#[test]
+fn outlines_that_bound_no_polygon_are_refused_with_the_vertices() {
+    let refused = |vertices: &[[f64; 2]]| Polygon::new(vertices.iter().map(|&x| vector(x)).collect()).unwrap_err();
+    let (a, b, c, d) = ([0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]);
+    assert_eq!(refused(&[a, b]), PolygonError::TooFew(2));
+    assert_eq!(refused(&[a, b, c, b]), PolygonError::Repeated(3, 1));
+    assert_eq!(refused(&[a, b, [1.0, 1e-12]]), PolygonError::Flat);
+    assert_eq!(refused(&[a, b, d, c]), PolygonError::Meeting([3, 0], [1, 2]));
+    // a vertex on an edge; an edge that runs back on the one before; and one along another
+    assert_eq!(refused(&[a, b, c, [1.0, 0.0], d]), PolygonError::Meeting([2, 3], [0, 1]));
+    assert_eq!(refused(&[a, b, [1.0, 0.0], d]), PolygonError::Meeting([1, 2], [0, 1]));
+    assert_eq!(refused(&[a, [4.0, 0.0], [4.0, 1.0], [3.0, 0.0], b, c]), PolygonError::Meeting([2, 3], [0, 1]));
+    assert_eq!(refused(&[[f64::NAN; 2]; 3]), PolygonError::Flat);
+    assert_eq!(Polygon::new(vec![vector([0.0; 3]); 3]), Err(PolygonError::Dimension(3)));
+    // Straight on through a vertex is no fault.
+    assert!(Polygon::new([a, [1.0, 0.0], b, c, d].map(vector).to_vec()).is_ok());
+}
+
+#[test]
+fn a_polygon_has_the_faces_of_the_boxes_it_is_made_of() {
+    let l = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+    let polygon: Shape<2> = Polygon::new(l.map(vector).to_vec()).unwrap().into();
+    let boxes = Union(vec![block([0.0, 0.0], [3.0, 1.0]), block([0.0, 0.0], [1.0, 2.0])]).into();
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [6, 4] };
+    let particles = fill(&grid, &polygon, 2, Fill::Particles).unwrap();
+    assert_eq!(particles, fill(&grid, &boxes, 2, Fill::Particles).unwrap());
+    for x in &particles {
+        let sorted = |shape: &Shape<2>| {
+            let mut faces = shape.faces(x, 0.25);
+            faces.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
+            faces
+        };
+        assert_eq!(sorted(&polygon), sorted(&boxes), "{x}");
+    }
+    let area: usize = particles.iter().map(|x| polygon.faces(x, 0.25).len()).sum();
+    assert_eq!(area as f64 * 0.25, 10.0);
+}
+
+#[test]
+fn the_surface_of_a_cylinder_is_found_whole() {
+    let ends = [vector([1.0, 1.0, 0.25]), vector([1.0, 1.0, 1.25])];
+    let shape: Shape<3> = Cone::new(ends, [0.75, 0.75]).unwrap().into();
+    let grid = Grid { origin: vector([0.0; 3]), spacing: 0.0625, cells: [32; 3] };
+    let (s, particles) = (0.03125_f64, fill(&grid, &shape, 2, Fill::Particles).unwrap());
+    let exact = std::f64::consts::PI * 0.75 * 0.75;
+    assert!((particles.len() as f64 * s.powi(3) / exact - 1.0).abs() < 5e-3);
+    let (mut ends, mut side) = (0.0, 0.0);
+    for (_, n) in particles.iter().flat_map(|x| shape.faces(x, s)) {
+        *(if n[2].abs() > 0.5 { &mut ends } else { &mut side }) += s * s;
+    }
+    // The discs to how well the lattice fills them; the side to how many of the lattice lie in one ring of that width.
+    assert!((ends / (2.0 * exact) - 1.0_f64).abs() < 5e-3, "{ends}");
+    assert!((side / (2.0 * exact / 0.75) - 1.0_f64).abs() < 0.08, "{side}");
+}
