@@ -285,7 +285,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
         (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
-        (true, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
         (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
         (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),
         (true, "Krylov vectors", nodes * vector / share * krylov_vectors),

@@ -105,7 +105,8 @@ pub enum Preconditioning {
 const MANY: [usize; 3] = [500, 10_000, 50_000];
 const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
 
-/// Particles up to which a factorisation was the fastest of all, in programs that have it; in 3D it never was (README, "Speed").
+/// Particles up to which a factorisation, in programs that have it, was the fastest in beams and no slower than what else would be taken in
+/// blocks; in 3D it never was (README, "Only what a scene requires").
 const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
 const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
 
