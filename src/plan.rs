@@ -9,7 +9,7 @@ use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms};
 use crate::particles::Particles;
 use crate::simulation::Simulation;
-use crate::solver::{Krylov, Precision, Preconditioning, multigrid_bytes};
+use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
 use serde::Serialize;
@@ -262,10 +262,11 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
     let share = if precision == Precision::Mixed { 2 } else { 1 };
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
-    let multigrid = simulation.preconditioner().0 == Preconditioning::Multigrid;
+    let preconditioner = simulation.preconditioner().0;
+    let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
     // What is not there does not appear.
     let keeps = simulation.settings.renewal != Renewal::EveryStep;
-    let used: [(bool, &'static str, usize); 17] = [
+    let used: [(bool, &'static str, usize); 18] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -284,8 +285,9 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
         (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
-        (true, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
         (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
+        (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),
         (true, "Krylov vectors", nodes * vector / share * krylov_vectors),
     ];
     let used = used.into_iter().filter(|(used, ..)| *used);

@@ -1,8 +1,8 @@
-//! A frozen tangent as a form on the cells of the grid, from which coarser grids are made.
+//! A frozen tangent on the grid: as a form on its cells, from which coarser grids are made; and which nodes share entries.
 
 use crate::mechanics::sweep::{At, LANES, Laned};
 use crate::mechanics::tangent::Tangent;
-use crate::solver::LocalForm;
+use crate::solver::{LocalForm, Neighbours};
 use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
 
@@ -13,11 +13,10 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         let (tiles, volume) = (D.pow(4), grid.spacing.powi(D as i32));
         let mut form = LocalForm {
             grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
-            nodes: active.ids().iter().map(|&id| padded(grid.index(id))).collect(),
-            prescribed: vec![false; D * active.len()],
+            nodes: self.indices(),
+            prescribed: self.held(),
             ..LocalForm::default()
         };
-        self.prescribed.iter().for_each(|dof| form.prescribed[dof.node * D + dof.component] = true);
         let terms: Vec<_> = self.terms.iter().filter_map(|term| term.product_at_points()).map(|(_, add)| add).collect();
         // Gradients are counted in units of 1/h.
         let factor = (self.unit.length / grid.spacing).powi(2);
@@ -72,6 +71,26 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         self.terms.iter().for_each(|term| term.add_bends(&mut form.bends));
         form.blocks = bytemuck::cast_slice(&blocks).to_vec();
         form
+    }
+
+    /// Nodes share an entry at a particle, or where second differences are held.
+    pub(super) fn joined(&self) -> Neighbours {
+        let mut bends = Vec::new();
+        self.terms.iter().for_each(|term| term.add_bends(&mut bends));
+        let reach = self.supports.reach().max(if bends.is_empty() { 0 } else { 2 });
+        Neighbours { nodes: self.indices(), reach, prescribed: self.held() }
+    }
+
+    fn indices(&self) -> Vec<[u32; 3]> {
+        let (grid, active) = (self.supports.grid(), self.supports.active());
+        active.ids().iter().map(|&id| padded(grid.index(id))).collect()
+    }
+
+    /// Which unknowns are prescribed.
+    fn held(&self) -> Vec<bool> {
+        let mut held = vec![false; D * self.supports.nodes()];
+        self.prescribed.iter().for_each(|dof| held[dof.node * D + dof.component] = true);
+        held
     }
 }
 

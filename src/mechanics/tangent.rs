@@ -7,7 +7,9 @@ use crate::mechanics::sweep::{At, Flow, Form, LANES, Laned, Laws, Supports};
 use crate::mechanics::terms::{Frozen, Piece, Unit};
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, LocalForm, NonlinearProblem, Precision};
+use crate::solver::{
+    DiagonalBlocks, LinearOperator, Linearization, LocalForm, Neighbours, NonlinearProblem, Precision,
+};
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
@@ -246,6 +248,10 @@ impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
 
     fn local_form(&self) -> Option<LocalForm> {
         Some(self.on_cells())
+    }
+
+    fn neighbours(&self) -> Option<Neighbours> {
+        Some(self.joined())
     }
 }
 

@@ -78,6 +78,9 @@ impl Solver {
                 problems.require(!with_pressures, "solver.krylov.method", "\"conjugate_gradient\"", allowed);
             }
         }
+        let absent = self.krylov.preconditioner == Preconditioning::Direct && !Preconditioning::HAS_DIRECT;
+        let allowed = "this program was built without it: build with `--features direct`, or use \"automatic\"";
+        problems.require(!absent, "solver.krylov.preconditioner", "\"direct\"", allowed);
         if let Forcing::Fixed(tolerance) = self.krylov.forcing {
             problems.between("solver.krylov.forcing.fixed", tolerance, 1e-15, 0.9);
         }

@@ -17,10 +17,12 @@ pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
-pub(crate) use preconditioner::multigrid_bytes;
+#[cfg(feature = "direct")]
+pub use preconditioner::Direct;
 pub use preconditioner::{
-    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Preconditioner, Preconditioning,
+    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioner, Preconditioning,
 };
+pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
 
 use vector::Entry;
 

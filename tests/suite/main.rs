@@ -5,6 +5,7 @@ mod adaptive;
 mod approximation;
 mod compaction;
 mod damping;
+mod direct;
 mod dynamics;
 mod equilibrium;
 mod examples;

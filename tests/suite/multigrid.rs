@@ -11,7 +11,7 @@ use bfree::solver::{LinearOperator, Multigrid, Precision, Preconditioner, Precon
 use serde_json::{Value, json};
 
 /// A block that hangs between cell faces, on a fixed floor, under its weight.
-fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Value) -> Result<Simulation<D>, Failure> {
+pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Value) -> Result<Simulation<D>, Failure> {
     let (low, high) = (0.53, 1.53);
     let (mut min, mut max, mut down) = (vec![low; D], vec![high; D], vec![0.0; D]);
     (min[D - 1], max[D - 1], down[D - 1]) = (0.0, 1.0, -50.0);
@@ -35,7 +35,7 @@ fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Value)
 }
 
 /// One step: Krylov iterations a Newton iteration.
-fn iterations<const D: usize>(
+pub fn iterations<const D: usize>(
     mut simulation: Simulation<D>,
     with: Preconditioning,
 ) -> Result<(f64, Simulation<D>), Failure> {
@@ -45,7 +45,7 @@ fn iterations<const D: usize>(
     Ok((history.counts.krylov_iterations as f64 / history.iterations.len() as f64, simulation))
 }
 
-fn families() -> [Value; 5] {
+pub fn families() -> [Value; 5] {
     [
         json!("linear"),
         json!({"bspline": {"degree": 2}}),
@@ -56,7 +56,7 @@ fn families() -> [Value; 5] {
 }
 
 /// Where the particles are does not depend on the preconditioner, by more than the tolerance of Newton's method.
-fn same<const D: usize>(one: &Simulation<D>, other: &Simulation<D>) -> bool {
+pub fn same<const D: usize>(one: &Simulation<D>, other: &Simulation<D>) -> bool {
     let (one, other) = (one.particles.by_id(), other.particles.by_id());
     one.position.iter().zip(&other.position).all(|(a, b)| (a - b).norm() < 1e-8)
 }

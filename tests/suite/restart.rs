@@ -216,8 +216,8 @@ fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
         (b"PK\x03\x04 something else".to_vec(), "no checkpoint of bfree"),
         (flipped(9), "format is version"),
         (flipped(100), "header is damaged"),
-        (flipped(good.len() - 5), "array dissipated is damaged"),
-        (flipped(good.len() - 13), "array external_work is damaged"),
+        (flipped(good.len() - 5), "array path is damaged"),
+        (flipped(good.len() - 41), "array dissipated is damaged"),
         (flipped(good.len() - 2000), "array displacement_gradient is damaged"),
     ];
     for (k, (bytes, words)) in damages.iter().enumerate() {

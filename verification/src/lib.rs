@@ -17,6 +17,7 @@ pub mod figure;
 pub mod known;
 pub mod manufactured;
 pub mod prepared;
+pub mod processor;
 pub mod random;
 pub mod record;
 pub mod report;

@@ -1,9 +1,13 @@
 //! Approximate inverses for Krylov methods, one file each.
 
 mod block_jacobi;
+#[cfg(feature = "direct")]
+mod direct;
 mod multigrid;
 
 pub use block_jacobi::BlockJacobi;
+#[cfg(feature = "direct")]
+pub use direct::Direct;
 pub(crate) use multigrid::bytes as multigrid_bytes;
 pub use multigrid::{Bend, LocalForm, Multigrid};
 
@@ -23,6 +27,22 @@ pub trait DiagonalBlocks {
     fn local_form(&self) -> Option<LocalForm> {
         None
     }
+
+    /// Which unknowns may share an entry; `None` if nothing is known of it.
+    fn neighbours(&self) -> Option<Neighbours> {
+        None
+    }
+}
+
+/// Where nodes are in a grid, and how far an entry reaches.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Neighbours {
+    /// Index of each node; 0 along axes that do not exist.
+    pub nodes: Vec<[u32; 3]>,
+    /// Along any axis, the largest difference of the indices of two nodes that share an entry, or more.
+    pub reach: u32,
+    /// Which unknowns are prescribed, node after node.
+    pub prescribed: Vec<bool>,
 }
 
 /// What makes approximate inverses of the tangents of a step: `apply` of one is z = M⁻¹ r. A positive factor does not matter.
@@ -66,13 +86,16 @@ pub trait Preconditioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// Multigrid for large bodies without inertia or in steps of Courant numbers above 10, else the diagonal blocks.
+    /// Multigrid for large bodies without inertia or in steps of Courant numbers above 10, else the diagonal blocks; for small ones of those
+    /// in 1D and 2D the direct solve, where the program has it.
     #[default]
     Automatic,
     /// The inverses of the diagonal blocks: cheap, and enough where inertia dominates.
     BlockJacobi,
     /// One V-cycle of multigrid: iterations hardly grow as the grid is refined.
     Multigrid,
+    /// The assembled tangent, factorised once a step: for small systems. Only in programs that are built with the feature `direct`.
+    Direct,
     /// Nothing.
     None,
 }
@@ -82,7 +105,15 @@ pub enum Preconditioning {
 const MANY: [usize; 3] = [500, 10_000, 50_000];
 const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
 
+/// Particles up to which a factorisation, in programs that have it, was the fastest in beams and no slower than what else would be taken in
+/// blocks; in 3D it never was (README, "Only what a scene requires").
+const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
+const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
+
 impl Preconditioning {
+    /// Whether this program can factorise.
+    pub const HAS_DIRECT: bool = cfg!(feature = "direct");
+
     /// What is used for so many particles in `D` dimensions, with B-splines or other functions, in steps that are `long` or not, along a
     /// path of equilibria (by GMRES) or not; and why.
     ///
@@ -103,10 +134,17 @@ impl Preconditioning {
         long: bool,
         on_path: bool,
     ) -> (Self, &'static str) {
-        let many = if splines { MANY_OF_SPLINES } else { MANY };
+        let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
+        let axes = (D - 1).min(2);
         match self {
+            Self::Direct if !Self::HAS_DIRECT => {
+                (Self::BlockJacobi, "this program was built without the feature `direct`")
+            }
             Self::Automatic if on_path => (Self::Multigrid, "restarts lose what few iterations keep"),
-            Self::Automatic if long && particles >= many[(D - 1).min(2)] => {
+            Self::Automatic if long && Self::HAS_DIRECT && particles <= few[axes] => {
+                (Self::Direct, "few particles, and inertia does not dominate")
+            }
+            Self::Automatic if long && particles >= many[axes] => {
                 (Self::Multigrid, "many particles, and inertia does not dominate")
             }
             Self::Automatic if long => (Self::BlockJacobi, "faster for so many particles and these functions"),
@@ -134,8 +172,12 @@ impl Preconditioning {
     /// ```
     pub fn anew<const D: usize>(self) -> Box<dyn Preconditioner> {
         match self {
+            #[cfg(not(feature = "direct"))]
+            Self::Direct => Self::BlockJacobi.anew::<D>(),
             Self::Automatic | Self::BlockJacobi => Box::new(BlockJacobi::<D>::default()),
             Self::Multigrid => Box::new(Multigrid::<D>::default()),
+            #[cfg(feature = "direct")]
+            Self::Direct => Box::new(Direct::<D>::default()),
             Self::None => Box::new(Identity),
         }
     }
@@ -147,9 +189,19 @@ impl Display for Preconditioning {
             Self::Automatic => "automatic",
             Self::BlockJacobi => "diagonal blocks",
             Self::Multigrid => "multigrid",
+            Self::Direct => "direct solve",
             Self::None => "none",
         })
     }
+}
+
+/// Bytes of the assembled tangent of so many nodes and its factor, at most: that of a band across a body as long as wide.
+pub(crate) fn direct_bytes(nodes: usize, dimension: usize, reach: usize) -> usize {
+    let across = (nodes as f64).powf(1.0 - 1.0 / dimension as f64).ceil() as usize;
+    let band = dimension * (reach + 1) * across;
+    // The lower half: lists of its columns, these one after the other, and in the order of the factor.
+    let row = dimension * ((2 * reach + 1).pow(dimension as u32) / 2 + 1);
+    dimension * nodes * (band + 6 * row) * size_of::<f64>()
 }
 
 /// No preconditioning: M = I.

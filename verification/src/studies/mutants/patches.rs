@@ -36,13 +36,14 @@ const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
 const GHOSTS: Check = Check::Test("ghost::");
 const LEVELS: Check = Check::Test("multigrid::");
+const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP, LAWS,
-    GHOSTS, LEVELS, KEPT, SOLVER,
+    GHOSTS, LEVELS, PATHS, KEPT, SOLVER,
 ];
 
 /// What is to become of a patch.
@@ -83,6 +84,7 @@ const MASS: &str = "src/mechanics/mass.rs";
 const TERMS: &str = "src/mechanics/terms/mod.rs";
 const INERTIA: &str = "src/mechanics/terms/inertia.rs";
 const STRESS: &str = "src/mechanics/terms/stress.rs";
+const PATH: &str = "src/mechanics/path.rs";
 const KEPT_GRID: &str = "src/mechanics/kept.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
@@ -662,6 +664,14 @@ pub(super) const PATCHES: &[Patch] = &[
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5)",
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.0)",
         Killed(&[KEPT], &[DYNAMICS])),
+    patch("a path's length with the loads against it", PATH,
+        "(self.length - moved.sum::<f64>()) / self.path.weight",
+        "(self.length + moved.sum::<f64>()) / self.path.weight",
+        Killed(&[PATHS], &[KEPT])),
+    patch("a path whose tangent forgets the loads", PATH,
+        "vector::axpy(along, bytemuck::cast_slice(&self.slope), y);",
+        "vector::axpy(0.0 * along, bytemuck::cast_slice(&self.slope), y);",
+        Killed(&[PATHS], &[KEPT])),
     patch("no wall that is met makes it anew", KEPT_GRID,
         "met.is_empty()",
         "(met.len() < usize::MAX)",

@@ -3,6 +3,7 @@
 use super::setting::Setting;
 use crate::baseline::{Assembled, BFree, Pattern, assemble};
 use crate::prepared::{Prepared, arranged};
+use crate::processor::Thread;
 use crate::studies::StudyError;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
@@ -15,7 +16,7 @@ use bfree::solver::{BlockJacobi, NewtonHistory, newton};
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The most blocks assembled: 0.4 GB in 3D.
 const MOST_BLOCKS: usize = 5_000_000;
@@ -250,31 +251,8 @@ fn best<R>(mut run: impl FnMut() -> R) -> f64 {
     (0..4).fold(f64::INFINITY, |best: f64, _| {
         let start = Thread::now();
         black_box(run());
-        let wall = start.wall.elapsed();
+        let wall = start.wall();
         // What takes long is interrupted every time; what is short, the system's clock of processors does not see.
         best.min(if wall < TICK { wall.as_secs_f64() } else { start.elapsed() })
     })
-}
-
-/// The time that this thread has had a processor; where the system does not say, the time of the clock on the wall.
-struct Thread {
-    wall: Instant,
-    processor: Option<Duration>,
-}
-
-impl Thread {
-    fn now() -> Self {
-        Self { wall: Instant::now(), processor: processor_time() }
-    }
-
-    fn elapsed(&self) -> f64 {
-        let used = self.processor.zip(processor_time()).map(|(start, end)| end.saturating_sub(start));
-        used.unwrap_or_else(|| self.wall.elapsed()).as_secs_f64()
-    }
-}
-
-/// The first number of Linux's schedstat: nanoseconds on a processor.
-fn processor_time() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(Duration::from_nanos(text.split_whitespace().next()?.parse().ok()?))
 }

@@ -1,5 +1,7 @@
 //! The tangent as a matrix, B-free and by Voigt, beside the matrix-free product.
 
+mod statics;
+
 use super::{Effort, Outcome, StudyError};
 use crate::baseline::{BFree, BlockMatrix, Pattern, Stiffness, Voigt, assemble};
 use crate::prepared::Prepared;
@@ -75,9 +77,11 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             .into(),
     );
     if !cfg!(feature = "direct") {
-        remarks.push("The sparse direct solve needs `--features direct` (faer takes a minute to build).".into());
+        remarks.push("The sparse direct solves need `--features direct` (faer takes a minute to build).".into());
     }
-    Ok(Outcome { reports: vec![study.report], tables: vec![study.table, study.solves], remarks, ..Outcome::default() })
+    let (statics, systems) = statics::run(*effort)?;
+    let (reports, tables) = (vec![study.report, statics], vec![study.table, study.solves, systems]);
+    Ok(Outcome { reports, tables, remarks, ..Outcome::default() })
 }
 
 struct Study {

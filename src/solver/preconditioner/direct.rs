@@ -1,0 +1,267 @@
+//! The tangent as a sparse matrix, factorised by faer: for systems so small that this costs less than the iterations it saves.
+//!
+//! One product shows the columns of all nodes that share no neighbour, and (2r + 1)^D D products show every entry, r the reach of a node:
+//! entries have whatever the product has, and its accuracy.
+
+use super::{BlockJacobi, Neighbours, Preconditioner};
+use crate::solver::vector::Entry;
+use crate::solver::{LinearOperator, Linearization};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+use std::collections::{BTreeMap, HashMap};
+
+/// Sums have one order, whatever the number of threads.
+const PAR: Par = Par::Seq;
+
+/// K⁻¹ = L⁻ᵀ L⁻¹ of the first tangent it is prepared with; of one that is not symmetric, as if the upper half were as the lower one.
+///
+/// ```
+/// use bfree::pooled::Pooled;
+/// use bfree::solver::{DiagonalBlocks, Direct, LinearOperator, Neighbours, Preconditioner};
+///
+/// /// −u″ on a line of nodes, h = 1, with u = 0 beyond both ends.
+/// struct Laplacian(usize);
+///
+/// impl LinearOperator for Laplacian {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         let at = |i: Option<usize>| i.and_then(|i| x.get(i)).copied().unwrap_or(0.0);
+///         (0..x.len()).for_each(|i| y[i] = 2.0 * x[i] - at(i.checked_sub(1)) - at(Some(i + 1)));
+///     }
+/// }
+///
+/// impl DiagonalBlocks for Laplacian {
+///     fn diagonal_blocks(&self) -> Pooled<f64> {
+///         vec![2.0; self.0].into()
+///     }
+///
+///     fn neighbours(&self) -> Option<Neighbours> {
+///         let nodes = (0..self.0 as u32).map(|i| [i, 0, 0]).collect();
+///         Some(Neighbours { nodes, reach: 1, prescribed: vec![false; self.0] })
+///     }
+/// }
+///
+/// // u = i (n + 1 − i)/2 hangs under a load of one.
+/// let (laplacian, mut direct, mut u) = (Laplacian(1000), Direct::<1>::default(), vec![0.0; 1000]);
+/// direct.prepare(&laplacian).apply(&vec![1.0; 1000], &mut u);
+/// assert!(u.iter().zip(1..).all(|(u, i)| (u - 0.5 * f64::from(i * (1001 - i))).abs() < 1e-6));
+/// ```
+#[derive(Debug, Default)]
+pub struct Direct<const D: usize> {
+    made: Option<Made<D>>,
+}
+
+#[derive(Debug)]
+enum Made<const D: usize> {
+    Factors(Box<Factors>),
+    /// Of a tangent that is not positive definite, or tells nothing of neighbours.
+    Blocks(BlockJacobi<D>),
+}
+
+/// L of K = L Lᵀ, rows and columns in the order that fills it least.
+#[derive(Debug)]
+struct Factors {
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<f64>,
+}
+
+/// The lower half of a symmetric matrix, column after column.
+#[derive(Default)]
+struct Lower {
+    starts: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Lower {
+    fn of<S: Entry, const D: usize>(tangent: &dyn LinearOperator<S>, neighbours: &Neighbours) -> Self {
+        let Neighbours { nodes, reach, prescribed } = neighbours;
+        let numbers: HashMap<[u32; 3], usize> = nodes.iter().enumerate().map(|(number, &at)| (at, number)).collect();
+        let mut colours: BTreeMap<[u32; 3], Vec<usize>> = BTreeMap::new();
+        for (number, at) in nodes.iter().enumerate() {
+            colours.entry(at.map(|i| i % (2 * reach + 1))).or_default().push(number);
+        }
+        let size = D * nodes.len();
+        let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![S::zero(); size], vec![S::zero(); size]);
+        for colour in colours.values() {
+            let around: Vec<Vec<usize>> =
+                colour.iter().map(|&node| around::<D>(nodes[node], *reach, &numbers)).collect();
+            for k in 0..D {
+                x.fill(S::zero());
+                colour.iter().filter(|&node| !prescribed[node * D + k]).for_each(|node| x[node * D + k] = S::one());
+                tangent.apply(&x, &mut y);
+                for (column, around) in colour.iter().map(|node| node * D + k).zip(&around) {
+                    let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
+                    // A diagonal of zero is that of what is prescribed.
+                    let value = |row: usize| if row == column && y[row] == S::zero() { 1.0 } else { y[row].value() };
+                    columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
+                }
+            }
+        }
+        let mut lower = Self { starts: vec![0], ..Self::default() };
+        for column in columns {
+            lower.rows.extend(column.iter().map(|&(row, _)| row));
+            lower.values.extend(column.iter().map(|&(_, value)| value));
+            lower.starts.push(lower.rows.len());
+        }
+        lower
+    }
+
+    /// `None` of a matrix that is not positive definite.
+    fn factors(&self) -> Option<Box<Factors>> {
+        let size = self.starts.len() - 1;
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.starts, None, &self.rows);
+        let order = SymmetricOrdering::Amd;
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, order, Default::default()).ok()?;
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PAR, Default::default());
+        let (mut values, mut memory) = (vec![0.0; symbolic.len_val()], MemBuffer::try_new(scratch).ok()?);
+        let (matrix, memory) = (SparseColMatRef::new(pattern, &self.values), MemStack::new(&mut memory));
+        let (shift, settings) = (Default::default(), Default::default());
+        symbolic.factorize_numeric_llt(&mut values, matrix, Side::Lower, shift, PAR, memory, settings).ok()?;
+        Some(Box::new(Factors { symbolic, values }))
+    }
+}
+
+/// The nodes within reach of a place, ascending.
+fn around<const D: usize>(at: [u32; 3], reach: u32, numbers: &HashMap<[u32; 3], usize>) -> Vec<usize> {
+    let range = |k: usize| if k < D { at[k].saturating_sub(reach)..=at[k] + reach } else { at[k]..=at[k] };
+    let all = range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
+    let mut found: Vec<usize> = all.filter_map(|at| numbers.get(&at).copied()).collect();
+    found.sort_unstable();
+    found
+}
+
+impl<S: Entry> LinearOperator<S> for Factors {
+    fn apply(&self, r: &[S], z: &mut [S]) {
+        let mut x: Vec<f64> = r.iter().map(|r| r.value()).collect();
+        let size = x.len();
+        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1, PAR));
+        let (right, memory) = (MatMut::from_column_major_slice_mut(&mut x, size, 1), MemStack::new(&mut memory));
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, right, PAR, memory);
+        z.iter_mut().zip(&x).for_each(|(z, &x)| *z = S::lit(x));
+    }
+}
+
+impl<const D: usize> Direct<D> {
+    /// Bytes of the factor; `None` if there is none.
+    pub fn bytes(&self) -> Option<usize> {
+        match &self.made {
+            Some(Made::Factors(factors)) => Some(size_of_val(factors.values.as_slice())),
+            _ => None,
+        }
+    }
+
+    fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
+        let made = self.made.get_or_insert_with(|| {
+            let factors = tangent.neighbours().and_then(|neighbours| Lower::of::<S, D>(tangent, &neighbours).factors());
+            factors.map_or_else(
+                || {
+                    let mut blocks = BlockJacobi::default();
+                    blocks.take(tangent);
+                    Made::Blocks(blocks)
+                },
+                Made::Factors,
+            )
+        });
+        match made {
+            Made::Factors(factors) => Box::new(&**factors),
+            Made::Blocks(blocks) => Box::new(&*blocks),
+        }
+    }
+}
+
+impl<const D: usize> Preconditioner for Direct<D> {
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
+        self.prepared(tangent)
+    }
+
+    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
+        self.prepared(tangent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pooled::Pooled;
+    use crate::solver::testing::{Dense, distance, irregular};
+    use crate::solver::{DiagonalBlocks, direct_bytes};
+    use crate::tensor::{Tensor, Vector};
+
+    /// Nodes on a square that pull at those beside them in both components, held at the first node, on springs.
+    struct Net {
+        side: u32,
+        spring: f64,
+    }
+
+    impl Net {
+        fn neighbours(&self) -> Neighbours {
+            let nodes: Vec<_> = (0..self.side.pow(2)).map(|i| [i % self.side + 3, i / self.side, 0]).collect();
+            let prescribed = (0..2 * nodes.len()).map(|unknown| unknown < 2).collect();
+            Neighbours { nodes, reach: 1, prescribed }
+        }
+
+        fn block(&self) -> Tensor<f64, 2> {
+            Tensor::<f64, 2>::new(8.0 + self.spring, 0.5, 0.5, 9.0 + self.spring)
+        }
+    }
+
+    impl LinearOperator for Net {
+        fn apply(&self, x: &[f64], y: &mut [f64]) {
+            let Neighbours { nodes, .. } = self.neighbours();
+            let (x, y): (&[Vector<f64, 2>], &mut [Vector<f64, 2>]) =
+                (bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+            for (i, y) in y.iter_mut().enumerate() {
+                let beside = |j: &usize| *j != i && (0..2).all(|k| nodes[i][k].abs_diff(nodes[*j][k]) <= 1);
+                let others: Vector<f64, 2> = (0..nodes.len()).filter(beside).map(|j| x[j]).sum();
+                *y = self.block() * x[i] - others;
+            }
+            y[0].fill(0.0);
+        }
+    }
+
+    impl DiagonalBlocks for Net {
+        fn diagonal_blocks(&self) -> Pooled<f64> {
+            Pooled::from(vec![self.block(); self.side.pow(2) as usize]).into_numbers()
+        }
+
+        fn neighbours(&self) -> Option<Neighbours> {
+            Some(self.neighbours())
+        }
+    }
+
+    #[test]
+    fn every_entry_is_found_and_what_is_prescribed_left_alone() {
+        let net = Net { side: 12, spring: 0.1 };
+        let mut r = irregular(2 * 144);
+        r[..2].fill(0.0);
+        let (mut direct, mut z, mut back) = (Direct::<2>::default(), vec![0.0; r.len()], vec![0.0; r.len()]);
+        direct.prepare(&net).apply(&r, &mut z);
+        net.apply(&z, &mut back);
+        assert!(z[..2] == [0.0; 2] && distance(&back, &r) < 1e-13, "{}", distance(&back, &r));
+        let (held, planned) = (direct.bytes().unwrap(), direct_bytes(144, 2, 1));
+        assert!((held..20 * held).contains(&planned), "{planned} for {held}");
+    }
+
+    #[test]
+    fn the_factor_of_the_first_tangent_is_kept() {
+        let (first, second) = (Net { side: 5, spring: 0.1 }, Net { side: 5, spring: 10.0 });
+        let (r, mut direct, mut z, mut again) = (irregular(50), Direct::<2>::default(), vec![0.0; 50], vec![0.0; 50]);
+        direct.prepare(&first).apply(&r, &mut z);
+        direct.prepare(&second).apply(&r, &mut again);
+        assert_eq!(z, again);
+    }
+
+    #[test]
+    fn diagonal_blocks_stand_in_where_there_is_no_factor() {
+        // Not definite, and without neighbours.
+        let (net, dense) = (Net { side: 5, spring: -7.0 }, Dense::from_fn(3, |i, k| if i == k { 4.0 } else { 0.0 }));
+        let (mut direct, mut z) = (Direct::<2>::default(), vec![0.0; 50]);
+        direct.prepare(&net).apply(&vec![1.0; 50], &mut z);
+        assert!(direct.bytes().is_none() && (net.block() * Vector::from([z[8], z[9]])).add_scalar(-1.0).norm() < 1e-14);
+        let (mut direct, mut z) = (Direct::<1>::default(), [0.0; 3]);
+        direct.prepare(&dense).apply(&[1.0; 3], &mut z);
+        assert_eq!(z, [0.25; 3]);
+    }
+}
