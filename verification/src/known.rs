@@ -180,6 +180,8 @@ pub const KNOWN: &[Known] = &[
             timed(&["solver.krylov.forcing", "manufactured 2D"], 0.93),
             timed(&["solver.krylov.forcing", "compaction 2D"], 0.88),
             timed(&["time.initial_guess", "manufactured 2D"], 0.76),
+            timed(&["approximation.lme.tolerance", "manufactured 2D"], 0.993),
+            timed(&["transfer", "Riemann 1D"], 0.995),
             timed(&["combinations", "Riemann 1D"], 0.66),
             timed(&["combinations", "compaction 2D"], 0.87),
             timed(&["combinations", "manufactured 3D"], 0.73),
