@@ -12,7 +12,7 @@ use crate::tensor::Vector;
 /// The share of the loads in the length of a step, at most: where they fall steeply the plane still meets the path.
 const SHARE: f64 = 0.1;
 
-/// The loads' part of the difference by which their slope is measured: within a piece of a curve, what rounding leaves of it is all that it errs.
+/// The part of a step's load over which the loads' slope is measured: within a piece of a curve, rounding is all that it errs by.
 const DIFFERENCE: f64 = 1e-3;
 
 /// Where on its path a simulation is.
@@ -39,7 +39,7 @@ impl Path {
         let increment = load - self.load;
         let length = vector::norm::<f64>(bytemuck::cast_slice(dphi));
         let weight = SHARE * length / increment.abs();
-        let first = self.increment == 0.0;
+        let first = self.speed == 0.0;
         Self {
             load,
             increment,
@@ -91,7 +91,8 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
 
     /// f′(λ)
     fn slope(&self, load: f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let by = DIFFERENCE * self.path.increment;
+        // Not Δλ of the last step, which may be next to nothing where the path turns.
+        let by = DIFFERENCE * SHARE * self.length / self.path.weight;
         let mut slope = (self.force)(load + by)?;
         slope.iter_mut().zip(&(self.force)(load)?).for_each(|(slope, force)| *slope = (*slope - force) / by);
         Ok(slope)
