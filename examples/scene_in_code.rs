@@ -12,7 +12,7 @@ use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::particles::{Body, Particles};
-use bfree::shape::{Block, Fill, fill};
+use bfree::shape::{Block, Filling, fill};
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::NewtonSettings;
 use bfree::tensor::Vector;
@@ -26,9 +26,8 @@ pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
     let grid = Grid { origin: Vector::zeros(), spacing: 0.25, cells: [12, 12] };
     let shape = Block { min: Vector::from([1.0, 1.0]), max: Vector::from([2.0, 2.0]) }.into();
     let mut particles = Particles::default();
-    let volume = (grid.spacing / 2.0).powi(2);
-    for x in fill(&grid, &shape, 2, Fill::Particles)? {
-        particles.push(x, Vector::zeros(), volume, DENSITY * volume, 0);
+    for seed in fill(&grid, &shape, Filling { per_axis: 2, ..Filling::default() })? {
+        particles.push(seed.position, Vector::zeros(), seed.volume, DENSITY * seed.volume, 0);
     }
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1e6, 0.3)?));
     let floor = Prescribed {

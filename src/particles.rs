@@ -14,7 +14,7 @@ pub struct Body<L> {
     pub density: f64,
 }
 
-/// State of all particles at the last converged step; one entry per particle in each array. Without inertia those of velocity and
+/// State of all particles, and of the points of loaded surfaces, at the last converged step; one entry per particle in each array. Without inertia those of velocity and
 /// acceleration are empty.
 ///
 /// In memory particles lie near the order in which the sweep over cells takes them: a step may put them in another one. Who a particle
@@ -198,6 +198,29 @@ impl<const D: usize> Particles<D> {
     /// Σ m v
     pub fn momentum(&self) -> Vector<f64, D> {
         self.mass.iter().zip(&self.velocity).map(|(&m, v)| v * m).sum()
+    }
+
+    /// Whether the particle at the place `p` has a volume: a point of a loaded surface has none, it goes with the body and shows the
+    /// load where it is.
+    pub fn is_solid(&self, p: usize) -> bool {
+        self.volume[p] > 0.0
+    }
+
+    /// Where those that have a volume lie in memory, by id.
+    ///
+    /// ```
+    /// // A body, and the points of its loaded end.
+    /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, points) = (&simulation.particles, simulation.loads.surface[0].points.len());
+    /// assert_eq!(particles.solid_places().len() + points, particles.len());
+    /// assert!(!particles.is_solid(simulation.loads.surface[0].points[0].particle));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn solid_places(&self) -> Vec<u32> {
+        let mut places = self.places();
+        places.retain(|&p| self.is_solid(p as usize));
+        places
     }
 
     /// V₀ J, the volume that a particle has now.

@@ -13,7 +13,6 @@ use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
 use serde::Serialize;
-use std::collections::HashSet;
 use std::fmt::{Display, Formatter};
 use std::mem::size_of;
 
@@ -37,21 +36,15 @@ pub struct ArrayUse {
     pub bytes: u64,
 }
 
-/// The particles that stand for a loaded surface.
+/// The points of a loaded surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SurfaceUse {
     /// The load.
     pub load: &'static str,
-    /// Loaded particles.
-    pub particles: usize,
-    /// Faces they carry; in edges and corners a particle carries more than one.
-    pub faces: usize,
-    /// Reference area of all faces.
+    /// Loaded points, where the surface is; or particles of the body, where the scene gives normal and area.
+    pub points: usize,
+    /// Reference area of them all.
     pub area: f64,
-    /// The least distance of a loaded particle below the true surface.
-    pub least_offset: f64,
-    /// The greatest one.
-    pub greatest_offset: f64,
 }
 
 impl SurfaceUse {
@@ -62,27 +55,20 @@ impl SurfaceUse {
     ///
     /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
     /// let surfaces = SurfaceUse::of(&scene.build::<2>("scenes".as_ref())?);
-    /// // The end of a beam of height 1, in particles of ⅛ whose centres lie half of that below it.
+    /// // The end of a beam of height 1, a point for each ⅛ of it.
     /// let [end] = surfaces.as_slice() else { return Err("one load".into()) };
-    /// assert_eq!((end.load, end.faces), ("traction", 8));
-    /// assert!((end.area - 1.0).abs() < 1e-14 && (end.greatest_offset - 0.0625).abs() < 1e-14);
+    /// assert_eq!((end.load, end.points), ("traction", 8));
+    /// assert!((end.area - 1.0).abs() < 1e-14);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<Self> {
-        let describe = |load: &SurfaceLoad<D>| {
-            let particles: HashSet<usize> = load.points.iter().map(|point| point.particle).collect();
-            let offsets = || load.points.iter().map(|point| point.offset);
-            Self {
-                load: match load.pressing {
-                    Pressing::Traction(_) => "traction",
-                    Pressing::Pressure(_) => "follower pressure",
-                },
-                particles: particles.len(),
-                faces: load.points.len(),
-                area: load.points.iter().map(|point| point.area).sum(),
-                least_offset: offsets().fold(f64::INFINITY, f64::min),
-                greatest_offset: offsets().fold(f64::NEG_INFINITY, f64::max),
-            }
+        let describe = |load: &SurfaceLoad<D>| Self {
+            load: match load.pressing {
+                Pressing::Traction(_) => "traction",
+                Pressing::Pressure(_) => "follower pressure",
+            },
+            points: load.points.len(),
+            area: load.points.iter().map(|point| point.area).sum(),
         };
         simulation.loads.surface.iter().map(describe).collect()
     }
@@ -90,9 +76,8 @@ impl SurfaceUse {
 
 impl Display for SurfaceUse {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Self { load, particles, faces, area, least_offset, greatest_offset } = self;
-        write!(f, "{load} on {particles} particles with {faces} faces, area {area:.6} in all, ")?;
-        write!(f, "{least_offset:.4} to {greatest_offset:.4} below the true surface")
+        let Self { load, points, area } = self;
+        write!(f, "{load} on {points} points, area {area:.6} in all")
     }
 }
 
@@ -163,7 +148,7 @@ impl Plan {
         let prescribed = simulation.prescribed(&nodes);
         Ok(Self {
             dimension: D,
-            particles: simulation.particles.len(),
+            particles: simulation.particles.solid_places().len(),
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
             unknowns: D * nodes.len() - prescribed.len(),

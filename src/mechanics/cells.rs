@@ -22,19 +22,22 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         let factor = (self.unit.length / grid.spacing).powi(2);
         let mut places = HashMap::new();
         self.supports.each_group(|group| {
-            let mut cells = [0; LANES];
-            for (cell, &p) in cells.iter_mut().zip(group.particles) {
+            // Points of surfaces have no share in a cell.
+            let mut cells = [None; LANES];
+            for (of, &p) in cells.iter_mut().zip(group.particles).filter(|(_, p)| self.particles.is_solid(**p as usize))
+            {
                 let x = &self.particles.position[p as usize];
                 let at = grid.cell(x).unwrap_or([0; D]);
-                *cell = *places.entry(at).or_insert_with(|| {
+                let cell = *places.entry(at).or_insert_with(|| {
                     form.push_cell(padded(at), tiles);
                     form.cells.len() - 1
                 });
                 let share = self.particles.present_volume(p as usize) / volume;
-                form.filled[*cell] += share;
+                *of = Some(cell);
+                form.filled[cell] += share;
                 for k in 0..D {
                     let local = (x[k] - grid.origin[k]) / grid.spacing;
-                    form.centres[*cell][k] += share * local;
+                    form.centres[cell][k] += share * local;
                 }
             }
             let probe = |at: &At<X, D, D>| {
@@ -45,14 +48,14 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             let mut at = At::<X, D, D>::zero();
             at.value[0] = [X::one(); LANES];
             let sums = probe(&at);
-            for (lane, &cell) in cells.iter().enumerate().take(group.particles.len()) {
+            for (lane, cell) in cells.iter().enumerate().filter_map(|(lane, cell)| Some((lane, (*cell)?))) {
                 form.masses[cell] += sums.value[0][lane].value();
             }
             for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
                 let mut at = At::<X, D, D>::zero();
                 at.gradient[j][l] = [X::one(); LANES];
                 let sums = probe(&at);
-                for (lane, &cell) in cells.iter().enumerate().take(group.particles.len()) {
+                for (lane, cell) in cells.iter().enumerate().filter_map(|(lane, cell)| Some((lane, (*cell)?))) {
                     for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
                         form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
                             factor * sums.gradient[i][k][lane].value();

@@ -226,17 +226,15 @@ pub struct Gravity<const D: usize> {
     pub curve: Curve,
 }
 
-/// A particle that stands for a piece of surface.
+/// A particle that stands for a piece of surface: one of its own, without volume, or one of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint<const D: usize> {
     /// The place of the particle in memory.
     pub particle: usize,
-    /// Outward unit normal N in the reference configuration.
+    /// Outward normal N in the reference configuration, the mean of unit normals over A.
     pub normal: Vector<f64, D>,
     /// Reference area A it stands for.
     pub area: f64,
-    /// Distance of the particle from the true surface.
-    pub offset: f64,
 }
 
 /// What acts on a surface.
@@ -298,7 +296,7 @@ impl<const D: usize> Loads<D> {
     ///
     /// // On a closed surface, Σ p A N = 0: here the four sides of a square, under p = 3 that doubles by t = 1.
     /// let sides = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
-    /// let side = |(particle, normal)| SurfacePoint { particle, normal: Vector::from(normal), area: 0.5, offset: 0.0 };
+    /// let side = |(particle, normal)| SurfacePoint { particle, normal: Vector::from(normal), area: 0.5 };
     /// let points = sides.into_iter().enumerate().map(side).collect();
     /// let curve = Curve::new(vec![[0.0, 1.0], [1.0, 2.0]])?;
     /// let loads = Loads { surface: vec![SurfaceLoad { pressing: Pressing::Pressure(3.0), curve, points }], ..Loads::default() };

@@ -115,7 +115,7 @@ impl Field {
         reference: &Reference<D>,
     ) -> Result<Vec<f64>, OutputError> {
         reference.check(simulation)?;
-        let places = simulation.particles.places();
+        let places = simulation.particles.solid_places();
         let mut out = Vec::with_capacity(places.len() * self.kind().components().len());
         for place in places {
             self.append_at(simulation, reference, place as usize, &mut out)?;

@@ -173,7 +173,7 @@ impl<const D: usize> Recorder<D> {
         let kept = |name: &str| mark.and_then(|mark| mark.files.get(name).copied());
         let loads = &simulation.loads;
         let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-        let begun = Counts { particles: simulation.particles.len(), ..Counts::default() };
+        let begun = Counts { particles: simulation.particles.solid_places().len(), ..Counts::default() };
         Ok(Self {
             history: History::open(at("history.csv"), simulation, kept("history.csv"))?,
             reactions: (!loads.prescribed.is_empty())

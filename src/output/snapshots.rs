@@ -135,7 +135,7 @@ pub(crate) fn snapshot<const D: usize, L: Law, A>(
     fields: &[Field],
 ) -> Result<Snapshot, OutputError> {
     let (grid, particles) = (&simulation.grid, &simulation.particles);
-    let places = particles.places();
+    let places = particles.solid_places();
     let arrays = fields.iter().map(|field| {
         let values = match field.kind() {
             Kind::Index => Values::Index(places.iter().map(|&p| particles.body[p as usize]).collect()),

@@ -4,7 +4,7 @@ use super::grid::GridBox;
 use super::shape::Shape;
 use crate::material;
 use crate::problems::{Number, Problems};
-use crate::shape::{EDGE, Fill};
+use crate::shape::{EDGE, Fill, Layout};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -31,7 +31,10 @@ pub struct Body {
     #[serde(default = "Body::default_particles_per_cell")]
     #[schemars(range(min = 1, max = 100))]
     pub particles_per_cell: u32,
-    /// Which of the regular positions become particles.
+    /// Where particles are in cells that the body fills. Default: `"gauss"` on a grid that is kept, `"regular"` on one that is made anew
+    /// every step and with uGIMP functions.
+    pub layout: Option<Layout>,
+    /// What becomes of particles in cells that the surface of the shape cuts.
     #[serde(default)]
     pub fill: Fill,
 }

@@ -8,14 +8,15 @@ use super::transfer::Transfer;
 use super::{Problems, Scene, scale};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
-use crate::grid::Grid;
+use crate::grid::{Grid, indices};
+use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::terms::ForceField;
 use crate::particles::{self, Particles};
-use crate::shape::{self, FillError, Shape, fill};
+use crate::shape::{self, Facet, FillError, Filling, Layout, Shape, around, fill};
 use crate::simulation::{Settings, Simulation, StepError};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
@@ -88,8 +89,8 @@ pub enum BuildError {
         /// Where it lies.
         position: Vec<f64>,
     },
-    /// A surface load that finds no particles.
-    #[error("{path}: no particle of body {body:?} lies on the loaded surface; enlarge the region or remove the load")]
+    /// A surface load that finds no surface.
+    #[error("{path}: nothing of the surface of body {body:?} is loaded; enlarge the region or remove the load")]
     NoSurface {
         /// The key.
         path: String,
@@ -225,8 +226,8 @@ impl Scene {
         let Some(approximation) = self.shape_functions(&mut problems).filter(|_| problems.is_empty()) else {
             return Err(BuildError::Values(problems));
         };
+        let loads = self.loads(&means, &grid, &mut particles)?;
         particles.remember_rest(&bodies);
-        let loads = self.loads(&grid, &particles)?;
         let mut simulation = Simulation {
             loads,
             settings: self.settings(),
@@ -251,6 +252,24 @@ impl Scene {
         let particles_per_axis = self.bodies.first().map_or(2, |body| body.particles_per_cell);
         let cells = Cells { dimension: self.dimension(), particles_per_axis };
         self.approximation.functions(cells, problems, "approximation")
+    }
+
+    /// How the shape of a body is filled.
+    ///
+    /// ```
+    /// use bfree::shape::Layout;
+    ///
+    /// // Load steps keep their grid, on which Gauss's points stay what they are.
+    /// for (name, layout) in [("elastica", Layout::Gauss), ("rebound", Layout::Regular)] {
+    ///     let scene = bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &[])?;
+    ///     assert_eq!(scene.filling(&scene.bodies[0]).layout, layout);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn filling(&self, body: &Body) -> Filling {
+        let kept = self.grid.renewed(self.time.inertia) != Renewal::EveryStep;
+        let by_itself = if kept && !self.approximation.one_half_width() { Layout::Gauss } else { Layout::Regular };
+        Filling { per_axis: body.particles_per_cell, layout: body.layout.unwrap_or(by_itself), rule: body.fill }
     }
 
     fn settings(&self) -> Settings {
@@ -283,7 +302,12 @@ impl Scene {
         }
     }
 
-    fn loads<const D: usize>(&self, grid: &Grid<D>, particles: &Particles<D>) -> Result<Loads<D>, BuildError> {
+    fn loads<const D: usize>(
+        &self,
+        means: &Means<'_>,
+        grid: &Grid<D>,
+        particles: &mut Particles<D>,
+    ) -> Result<Loads<D>, BuildError> {
         let mut loads = self.given_as_they_are();
         if let Some(gravity) = &self.gravity {
             let acceleration = vector("gravity.acceleration", &gravity.acceleration)?;
@@ -319,70 +343,108 @@ impl Scene {
         for (i, traction) in self.tractions.iter().enumerate() {
             let path = format!("tractions[{i}]");
             let pressing = Pressing::Traction(vector(&format!("{path}.traction"), &traction.traction)?);
-            loads.surface.push(self.surface(&path, pressing, &traction.loaded(), grid, particles)?);
+            loads.surface.push(self.surface(&path, pressing, &traction.loaded(), means, grid, particles)?);
         }
         for (i, pressure) in self.pressures.iter().enumerate() {
             let pressing = Pressing::Pressure(pressure.pressure);
             let path = format!("pressures[{i}]");
-            loads.surface.push(self.surface(&path, pressing, &pressure.loaded(), grid, particles)?);
+            loads.surface.push(self.surface(&path, pressing, &pressure.loaded(), means, grid, particles)?);
         }
         Ok(loads)
     }
 
-    /// The particles of a body that stand for its surface: those less than one particle spacing s below it, each for the area
-    /// V₀/s of every loaded face it lies below, so that the particles of an edge or a corner carry each of its faces. A
-    /// particle outside its shape (a filled cell may lead beyond it) stands for the nearest face.
+    /// The points of a loaded surface: of a body with a shape, where that surface is; of others, the particles that are said to stand
+    /// for it.
     fn surface<const D: usize>(
         &self,
         path: &str,
         pressing: Pressing<D>,
         on: &Loaded<'_>,
+        means: &Means<'_>,
         grid: &Grid<D>,
-        particles: &Particles<D>,
+        particles: &mut Particles<D>,
     ) -> Result<SurfaceLoad<D>, BuildError> {
         let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
         let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| dimension::<D>(path));
         let region = on.region.as_ref().map(built).transpose()?;
-        let loaded = |x: &Vector<f64, D>| region.as_ref().is_none_or(|region| region.holds(x, grid.spacing));
         let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
             return Err(dimension::<D>(path));
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
-        let spacing = grid.spacing / f64::from(body.particles_per_cell);
-        let normal = |given: &load::Surface| vector::<D>(&format!("{path}.surface.normal"), &given.normal);
-        let given = on.surface.as_ref().map(|given| Ok((normal(given)?.normalize(), given.area))).transpose()?;
-        let mut points = Vec::new();
-        for particle in 0..particles.len() {
-            if particles.body[particle] as usize != number {
-                continue;
+        let points = match (&on.surface, &shape) {
+            (Some(given), _) => {
+                let normal = vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize();
+                let spacing = grid.spacing / f64::from(body.particles_per_cell);
+                let loaded = |&p: &usize| {
+                    let x = &particles.position[p];
+                    let depth = shape.as_ref().map_or(0.0, |shape| shape.signed_distance(x));
+                    particles.is_solid(p)
+                        && particles.body[p] as usize == number
+                        && shape::is_above(depth, spacing)
+                        && region.as_ref().is_none_or(|region| region.holds(x, grid.spacing))
+                };
+                let point = |particle| SurfacePoint { particle, normal, area: given.area };
+                (0..particles.len()).filter(loaded).map(point).collect()
             }
-            let x = &particles.position[particle];
-            let near = shape.as_ref().map(|shape| shape.distance_and_normal(x));
-            if let Some((normal, area)) = given {
-                let too_deep = near.is_some_and(|(distance, _)| !shape::is_above(distance, spacing));
-                if !too_deep && loaded(x) {
-                    let offset = near.map_or(0.0, |(distance, _)| -distance);
-                    points.push(SurfacePoint { particle, normal, area, offset });
+            (None, Some(shape)) => {
+                let facets = self.facets(body, shape, region.as_ref(), grid);
+                means.make_room(path, particles, facets.len())?;
+                let velocity = body.velocity.as_ref().map(|v| vector::<D>(path, v)).transpose()?;
+                let mut points = Vec::new();
+                for facet in facets {
+                    points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
+                    // A hair inside, in the cell where the body is.
+                    let x = facet.position - facet.normal * (shape::HAIR * grid.spacing);
+                    if self.time.inertia.has_inertia() {
+                        particles.push(x, velocity.unwrap_or_else(Vector::zeros), 0.0, 0.0, number as u32);
+                    } else {
+                        particles.push_without_inertia(x, 0.0, 0.0, number as u32);
+                    }
                 }
-                continue;
+                points
             }
-            let faces = match (&shape, near) {
-                (Some(_), Some(outside)) if outside.0 > 0.0 => vec![outside],
-                (Some(shape), _) => shape.faces(x, spacing),
-                (None, _) => Vec::new(),
-            };
-            for (distance, normal) in faces {
-                // The region says which part of the surface is loaded: the foot of the particle is on it.
-                if loaded(&(x - normal * distance)) {
-                    let area = particles.volume[particle] / spacing;
-                    points.push(SurfacePoint { particle, normal, area, offset: -distance });
-                }
-            }
-        }
+            (None, None) => Vec::new(),
+        };
         if points.is_empty() {
             return Err(BuildError::NoSurface { path: path.into(), body: on.body.into() });
         }
         Ok(SurfaceLoad { pressing, curve, points })
+    }
+
+    /// The surface of a body in the boxes of its particles. Where the box ends and holds the motion across, the body goes on: a plane
+    /// of symmetry is no surface.
+    fn facets<const D: usize>(
+        &self,
+        body: &Body,
+        shape: &Shape<D>,
+        region: Option<&Shape<D>>,
+        grid: &Grid<D>,
+    ) -> Vec<Facet<D>> {
+        let (h, n) = (grid.spacing, u64::from(body.particles_per_cell));
+        let edges = Vector::repeat(h / n as f64);
+        let (first, count) = around(grid, shape);
+        let goes_on = |facet: &Facet<D>| {
+            (0..2 * D).any(|face| {
+                let (k, upper) = (face / 2, face % 2 == 1);
+                let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
+                let there = (facet.position[k] - wall).abs() < shape::HAIR * h && facet.normal[k] * outward > 0.5;
+                there && self.boundary.face(k, upper).holds_across(k)
+            })
+        };
+        let mut facets = Vec::new();
+        for cell in indices(count) {
+            let corner: Vector<f64, D> = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
+            let middle = corner.add_scalar(0.5 * h);
+            if shape.signed_distance(&middle).abs() > h * (D as f64).sqrt() {
+                continue;
+            }
+            for i in indices([n; D]) {
+                let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
+                facets.extend(shape.facets(region, &lower, &edges, h));
+            }
+        }
+        facets.retain(|facet| !goes_on(facet));
+        facets
     }
 
     fn fill<const D: usize>(
@@ -406,13 +468,12 @@ impl Scene {
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
             let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
-            let volume = (grid.spacing / f64::from(body.particles_per_cell)).powi(D as i32);
             let velocity = common.unwrap_or_else(Vector::zeros);
-            let positions = fill(grid, &shape, body.particles_per_cell, body.fill)
+            let seeds = fill(grid, &shape, self.filling(body))
                 .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
-            means.make_room(&path, particles, positions.len())?;
-            for x in positions {
-                push(particles, x, velocity, volume);
+            means.make_room(&path, particles, seeds.len())?;
+            for seed in seeds {
+                push(particles, seed.position, velocity, seed.volume);
             }
         } else if let Some(file) = &body.particles {
             let path = format!("{path}.particles.file");
@@ -466,6 +527,18 @@ impl Scene {
 }
 
 impl Face {
+    /// Whether it prescribes the component across the face.
+    fn holds_across(&self, axis: usize) -> bool {
+        match self {
+            Self::Free => false,
+            Self::Sliding | Self::Fixed => true,
+            Self::Held(components) => components.get(axis) == Some(&true),
+            Self::Displacement(table) | Self::Velocity(table) => {
+                table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
+            }
+        }
+    }
+
     /// The motion of each component on a face across `axis`.
     fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion>; D], BuildError> {
         let held = |holds: &dyn Fn(usize) -> bool| std::array::from_fn(|i| holds(i).then_some(Motion::Rest));

@@ -34,6 +34,7 @@ use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::schemes::LONG_STEPS;
 use crate::mechanics::terms::Rayleigh;
+use crate::shape::Layout;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -76,7 +77,8 @@ pub struct Scene {
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
     /// Ghost stiffness γ (no unit), 0 to 1: holds nodes that have little of a body, by this share of its stiffness against bending from
-    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia and in steps of Courant numbers above 10; else 0.
+    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia, in steps of Courant numbers above 10, and where
+    /// the surface of a shape is loaded; else 0.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
@@ -224,9 +226,13 @@ impl Scene {
         problems
     }
 
-    /// γ of the ghost stiffness. In shorter steps, mass holds what stiffness does not.
+    /// γ of the ghost stiffness. In shorter steps, mass holds what stiffness does not; but for nodes that see more of a loaded surface
+    /// than of the particles below it.
     fn ghost(&self) -> f64 {
-        self.ghost_stiffness.unwrap_or(if self.courant() > LONG_STEPS { GHOST } else { 0.0 })
+        let loads =
+            self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
+        let needed = self.courant() > LONG_STEPS || loads.into_iter().any(|load| load.surface.is_none());
+        self.ghost_stiffness.unwrap_or(if needed { GHOST } else { 0.0 })
     }
 
     /// The largest Courant number, that of waves of pressure; infinite without inertia.
@@ -285,6 +291,8 @@ impl Scene {
     /// Gives every key its value, of those that mean something.
     fn complete(mut self) -> Self {
         self.time.complete();
+        let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
+        self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
         self.grid.renewed = Some(self.grid.renewed(self.time.inertia));
         if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
@@ -308,6 +316,9 @@ impl Scene {
             let allowed =
                 format!("must be {first} as in the first body: {family} has one half width for all particles");
             problems.require(!agree || found == first, &format!("{path}.particles_per_cell"), found, allowed);
+            let gauss = agree && body.layout == Some(Layout::Gauss);
+            let allowed = format!("must be \"regular\": {family} has one half width for all particles");
+            problems.require(!gauss, &format!("{path}.layout"), "\"gauss\"", allowed);
         }
     }
 }

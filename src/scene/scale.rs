@@ -25,7 +25,7 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
     let mut heaviest: f64 = 0.0;
     for (i, body) in simulation.bodies.iter().enumerate() {
         let mut extremes = Extremes::default();
-        for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i) {
+        for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i && particles.is_solid(p)) {
             let speed = particles.velocity.get(p).map_or(0.0, Vector::amax);
             extremes.add(particles.volume[p], particles.mass[p], speed);
         }

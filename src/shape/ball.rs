@@ -21,6 +21,12 @@ impl<const D: usize> Solid<D> for Ball<D> {
         (length - self.radius, normal)
     }
 
+    /// The tangent plane, which the sphere leaves by r²/2R.
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        planes.extend(Some(self.nearest(x)).filter(|face| face.0.abs() < radius));
+        0.5 * radius * radius / self.radius
+    }
+
     /// n·c + r |n|
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         n.dot(&self.center) + self.radius * n.norm()

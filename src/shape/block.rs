@@ -30,11 +30,10 @@ impl<const D: usize> Solid<D> for Block<D> {
         if distance > 0.0 { (distance, outside / distance) } else { nearest }
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        for k in 0..D {
-            faces.push((self.min[k] - x[k], axis(k, -1.0)));
-            faces.push((x[k] - self.max[k], axis(k, 1.0)));
-        }
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        let faces = (0..D).flat_map(|k| [(self.min[k] - x[k], axis(k, -1.0)), (x[k] - self.max[k], axis(k, 1.0))]);
+        planes.extend(faces.filter(|face| face.0.abs() < radius));
+        0.0
     }
 
     /// Σ_k n_k max_k, or n_k min_k where n_k < 0

@@ -27,8 +27,8 @@ impl<const D: usize> Solid<D> for Union<D> {
         self.0.iter().map(|part| part.solid().nearest(x)).fold(nowhere, |a, b| if b.0 < a.0 { b } else { a })
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        self.0.iter().for_each(|part| part.solid().add_faces(x, faces));
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
     }
 
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
@@ -43,8 +43,8 @@ impl<const D: usize> Solid<D> for Intersection<D> {
         self.0.iter().map(|part| part.solid().nearest(x)).fold(everywhere, |a, b| if b.0 > a.0 { b } else { a })
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        self.0.iter().for_each(|part| part.solid().add_faces(x, faces));
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        self.0.iter().map(|part| part.solid().add_planes(x, radius, planes)).fold(0.0, f64::max)
     }
 
     /// An upper bound.
@@ -60,14 +60,9 @@ impl<const D: usize> Solid<D> for Difference<D> {
         if solid.0 >= -hole.0 { solid } else { (-hole.0, -hole.1) }
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        self.of.solid().add_faces(x, faces);
-        let outer = faces.len();
-        self.minus.solid().add_faces(x, faces);
-        // The faces of a hole look into it.
-        for (d, n) in faces.iter_mut().skip(outer) {
-            (*d, *n) = (-*d, -*n);
-        }
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        let departure = self.of.solid().add_planes(x, radius, planes);
+        departure.max(self.minus.solid().add_planes(x, radius, planes))
     }
 
     /// An upper bound.

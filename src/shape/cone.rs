@@ -76,11 +76,14 @@ impl<const D: usize> Solid<D> for Cone<D> {
         (d, self.along * n[0] + outward * n[1])
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+    /// Those of the cut through `x`, which a side leaves by r²/2ρ in 3D, ρ its distance from the axis.
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let (place, outward) = self.in_profile(x);
         let mut of_profile = Vec::new();
-        self.profile.add_faces(&place, &mut of_profile);
-        faces.extend(of_profile.into_iter().map(|(d, n)| (d, self.along * n[0] + outward * n[1])));
+        self.profile.add_planes(&place, radius, &mut of_profile);
+        let turned = D == 3 && of_profile.iter().any(|(_, n)| n[1] != 0.0);
+        planes.extend(of_profile.into_iter().map(|(d, n)| (d, self.along * n[0] + outward * n[1])));
+        if turned { 0.5 * radius * radius / (place[1] - radius).max(0.25 * radius) } else { 0.0 }
     }
 
     /// max of n·c + r |n − (n·e) e| over the discs

@@ -1,6 +1,6 @@
 //! Filling a solid with particles.
 
-use super::Shape;
+use super::{EDGE, Shape};
 use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -9,16 +9,57 @@ use serde::{Deserialize, Serialize};
 /// The largest number of particle positions that [`fill`] looks at for one body.
 pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
 
-/// Which of the regular positions become particles.
+/// What becomes of the places of particles in the cells at the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fill {
-    /// Those that lie in the shape.
+    /// Every particle has the volume and the centroid of that part of its box that lies in the shape: volume, mass and first moments
+    /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour.
     #[default]
+    Cut,
+    /// Those that lie in the shape, each for its whole box.
     Particles,
-    /// Those of all cells whose centre lies in the shape.
+    /// Those of all cells whose centre lies in the shape, each for its whole box.
     Cells,
 }
+
+/// Where particles are in a whole cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// In the middle of equal boxes.
+    #[default]
+    Regular,
+    /// At the points of Gauss's rule, with its weights: smooth stresses are integrated to a higher order. Cells that the surface cuts
+    /// have boxes of half the size. For grids that are kept: particles that move to other cells are no Gauss points there.
+    Gauss,
+}
+
+/// How a solid is filled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Filling {
+    /// Particles along each axis of a cell, > 0.
+    pub per_axis: u32,
+    /// Where they are in a whole cell.
+    pub layout: Layout,
+    /// What becomes of those at the surface.
+    pub rule: Fill,
+}
+
+/// A particle to be: its place, and the volume it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seed<const D: usize> {
+    /// x
+    pub position: Vector<f64, D>,
+    /// V₀
+    pub volume: f64,
+}
+
+/// Parts of a box smaller than this share of it are joined to their neighbour.
+const SLIVER: f64 = 0.1;
+
+/// Parts as small as that are round-off, and so is what is missing in a box that is as full.
+const NOTHING: f64 = 1e-9;
 
 /// A shape that cannot be filled.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -43,31 +84,92 @@ pub enum FillError {
     },
 }
 
-/// Fills `shape` with particles at the regular sub-cell centres, (i + ½) h / `per_axis` from the lower corner of each cell.
+/// Fills `shape` with particles, `per_axis` along each axis of a cell.
 ///
 /// Shapes are clipped to the grid. Only cells that overlap the shape's bounding box are visited; cell by cell and within a
-/// cell, the first axis runs fastest. Every particle stands for the volume (h / `per_axis`)^D.
+/// cell, the first axis runs fastest.
 ///
 /// ```
 /// use bfree::grid::Grid;
-/// use bfree::shape::{Block, Fill, fill};
+/// use bfree::shape::{Ball, Block, Fill, Filling, Layout, fill};
 /// use bfree::tensor::Vector;
 ///
 /// let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: 0.5, cells: [4, 4] };
 /// let square = Block { min: Vector::from([0.5, 0.5]), max: Vector::from([1.5, 1.5]) }.into();
-/// let particles = fill(&grid, &square, 2, Fill::Particles)?;
-/// assert_eq!((particles.len(), particles[0]), (16, Vector::from([0.625, 0.625])));
+/// let regular = Filling { per_axis: 2, ..Filling::default() };
+/// let seeds = fill(&grid, &square, regular)?;
+/// assert_eq!((seeds.len(), seeds[0].position, seeds[0].volume), (16, Vector::from([0.625, 0.625]), 0.0625));
+/// // The volume is that of the shape wherever its surface is.
+/// let disc = Ball { center: Vector::from([1.0, 1.0]), radius: 0.9 }.into();
+/// let volume = |rule| fill(&grid, &disc, Filling { rule, ..regular }).map(|seeds| seeds.iter().map(|seed| seed.volume).sum::<f64>());
+/// let exact = std::f64::consts::PI * 0.81;
+/// assert!((volume(Fill::Cut)? / exact - 1.0).abs() < 1e-3 && (volume(Fill::Particles)? / exact - 1.0).abs() > 0.05);
 /// # Ok::<(), bfree::shape::FillError>(())
 /// ```
 ///
 /// # Errors
 /// More than [`MAX_CANDIDATES`] positions to look at (found before anything is allocated), or no particle.
-pub fn fill<const D: usize>(
-    grid: &Grid<D>,
-    shape: &Shape<D>,
-    per_axis: u32,
-    rule: Fill,
-) -> Result<Vec<Vector<f64, D>>, FillError> {
+pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> Result<Vec<Seed<D>>, FillError> {
+    let h = grid.spacing;
+    let (first, count) = around(grid, shape);
+    let candidates = count.iter().map(|&n| n as f64 * f64::from(how.per_axis)).product::<f64>();
+    if candidates > MAX_CANDIDATES {
+        return Err(FillError::TooMany { candidates });
+    }
+    let (whole, pieces) = (how.layout.points(how.per_axis), how.layout.pieces(how.per_axis));
+    let edges: Vector<f64, D> = Vector::repeat(h / f64::from(pieces));
+    let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
+    for (id, cell) in (0..).zip(indices(count)) {
+        let corner: [f64; D] = std::array::from_fn(|k| (first[k] + cell[k]) as f64);
+        let position = |within: Vector<f64, D>| Vector::from_fn(|k, _| grid.origin[k] + (corner[k] + within[k]) * h);
+        let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
+        let all = match how.rule {
+            Fill::Cells => distance <= EDGE * h,
+            Fill::Particles => true,
+            Fill::Cut => distance < 0.5 * h * (D as f64).sqrt(),
+        };
+        if !all {
+            continue;
+        }
+        if how.rule == Fill::Cut {
+            filling.cells.push((id, filling.seeds.len()));
+        }
+        if how.rule == Fill::Cut && distance > -0.5 * h * (D as f64).sqrt() {
+            let mut parts = Vec::new();
+            for i in indices([u64::from(pieces); D]) {
+                let lower = position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(pieces)));
+                parts.push(shape.part(&lower, &edges, h));
+            }
+            if parts.iter().any(|part| part.0 < (1.0 - NOTHING) * edges.product()) {
+                for (i, (volume, centroid)) in indices([u64::from(pieces); D]).zip(parts) {
+                    let share = volume / edges.product();
+                    if share > 1.0 - NOTHING {
+                        let middle = Vector::from_fn(|k, _| (i[k] as f64 + 0.5) / f64::from(pieces));
+                        filling.seeds.push(Seed { position: position(middle), volume: edges.product() });
+                    } else if share > NOTHING {
+                        if share < SLIVER {
+                            filling.slivers.push((id, filling.seeds.len()));
+                        }
+                        filling.seeds.push(Seed { position: centroid, volume });
+                    }
+                }
+                continue;
+            }
+        }
+        for i in indices([u64::from(how.per_axis); D]) {
+            let x = position(Vector::from_fn(|k, _| whole[i[k] as usize].0));
+            if how.rule != Fill::Particles || shape.holds(&x, h) {
+                let volume = (0..D).map(|k| whole[i[k] as usize].1 * h).product();
+                filling.seeds.push(Seed { position: x, volume });
+            }
+        }
+    }
+    let seeds = filling.joined();
+    if seeds.is_empty() { Err(FillError::Empty { candidates: candidates as u64 }) } else { Ok(seeds) }
+}
+
+/// The first cell around a shape and how many there are along each axis, clipped to the grid.
+pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64; D], [u64; D]) {
     let h = grid.spacing;
     let (min, max) = shape.bounding_box();
     let (mut first, mut count) = ([0_u64; D], [0_u64; D]);
@@ -78,25 +180,94 @@ pub fn fill<const D: usize>(
         first[k] = lower.max(0.0) as u64;
         count[k] = (upper.min(f64::from(grid.cells[k])) as u64).saturating_sub(first[k]);
     }
-    let candidates = count.iter().map(|&n| n as f64 * f64::from(per_axis)).product::<f64>();
-    if candidates > MAX_CANDIDATES {
-        return Err(FillError::TooMany { candidates });
+    (first, count)
+}
+
+impl Layout {
+    /// The points of an axis of a cell and their weights, both in cells.
+    pub(super) fn points(self, n: u32) -> Vec<(f64, f64)> {
+        let n_f = f64::from(n);
+        match self {
+            Self::Regular => (0..n).map(|i| ((f64::from(i) + 0.5) / n_f, 1.0 / n_f)).collect(),
+            Self::Gauss => (0..n).map(|i| gauss(n, i)).collect(),
+        }
     }
 
-    let offset = |i: u64| (i as f64 + 0.5) / f64::from(per_axis);
-    let mut particles = Vec::new();
-    for cell in indices(count) {
-        let corner: [f64; D] = std::array::from_fn(|k| (first[k] + cell[k]) as f64);
-        let position = |within: Vector<f64, D>| Vector::from_fn(|k, _| grid.origin[k] + (corner[k] + within[k]) * h);
-        if rule == Fill::Cells && !shape.holds(&position(Vector::repeat(0.5)), h) {
-            continue;
-        }
-        for i in indices([u64::from(per_axis); D]) {
-            let x = position(Vector::from_fn(|k, _| offset(i[k])));
-            if rule == Fill::Cells || shape.holds(&x, h) {
-                particles.push(x);
-            }
+    /// Boxes along an axis of a cell that is cut.
+    fn pieces(self, n: u32) -> u32 {
+        match self {
+            Self::Regular => n,
+            Self::Gauss => 2 * n,
         }
     }
-    if particles.is_empty() { Err(FillError::Empty { candidates: candidates as u64 }) } else { Ok(particles) }
+}
+
+/// Point i of Gauss's rule of n on 0 … 1, and its weight: a zero of Legendre's P_n by Newton's method, w = 1/((1 − x²) P_n′²) there.
+fn gauss(n: u32, i: u32) -> (f64, f64) {
+    let n = f64::from(n);
+    let mut x = -(std::f64::consts::PI * (f64::from(i) + 0.75) / (n + 0.5)).cos();
+    let mut slope = 1.0;
+    for _ in 0..10 {
+        // (k + 1) P_{k+1} = (2k + 1) x P_k − k P_{k−1},   (x² − 1) P_n′ = n (x P_n − P_{n−1})
+        let (mut before, mut value, mut k) = (0.0, 1.0, 0.0);
+        while k < n {
+            (before, value) = (value, ((2.0 * k + 1.0) * x * value - k * before) / (k + 1.0));
+            k += 1.0;
+        }
+        slope = n * (x * value - before) / (x * x - 1.0);
+        x -= value / slope;
+    }
+    (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
+}
+
+/// Seeds cell by cell.
+struct Seeds<const D: usize> {
+    seeds: Vec<Seed<D>>,
+    /// The cells that have some, in order, and the first seed of each.
+    cells: Vec<(u64, usize)>,
+    /// Seeds that are slivers, with their cell.
+    slivers: Vec<(u64, usize)>,
+    /// Cells along each axis.
+    count: [u64; D],
+}
+
+impl<const D: usize> Seeds<D> {
+    /// The seeds with each sliver joined to the nearest other one of its cell or of the cells beside it, volume and first moments kept.
+    fn joined(mut self) -> Vec<Seed<D>> {
+        let mut gone = vec![false; if self.slivers.is_empty() { 0 } else { self.seeds.len() }];
+        self.slivers.iter().for_each(|&(_, sliver)| gone[sliver] = true);
+        for (cell, sliver) in std::mem::take(&mut self.slivers) {
+            let small = self.seeds[sliver];
+            let far = |i: usize| (self.seeds[i].position - small.position).norm_squared();
+            let near = self.beside(cell).filter(|&i| !gone[i]).min_by(|&a, &b| far(a).total_cmp(&far(b)));
+            let Some(near) = near else {
+                gone[sliver] = false;
+                continue;
+            };
+            let Seed { position, volume } = &mut self.seeds[near];
+            let sum = *volume + small.volume;
+            *position = (*position * *volume + small.position * small.volume) / sum;
+            *volume = sum;
+        }
+        let mut gone = gone.into_iter();
+        self.seeds.retain(|_| !gone.next().unwrap_or(false));
+        self.seeds
+    }
+
+    /// The seeds of a cell and of those that share a face with it.
+    fn beside(&self, cell: u64) -> impl Iterator<Item = usize> {
+        let (mut near, mut stride) = (vec![cell], 1);
+        for &n in &self.count {
+            let index = cell / stride % n;
+            near.extend((index > 0).then(|| cell - stride));
+            near.extend((index + 1 < n).then(|| cell + stride));
+            stride *= n;
+        }
+        near.into_iter().flat_map(|cell| {
+            let after = self.cells.partition_point(|one| one.0 < cell);
+            let start = self.cells.get(after).filter(|one| one.0 == cell).map(|one| one.1);
+            let end = self.cells.get(after + 1).map_or(self.seeds.len(), |one| one.1);
+            start.into_iter().flat_map(move |start| start..end)
+        })
+    }
 }

@@ -22,6 +22,11 @@ impl<const D: usize> Solid<D> for HalfSpace<D> {
         ((x - self.point).dot(&n), n)
     }
 
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        planes.extend(Some(self.nearest(x)).filter(|face| face.0.abs() < radius));
+        0.0
+    }
+
     /// n·p along the normal, without end in all other directions.
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         let normal = self.normal / self.normal.norm();

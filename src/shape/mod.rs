@@ -4,6 +4,7 @@ mod ball;
 mod block;
 mod combined;
 mod cone;
+mod cut;
 mod fill;
 mod half_space;
 mod polygon;
@@ -16,7 +17,9 @@ pub use ball::Ball;
 pub use block::Block;
 pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
-pub use fill::{Fill, FillError, MAX_CANDIDATES, fill};
+pub use cut::Facet;
+pub(crate) use fill::around;
+pub use fill::{Fill, FillError, Filling, Layout, MAX_CANDIDATES, Seed, fill};
 pub use half_space::HalfSpace;
 pub use polygon::{Polygon, PolygonError};
 pub use similar::{Similar, rotation};
@@ -26,6 +29,9 @@ use crate::tensor::Vector;
 /// Round-off in a length that is compared with others, relative to the spacing they have.
 pub(crate) const EDGE: f64 = 1e-9;
 
+/// How far below a surface its points are, relative to the spacing: in the cell where the body is, whatever the rounding.
+pub(crate) const HAIR: f64 = 1e-6;
+
 /// A piece of surface: the signed distance d from it, negative inside, and the outward unit normal n = ∇d.
 type Face<const D: usize> = (f64, Vector<f64, D>);
 
@@ -34,10 +40,9 @@ trait Solid<const D: usize> {
     /// The surface nearest to `x`.
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D>;
 
-    /// Adds the pieces of surface that have a foot of `x`; flat ones may go on beyond their edges.
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        faces.push(self.nearest(x));
-    }
+    /// Adds the planes that the surface within `radius` of `x` follows, by their distance from `x` and their normal; returns how far it
+    /// departs from them there, at most.
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64;
 
     /// How far it reaches in a direction of any length: the largest n·x, or more.
     fn reach(&self, n: &Vector<f64, D>) -> f64;
@@ -173,41 +178,6 @@ impl<const D: usize> Shape<D> {
     /// ```
     pub fn distance_and_normal(&self, x: &Vector<f64, D>) -> (f64, Vector<f64, D>) {
         self.solid().nearest(x)
-    }
-
-    /// The pieces of surface that a point `x` of the solid lies less than `depth` below: none deep inside, one below a face,
-    /// several in an edge or a corner. Each with its signed distance −`depth` < d ≤ 0 and its outward unit normal n; the foot
-    /// x − d n lies on the surface.
-    ///
-    /// ```
-    /// use bfree::shape::{Block, Shape};
-    /// use bfree::tensor::Vector;
-    ///
-    /// let square = Shape::from(Block { min: Vector::from([0.0, 0.0]), max: Vector::from([1.0, 1.0]) });
-    /// assert_eq!(square.faces(&Vector::from([0.5, 0.5]), 0.25), []);
-    /// assert_eq!(square.faces(&Vector::from([0.5, 0.875]), 0.25), [(-0.125, Vector::from([0.0, 1.0]))]);
-    /// // A particle in a corner stands for a piece of both faces.
-    /// assert_eq!(square.faces(&Vector::from([0.875, 0.875]), 0.25).len(), 2);
-    /// ```
-    pub fn faces(&self, x: &Vector<f64, D>, depth: f64) -> Vec<(f64, Vector<f64, D>)> {
-        let mut candidates = Vec::new();
-        self.solid().add_faces(x, &mut candidates);
-        let hair = 1e-6 * depth;
-        let mut faces: Vec<Face<D>> = Vec::new();
-        for (d, n) in candidates {
-            if d > hair || !is_above(d, depth) {
-                continue;
-            }
-            let foot = x - n * d;
-            // A face of a part counts where the whole ends: not inside another part, nor where two parts touch.
-            let ends = !self.contains(&(foot + n * hair)) && self.contains(&(foot - n * hair));
-            // Parts may share a face.
-            let known = faces.iter().any(|(e, m)| (e - d).abs() <= hair && (m - n).norm() <= 1e-6);
-            if ends && !known {
-                faces.push((d.min(0.0), n));
-            }
-        }
-        faces
     }
 
     /// A box `(min, max)` that holds the solid: infinite for half-spaces, with `min > max` where nothing is left.

@@ -153,16 +153,15 @@ impl<const D: usize> Solid<D> for Polygon<D> {
         (distance, if distance == 0.0 { between / between.norm() } else { away / distance })
     }
 
-    /// The edges that `x` has its foot on.
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
+    /// The lines of the edges that come so near.
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         for i in 0..self.vertices.len() {
-            let [a, b] = self.edge(i);
-            let (along, edge) = ((x - a).dot(&(b - a)), (b - a).norm_squared());
-            if (-MEET * edge..=(1.0 + MEET) * edge).contains(&along) {
+            if (x - foot(x, self.edge(i)).1).norm_squared() < radius * radius {
                 let normal = self.normal(i);
-                faces.push(((x - a).dot(&normal), normal));
+                planes.push(((x - self.vertices[i]).dot(&normal), normal));
             }
         }
+        0.0
     }
 
     fn reach(&self, n: &Vector<f64, D>) -> f64 {

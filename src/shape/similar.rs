@@ -32,12 +32,11 @@ impl<const D: usize> Solid<D> for Similar<D> {
         self.after(self.of.solid().nearest(&self.before(x)))
     }
 
-    fn add_faces(&self, x: &Vector<f64, D>, faces: &mut Vec<Face<D>>) {
-        let others = faces.len();
-        self.of.solid().add_faces(&self.before(x), faces);
-        for face in faces.iter_mut().skip(others) {
-            *face = self.after(*face);
-        }
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        let others = planes.len();
+        let departure = self.of.solid().add_planes(&self.before(x), radius / self.factor, planes);
+        planes.iter_mut().skip(others).for_each(|plane| *plane = self.after(*plane));
+        self.factor * departure
     }
 
     /// max n·(c + s R (x − c)) = n·c + s (max m·x − m·c),  m = Rᵀn

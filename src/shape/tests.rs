@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::grid::Grid;
+use crate::grid::indices;
 use crate::tensor::Tensor;
 
 fn vector<const D: usize>(x: [f64; D]) -> Vector<f64, D> {
@@ -46,14 +47,23 @@ fn points() -> impl Iterator<Item = Vector<f64, 3>> {
     (1..400).map(|i| Vector::from_fn(|k, _| 3.0 * (f64::from(i) * [0.618034, 0.414214, 0.732051][k]).fract() - 1.5))
 }
 
+fn regular(per_axis: u32, rule: Fill) -> Filling {
+    Filling { per_axis, rule, ..Filling::default() }
+}
+
+/// The places of the particles.
+fn filled<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, per_axis: u32, rule: Fill) -> Vec<Vector<f64, D>> {
+    fill(grid, shape, regular(per_axis, rule)).unwrap().iter().map(|seed| seed.position).collect()
+}
+
 #[test]
 fn the_paper_s_disc_has_112_particles() {
     let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [30, 10] };
     let disc = ball([2.5, 2.5], 1.5);
     // ½ ρ v² V₀ n = 3.5, the energy of the reference, with ρ = 4, v = ½, V₀ = h²/4
-    assert_eq!(fill(&grid, &disc, 2, Fill::Particles).unwrap().len(), 112);
+    assert_eq!(filled(&grid, &disc, 2, Fill::Particles).len(), 112);
     // whole cells: centres at (¼, ¾, 5/4)², all but the four corners of the 6×6 square
-    let particles = fill(&grid, &disc, 2, Fill::Cells).unwrap();
+    let particles = filled(&grid, &disc, 2, Fill::Cells);
     assert_eq!(particles.len(), (36 - 4) * 4);
     // quarter points, the first axis fastest
     assert_eq!(particles[1] - particles[0], vector([0.25, 0.0]));
@@ -64,8 +74,8 @@ fn the_paper_s_disc_has_112_particles() {
 fn a_filled_box_has_its_volume_and_its_center() {
     let grid = Grid { origin: vector([-0.3, 0.2, 0.0]), spacing: 0.1, cells: [10, 12, 9] };
     let shape = block([-0.1, 0.4, 0.2], [0.5, 0.8, 0.5]);
-    for rule in [Fill::Particles, Fill::Cells] {
-        let particles = fill(&grid, &shape, 3, rule).unwrap();
+    for rule in [Fill::Cut, Fill::Particles, Fill::Cells] {
+        let particles = filled(&grid, &shape, 3, rule);
         assert_eq!(particles.len(), 6 * 4 * 3 * 27, "{rule:?}");
         let center = particles.iter().sum::<Vector<f64, 3>>() / particles.len() as f64;
         assert!((center - vector([0.2, 0.6, 0.35])).norm() < 1e-12);
@@ -79,7 +89,7 @@ fn the_volume_of_a_filled_ball_converges() {
     for (cells, bound) in [(8, 0.03), (32, 0.003)] {
         let h = 1.0 / f64::from(cells);
         let grid = Grid { origin: vector([0.0; 3]), spacing: h, cells: [cells; 3] };
-        let volume = fill(&grid, &shape, 2, Fill::Particles).unwrap().len() as f64 * (h / 2.0).powi(3);
+        let volume = filled(&grid, &shape, 2, Fill::Particles).len() as f64 * (h / 2.0).powi(3);
         assert!((volume / exact - 1.0).abs() < bound, "{cells} cells: {volume} against {exact}");
     }
 }
@@ -88,7 +98,7 @@ fn the_volume_of_a_filled_ball_converges() {
 fn an_unbounded_shape_is_clipped_to_the_grid() {
     let grid = Grid { origin: vector([0.0, 0.0]), spacing: 1.0, cells: [4, 3] };
     let tilted = Shape::from(HalfSpace { point: vector([0.0, 3.0]), normal: vector([1.0, 1.0]) });
-    let particles = fill(&grid, &tilted, 1, Fill::Particles).unwrap();
+    let particles = filled(&grid, &tilted, 1, Fill::Particles);
     // x + y ≤ 3 over the centres (½, ½), (1½, ½), …
     assert_eq!(particles.len(), 6);
 }
@@ -98,10 +108,10 @@ fn too_many_or_no_particles_are_refused() {
     let grid = Grid { origin: vector([0.0; 3]), spacing: 1e-3, cells: [1000; 3] };
     let all = Shape::from(HalfSpace { point: vector([1.0; 3]), normal: vector([1.0; 3]) });
     assert!(
-        matches!(fill(&grid, &all, 2, Fill::Particles), Err(FillError::TooMany { candidates }) if candidates == 8e9)
+        matches!(fill(&grid, &all, regular(2, Fill::Cut)), Err(FillError::TooMany { candidates }) if candidates == 8e9)
     );
     for lost in [ball([7.0; 3], 0.1), ball([0.5; 3], 1e-5), Union(vec![]).into()] {
-        assert!(matches!(fill(&grid, &lost, 2, Fill::Particles), Err(FillError::Empty { .. })), "{lost:?}");
+        assert!(matches!(fill(&grid, &lost, regular(2, Fill::Particles)), Err(FillError::Empty { .. })), "{lost:?}");
     }
 }
 
@@ -156,28 +166,6 @@ fn at_a_hole_the_normal_points_into_the_hole() {
 }
 
 #[test]
-fn a_corner_lies_below_all_its_faces_and_an_inner_face_below_none() {
-    let unit = block([0.0; 3], [1.0; 3]);
-    assert!(unit.faces(&vector([0.5; 3]), 0.1).is_empty());
-    assert_eq!(unit.faces(&vector([0.5, 0.98, 0.5]), 0.1), [(0.98 - 1.0, vector([0.0, 1.0, 0.0]))]);
-    let edge: Vec<_> = unit.faces(&vector([0.98, 0.02, 0.5]), 0.1).iter().map(|face| face.1).collect();
-    assert_eq!(edge, [vector([1.0, 0.0, 0.0]), vector([0.0, -1.0, 0.0])]);
-    assert_eq!(unit.faces(&vector([0.02; 3]), 0.1).len(), 3);
-    // two blocks that touch at x = 1, and two that overlap: their common bottom counts once, what lies inside not at all
-    for other in [block([1.0, 0.0], [2.0, 1.0]), block([0.5, 0.0], [2.0, 1.0])] {
-        let long = Shape::from(Union(vec![block([0.0, 0.0], [1.0, 1.0]), other]));
-        assert!(long.faces(&vector([0.99, 0.5]), 0.1).is_empty());
-        assert_eq!(long.faces(&vector([0.99, 0.01]), 0.1), [(-0.01, vector([0.0, -1.0]))]);
-        assert_eq!(long.faces(&vector([1.99, 0.01]), 0.1).len(), 2);
-    }
-    // beside a square hole: its faces point into it, and off its corner there is none
-    let hole = block([0.4, 0.4], [0.6, 0.6]);
-    let frame = Shape::from(Difference { of: Box::new(block([0.0, 0.0], [1.0, 1.0])), minus: Box::new(hole) });
-    assert_eq!(frame.faces(&vector([0.39, 0.5]), 0.1), [(0.39 - 0.4, vector([1.0, 0.0]))]);
-    assert!(frame.faces(&vector([0.39, 0.39]), 0.1).is_empty());
-}
-
-#[test]
 fn an_axis_parallel_half_space_is_bounded_on_its_side() {
     let left: Shape<2> = Shape::from(HalfSpace { point: vector([0.5, 9.0]), normal: vector([3.0, 0.0]) });
     let (min, max) = left.bounding_box();
@@ -195,7 +183,7 @@ fn what_round_off_puts_beside_an_edge_lies_in_the_shape() {
     // Filled with one particle a cell, whose centres are on the edge to within round-off, in any units.
     for unit in [1e-6, 1.0, 1e6] {
         let grid = Grid { origin: vector([0.0, -0.35 * unit]), spacing: 0.1 * unit, cells: [4, 6] };
-        assert_eq!(fill(&grid, &below, 1, Fill::Particles).unwrap().len(), 4 * 4, "{unit}");
+        assert_eq!(filled(&grid, &below, 1, Fill::Particles).len(), 4 * 4, "{unit}");
     }
 }
 
@@ -231,39 +219,159 @@ fn outlines_that_bound_no_polygon_are_refused_with_the_vertices() {
     assert!(Polygon::new([a, [1.0, 0.0], b, c, d].map(vector).to_vec()).is_ok());
 }
 
-#[test]
-fn a_polygon_has_the_faces_of_the_boxes_it_is_made_of() {
-    let l = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
-    let polygon: Shape<2> = Polygon::new(l.map(vector).to_vec()).unwrap().into();
-    let boxes = Union(vec![block([0.0, 0.0], [3.0, 1.0]), block([0.0, 0.0], [1.0, 2.0])]).into();
-    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [6, 4] };
-    let particles = fill(&grid, &polygon, 2, Fill::Particles).unwrap();
-    assert_eq!(particles, fill(&grid, &boxes, 2, Fill::Particles).unwrap());
-    for x in &particles {
-        let sorted = |shape: &Shape<2>| {
-            let mut faces = shape.faces(x, 0.25);
-            faces.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
-            faces
-        };
-        assert_eq!(sorted(&polygon), sorted(&boxes), "{x}");
+/// Volume, centroid, area and ∫ n dA of a solid by the cells of a grid, and ∫ x·n dA / D, which is the volume too (Gauss).
+fn measured<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> (f64, Vector<f64, D>, f64, Vector<f64, D>, f64) {
+    let (mut volume, mut moment, mut area) = (0.0, Vector::zeros(), 0.0);
+    let (mut normals, mut flux): (Vector<f64, D>, f64) = (Vector::zeros(), 0.0);
+    let edges = Vector::repeat(grid.spacing);
+    for cell in indices(grid.cells.map(u64::from)) {
+        let lower = grid.position(cell.map(|i| i as u32));
+        let (v, centroid) = shape.part(&lower, &edges, grid.spacing);
+        volume += v;
+        moment += centroid * v;
+        for facet in shape.facets(None, &lower, &edges, grid.spacing) {
+            area += facet.area;
+            normals += facet.normal * facet.area;
+            flux += facet.position.dot(&facet.normal) * facet.area / D as f64;
+        }
     }
-    let area: usize = particles.iter().map(|x| polygon.faces(x, 0.25).len()).sum();
-    assert_eq!(area as f64 * 0.25, 10.0);
+    (volume, moment / volume, area, normals, flux)
 }
 
 #[test]
-fn the_surface_of_a_cylinder_is_found_whole() {
-    let ends = [vector([1.0, 1.0, 0.25]), vector([1.0, 1.0, 1.25])];
-    let shape: Shape<3> = Cone::new(ends, [0.75, 0.75]).unwrap().into();
-    let grid = Grid { origin: vector([0.0; 3]), spacing: 0.0625, cells: [32; 3] };
-    let (s, particles) = (0.03125_f64, fill(&grid, &shape, 2, Fill::Particles).unwrap());
-    let exact = std::f64::consts::PI * 0.75 * 0.75;
-    assert!((particles.len() as f64 * s.powi(3) / exact - 1.0).abs() < 5e-3);
-    let (mut ends, mut side) = (0.0, 0.0);
-    for (_, n) in particles.iter().flat_map(|x| shape.faces(x, s)) {
-        *(if n[2].abs() > 0.5 { &mut ends } else { &mut side }) += s * s;
+fn flat_faces_are_cut_exactly() {
+    // An L and the two boxes that make it, one that overlaps and one that touches; a frame; all turned by 27° too.
+    let l = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]
+        .map(|x| vector(x) + vector([0.6, 0.7]));
+    let at = |x: [f64; 2]| vector(x) + vector([0.6, 0.7]);
+    let cube = |a: [f64; 2], b: [f64; 2]| Shape::from(Block { min: at(a), max: at(b) });
+    let hole = Box::new(cube([0.25, 0.25], [0.75, 0.75]));
+    let cases: [(Shape<2>, f64, f64); 4] = [
+        (Polygon::new(l.to_vec()).unwrap().into(), 4.0, 10.0),
+        (Union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 0.0], [1.0, 2.0])]).into(), 4.0, 10.0),
+        (Union(vec![cube([0.0, 0.0], [3.0, 1.0]), cube([0.0, 1.0], [1.0, 2.0])]).into(), 4.0, 10.0),
+        (Difference { of: Box::new(cube([0.0, 0.0], [1.0, 1.0])), minus: hole }.into(), 0.75, 6.0),
+    ];
+    for spacing in [0.5, 0.3, 0.17] {
+        let grid = Grid { origin: vector([-1.5, -1.5]), spacing, cells: [(7.0 / spacing) as u32; 2] };
+        for (shape, volume, area) in &cases {
+            for degrees in [0.0, 27.0, 90.0] {
+                let rotation = rotation(degrees, None).unwrap();
+                let turned = Similar { of: Box::new(shape.clone()), about: vector([2.0, 2.0]), rotation, factor: 1.0 };
+                let (v, _, a, normals, flux) = measured(&grid, &turned.into());
+                let worst = (v - volume).abs().max((a - area).abs()).max(normals.norm()).max((flux - volume).abs());
+                assert!(worst < 1e-9, "{shape:?} by {degrees}° at h = {spacing}: {v}, {a}, {normals}, {flux}");
+            }
+        }
     }
-    // The discs to how well the lattice fills them; the side to how many of the lattice lie in one ring of that width.
-    assert!((ends / (2.0 * exact) - 1.0_f64).abs() < 5e-3, "{ends}");
-    assert!((side / (2.0 * exact / 0.75) - 1.0_f64).abs() < 0.08, "{side}");
+    // A cube in general position: volume, centroid, area.
+    let cube = block([-0.5; 3], [0.5; 3]);
+    let turned = Similar {
+        of: Box::new(cube),
+        about: vector([0.0; 3]),
+        rotation: rotation(40.0, Some(&vector([1.0, 2.0, 3.0]))).unwrap(),
+        factor: 1.3,
+    };
+    let grid = Grid { origin: vector([-1.3; 3]), spacing: 0.26, cells: [10; 3] };
+    let (v, centroid, a, normals, flux) = measured(&grid, &turned.into());
+    assert!((v - 1.3_f64.powi(3)).abs() < 1e-9 && centroid.norm() < 1e-9 && (a - 6.0 * 1.69).abs() < 1e-9, "{v} {a}");
+    assert!(normals.norm() < 1e-9 && (flux - v).abs() < 1e-9);
+}
+
+#[test]
+fn curved_faces_are_cut_to_a_thousandth_at_four_cells_across() {
+    use std::f64::consts::PI;
+    let near = |found: f64, exact: f64, what: &str| {
+        assert!((found / exact - 1.0).abs() < 1e-3, "{what}: {found} against {exact}");
+    };
+    for offset in [0.0, 0.13, 0.37] {
+        let center = [2.5 + offset; 2];
+        let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [11, 11] };
+        let ring = Difference { of: Box::new(ball(center, 2.0)), minus: Box::new(ball(center, 1.0)) }.into();
+        for (shape, volume, area) in [(ball(center, 1.0), PI, 2.0 * PI), (ring, 3.0 * PI, 6.0 * PI)] {
+            let (v, centroid, a, normals, _) = measured(&grid, &shape);
+            near(v, volume, "disc");
+            near(a, area, "circle");
+            assert!((centroid - vector(center)).norm() < 1e-3 && normals.norm() < 1e-3 * a);
+        }
+        let center = [1.5 + offset; 3];
+        let grid = Grid { origin: vector([0.0; 3]), spacing: 0.5, cells: [7; 3] };
+        let (v, _, a, normals, _) = measured(&grid, &ball(center, 1.0));
+        near(v, 4.0 / 3.0 * PI, "ball");
+        near(a, 4.0 * PI, "sphere");
+        assert!(normals.norm() < 1e-3 * a);
+        let ends = [vector(center) - vector([0.4, 0.5, 0.6]), vector(center) + vector([0.4, 0.5, 0.6])];
+        let length = (ends[1] - ends[0]).norm();
+        let (v, _, a, ..) = measured(&grid, &Cone::new(ends, [0.8, 0.8]).unwrap().into());
+        near(v, PI * 0.64 * length, "cylinder");
+        near(a, 2.0 * PI * 0.8 * (length + 0.8), "surface of a cylinder");
+        let (v, _, a, ..) = measured(&grid, &Cone::new(ends, [1.0, 0.0]).unwrap().into());
+        near(v, PI / 3.0 * length, "cone");
+        near(a, PI * (1.0 + (1.0 + length * length).sqrt()), "surface of a cone");
+    }
+}
+
+#[test]
+fn particles_have_the_volume_and_the_first_moments_of_the_shape() {
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 1.0, cells: [60, 60] };
+    let cook = Polygon::new([[0.0, 0.0], [48.0, 44.0], [48.0, 60.0], [0.0, 44.0]].map(vector).to_vec()).unwrap().into();
+    // A plate of a quarter of a cell, and a sliver of a hundredth beside a whole cell.
+    let plate = block([3.0, 7.13], [40.0, 7.39]);
+    let beside = block([3.0, 7.0], [40.0, 8.01]);
+    for (shape, volume, center) in [
+        (cook, 48.0 * 30.0, vector([48.0 * 19.0 / 45.0, 0.0])),
+        (plate, 37.0 * 0.26, vector([21.5, 7.26])),
+        (beside, 37.0 * 1.01, vector([21.5, 7.505])),
+    ] {
+        for layout in [Layout::Regular, Layout::Gauss] {
+            let seeds = fill(&grid, &shape, Filling { per_axis: 2, layout, rule: Fill::Cut }).unwrap();
+            let found: f64 = seeds.iter().map(|seed| seed.volume).sum();
+            let moment: Vector<f64, 2> = seeds.iter().map(|seed| seed.position * seed.volume).sum();
+            assert!((found / volume - 1.0).abs() < 1e-9, "{shape:?}: {found}");
+            assert!((moment[0] / found - center[0]).abs() < 1e-8, "{shape:?}: {}", moment / found);
+            assert!(center[1] == 0.0 || (moment[1] / found - center[1]).abs() < 1e-8);
+            // No crumbs, where there is something to join them to.
+            let least = seeds.iter().map(|seed| seed.volume).fold(f64::INFINITY, f64::min);
+            assert!(least > 0.1 / 16.0, "{least}");
+        }
+    }
+}
+
+#[test]
+fn gauss_points_integrate_polynomials_of_degree_2_n_minus_1() {
+    for n in 1..9 {
+        let points = Layout::Gauss.points(n);
+        for degree in 0..2 * n as i32 {
+            let sum: f64 = points.iter().map(|(x, w)| w * x.powi(degree)).sum();
+            assert!((sum * f64::from(degree + 1) - 1.0).abs() < 1e-13, "{n}, {degree}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn a_region_cuts_the_surface_where_it_ends() {
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [8, 8] };
+    let (disc, right) = (ball([2.0, 2.0], 1.2), HalfSpace { point: vector([2.3, 0.0]), normal: vector([-1.0, 0.0]) });
+    let mut area = 0.0;
+    for cell in indices(grid.cells.map(u64::from)) {
+        let lower = grid.position(cell.map(|i| i as u32));
+        let facets = disc.facets(Some(&right.clone().into()), &lower, &vector([0.5, 0.5]), 0.5);
+        area += facets.iter().map(|facet| facet.area).sum::<f64>();
+    }
+    // The arc beyond x = 2.3, of 2 acos(0.3/1.2).
+    assert!((area / (2.4 * 0.25_f64.acos()) - 1.0).abs() < 1e-3, "{area}");
+}
+
+#[test]
+fn edges_that_are_nearly_one_are_counted_once() {
+    // A square with a vertex 1e-6 beside the middle of a side.
+    let vertices =
+        [[0.0, 0.0], [1.0, -1e-6], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]].map(|x| vector(x) + vector([0.31, 0.32]));
+    let shape = Polygon::new(vertices.to_vec()).unwrap().into();
+    let grid = Grid { origin: vector([0.0, 0.0]), spacing: 0.5, cells: [6, 6] };
+    let (volume, _, area, normals, _) = measured(&grid, &shape);
+    assert!(
+        (volume - 4.0 - 1e-6).abs() < 1e-9 && (area - 8.0).abs() < 1e-9 && normals.norm() < 1e-9,
+        "{volume} {area}"
+    );
 }

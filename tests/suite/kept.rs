@@ -203,6 +203,7 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
             let overrides = [
                 &format!("time.inertia={scheme}"),
                 &format!("grid.renewed=\"{renewed}\""),
+                r#"bodies[0].layout="regular""#,
                 "time.step=0.01",
                 "time.lumping=0.05",
                 damping,

@@ -86,7 +86,7 @@ fn filled<const D: usize>(name: &str) -> (bfree::grid::Grid<D>, usize) {
     let scene = scene::read_file(&folder("scenes").join(name), &[]).unwrap();
     let (grid, body) = (scene.grid.build::<D>().unwrap(), &scene.bodies[0]);
     let shape = body.shape.as_ref().and_then(|shape| shape.build()).unwrap();
-    let particles = fill(&grid, &shape, body.particles_per_cell, body.fill).unwrap();
+    let particles = fill(&grid, &shape, scene.filling(body)).unwrap();
     (grid, particles.len())
 }
 
@@ -98,7 +98,7 @@ fn shipped_scenes_have_the_published_sizes() {
     assert_eq!(filled::<2>("compaction_confined.json").0.cells, [10, 15]);
     let (grid, particles) = filled::<1>("riemann.json");
     assert_eq!((grid.cells, particles), ([1000], 4000));
-    assert!((3800..4600).contains(&filled::<3>("ball_drop.json").1));
+    assert!((4600..6000).contains(&filled::<3>("ball_drop.json").1));
     // Paper: Λ = 150 from K = 170 and G = 30
     let rebound = scene::read_file(&folder("scenes").join("rebound.json"), &[]).unwrap();
     let law = rebound.bodies[0].material.law(&mut scene::Problems::default(), "material");
@@ -138,7 +138,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
                    "krylov": {"method": "automatic", "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
         "output": {"fields": ["displacement", "velocity", "stress", "jacobian"], "probes": []}, "#, 1)
         .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "wall_update": "literal", "max_halvings": 10"#)
-        .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "particles""#);
+        .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "cut", "layout": "regular""#);
     assert_eq!(scene, scene::read(&all, &[]).unwrap_or_else(|error| panic!("{error}")));
     for (short, long) in [
         ("bspline={}", r#"bspline={"degree": 3}"#),
@@ -500,14 +500,17 @@ fn every_face_of_a_box_is_loaded_with_its_whole_area() -> Result<(), Box<dyn std
     let points = built::<2>(&block(2, 1.0, pressed(None)))?.loads.surface.remove(0).points;
     assert_eq!(points.len(), 4 * 4);
     assert_eq!(points.iter().map(|point| point.area).sum::<f64>(), 4.0);
-    assert!(points.iter().all(|point| point.offset == 0.125 && point.normal.amax() == 1.0));
+    assert!(points.iter().all(|point| point.normal.amax() == 1.0));
     let points = built::<3>(&block(3, 1.0, pressed(None)))?.loads.surface.remove(0).points;
     assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (6 * 16, 6.0));
-    // the top alone, by a region that ends on it: the corner particles carry the top and not the sides
-    let top = json!({"box": {"min": [0, 1.4], "max": [2, 1.5]}});
+    // the top alone, by a region that begins at it; of a region that reaches below, what it holds of the sides too
+    let top = json!({"half_space": {"point": [0, 1.5], "normal": [0, -1]}});
     let points = built::<2>(&block(2, 1.0, pressed(Some(top))))?.loads.surface.remove(0).points;
     assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (4, 1.0));
     assert!(points.iter().all(|point| point.normal[1] == 1.0));
+    let below = json!({"box": {"min": [0, 1.4], "max": [2, 1.5]}});
+    let points = built::<2>(&block(2, 1.0, pressed(Some(below))))?.loads.surface.remove(0).points;
+    assert!(points.len() == 6 && (points.iter().map(|point| point.area).sum::<f64>() - 1.2).abs() < 1e-12);
     Ok(())
 }
 

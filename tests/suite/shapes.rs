@@ -87,6 +87,23 @@ fn bounded<const D: usize>(shape: &Shape<D>, surface: &[Point<D>], hair: f64) ->
     Ok(())
 }
 
+/// Volume, centroid, area and ∫ n dA of a solid in the box from −r to r, cut by so many cells along each axis.
+fn by_cells<const D: usize>(shape: &Shape<D>, r: f64, cells: usize) -> (f64, Vector<f64, D>, f64, Vector<f64, D>) {
+    let h = 2.0 * r / cells as f64;
+    let (mut volume, mut moment, mut area, mut normals) = (0.0, Vector::zeros(), 0.0, Vector::zeros());
+    for id in 0..cells.pow(D as u32) {
+        let lower = Vector::from_fn(|k, _| (id / cells.pow(k as u32) % cells) as f64 * h - r);
+        let (part, centroid) = shape.part(&lower, &Vector::repeat(h), h);
+        volume += part;
+        moment += centroid * part;
+        for facet in shape.facets(None, &lower, &Vector::repeat(h), h) {
+            area += facet.area;
+            normals += facet.normal * facet.area;
+        }
+    }
+    (volume, moment / volume, area, normals)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -104,10 +121,16 @@ proptest! {
             // Places along an edge are at most 4/200 apart.
             prop_assert!(d.abs() <= nearest + 1e-14 && nearest <= d.abs() + 0.01, "{d} {nearest}");
             foot_and_normal(&shape, x)?;
-            for (d, n) in shape.faces(x, 0.2) {
-                prop_assert!(-0.2 < d && d <= 0.0 && shape.signed_distance(&(x - n * d)).abs() < 1e-12);
-            }
         }
+        // What is cut out of boxes is all of it: area and first moment by the trapezia under its edges, and the length of its outline.
+        let (area, moment) = vertices.iter().zip(vertices.iter().cycle().skip(1)).fold((0.0, Vector::zeros()), |(area, moment), (a, b)| {
+            let twice = a[0] * b[1] - a[1] * b[0];
+            (area + 0.5 * twice, moment + (a + b) * (twice / 6.0))
+        });
+        let length: f64 = vertices.iter().zip(vertices.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
+        let (cut, centroid, surface, normals) = by_cells(&shape, 3.0, 12);
+        prop_assert!((cut - area.abs()).abs() < 1e-9 && (centroid * cut - moment * area.signum()).norm() < 1e-9, "{cut} {area}");
+        prop_assert!((surface - length).abs() < 1e-6 && normals.norm() < 1e-6, "{surface} {length}");
         // At a vertex, and on an edge, too.
         for x in &outline {
             prop_assert!(shape.signed_distance(x).abs() < 1e-14);
@@ -129,7 +152,7 @@ proptest! {
     fn no_vertices_bring_a_polygon_down(vertices in prop::collection::vec(prop::array::uniform2(any::<f64>()), 0..6), x in prop::array::uniform2(any::<f64>())) {
         if let Ok(polygon) = Polygon::new(vertices.into_iter().map(Vector::from).collect()) {
             let shape = Shape::from(polygon);
-            shape.faces(&Vector::from(x), 0.1);
+            shape.facets(None, &Vector::from(x), &Vector::repeat(1.0), 0.1);
             shape.bounding_box();
         }
     }
@@ -186,8 +209,8 @@ proptest! {
         };
         let (cone, polygon) = (Shape::from(cone), Shape::from(polygon));
         prop_assert!((cone.signed_distance(&x) - polygon.signed_distance(&x)).abs() < 1e-14);
-        let faces = cone.faces(&x, 0.2);
-        prop_assert_eq!(faces.len(), polygon.faces(&x, 0.2).len());
+        let ((a, b, c, _), (d, e, f, _)) = (by_cells(&cone, 2.5, 7), by_cells(&polygon, 2.5, 7));
+        prop_assert!((a - d).abs() < 1e-9 && (b - e).norm() < 1e-9 && (c - f).abs() < 1e-6, "{a} {d}, {c} {f}");
     }
 
     #[test]
@@ -207,8 +230,11 @@ proptest! {
         for x in &places {
             let ((d, n), (e, m)) = (solid.distance_and_normal(x), moved.distance_and_normal(&after(x)));
             prop_assert!((d * factor - e).abs() < 1e-13 && (rotation * n - m).norm() < 1e-12, "{d} {e} {n} {m}");
-            prop_assert_eq!(solid.faces(x, 0.2).len(), moved.faces(&after(x), 0.2 * factor).len());
         }
+        let (volume, centroid, surface, normals) = by_cells(&moved, 18.0, 11);
+        prop_assert!((volume / (0.9375 * factor.powi(3)) - 1.0).abs() < 1e-6, "{volume}");
+        prop_assert!((centroid - after(&Vector::from([0.0, 0.375, 0.375]))).norm() < 1e-6);
+        prop_assert!((surface / (5.875 * factor.powi(2)) - 1.0).abs() < 1e-6 && normals.norm() < 1e-6 * surface, "{surface}");
         let corner = |i: u32| Vector::from([[-0.5, 0.5][i as usize % 2], [-0.25, 1.0][i as usize / 2 % 2], [0.0, 0.75][i as usize / 4]]);
         let corners: Vec<_> = (0..8).map(|i| after(&corner(i))).collect();
         bounded(&moved, &corners, 1e-12)?;
@@ -238,20 +264,19 @@ fn bodies_have_the_volume_of_what_is_drawn() -> Result<(), Failure> {
     let volume = |particles: &[f64]| particles.iter().sum::<f64>();
     let drawn = json!({"polygon": [[1, 1], [3, 1], [3, 3], [2, 2], [1, 3]]});
     let plane = |shape: &Value| Ok::<_, Failure>(volume(&built::<2>(&with_shape(2, shape))?.particles.volume));
-    // The diagonals go through particles, which count as inside.
-    assert!((plane(&drawn)? - 3.0).abs() < 0.15);
+    assert!((plane(&drawn)? - 3.0).abs() < 1e-9);
     let half = json!({"scaled": {"of": drawn, "about": [1, 1], "factor": 0.5}});
-    assert!((plane(&half)? - 0.75).abs() < 0.1);
-    let turned = json!({"rotated": {"of": drawn, "about": [2, 2], "angle": 90}});
-    assert_eq!(plane(&turned)?, plane(&drawn)?);
+    assert!((plane(&half)? - 0.75).abs() < 1e-9);
+    let turned = json!({"rotated": {"of": drawn, "about": [2, 2], "angle": 33}});
+    assert!((plane(&turned)? - 3.0).abs() < 1e-9);
     let space = |shape: &Value| Ok::<_, Failure>(volume(&built::<3>(&with_shape(3, shape))?.particles.volume));
     let cylinder = json!({"cylinder": {"from": [2, 2, 0.5], "to": [2, 2, 3.5], "radius": 1}});
     let exact = 3.0 * std::f64::consts::PI;
-    assert!((space(&cylinder)? / exact - 1.0).abs() < 0.04);
+    assert!((space(&cylinder)? / exact - 1.0).abs() < 1e-3);
     let lying = json!({"rotated": {"of": cylinder, "about": [2, 2, 2], "angle": 90, "axis": [1, 0, 0]}});
-    assert_eq!(space(&lying)?, space(&cylinder)?);
+    assert!((space(&lying)? / exact - 1.0).abs() < 1e-3);
     let cone = json!({"cone": {"from": [0.5, 2, 2], "to": [3.5, 2, 2], "radii": [1, 0]}});
-    assert!((space(&cone)? / exact * 3.0 - 1.0).abs() < 0.04);
+    assert!((space(&cone)? / exact * 3.0 - 1.0).abs() < 1e-3);
     Ok(())
 }
 
@@ -262,7 +287,7 @@ fn a_region_that_ends_on_nodes_holds_them_whatever_the_round_off() -> Result<(),
         "grid": {"origin": [0, -0.3], "size": [0.4, 0.6], "spacing": 0.1}, "approximation": "linear",
         "time": {"step": 1, "end": 1, "inertia": "none"},
         "bodies": [{"name": "body", "shape": {"box": {"min": [0, 0], "max": [0.4, 0.2]}}, "density": 1,
-                    "material": {"neo_hookean": {"young": 1, "poisson": 0}}}],
+                    "layout": "regular", "material": {"neo_hookean": {"young": 1, "poisson": 0}}}],
         "prescribed": [{"region": {"half_space": {"point": [0, 0], "normal": [0, 1]}}, "displacement": [[0, [0, 0]]]}],
         "gravity": {"acceleration": [0, -0.01]}
     });
@@ -363,19 +388,17 @@ fn wrong_drawings_are_named_with_what_is_allowed() {
     }
 }
 
-/// The middle of the free edge of Cook's membrane, extrapolated from the particles nearest to it.
+/// The middle of the free edge of Cook's membrane, between the two points of the load nearest to it.
 fn tip(simulation: &Simulation<2>, start: &[Point<2>]) -> Point<2> {
-    let now = simulation.particles.by_id().position;
-    let half = 0.5 * simulation.particles.volume[0].sqrt();
-    let mean = |x: f64| {
-        let at: Vec<_> = (0..now.len()).filter(|&p| start[p][0] == x && (start[p][1] - 52.0).abs() == half).collect();
-        at.iter().map(|&p| now[p] - start[p]).sum::<Point<2>>() / at.len() as f64
-    };
-    mean(48.0 - half) * 1.5 - mean(48.0 - 3.0 * half) * 0.5
+    let now = simulation.particles.by_id();
+    let mut points: Vec<_> = (0..now.len()).filter(|&p| !now.is_solid(p)).collect();
+    let off = |p: usize| (start[p][1] - 52.0).abs();
+    points.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+    (0..2).map(|i| now.position[points[i]] - start[points[i]]).sum::<Point<2>>() * 0.5
 }
 
 /// Nine-node elements of the same law, 32 × 32, end at (−9.130, 14.505); those of the benchmark's, with
-/// W = G/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J), at 14.737. What is left falls with h: it is the slopes, which particles follow in steps.
+/// W = G/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J), at 14.737.
 #[test]
 fn cook_s_membrane_does_not_ask_how_many_steps() -> Result<(), Failure> {
     let bent = |h: f64, steps: u32| {
@@ -387,7 +410,7 @@ fn cook_s_membrane_does_not_ask_how_many_steps() -> Result<(), Failure> {
         }
         Ok::<_, Failure>(tip(&simulation, &start))
     };
-    for (h, bound) in [(4.0, 0.035), (2.0, 0.017)] {
+    for (h, bound) in [(4.0, 5e-3), (2.0, 1e-3)] {
         let one = bent(h, 1)?;
         assert!((one[1] / 14.505 - 1.0).abs() < bound, "h = {h}: {one}");
         for steps in [2, 4, 8] {

@@ -232,16 +232,11 @@ fn units_do_not_matter_to_load_steps() -> Result<(), Failure> {
     Ok(())
 }
 
-/// u/L and w/L of the middle of the beam's end, half a particle beyond the last ones.
+/// u/L and w/L of the beam's end, the mean over the points of the load there.
 fn end_of_beam(simulation: &Simulation<2>, start: &[Vector<f64, 2>]) -> [f64; 2] {
-    let (length, now) = (20.0, simulation.particles.by_id().position);
-    let last = start.iter().fold(0.0_f64, |last, x| last.max(x[0]));
-    let spacing = 2.0 * (length - last);
-    let mean = |x: f64| {
-        let at: Vec<_> = (0..now.len()).filter(|&p| (start[p][0] - x).abs() < 0.1 * spacing).collect();
-        at.iter().map(|&p| now[p] - start[p]).sum::<Vector<f64, 2>>() / at.len() as f64
-    };
-    let end = mean(last) * 1.5 - mean(last - spacing) * 0.5;
+    let (length, now) = (20.0, simulation.particles.by_id());
+    let at: Vec<_> = (0..now.len()).filter(|&p| !now.is_solid(p)).collect();
+    let end = at.iter().map(|&p| now.position[p] - start[p]).sum::<Vector<f64, 2>>() / at.len() as f64;
     [-end[0] / length, -end[1] / length]
 }
 

@@ -63,12 +63,13 @@ const WIDEST: usize = 16;
 /// use bfree::approximation::Lme;
 /// use bfree::grid::Grid;
 /// use bfree::mechanics::sweep::Supports;
-/// use bfree::shape::{Ball, Fill, fill};
+/// use bfree::shape::{Ball, Filling, fill};
 /// use bfree::tensor::{Vector, identity};
 ///
 /// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
 /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
-/// let positions = fill(&grid, &disc, 2, Fill::Particles)?;
+/// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
+/// let positions: Vec<_> = seeds.iter().map(|seed| seed.position).collect();
 /// let (supports, nodes) = Supports::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
 /// assert_eq!(supports.particles(), positions.len());
 /// // What particles see of the field x_I is x and I: Σ N x_I = x, Σ x_I ⊗ ∇N = I.
@@ -304,12 +305,13 @@ impl<const D: usize> Supports<D> {
     /// use bfree::approximation::Lme;
     /// use bfree::grid::Grid;
     /// use bfree::mechanics::{check::direction, sweep::Supports};
-    /// use bfree::shape::{Ball, Fill, fill};
+    /// use bfree::shape::{Ball, Filling, fill};
     /// use bfree::tensor::Vector;
     ///
     /// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
     /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
-    /// let (lme, positions) = (Lme::new(3.0, 1e-6), fill(&grid, &disc, 2, Fill::Particles)?);
+    /// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
+    /// let (lme, positions) = (Lme::new(3.0, 1e-6), seeds.iter().map(|seed| seed.position).collect::<Vec<_>>());
     /// let (fast, nodes) = Supports::new(&lme, &grid, &positions)?;
     /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;
     /// assert_eq!(nodes, same_nodes);

@@ -4,6 +4,8 @@
 //! Π = ½ Σ k |Δφ_{i−1} − 2 Δφ_i + Δφ_{i+1}|²  over triples of nodes along an axis that contain a node with little of a body,
 //! k = γ (1 − 2f) (Λ + 2G) h^{D−2},  f < ½ the least share of a cell that one of the three has.
 //!
+//! Nodes that only points of loaded surfaces see have nothing at all of a body: f = 0, and γ = 1e-3 without ghost stiffness too.
+//!
 //! It is zero for every affine Δφ: momentum, moment of momentum, turning as a whole and the patch test stay exact.
 
 use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit, summed};
@@ -13,6 +15,12 @@ use crate::mechanics::sweep::{Laned, Number};
 use crate::solver::Bend;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
+/// A share of a cell that is nothing.
+const EMPTY: f64 = 1e-14;
+
+/// γ where there is nothing.
+const OF_EMPTY: f64 = 1e-3;
+
 /// Second differences at nodes with little of a body, with their stiffness.
 pub struct Ghost {
     bends: Vec<Bend>,
@@ -20,7 +28,8 @@ pub struct Ghost {
 
 impl Ghost {
     pub(super) fn of<const D: usize, L: Law>(step: &Step<'_, D, L>) -> Option<Self> {
-        if step.ghost == 0.0 {
+        let at_all = step.ghost > 0.0;
+        if !at_all && step.loads.surface.is_empty() {
             return None;
         }
         let (grid, nodes) = (step.supports.grid(), step.supports.active());
@@ -42,6 +51,8 @@ impl Ghost {
         };
         let modulus =
             |node: usize| if volumes[node][0] > 0.0 { stiff[node][0] / volumes[node][0] } else { f64::INFINITY };
+        let softest_body = moduli.iter().copied().filter(|&modulus| modulus > 0.0).fold(f64::INFINITY, f64::min);
+        let is_empty = |node: usize| filled(node) <= EMPTY;
         let mut bends = Vec::new();
         for axis in 0..D {
             let beside = |node: usize, by: i64| {
@@ -50,7 +61,7 @@ impl Ghost {
                 index[axis] = u32::try_from(moved).ok().filter(|&moved| moved <= grid.cells[axis])?;
                 nodes.number(grid.id(index))
             };
-            let low = (0..nodes.len()).filter(|&node| filled(node) < 0.5);
+            let low = (0..nodes.len()).filter(|&node| if at_all { filled(node) < 0.5 } else { is_empty(node) });
             let mut centres: Vec<usize> =
                 low.flat_map(|node| [-1, 0, 1].into_iter().filter_map(move |by| beside(node, by))).collect();
             centres.sort_unstable();
@@ -59,14 +70,18 @@ impl Ghost {
                 let (Some(before), Some(after)) = (beside(centre, -1), beside(centre, 1)) else { continue };
                 let all = [before, centre, after];
                 let least = all.into_iter().map(filled).fold(f64::INFINITY, f64::min);
-                let softest = all.into_iter().map(modulus).fold(f64::INFINITY, f64::min);
+                if !at_all && least > EMPTY {
+                    continue;
+                }
+                let softest = all.into_iter().map(modulus).fold(softest_body, f64::min);
                 if softest.is_finite() {
-                    let stiffness = step.ghost * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
+                    let factor = if at_all { step.ghost } else { OF_EMPTY };
+                    let stiffness = factor * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
                     bends.push(Bend { nodes: all.map(|node| node as u32), stiffness });
                 }
             }
         }
-        Some(Self { bends })
+        (at_all || !bends.is_empty()).then_some(Self { bends })
     }
 }
 

@@ -9,6 +9,9 @@ use crate::studies::StudyError;
 /// How often it is measured again what evaluations take.
 const ROUNDS: usize = 4;
 
+/// What does better than the defaults by less than this is measured again beside them: by chance some of hundreds do.
+const DOUBTFUL: f64 = 0.9;
+
 /// A run that succeeded.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
@@ -64,16 +67,46 @@ impl Measured {
                 units.push(problem.units(setting)?);
             }
         }
+        let first = Self::from(problem, &runs, &units);
+        let doubtful: Vec<(usize, usize)> = first.doubtful().collect();
+        for _ in 0..ROUNDS {
+            for &(base, other) in &doubtful {
+                for one in [base, other] {
+                    units[one].push(problem.units(&runs[one].0)?);
+                }
+            }
+        }
+        Ok(Self { failures, ..Self::from(problem, &runs, &units) })
+    }
+
+    /// What came of the runs, by all that was measured of each.
+    fn from(problem: &dyn Problem, runs: &[(Setting, f64, Cost)], units: &[Vec<Units>]) -> Self {
         let least = |units: &[Units]| units.iter().fold(units[0], |least, one| least.least(one));
         let unit = least(&units[0]).product_of_one;
-        let point = |((setting, error, cost), units): ((Setting, f64, Cost), Vec<Units>)| {
+        let point = |((setting, error, cost), units): (&(Setting, f64, Cost), &Vec<Units>)| {
             let mut sorted: Vec<f64> = units.iter().map(|units| cost.counted(units) / unit).collect();
             sorted.sort_by(f64::total_cmp);
-            let scatter = [sorted[0], sorted[ROUNDS]];
-            Point { setting, error, work: cost.counted(&least(&units)) / unit, cost, scatter, again: sorted[1] / sorted[0] }
+            let (scatter, again) = ([sorted[0], sorted[sorted.len() - 1]], sorted[1] / sorted[0]);
+            let work = cost.counted(&least(units)) / unit;
+            Point { setting: setting.clone(), error: *error, work, cost: *cost, scatter, again }
         };
-        let points: Vec<Point> = runs.into_iter().zip(units).map(point).collect();
-        Ok(Self { problem: problem.name(), smooth: problem.smooth(), base: points[0].clone(), points, failures })
+        let points: Vec<Point> = runs.iter().zip(units).map(point).collect();
+        let (problem, smooth) = (problem.name(), problem.smooth());
+        Self { problem, smooth, base: points[0].clone(), points, failures: Vec::new() }
+    }
+
+    /// Settings that seem to do a little better than what they are compared with, after that one.
+    fn doubtful(&self) -> impl Iterator<Item = (usize, usize)> {
+        let of = |origin: Origin| self.points.iter().position(|point| point.setting.origin == origin);
+        let scatter = self.scatter();
+        self.points.iter().enumerate().filter_map(move |(other, point)| {
+            let base = match &point.setting.origin {
+                Origin::Knob(knob, _) => of(origin(knob))?,
+                _ => 0,
+            };
+            let by = self.points[base].dominated(point, scatter);
+            (base != other && (DOUBTFUL..1.0).contains(&by)).then_some((base, other))
+        })
     }
 
     /// How well the least work of a setting is found again: the second least over it, at worst over all settings. One setting's own is no

@@ -1,0 +1,253 @@
+//! What of a box lies in a solid: volume, centroid, and the surface in it. A box is halved until the surface in it is nearly flat, and
+//! then cut into simplices by planes, exactly.
+
+use super::{EDGE, Face, Shape};
+use crate::tensor::{Tensor, Vector, determinant};
+
+/// How far a surface may depart from the planes that stand for it, relative to the spacing. A ball two spacings in radius is filled to
+/// about 1e-4 so; solids with flat faces are cut exactly.
+const FLAT: f64 = 1e-3;
+
+/// Planes in one box, at most: each may double the simplices.
+const MANY: usize = 6;
+
+/// The cosine of the angle between two pieces of surface in a box that are taken as one.
+const ALIKE: f64 = 0.9;
+
+/// A piece of surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet<const D: usize> {
+    /// Its centroid.
+    pub position: Vector<f64, D>,
+    /// The mean of its outward unit normals: shorter than 1 where it is curved, so that area times normal is ∫ n dA.
+    pub normal: Vector<f64, D>,
+    /// Its area (a length in 2D, 1 in 1D).
+    pub area: f64,
+}
+
+/// A convex piece of a box that lies in the solid.
+struct Piece<'a, const D: usize> {
+    volume: f64,
+    centroid: Vector<f64, D>,
+    /// Of a piece that the surface may bound.
+    cut: Option<(&'a Simplex<D>, &'a Cut<D>)>,
+}
+
+/// Corners 0 … D.
+type Simplex<const D: usize> = [Vector<f64, D>; 4];
+
+/// The planes that cut a box, as seen from its centre, and how far the surface may be from them.
+struct Cut<const D: usize> {
+    center: Vector<f64, D>,
+    planes: Vec<Face<D>>,
+    departure: f64,
+}
+
+impl<const D: usize> Cut<D> {
+    /// The distance of a point from one of the planes.
+    fn distance(&self, plane: &Face<D>, x: &Vector<f64, D>) -> f64 {
+        plane.0 + plane.1.dot(&(x - self.center))
+    }
+}
+
+impl<const D: usize> Shape<D> {
+    /// The volume and the centroid of what lies in the box from `lower` with these `edges`, on a grid of this spacing. Exact but for
+    /// round-off where all faces are flat; else to about 1e-3 `spacing` across the surface.
+    ///
+    /// ```
+    /// use bfree::shape::{HalfSpace, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // Half of a square, a triangle.
+    /// let below = Shape::from(HalfSpace { point: Vector::zeros(), normal: Vector::from([1.0, 1.0]) });
+    /// let (volume, centroid) = below.part(&Vector::from([-3.0, 0.0]), &Vector::from([3.0, 3.0]), 1.0);
+    /// assert!((volume - 4.5).abs() < 1e-14 && (centroid - Vector::from([-2.0, 1.0])).norm() < 1e-14);
+    /// ```
+    pub fn part(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, spacing: f64) -> (f64, Vector<f64, D>) {
+        let (mut volume, mut moment) = (0.0, Vector::zeros());
+        self.pieces(None, lower, edges, FLAT * spacing, &mut |piece| {
+            volume += piece.volume;
+            moment += piece.centroid * piece.volume;
+        });
+        (volume, if volume > 0.0 { moment / volume } else { lower + edges * 0.5 })
+    }
+
+    /// The pieces of surface in that box, and in `region` if there is one: one for each of its sides there.
+    ///
+    /// ```
+    /// use bfree::shape::{Ball, Shape};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A quarter of a circle. Its normals sum up to those of the two straight sides of that quarter.
+    /// let disc = Shape::from(Ball { center: Vector::zeros(), radius: 1.0 });
+    /// let facets = disc.facets(None, &Vector::zeros(), &Vector::from([1.0, 1.0]), 0.5);
+    /// let arc: f64 = facets.iter().map(|facet| facet.area).sum();
+    /// assert!((arc / std::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-3);
+    /// let normal: Vector<f64, 2> = facets.iter().map(|facet| facet.normal * facet.area).sum();
+    /// assert!((normal - Vector::from([1.0, 1.0])).norm() < 1e-3);
+    /// ```
+    pub fn facets(
+        &self,
+        region: Option<&Self>,
+        lower: &Vector<f64, D>,
+        edges: &Vector<f64, D>,
+        spacing: f64,
+    ) -> Vec<Facet<D>> {
+        let mut sides: Vec<Facet<D>> = Vec::new();
+        self.pieces(region, lower, edges, FLAT * spacing, &mut |piece| {
+            let Some((simplex, cut)) = piece.cut else { return };
+            for apex in 0..=D {
+                let Some(facet) = self.facet(simplex, apex, piece.volume, cut, spacing) else { continue };
+                let slack = cut.departure + EDGE * spacing;
+                if region.is_some_and(|region| region.signed_distance(&facet.position) > slack) {
+                    continue;
+                }
+                let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > ALIKE * side.normal.norm();
+                let Some(side) = sides.iter_mut().find(side) else {
+                    sides.push(facet);
+                    continue;
+                };
+                let area = side.area + facet.area;
+                let mean = |a: Vector<f64, D>, b: Vector<f64, D>| (a * side.area + b * facet.area) / area;
+                let (position, normal) = (mean(side.position, facet.position), mean(side.normal, facet.normal));
+                *side = Facet { position, normal, area };
+            }
+        });
+        sides
+    }
+
+    /// The side of a simplex across from a corner, if it lies in a plane where the solid ends.
+    fn facet(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<Facet<D>> {
+        let hair = EDGE * spacing;
+        let side = || (0..=D).filter(|&i| i != apex).map(|i| &simplex[i]);
+        let height = |plane: &Face<D>| cut.distance(plane, &simplex[apex]);
+        let lies_in =
+            |plane: &&Face<D>| height(plane).abs() > hair && side().all(|x| cut.distance(plane, x).abs() <= hair);
+        let plane = cut.planes.iter().find(lies_in)?;
+        let outward = plane.1 * -height(plane).signum();
+        let position = side().sum::<Vector<f64, D>>() / D as f64;
+        let beyond = position + outward * (2.0 * cut.departure + 1e3 * hair);
+        // V = A height / D
+        let area = D as f64 * volume / height(plane).abs();
+        (!self.contains(&beyond)).then_some(Facet { position, normal: outward, area })
+    }
+
+    /// Whether a piece with this centroid lies in the solid: near a curved surface, by the plane that stands for it.
+    fn holds_by(&self, cut: &Cut<D>, x: &Vector<f64, D>) -> bool {
+        let (distance, normal) = self.distance_and_normal(x);
+        let along = |plane: &&Face<D>| plane.1.dot(&normal);
+        let nearest = cut.planes.iter().max_by(|a, b| along(a).abs().total_cmp(&along(b).abs()));
+        match nearest {
+            Some(plane) if distance.abs() <= cut.departure => cut.distance(plane, x) * along(&plane) <= 0.0,
+            _ => distance <= 0.0,
+        }
+    }
+
+    /// Hands over the convex pieces that a box and the solid have in common; `region` cuts them once more.
+    fn pieces(
+        &self,
+        region: Option<&Self>,
+        lower: &Vector<f64, D>,
+        edges: &Vector<f64, D>,
+        flat: f64,
+        visit: &mut dyn FnMut(Piece<'_, D>),
+    ) {
+        // A hair more, for faces that the box touches.
+        let (center, radius) = (lower + edges * 0.5, (0.5 + EDGE) * edges.norm());
+        let distance = self.signed_distance(&center);
+        if distance >= radius {
+            return;
+        }
+        if distance <= -radius {
+            visit(Piece { volume: edges.product(), centroid: center, cut: None });
+            return;
+        }
+        let (mut planes, mut departure) = (Vec::new(), 0.0_f64);
+        for shape in std::iter::once(self).chain(region) {
+            departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
+        }
+        let hair = EDGE / FLAT * flat;
+        let same = |a: &Face<D>, b: &Face<D>| {
+            let along = a.1.dot(&b.1).signum();
+            (a.1 - b.1 * along).norm() <= 1e-6 && (a.0 - b.0 * along).abs() <= hair
+        };
+        let mut distinct: Vec<Face<D>> = Vec::new();
+        for plane in planes {
+            if !distinct.iter().any(|other| same(other, &plane)) {
+                distinct.push(plane);
+            }
+        }
+        if (departure > flat || distinct.len() > MANY) && radius > flat {
+            let k = edges.imax();
+            let mut half = *edges;
+            half[k] *= 0.5;
+            let mut upper = *lower;
+            upper[k] += half[k];
+            self.pieces(region, lower, &half, flat, visit);
+            self.pieces(region, &upper, &half, flat, visit);
+            return;
+        }
+        let cut = Cut { center, planes: distinct, departure: departure.min(2.0 * radius) };
+        let mut simplices = halved_box(lower, edges);
+        for plane in &cut.planes {
+            let mut parts = Vec::new();
+            for simplex in simplices {
+                split(simplex, &|x| cut.distance(plane, x), hair, &mut parts);
+            }
+            simplices = parts;
+        }
+        for simplex in &simplices {
+            let volume = volume(simplex);
+            let centroid = simplex[..=D].iter().sum::<Vector<f64, D>>() / (D + 1) as f64;
+            if volume > 0.0 && self.holds_by(&cut, &centroid) {
+                visit(Piece { volume, centroid, cut: Some((simplex, &cut)) });
+            }
+        }
+    }
+}
+
+/// The D! simplices of a box (Kuhn): from the lower corner to the upper one, an axis at a time.
+fn halved_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> Vec<Simplex<D>> {
+    let orders: &[[usize; 3]] = match D {
+        1 => &[[0, 0, 0]],
+        2 => &[[0, 1, 0], [1, 0, 0]],
+        _ => &[[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]],
+    };
+    let walk = |order: &[usize; 3]| {
+        let mut simplex = [*lower; 4];
+        for i in 0..D {
+            simplex[i + 1] = simplex[i];
+            simplex[i + 1][order[i]] += edges[order[i]];
+        }
+        simplex
+    };
+    orders.iter().map(walk).collect()
+}
+
+/// Cuts a simplex at the zeros of an affine function, edge after edge.
+fn split<const D: usize>(
+    simplex: Simplex<D>,
+    f: &impl Fn(&Vector<f64, D>) -> f64,
+    hair: f64,
+    parts: &mut Vec<Simplex<D>>,
+) {
+    let corners = &simplex[..=D];
+    let values: Vec<f64> = corners.iter().map(f).collect();
+    let of_sign = |sign: f64| values.iter().position(|value| value * sign > hair);
+    let (Some(i), Some(k)) = (of_sign(-1.0), of_sign(1.0)) else {
+        parts.push(simplex);
+        return;
+    };
+    let zero = corners[i] + (corners[k] - corners[i]) * (values[i] / (values[i] - values[k]));
+    for replaced in [i, k] {
+        let mut part = simplex;
+        part[replaced] = zero;
+        split(part, f, hair, parts);
+    }
+}
+
+/// |det (x₁ − x₀, …)| / D!
+fn volume<const D: usize>(simplex: &Simplex<D>) -> f64 {
+    let edges = Tensor::<f64, D>::from_fn(|i, k| simplex[k + 1][i] - simplex[0][i]);
+    determinant(&edges).abs() / [1.0, 1.0, 2.0, 6.0][D.min(3)]
+}
