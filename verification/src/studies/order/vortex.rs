@@ -34,8 +34,10 @@ fn spun(
 }
 
 /// Δt falls with h², so that the time scheme does not show. With ε = 1 the lumped mass makes errors of order 2, whatever the functions; with
-/// ε = 0 the orders on Gauss points are those of functions of degree p: p + 1, p + 1 and p.
+/// ε = 0 the orders on Gauss points are those of functions of degree p: p + 1, p + 1 and p. The stress of cubic ones under a lumped mass is
+/// shown: on these grids its own error, of order 3, is not small beside that of the mass.
 fn in_space(effort: Effort, outcome: &mut Outcome) {
+    use Effort::{Full, Short};
     let title = "a vortex, the grid kept, dt = 2.56 h^2";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout", "eps"]);
     let header = ["shape", "layout", "eps", "cells", "displacement", "order", "velocity", "order", "stress", "order", "products x particles"];
@@ -43,15 +45,13 @@ fn in_space(effort: Effort, outcome: &mut Outcome) {
     let sizes: &[u32] = if effort == Effort::Full { &[20, 35, 50] } else { &[20, 40] };
     let mut lines = Vec::new();
     let cases = [
-        ("linear", Approximation::from(Linear), &REGULAR, 1.0, [Some(2.0), Some(2.0), Some(1.0)]),
-        ("cubic", Bspline::Cubic.into(), &GAUSS, 1.0, [Some(2.0), Some(2.0), None]),
-        ("linear", Linear.into(), &REGULAR, 0.0, [Some(2.0), Some(2.0), Some(1.0)]),
-        ("quadratic", Bspline::Quadratic.into(), &GAUSS_OF_MIDDLES, 0.0, [Some(3.0), Some(3.0), Some(2.0)]),
-        ("cubic", Bspline::Cubic.into(), &GAUSS, 0.0, [Some(4.0), Some(4.0), Some(3.0)]),
+        (Short, "linear", Approximation::from(Linear), &REGULAR, 1.0, [Some(2.0), Some(2.0), Some(1.0)]),
+        (Full, "cubic", Bspline::Cubic.into(), &GAUSS, 1.0, [Some(2.0), Some(2.0), None]),
+        (Full, "linear", Linear.into(), &REGULAR, 0.0, [Some(2.0), Some(2.0), Some(1.0)]),
+        (Full, "quadratic", Bspline::Quadratic.into(), &GAUSS_OF_MIDDLES, 0.0, [Some(3.0), Some(3.0), Some(2.0)]),
+        (Short, "cubic", Bspline::Cubic.into(), &GAUSS, 0.0, [Some(4.0), Some(4.0), Some(3.0)]),
     ];
-    // What takes longest is the consistent mass; of it the best functions first.
-    let left_out = |name: &str, lumping: f64| effort == Effort::Short && (name == "cubic") != (lumping == 0.0);
-    for (name, shape, layout, lumping, orders) in cases.into_iter().filter(|case| !left_out(case.0, case.3)) {
+    for (_, name, shape, layout, lumping, orders) in cases.into_iter().filter(|case| case.0 <= effort) {
         let [displacement, velocity, stress] =
             orders.map(|order| order.map_or(Bound::Reported, |order| Bound::AtLeast(order - NEAR)));
         let least = [("displacement", displacement), ("velocity", velocity), ("stress", stress)];
