@@ -3,9 +3,11 @@
 //! b = φ_tt − (1/ρ₀) DIV P(GRAD φ), with every derivative by dual numbers through the motion and through the shipped law.
 
 mod axis_aligned;
+mod block;
 mod vortex;
 
 pub use axis_aligned::AxisAligned;
+pub use block::Block;
 pub use vortex::Vortex;
 
 use bfree::material::{Law, Start};

@@ -4,10 +4,10 @@ use super::Motion;
 use bfree::scalar::Real;
 use bfree::tensor::Vector;
 
-/// x = Q(α) X with α(R, t) = A sin(ωt) (1 − R²)³ inside R = |X| < 1, and no motion outside.
+/// x = Q(α) X with α(R, t) = A sin(ωt) (1 − R²)⁵ inside R = |X| < 1, and no motion outside.
 ///
-/// The published profile on an annulus is once differentiable at its rims and shears by 6 A; this one is twice differentiable, so that
-/// the body force is continuous and orders can be seen. J = 1 everywhere; the rim R = 1 is free of stress.
+/// The published profile on an annulus is once differentiable at its rims and shears by 6 A; this one is four times differentiable, and the
+/// body force twice, so that particles integrate it and orders up to four can be seen. J = 1 everywhere; the rim R = 1 is free of stress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vortex {
     /// A, the largest rotation in radians.
@@ -17,7 +17,7 @@ pub struct Vortex {
 }
 
 impl Default for Vortex {
-    /// A quarter turn at the centre at t = 1, and a shear of up to 1.4 around it.
+    /// A quarter turn at the centre at t = 1, and a shear of up to 1.3 around it.
     fn default() -> Self {
         Self { amplitude: std::f64::consts::FRAC_PI_2, frequency: std::f64::consts::FRAC_PI_2 }
     }
@@ -29,7 +29,7 @@ impl Motion<2> for Vortex {
         if rest.value() <= 0.0 {
             return Vector::zeros();
         }
-        let alpha = T::lit(self.amplitude) * (T::lit(self.frequency) * t).sin() * rest * rest * rest;
+        let alpha = T::lit(self.amplitude) * (T::lit(self.frequency) * t).sin() * rest.powi(5);
         // cos α − 1 = −2 sin² α/2
         let (sin, half) = (alpha.sin(), (alpha * T::lit(0.5)).sin());
         let cos_minus_one = T::lit(-2.0) * half * half;

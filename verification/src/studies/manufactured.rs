@@ -1,4 +1,5 @@
-//! Manufactured solutions with large rotation and large strain: observed orders in space and in time.
+//! Manufactured solutions with large rotation and large strain, the grid renewed in every step: observed orders in space. Those on a grid that
+//! is kept, and those in time, are in the study `order`.
 
 use super::{Effort, Outcome, StudyError};
 use crate::figure::{Axis, Figure, Line};
@@ -17,7 +18,7 @@ use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 
 /// What the study shows.
-pub(super) const ABOUT: &str = "orders in space and time on a vortex and on an axis-aligned motion";
+pub(super) const ABOUT: &str = "orders in space on a vortex and on an axis-aligned motion, the grid renewed in every step";
 
 /// Particles along each axis of a cell.
 const PER_AXIS: u32 = 2;
@@ -106,7 +107,6 @@ fn simulate<P: Problem>(
     shape: &Approximation,
     h: f64,
     steps: u32,
-    lumping: f64,
 ) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> {
     let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1.0, 0.3)?));
     let grid = problem.grid(h);
@@ -145,7 +145,6 @@ fn simulate<P: Problem>(
             field: Some(force_field(*problem, law, density, reference.clone())),
             ..Loads::default()
         }, settings: Settings {
-            lumping,
             wall_update: WallUpdate::Consistent,
             newton: NewtonSettings { forcing: Forcing::Fixed(1e-3), ..NewtonSettings::default() },
             ..Settings::default()
@@ -185,13 +184,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("orders of the manufactured solutions", &["quantity", "shape", "motion"]);
     space(&AxisAligned::default(), "axis-aligned", *effort, &mut report, &mut outcome)?;
     space(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
-    time(&AxisAligned::default(), "axis-aligned", *effort, &mut report, &mut outcome)?;
-    time(&Vortex::default(), "vortex", *effort, &mut report, &mut outcome)?;
     outcome.reports.push(report);
     outcome.remarks.push(
         "In space only functions with smooth gradients converge: linear functions and LME with a large gamma diverge or stand still, GIMP and \
-         quadratic B-splines stop where the quadrature error of their kinks is reached (F off by 6 percent, whatever h). In time the trapezoidal \
-         rule promises order 2 on nodes that stay; here every step projects anew, and the orders seen lie between 0.4 and 1.9 even for smooth gradients."
+         quadratic B-splines stop where the quadrature error of their kinks is reached (F off by 6 percent, whatever h)."
             .into(),
     );
     Ok(outcome)
@@ -216,7 +212,7 @@ fn space<P: Problem>(
         let mut before: Option<Errors> = None;
         for h in spacings.clone() {
             let steps = (1.0 / (STEP_OVER_SPACING * h)).ceil() as u32;
-            let (simulation, reference) = match simulate(problem, &family.shape, h, steps, 1.0) {
+            let (simulation, reference) = match simulate(problem, &family.shape, h, steps) {
                 Ok(run) => run,
                 Err(error) => {
                     report.push_error(&[&format!("run at h = {h}"), family.name, motion], error.as_ref());
@@ -261,70 +257,5 @@ fn space<P: Problem>(
         y: Axis::logarithmic("rms error of the position"),
         lines,
     });
-    Ok(())
-}
-
-/// Δt refined at a fixed h, against the next finer Δt.
-fn time<P: Problem>(
-    problem: &P,
-    motion: &str,
-    effort: Effort,
-    report: &mut Report,
-    outcome: &mut Outcome,
-) -> Result<(), StudyError> {
-    let (h, counts): (f64, &[u32]) = match effort {
-        Effort::Short => (0.125, &[10, 20, 40]),
-        Effort::Full => (0.0625, &[10, 20, 40, 80]),
-    };
-    let mut table = Table::new(
-        format!("{motion}: rms differences at t = 1 between dt and dt/2, h = {h}"),
-        ["shape", "eps", "steps", "position", "order", "velocity", "order"],
-    );
-    // What has no order is shown once.
-    let shown = |family: &Family| effort == Effort::Full || family.smooth || family.name == "linear";
-    for family in families(effort).into_iter().filter(shown) {
-        for lumping in [1.0, 0.1] {
-            let mut before: Option<Simulation<2>> = None;
-            let mut differences: Vec<[f64; 2]> = Vec::new();
-            for &steps in counts {
-                let (now, _) = match simulate(problem, &family.shape, h, steps, lumping) {
-                    Ok(run) => run,
-                    Err(error) => {
-                        report.push_error(&[&format!("run of {steps} steps, eps = {lumping}"), family.name, motion], error.as_ref());
-                        break;
-                    }
-                };
-                if let Some(before) = before {
-                    let (a, b) = (&before.particles, &now.particles);
-                    let rms = |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| {
-                        (a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
-                    };
-                    let difference = [rms(&a.position, &b.position), rms(&a.velocity, &b.velocity)];
-                    let orders = differences.last().map_or([f64::NAN; 2], |before| {
-                        [order(before[0], difference[0], 2.0), order(before[1], difference[1], 2.0)]
-                    });
-                    table.push([
-                        family.name.into(),
-                        format!("{lumping}"),
-                        format!("{steps}/{}", steps / 2),
-                        format!("{:.3e}", difference[0]),
-                        text(orders[0]),
-                        format!("{:.3e}", difference[1]),
-                        text(orders[1]),
-                    ]);
-                    differences.push(difference);
-                }
-                before = Some(now);
-            }
-            if let (Some(first), Some(last), true) = (differences.first(), differences.last(), differences.len() > 1) {
-                let overall = order(first[0], last[0], 2.0_f64.powi(differences.len() as i32 - 1));
-                let label = format!("order in time, position, eps = {lumping}");
-                // Projected anew in every step, Newmark's rule has no order to promise; on nodes that stay the study
-                // `order` judges it.
-                report.push(&[&label, family.name, motion], overall, Bound::Reported);
-            }
-        }
-    }
-    outcome.tables.push(table);
     Ok(())
 }

@@ -26,6 +26,7 @@ const BALANCE: Check = Check::Study("balance");
 const DIGITS: Check = Check::Study("digits");
 const OPERATOR: Check = Check::Study("operator");
 const MANUFACTURED: Check = Check::Study("manufactured");
+const ORDER: Check = Check::Study("order");
 const DYNAMICS: Check = Check::Test("dynamics::");
 const POINTS: Check = Check::Test("points::");
 const LOADS: Check = Check::Test("loads::");
@@ -42,8 +43,8 @@ const SOLVER: Check = Check::Unit("solver::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
-    TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP, LAWS,
-    GHOSTS, LEVELS, PATHS, KEPT, SOLVER,
+    TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, SOLVER,
 ];
 
 /// What is to become of a patch.
@@ -214,7 +215,11 @@ pub(super) const PATCHES: &[Patch] = &[
     patch("a force field without the mass it acts on", BODY_FORCE,
         "of_particle(p) * particles.mass[p]",
         "of_particle(p)",
-        Killed(&[MANUFACTURED], &[DYNAMICS, TANGENT])),
+        Killed(&[MANUFACTURED, ORDER], &[DYNAMICS, TANGENT])),
+    patch("a force field at the start of the step", BODY_FORCE,
+        "field(particles.id[p] as usize, &particles.position[p], time)",
+        "field(particles.id[p] as usize, &particles.position[p], time - step.dt)",
+        Killed(&[ORDER], &[DYNAMICS, TANGENT])),
     patch("sign of the follower pressure", PRESSURE,
         "out[node] += force * T::lit(n);",
         "out[node] += force * T::lit(-n);",
@@ -660,6 +665,10 @@ pub(super) const PATCHES: &[Patch] = &[
         "motion + dphi",
         "motion * 0.0 + dphi",
         Killed(&[KEPT], &[DYNAMICS])),
+    patch("nodes of a grid that is kept forget their acceleration", KEPT_GRID,
+        "end.acceleration.to_vec()",
+        "vec![Vector::zeros(); end.acceleration.len()]",
+        Killed(&[ORDER], &[DYNAMICS])),
     patch("no strain makes a grid anew", TRANSFER,
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5)",
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.0)",

@@ -1,0 +1,189 @@
+//! In space, without inertia: a block between walls, J from 0.3 to 1.7.
+
+use super::{GAUSS, GAUSS_3, GAUSS_OF_HALVES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
+use crate::manufactured::Block;
+use crate::report::{Bound, Report};
+use crate::studies::{Effort, Outcome, StudyError};
+use crate::table::Table;
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
+use bfree::grid::Grid;
+use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::schemes::Statics;
+use bfree::simulation::Settings;
+use bfree::tensor::Vector;
+use std::sync::Arc;
+
+/// J is between 1 − this and 1 + this.
+const CHANGE: f64 = 0.7;
+
+/// Load steps: with the grid kept, the answer is the same for any number of them that Newton's method can take.
+const STEPS: u32 = 4;
+
+/// Shape functions on a layout, and the least orders in h, of displacement and stress.
+struct Case {
+    name: &'static str,
+    shape: Approximation,
+    layout: &'static Layout,
+    orders: [f64; 2],
+    /// The most of the stress that may be left where the grid has been made anew once, in 2D on 32 cells.
+    floor: Option<f64>,
+}
+
+impl Case {
+    fn new(name: &'static str, shape: impl Into<Approximation>, layout: &'static Layout, orders: [f64; 2]) -> Self {
+        Self { name, shape: shape.into(), layout, orders, floor: None }
+    }
+
+    fn with_floor(self, floor: f64) -> Self {
+        Self { floor: Some(floor), ..self }
+    }
+}
+
+/// What is asked where u″ at the walls is not zero.
+///
+/// Functions that are consistent to first order: 2 and 1. B-splines at a wall continue the field linearly, u″ = 0 where it is not: an error
+/// of O(h) in the stress over a layer of width h, 1.5 in the mean square, and 2.5 of the displacement, if the particles are Gauss points of
+/// the pieces; if they are not, their sums leave the displacement 2. Quadratic functions have their kinks in the middle of cells.
+///
+/// After a renewal, what a prototype (robust.md) found not to fall with h any more, with 2 × 2 regular particles.
+fn curved() -> Vec<Case> {
+    let (lme, wide) = (Lme::new(3.0, 1e-6), Lme::new(1.4, 1e-6));
+    let (quadratic, cubic) = (Bspline::Quadratic, Bspline::Cubic);
+    vec![
+        Case::new("linear", Linear, &REGULAR, [2.0, 1.0]).with_floor(0.45),
+        Case::new("gimp", Gimp::particles_per_axis(2), &REGULAR, [2.0, 1.0]),
+        Case::new("LME 3", lme.clone(), &REGULAR, [2.0, 1.0]),
+        Case::new("LME 1.4", wide.clone(), &REGULAR, [2.0, 1.0]),
+        Case::new("quadratic", quadratic, &REGULAR, [2.0, 1.5]).with_floor(0.05),
+        Case::new("cubic", cubic, &REGULAR, [2.0, 1.5]).with_floor(0.01),
+        Case::new("linear", Linear, &GAUSS, [2.0, 1.0]),
+        Case::new("LME 3", lme, &GAUSS, [2.0, 1.0]),
+        Case::new("LME 1.4", wide, &GAUSS, [2.0, 1.0]),
+        Case::new("quadratic", quadratic, &GAUSS, [2.0, 1.5]),
+        Case::new("cubic", cubic, &GAUSS, [2.5, 1.5]),
+        Case::new("cubic", cubic, &GAUSS_3, [2.5, 1.5]),
+    ]
+}
+
+/// What is asked of Gauss points where u″ at the walls is zero, and the walls do not show: of degree p, p + 1 and p.
+fn straight() -> [Case; 2] {
+    [
+        Case::new("quadratic", Bspline::Quadratic, &GAUSS_OF_HALVES, [3.0, 2.0]),
+        Case::new("cubic", Bspline::Cubic, &GAUSS, [4.0, 3.0]),
+    ]
+}
+
+/// The block under its whole load.
+fn loaded<const D: usize>(
+    block: Block,
+    case: &Case,
+    cells: u32,
+    steps: u32,
+    renewal: Renewal,
+) -> Result<Held<Block, D>, StudyError> {
+    let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; D] };
+    let settings = Settings { scheme: Arc::new(Statics), renewal, ..Settings::default() };
+    Held::new(block, grid, (&case.shape, case.layout), f64::from(steps).recip(), settings)?.after(steps)
+}
+
+/// Orders of one case.
+struct Refining<'a> {
+    case: &'a Case,
+    walls: &'static str,
+    report: &'a mut Report,
+    table: &'a mut Table,
+}
+
+impl Refining<'_> {
+    fn run<const D: usize>(&mut self, block: Block, sizes: &[u32]) -> Vec<(f64, [f64; 2])> {
+        let Self { case, walls, report, table } = self;
+        let [displacement, stress] = case.orders.map(|order| Bound::AtLeast(order - NEAR));
+        let least = [("displacement", displacement), ("stress", stress)];
+        let labels = [case.name, case.layout.name, *walls, &D.to_string()];
+        Refined { report, table, least }.run(&labels, sizes, |cells| {
+            let held = loaded::<D>(block, case, cells, STEPS, Renewal::Never)?;
+            Ok(([held.displacement(), held.stress()], held.work))
+        })
+    }
+}
+
+fn kept(effort: Effort, outcome: &mut Outcome) {
+    let title = "a block between walls, J from 0.3 to 1.7, no inertia, the grid kept";
+    let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout", "u at walls", "D"]);
+    let header =
+        ["shape", "layout", "u at walls", "D", "cells", "displacement", "order", "stress", "order", "products x particles"];
+    let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
+    let plane = [8, 16, 32];
+    let space: &[u32] = if effort == Effort::Full { &[4, 8, 16] } else { &[4, 8] };
+    // Lines by layout and by what errs.
+    let mut lines = [(); 2].map(|()| [(); 2].map(|()| Vec::new()));
+    for case in curved() {
+        let mut refining = Refining { case: &case, walls: "curved", report: &mut report, table: &mut table };
+        let found = refining.run::<2>(Block::curved_at_walls::<2>(CHANGE), &plane);
+        refining.run::<3>(Block::curved_at_walls::<3>(CHANGE), space);
+        let regular = std::ptr::eq(case.layout, &REGULAR);
+        for (k, lines) in lines[usize::from(!regular)].iter_mut().enumerate() {
+            let name = if regular { case.name.into() } else { format!("{}, {}", case.name, case.layout.name) };
+            lines.push(line(&name, found.iter().map(|(cells, errors)| (*cells, errors[k]))));
+        }
+    }
+    for case in straight() {
+        let mut refining = Refining { case: &case, walls: "straight", report: &mut report, table: &mut table };
+        refining.run::<2>(Block::straight_at_walls::<2>(CHANGE), &plane);
+        if effort == Effort::Full {
+            refining.run::<3>(Block::straight_at_walls::<3>(CHANGE), space);
+        }
+    }
+    for (layout, lines) in ["regular", "Gauss"].into_iter().zip(lines) {
+        for (what, lines) in ["displacement", "stress"].into_iter().zip(lines) {
+            let title = format!("{what} of a block in 2D, the grid kept, {layout} layout");
+            outcome.figures.push(figure(&format!("{what}-{layout}"), &title, lines));
+        }
+    }
+    outcome.reports.push(report);
+    outcome.tables.push(table);
+}
+
+/// The same in 2D with the grid made anew after half of the load, and after every eighth of it.
+fn renewed(effort: Effort, outcome: &mut Outcome) {
+    let title = "that block in 2D, the grid renewed";
+    let mut report = Report::new(format!("{title}: error of the stress, 32 cells"), &["grid", "shape", "layout"]);
+    let mut table = Table::new(
+        format!("{title}: errors of the stress, relative, in the mean square"),
+        ["shape", "layout", "cells", "kept", "renewed once", "in every step of 8"],
+    );
+    let sizes: &[u32] = if effort == Effort::Full { &[8, 16, 32] } else { &[32] };
+    for case in curved() {
+        let bound = case.floor.map_or(Bound::Reported, Bound::AtMost);
+        if effort == Effort::Short && bound == Bound::Reported {
+            continue;
+        }
+        for &cells in sizes {
+            let mut row = [case.name, case.layout.name, &cells.to_string()].map(String::from).to_vec();
+            for (steps, renewal, name) in
+                [(2, Renewal::Never, "kept"), (2, Renewal::EveryStep, "once"), (8, Renewal::EveryStep, "in every step of 8")]
+            {
+                let labels = [name, case.name, case.layout.name];
+                let found = loaded::<2>(Block::curved_at_walls::<2>(CHANGE), &case, cells, steps, renewal);
+                match found.map(|held| held.stress()) {
+                    Ok(stress) => {
+                        row.push(format!("{stress:.2e}"));
+                        if cells == 32 && renewal == Renewal::EveryStep {
+                            let bound = if steps == 2 { bound } else { Bound::Reported };
+                            report.push(&labels, stress, bound);
+                        }
+                    }
+                    Err(error) => report.push_error(&labels, error.as_ref()),
+                }
+            }
+            table.push(row);
+        }
+    }
+    outcome.reports.push(report);
+    outcome.tables.push(table);
+}
+
+pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
+    kept(effort, outcome);
+    renewed(effort, outcome);
+}

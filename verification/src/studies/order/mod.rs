@@ -1,0 +1,255 @@
+//! Orders in h and in Δt at large deformation: whole steps on a grid that is kept, against solutions that are known; what renewing it
+//! costs; and the energy that an impact loses.
+
+mod block;
+mod rebound;
+mod vortex;
+
+use super::{Effort, Outcome, StudyError};
+use crate::figure::{Axis, Figure, Line};
+use crate::manufactured::{Motion, State, force_field, state};
+use crate::report::{Bound, Report};
+use crate::table::Table;
+use bfree::approximation::Approximation;
+use bfree::clock::Clock;
+use bfree::grid::Grid;
+use bfree::material::{Lame, Law, Material, NeoHookean, Start};
+use bfree::mechanics::loads::{self, Loads, Prescribed, Selection};
+use bfree::particles::{Body, Particles};
+use bfree::simulation::{InitialGuess, Settings, Simulation};
+use bfree::tensor::{Deformation, Tensor, Vector};
+
+/// What the study shows.
+pub(super) const ABOUT: &str =
+    "orders in h and dt at large deformation on a grid that is kept; what its renewal costs; the energy that the rebound loses";
+
+/// How far below its limit an order may be seen: an error C hᵖ (1 + c h) of a body with c = 2, from 16 to 32 cells across, has
+/// p + 2 (1/16 − 1/32)/ln 2.
+const NEAR: f64 = 0.1;
+
+/// Where the particles of a cell lie along each axis, and the part of it that each stands for.
+struct Layout {
+    name: &'static str,
+    points: &'static [(f64, f64)],
+}
+
+const REGULAR: Layout = Layout { name: "regular", points: &[(0.25, 0.5), (0.75, 0.5)] };
+
+/// Gauss points of a cell, ½ ± 1/(2√3): those of functions that are polynomials between nodes.
+const GAUSS: Layout =
+    Layout { name: "Gauss", points: &[(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)] };
+
+/// Gauss points from the middle of a cell to the middle of the next, ± 1/(2√3) about each node: those of quadratic B-splines, which are
+/// polynomials there.
+const GAUSS_OF_MIDDLES: Layout =
+    Layout { name: "Gauss, of middles", points: &[(0.288_675_134_594_812_9, 0.5), (0.711_324_865_405_187_1, 0.5)] };
+
+/// Gauss points of each half of a cell, ¼ ± 1/(4√3) and ¾ ± 1/(4√3): of quadratic B-splines at walls as well, where they are cut at a node.
+const GAUSS_OF_HALVES: Layout = Layout {
+    name: "Gauss, of halves",
+    points: &[
+        (0.105_662_432_702_593_6, 0.25),
+        (0.394_337_567_297_406_4, 0.25),
+        (0.605_662_432_702_593_6, 0.25),
+        (0.894_337_567_297_406_4, 0.25),
+    ],
+};
+
+/// ½ and ½ ± ½ √(3/5)
+const GAUSS_3: Layout = Layout {
+    name: "Gauss 3",
+    points: &[
+        (0.112_701_665_379_258_3, 5.0 / 18.0),
+        (0.5, 8.0 / 18.0),
+        (0.887_298_334_620_741_7, 5.0 / 18.0),
+    ],
+};
+
+/// A body that fills the box of its grid and is held at its faces, moved by the body force of a known motion.
+struct Held<M, const D: usize> {
+    motion: M,
+    simulation: Simulation<D>,
+    /// X of the particles, by id.
+    reference: Vec<Vector<f64, D>>,
+    /// Products with the tangent, times particles.
+    work: f64,
+}
+
+impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
+    fn new(
+        motion: M,
+        grid: Grid<D>,
+        (shape, layout): (&Approximation, &Layout),
+        dt: f64,
+        settings: Settings,
+    ) -> Result<Self, StudyError> {
+        let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1.0, 0.3)?));
+        let inertia = settings.scheme.has_inertia();
+        let mut particles = Particles::default();
+        let across = grid.cells.map(|cells| cells as usize * layout.points.len());
+        for number in 0..across.iter().product() {
+            let mut rest: usize = number;
+            let (mut x, mut volume) = (grid.origin, 1.0);
+            for k in 0..D {
+                let (cell, point) = (rest % across[k] / layout.points.len(), rest % layout.points.len());
+                let (place, part) = layout.points[point];
+                x[k] += (cell as f64 + place) * grid.spacing;
+                volume *= part * grid.spacing;
+                rest /= across[k];
+            }
+            if inertia {
+                let start = state(&motion, &x, 0.0);
+                particles.push(x, start.velocity, volume, volume, 0);
+                particles.acceleration[number] = start.acceleration;
+            } else {
+                particles.push_without_inertia(x, volume, volume, 0);
+            }
+        }
+        let reference = particles.position.clone();
+        let faces = (0..D).flat_map(|axis| [false, true].map(|upper| Selection::Face { axis, upper }));
+        let wall = |on| Prescribed { name: "wall".into(), on, motion: std::array::from_fn(|_| Some(loads::Motion::Rest)) };
+        let loads = Loads {
+            prescribed: faces.map(wall).collect(),
+            field: Some(force_field(motion, law.clone(), 1.0, reference.clone())),
+            ..Loads::default()
+        };
+        let settings = Settings { initial_guess: InitialGuess::LastStep, ..settings };
+        let bodies = vec![Body { name: "body".into(), law, density: 1.0 }];
+        let clock = Clock::new(dt, 0);
+        let simulation =
+            Simulation { loads, settings, ..Simulation::new(grid, shape.clone(), bodies, particles, clock) };
+        Ok(Self { motion, simulation, reference, work: 0.0 })
+    }
+
+    fn after(mut self, steps: u32) -> Result<Self, StudyError> {
+        for _ in 0..steps {
+            let products = self.simulation.step()?.newton.history.counts.tangent_products;
+            self.work += (products * self.reference.len()) as f64;
+        }
+        Ok(self)
+    }
+
+    /// √(Σ V d²) over √(Σ V s²), of what is found and what is exact, and of that by itself.
+    fn relative(&self, squares: impl Fn(&Particles<D>, usize, &State<D>) -> [f64; 2]) -> f64 {
+        let particles = &self.simulation.particles;
+        let mut sums = [0.0; 2];
+        for p in 0..particles.len() {
+            let exact = state(&self.motion, &self.reference[particles.id[p] as usize], self.simulation.clock.time());
+            let here = squares(particles, p, &exact);
+            (0..2).for_each(|k| sums[k] += particles.volume[p] * here[k]);
+        }
+        (sums[0] / sums[1]).sqrt()
+    }
+
+    /// Of the displacement.
+    fn displacement(&self) -> f64 {
+        self.relative(|particles, p, exact| {
+            let x = self.reference[particles.id[p] as usize];
+            [(particles.position[p] - exact.position).norm_squared(), (exact.position - x).norm_squared()]
+        })
+    }
+
+    /// Of the velocity.
+    fn velocity(&self) -> f64 {
+        self.relative(|particles, p, exact| {
+            [(particles.velocity[p] - exact.velocity).norm_squared(), exact.velocity.norm_squared()]
+        })
+    }
+
+    /// Of the Kirchhoff stress τ = F S Fᵀ.
+    fn stress(&self) -> f64 {
+        let law = &self.simulation.bodies[0].law;
+        let tau = |h: Tensor<f64, D>| {
+            let at = Deformation::new(h);
+            at.f * law.stress(&at, &Start::NONE) * at.f.transpose()
+        };
+        self.relative(|particles, p, exact| {
+            let of_exact = tau(exact.displacement_gradient);
+            [(tau(particles.displacement_gradient[p]) - of_exact).norm_squared(), of_exact.norm_squared()]
+        })
+    }
+}
+
+/// Errors of one case on finer and finer grids.
+struct Refined<'a, const N: usize> {
+    report: &'a mut Report,
+    table: &'a mut Table,
+    /// What is measured, and the least order of each.
+    least: [(&'static str, Bound); N],
+}
+
+impl<const N: usize> Refined<'_, N> {
+    /// Runs the case at each number of cells, which gives its errors and its work. The orders between the last two are judged.
+    fn run(
+        self,
+        labels: &[&str],
+        sizes: &[u32],
+        run: impl Fn(u32) -> Result<([f64; N], f64), StudyError>,
+    ) -> Vec<(f64, [f64; N])> {
+        let mut found: Vec<(f64, [f64; N])> = Vec::new();
+        let mut orders = [f64::NAN; N];
+        for &cells in sizes {
+            let (errors, work) = match run(cells) {
+                Ok(run) => run,
+                Err(error) => {
+                    let mut labels = labels.to_vec();
+                    let place = format!("{cells} cells");
+                    labels.insert(0, &place);
+                    self.report.push_error(&labels, error.as_ref());
+                    return found;
+                }
+            };
+            let size = f64::from(cells);
+            let mut row: Vec<String> = labels.iter().map(|&label| label.into()).collect();
+            row.push(cells.to_string());
+            for k in 0..N {
+                row.push(format!("{:.2e}", errors[k]));
+                row.push(found.last().map_or("-".into(), |(before, coarse)| {
+                    orders[k] = (coarse[k] / errors[k]).ln() / (size / before).ln();
+                    format!("{:.2}", orders[k])
+                }));
+            }
+            row.push(format!("{work:.1e}"));
+            self.table.push(row);
+            found.push((size, errors));
+        }
+        for ((what, bound), order) in self.least.into_iter().zip(orders) {
+            let labels: Vec<&str> = std::iter::once(what).chain(labels.iter().copied()).collect();
+            self.report.push(&labels, order, bound);
+        }
+        found
+    }
+}
+
+/// The line of a case, with its last slope.
+fn line(name: &str, points: impl Iterator<Item = (f64, f64)>) -> Line {
+    let points: Vec<_> = points.collect();
+    let slope = points.windows(2).last().map_or(f64::NAN, |pair| (pair[0].1 / pair[1].1).ln() / (pair[1].0 / pair[0].0).ln());
+    Line { name: format!("{name}: {slope:.1}"), points }
+}
+
+/// Errors against cells.
+fn figure(name: &str, title: &str, lines: Vec<Line>) -> Figure {
+    Figure {
+        name: format!("order-{name}"),
+        title: format!("{title}; with the slope of the last piece"),
+        x: Axis::logarithmic("cells across"),
+        y: Axis::logarithmic("rms error, relative"),
+        lines,
+    }
+}
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let mut outcome = Outcome::default();
+    block::run(*effort, &mut outcome);
+    vortex::run(*effort, &mut outcome)?;
+    rebound::run(*effort, &mut outcome)?;
+    outcome.remarks.push(
+        "On a grid that is kept, functions of degree p on Gauss points of their own pieces have order p + 1 in the displacement and p in the \
+         stress. B-splines at a held wall where the displacement is curved have 2.5 and 1.5, whatever p; regular particles 2 and 1.5. The pieces \
+         of quadratic ones end in the middle of cells: Gauss points of cells are no better for them than regular ones. A lumped mass leaves order 2."
+            .into(),
+    );
+    Ok(outcome)
+}
