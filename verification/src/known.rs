@@ -1,4 +1,4 @@
-//! Failures that are known: the one list of them, with numbers. README's section on limits holds the same text.
+//! Failures that are known: the one list of them, with numbers. The manual's page of limits holds the same text.
 //!
 //! A known failure does not fail a run; it is printed and counted apart. One that passes again, gets much worse or is
 //! not there any more does: the list cannot rot.
