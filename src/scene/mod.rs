@@ -45,7 +45,7 @@ const GHOST: f64 = 1e-3;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. Of no other effect.
+    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. It has no other effect.
     #[serde(rename = "$schema")]
     pub schema: Option<String>,
     /// One line about the scene.
@@ -59,7 +59,7 @@ pub struct Scene {
     /// What the accuracy has set.
     #[serde(skip)]
     pub chosen: Vec<accuracy::Chosen>,
-    /// The shape functions. Default: `{"bspline": {"degree": 3}}`; all shipped scenes name theirs.
+    /// The shape functions. Default: `{"bspline": {"degree": 3}}`.
     #[serde(default)]
     pub approximation: approximation::Parameters,
     /// Time stepping.
@@ -75,8 +75,8 @@ pub struct Scene {
     /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
-    /// Ghost stiffness γ (no unit), 0 to 1: holds nodes that have little of a body, by this share of its stiffness against bending from
-    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia and in steps of Courant numbers above 10; else 0.
+    /// Ghost stiffness γ (no unit), 0 to 1: stabilises nodes with little of a body. Second differences of the motion between such nodes are
+    /// penalised by this share of the body's stiffness; momentum and uniform strains stay exact. Default: 0.001 without inertia and in steps of Courant numbers above 10; else 0.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.

@@ -122,13 +122,18 @@ fn every_link_leads_somewhere() -> Result<(), Failure> {
         page.undefined.iter().for_each(|link| refuse(link, "no such label"));
         for link in page.links.iter().filter(|link| !link.contains("://")) {
             let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
-            let target = if path.is_empty() { Ok(file.clone()) } else { file.with_file_name("").join(path).canonicalize() };
+            let target =
+                if path.is_empty() { Ok(file.clone()) } else { file.with_file_name("").join(path).canonicalize() };
             followed += 1;
             match target {
                 Err(error) => refuse(link, &error.to_string()),
                 // The book is a folder of its own when it is built.
-                Ok(target) if file.starts_with(&source) && !target.starts_with(&source) => refuse(link, "not in the book"),
-                Ok(target) if !anchor.is_empty() && !Page::read(&target)?.anchors.contains(anchor) => refuse(link, "no such heading"),
+                Ok(target) if file.starts_with(&source) && !target.starts_with(&source) => {
+                    refuse(link, "not in the book")
+                }
+                Ok(target) if !anchor.is_empty() && !Page::read(&target)?.anchors.contains(anchor) => {
+                    refuse(link, "no such heading")
+                }
                 Ok(_) => {}
             }
         }
@@ -163,10 +168,10 @@ fn files_that_are_named_are_there() -> Result<(), Failure> {
 #[test]
 fn the_book_lists_all_its_pages() -> Result<(), Failure> {
     let source = in_repository("docs/src");
-    let listed: Vec<PathBuf> = Page::read(&source.join("SUMMARY.md"))?.links.iter().map(|link| source.join(link)).collect();
-    let (mut sorted, pages) = (listed.clone(), book()?);
-    sorted.sort();
-    assert_eq!(sorted, pages);
+    let mut listed: Vec<PathBuf> =
+        Page::read(&source.join("SUMMARY.md"))?.links.iter().map(|link| source.join(link)).collect();
+    listed.sort();
+    assert_eq!(listed, book()?);
     Ok(())
 }
 

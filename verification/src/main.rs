@@ -111,8 +111,11 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
 fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
     // Before hours are spent; and of the tree as it is before the run writes to it.
-    let of_run =
-        if asked_for(arguments, "full") { Some(Run::starting(&root()).map_err(writing("README.md and docs/src/limits.md"))?) } else { None };
+    let of_run = if asked_for(arguments, "full") {
+        Some(Run::starting(&root()).map_err(writing("README.md and docs/src/limits.md"))?)
+    } else {
+        None
+    };
     let mut text = Vec::new();
     let mut findings: Vec<Finding> = Vec::new();
     let mut documents = Vec::new();
