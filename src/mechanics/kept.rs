@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::fmt::{Display, Formatter};
 
-/// When the background grid is made anew. A grid that is kept holds what it held when it was new; where a body comes to a part of a wall or of
-/// a prescribed region at which nothing was, it is made anew whatever is asked here.
+/// When the background grid is renewed. While a grid is kept, its held nodes stay held. It is renewed in any case where a body comes to a
+/// part of a wall, or of a prescribed region, at which no body was.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Renewal {

@@ -13,7 +13,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The problems, and the scene of each.
-const PROBLEMS: [(&str, &str); 7] = [
+const PROBLEMS: [(&str, &str); 10] = [
     ("rebound", include_str!("../../scenes/rebound.json")),
     ("collision", include_str!("../../scenes/collision.json")),
     ("cantilever", include_str!("../../scenes/cantilever.json")),
@@ -21,6 +21,9 @@ const PROBLEMS: [(&str, &str); 7] = [
     ("riemann_jump", include_str!("../../scenes/riemann_jump.json")),
     ("ball_drop", include_str!("../../scenes/ball_drop.json")),
     ("column_static", include_str!("../../scenes/column_static.json")),
+    ("elastica", include_str!("../../scenes/elastica.json")),
+    ("cook", include_str!("../../scenes/cook.json")),
+    ("ring", include_str!("../../scenes/ring.json")),
 ];
 
 /// The schema's file beside the scene.

@@ -87,6 +87,9 @@ impl SceneArguments {
             let _ = writeln!(text, "accuracy      {set}");
         }
         let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
+        for body in scene.filled(&simulation) {
+            let _ = writeln!(text, "body          {body}");
+        }
         let _ = write!(text, "{}", self.plan(&simulation)?);
         let _ = write!(text, "\noutput        {}", written(scene));
         for bound in bound_probes(scene, &simulation) {

@@ -8,15 +8,14 @@ use super::transfer::Transfer;
 use super::{Problems, Scene, scale};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
-use crate::grid::{Grid, indices};
-use crate::mechanics::kept::Renewal;
+use crate::grid::Grid;
 use crate::mechanics::loads::{
     Curve, CurveError, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::terms::ForceField;
 use crate::particles::{self, Particles};
-use crate::shape::{self, Facet, FillError, Filling, Layout, Shape, around, fill};
+use crate::shape::{self, FillError, Shape, fill};
 use crate::simulation::{Settings, Simulation, StepError};
 use crate::solver::NewtonSettings;
 use crate::tensor::Vector;
@@ -254,24 +253,6 @@ impl Scene {
         self.approximation.functions(cells, problems, "approximation")
     }
 
-    /// How the shape of a body is filled.
-    ///
-    /// ```
-    /// use bfree::shape::Layout;
-    ///
-    /// // Load steps keep their grid, on which Gauss's points stay what they are.
-    /// for (name, layout) in [("elastica", Layout::Gauss), ("rebound", Layout::Regular)] {
-    ///     let scene = bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &[])?;
-    ///     assert_eq!(scene.filling(&scene.bodies[0]).layout, layout);
-    /// }
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn filling(&self, body: &Body) -> Filling {
-        let kept = self.grid.renewed(self.time.inertia) != Renewal::EveryStep;
-        let by_itself = if kept && !self.approximation.one_half_width() { Layout::Gauss } else { Layout::Regular };
-        Filling { per_axis: body.particles_per_cell, layout: body.layout.unwrap_or(by_itself), rule: body.fill }
-    }
-
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
         Settings {
@@ -411,42 +392,6 @@ impl Scene {
         Ok(SurfaceLoad { pressing, curve, points })
     }
 
-    /// The surface of a body in the boxes of its particles. Where the box ends and holds the motion across, the body goes on: a plane
-    /// of symmetry is no surface.
-    fn facets<const D: usize>(
-        &self,
-        body: &Body,
-        shape: &Shape<D>,
-        region: Option<&Shape<D>>,
-        grid: &Grid<D>,
-    ) -> Vec<Facet<D>> {
-        let (h, n) = (grid.spacing, u64::from(body.particles_per_cell));
-        let edges = Vector::repeat(h / n as f64);
-        let (first, count) = around(grid, shape);
-        let goes_on = |facet: &Facet<D>| {
-            (0..2 * D).any(|face| {
-                let (k, upper) = (face / 2, face % 2 == 1);
-                let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
-                let there = (facet.position[k] - wall).abs() < shape::HAIR * h && facet.normal[k] * outward > 0.5;
-                there && self.boundary.face(k, upper).holds_across(k)
-            })
-        };
-        let mut facets = Vec::new();
-        for cell in indices(count) {
-            let corner: Vector<f64, D> = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
-            let middle = corner.add_scalar(0.5 * h);
-            if shape.signed_distance(&middle).abs() > h * (D as f64).sqrt() {
-                continue;
-            }
-            for i in indices([n; D]) {
-                let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
-                facets.extend(shape.facets(region, &lower, &edges, h));
-            }
-        }
-        facets.retain(|facet| !goes_on(facet));
-        facets
-    }
-
     fn fill<const D: usize>(
         &self,
         body: &Body,
@@ -527,18 +472,6 @@ impl Scene {
 }
 
 impl Face {
-    /// Whether it prescribes the component across the face.
-    fn holds_across(&self, axis: usize) -> bool {
-        match self {
-            Self::Free => false,
-            Self::Sliding | Self::Fixed => true,
-            Self::Held(components) => components.get(axis) == Some(&true),
-            Self::Displacement(table) | Self::Velocity(table) => {
-                table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
-            }
-        }
-    }
-
     /// The motion of each component on a face across `axis`.
     fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion>; D], BuildError> {
         let held = |holds: &dyn Fn(usize) -> bool| std::array::from_fn(|i| holds(i).then_some(Motion::Rest));

@@ -35,8 +35,8 @@ pub struct GridBox {
     /// 1e-9 relative, into at most a million cells.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing: f64,
-    /// When the background grid is made anew. A grid that is kept makes the answer independent of the number of steps and its stresses
-    /// smooth; it holds bodies to the walls they touch. Default: `{"strain": 1}` in load steps, `"every_step"` with inertia.
+    /// When the background grid is renewed. With a grid that is kept, the answer does not depend on the number of steps, stresses are
+    /// smooth, and bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps, `"every_step"` with inertia.
     pub renewed: Option<Renewal>,
 }
 

@@ -18,6 +18,7 @@ pub mod time;
 pub mod transfer;
 
 mod build;
+mod filling;
 mod overrides;
 mod place;
 mod read;
@@ -26,6 +27,7 @@ mod suggest;
 
 pub use crate::problems::{Place, Problem, Problems};
 pub use build::BuildError;
+pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
@@ -46,7 +48,7 @@ const GHOST: f64 = 1e-3;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. Of no other effect.
+    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. It has no other effect.
     #[serde(rename = "$schema")]
     pub schema: Option<String>,
     /// One line about the scene.
@@ -60,7 +62,7 @@ pub struct Scene {
     /// What the accuracy has set.
     #[serde(skip)]
     pub chosen: Vec<accuracy::Chosen>,
-    /// The shape functions. Default: `{"bspline": {"degree": 3}}`; all shipped scenes name theirs.
+    /// The shape functions. Default: `{"bspline": {"degree": 3}}`.
     #[serde(default)]
     pub approximation: approximation::Parameters,
     /// Time stepping.
@@ -76,9 +78,9 @@ pub struct Scene {
     /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
-    /// Ghost stiffness γ (no unit), 0 to 1: holds nodes that have little of a body, by this share of its stiffness against bending from
-    /// node to node. It keeps momentum and uniform strains. Default: 0.001 without inertia, in steps of Courant numbers above 10, and where
-    /// the surface of a shape is loaded; else 0.
+    /// Ghost stiffness γ (no unit), 0 to 1: stabilises nodes with little of a body. Second differences of the motion between such nodes are
+    /// penalised by this share of the body's stiffness; momentum and uniform strains stay exact. Default: 0.001 without inertia, in steps of
+    /// Courant numbers above 10, and where the surface of a shape is loaded; else 0.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.

@@ -19,8 +19,8 @@ pub struct Solver {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Newton {
-    /// The residual norm at which a step has converged, relative to that of its first iterate, 1e-15 to 0.1; round-off, measured by
-    /// the sum of the magnitudes of its contributions, is never asked to fall. Default 1e-9.
+    /// The residual norm at which a step has converged, relative to that of its first iterate, 1e-15 to 0.1. A residual
+    /// that is all round-off has converged, too. Default 1e-9.
     #[schemars(range(min = 1e-15, max = 0.1))]
     pub tolerance: f64,
     /// Iterations after which a step has failed, 1 to 1000. Default 30.

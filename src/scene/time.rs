@@ -23,14 +23,14 @@ pub struct Time {
     /// The end of the simulation (time), at least one step; it starts at 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
-    /// Whether the bodies have inertia. Without it there are load steps: each ends in static equilibrium under the loads at its
-    /// end, and whatever speaks of velocities or of the mass matrix is refused.
+    /// Dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the loads at its end, and keys
+    /// about velocities or the mass matrix are refused. Default: `"newmark"`.
     #[serde(default)]
     pub inertia: Inertia,
-    /// Newmark's β (no unit), > 0, with 2β ≥ γ; of no other method. Default 0.25, the trapezoidal rule.
+    /// Newmark's β (no unit), > 0, with 2β ≥ γ; for `"newmark"` only. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
-    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps; of no other method. Default 0.5.
+    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps; for `"newmark"` only. Default 0.5.
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.

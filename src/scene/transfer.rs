@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Transfer {
-    /// Increments only, as in the paper: undamped, and blind to what particles carry and nodes do not see.
+    /// Increments only, as in the paper. Nothing is damped, and velocities that particles have and nodes do not see stay.
     #[default]
     Flip,
     /// The particles take the velocity of their nodes in every step: the shorter the steps, the more is smoothed away.

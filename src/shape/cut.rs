@@ -78,13 +78,13 @@ impl<const D: usize> Shape<D> {
     /// use bfree::shape::{Ball, Shape};
     /// use bfree::tensor::Vector;
     ///
-    /// // A quarter of a circle. Its normals sum up to those of the two straight sides of that quarter.
+    /// // Half of a circle. Its normals sum up to that of its diameter.
     /// let disc = Shape::from(Ball { center: Vector::zeros(), radius: 1.0 });
-    /// let facets = disc.facets(None, &Vector::zeros(), &Vector::from([1.0, 1.0]), 0.5);
+    /// let facets = disc.facets(None, &Vector::from([0.0, -2.0]), &Vector::from([2.0, 4.0]), 0.5);
     /// let arc: f64 = facets.iter().map(|facet| facet.area).sum();
-    /// assert!((arc / std::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-3);
+    /// assert!((arc / std::f64::consts::PI - 1.0).abs() < 1e-3);
     /// let normal: Vector<f64, 2> = facets.iter().map(|facet| facet.normal * facet.area).sum();
-    /// assert!((normal - Vector::from([1.0, 1.0])).norm() < 1e-3);
+    /// assert!((normal - Vector::from([2.0, 0.0])).norm() < 2e-3);
     /// ```
     pub fn facets(
         &self,

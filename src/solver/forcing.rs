@@ -22,7 +22,7 @@ const SAFEGUARD: f64 = 0.1;
 pub enum Forcing {
     /// To this relative residual, 1e-15 to 0.9, at every iteration. Small values keep Newton's convergence quadratic.
     Fixed(#[schemars(range(min = 1e-15, max = 0.9))] f64),
-    /// As far as Newton's progress deserves (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9, α = 2): loose
+    /// As Newton's method progresses (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9, α = 2): loose
     /// at first, tighter as the residual falls, never tighter than the end of the iteration needs.
     EisenstatWalker,
 }

@@ -76,7 +76,8 @@ fn shipped_scenes_are_sound() {
             "rebound",
             "rebound_fast",
             "riemann",
-            "riemann_jump"
+            "riemann_jump",
+            "ring"
         ]
     );
 }

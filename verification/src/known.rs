@@ -1,4 +1,4 @@
-//! Failures that are known: the one list of them, with numbers. README's section on limits holds the same text.
+//! Failures that are known: the one list of them, with numbers. The manual's page of limits holds the same text.
 //!
 //! A known failure does not fail a run; it is printed and counted apart. One that passes again, gets much worse or is
 //! not there any more does: the list cannot rot.
@@ -193,6 +193,7 @@ pub const KNOWN: &[Known] = &[
             timed(&["solver.krylov.forcing", "compaction 2D"], 0.88),
             timed(&["time.initial_guess", "manufactured 2D"], 0.76),
             timed(&["approximation.lme.tolerance", "manufactured 2D"], 0.993),
+            timed(&["approximation.lme.tolerance", "manufactured 3D"], 0.998),
             timed(&["transfer", "Riemann 1D"], 0.995),
             timed(&["combinations", "Riemann 1D"], 0.66),
             timed(&["combinations", "compaction 2D"], 0.87),

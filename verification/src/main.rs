@@ -16,7 +16,7 @@ use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 #[command(version, after_help = studies_list())]
 struct Arguments {
     /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the
-    /// paper: verdicts are kept in verification/FULL.md and README.md, tables in target/verification. `results` are the
+    /// paper: verdicts are kept in verification/FULL.md, README.md and docs/src/limits.md, tables in target/verification. `results` are the
     /// studies of the paper with their tables and pictures, kept in verification/RESULTS.md and verification/results.
     /// `tradeoff` with full effort rewrites verification/TRADEOFF.md
     #[arg(value_name = "STUDY", default_value = "all")]
@@ -111,8 +111,11 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
 fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
     // Before hours are spent; and of the tree as it is before the run writes to it.
-    let of_run =
-        if asked_for(arguments, "full") { Some(Run::starting(&root()).map_err(writing("README.md"))?) } else { None };
+    let of_run = if asked_for(arguments, "full") {
+        Some(Run::starting(&root()).map_err(writing("README.md and docs/src/limits.md"))?)
+    } else {
+        None
+    };
     let mut text = Vec::new();
     let mut findings: Vec<Finding> = Vec::new();
     let mut documents = Vec::new();

@@ -1,5 +1,5 @@
-//! What the last full run leaves in the repository: verification/FULL.md, and two passages of README.md; its tables go
-//! elsewhere.
+//! What the last full run leaves in the repository: verification/FULL.md, a passage of README.md, and one of the manual's limits; its
+//! tables go elsewhere.
 
 use crate::known;
 use crate::report::{Counts, Report, chain, worst};
@@ -109,17 +109,16 @@ impl Run {
     /// A run that starts now, of the tree at `root`.
     ///
     /// # Errors
-    /// If README.md cannot be read or lacks a passage that the run is to write.
+    /// If README.md or the page of limits cannot be read or lacks the passage that the run is to write.
     pub fn starting(root: &Path) -> io::Result<Self> {
-        let readme = fs::read_to_string(root.join("README.md"))?;
-        for name in [LAST_RUN, LIMITS] {
-            passage(&readme, name)?;
+        for (file, name) in [LAST_RUN, LIMITS] {
+            passage(&fs::read_to_string(root.join(file))?, name)?;
         }
         Ok(Self { commit: commit(root), machine: machine() })
     }
 
     /// Leaves the text of the whole run in `target`/verification, whose path is returned, what it came to in
-    /// verification/FULL.md, and its verdict with the list of known failures in README.md.
+    /// verification/FULL.md, its verdict in README.md, and the list of known failures on the page of limits.
     ///
     /// # Errors
     /// Those of reading and writing these files.
@@ -130,9 +129,10 @@ impl Run {
         fs::write(&tables, text)?;
         let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
         fs::write(root.join("verification").join("FULL.md"), self.full(findings, &date))?;
-        let readme = fs::read_to_string(root.join("README.md"))?;
-        let readme = replaced(&readme, LAST_RUN, &self.sentence(findings, &date))?;
-        fs::write(root.join("README.md"), replaced(&readme, LIMITS, &known::markdown())?)?;
+        for ((file, name), by) in [(LAST_RUN, self.sentence(findings, &date)), (LIMITS, known::markdown())] {
+            let text = fs::read_to_string(root.join(file))?;
+            fs::write(root.join(file), replaced(&text, name, &by)?)?;
+        }
         tables.canonicalize()
     }
 
@@ -185,11 +185,11 @@ impl Run {
     }
 }
 
-/// The passage of README.md about the last full run.
-pub const LAST_RUN: &str = "last-full-verification";
+/// The file and the passage about the last full run.
+pub const LAST_RUN: (&str, &str) = ("README.md", "last-full-verification");
 
-/// The passage of README.md that lists the known failures.
-pub const LIMITS: &str = "known-failures";
+/// The file and the passage that lists the known failures.
+pub const LIMITS: (&str, &str) = ("docs/src/limits.md", "known-failures");
 
 /// What stands between `<!-- name -->` and `<!-- /name -->`, each on a line of its own.
 ///

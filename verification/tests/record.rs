@@ -1,4 +1,4 @@
-//! What a full run writes, and that README.md has a place for it and lists the known failures.
+//! What a full run writes, and that README.md and the manual have a place for it and list the known failures.
 
 use std::fs;
 use std::io;
@@ -9,39 +9,46 @@ use verification::report::Listed;
 use verification::studies::Outcome;
 use verification::{Bound, Report, known};
 
-fn readme() -> io::Result<String> {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md"))
+/// The passage of a file under `root`.
+fn written(root: &Path, (file, name): (&str, &str)) -> io::Result<String> {
+    Ok(passage(&fs::read_to_string(root.join(file))?, name)?.to_owned())
+}
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
 #[test]
-fn readme_lists_the_known_failures() -> io::Result<()> {
-    let (text, asked) = (readme()?, known::markdown());
-    assert!(passage(&text, LIMITS)? == asked, "between the lines `{LIMITS}` README.md must say\n\n{asked}");
+fn the_manual_lists_the_known_failures() -> io::Result<()> {
+    let (text, asked) = (written(&repository(), LIMITS)?, known::markdown());
+    assert!(text == asked, "between the lines `{}` {} must say\n\n{asked}", LIMITS.1, LIMITS.0);
     Ok(())
 }
 
 #[test]
 fn readme_says_when_what_was_last_verified() -> io::Result<()> {
-    let text = readme()?;
-    let said = passage(&text, LAST_RUN)?;
+    let said = written(&repository(), LAST_RUN)?;
     for word in ["cargo verify full", "commit", "studies pass", "verification/FULL.md"] {
         assert!(said.contains(word), "{word}: {said}");
     }
     Ok(())
 }
 
-/// An empty folder.
+/// A folder with nothing in it but places for what is written.
 fn folder(name: &str) -> io::Result<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
     fs::create_dir_all(folder.join("verification"))?;
+    fs::create_dir_all(folder.join("docs/src"))?;
+    fs::write(folder.join("README.md"), README)?;
+    fs::write(folder.join("docs/src/limits.md"), MANUAL)?;
     Ok(folder)
 }
 
-const README: &str = "before\n<!-- last-full-verification -->\nold\n<!-- /last-full-verification -->\nbetween\n\
-                      <!-- known-failures -->\n<!-- /known-failures -->\nafter\n";
+const README: &str = "before\n<!-- last-full-verification -->\nold\n<!-- /last-full-verification -->\nafter\n";
+const MANUAL: &str = "before\n<!-- known-failures -->\n<!-- /known-failures -->\nafter\n";
 
 fn findings() -> Vec<Finding> {
     let mut report = Report::new("of three cells", &["what"]);
@@ -56,7 +63,6 @@ fn findings() -> Vec<Finding> {
 #[test]
 fn a_run_leaves_its_verdict_and_puts_its_tables_elsewhere() -> Result<(), Box<dyn std::error::Error>> {
     let root = folder("a_run")?;
-    fs::write(root.join("README.md"), README)?;
     let target = root.join("target");
     let tables = Run::starting(&root)?.keep(&root, &target, &findings(), b"everything")?;
     assert_eq!(fs::read(tables)?, b"everything");
@@ -69,32 +75,27 @@ fn a_run_leaves_its_verdict_and_puts_its_tables_elsewhere() -> Result<(), Box<dy
     ] {
         assert!(full.contains(words), "{words}\n{full}");
     }
-    let text = fs::read_to_string(root.join("README.md"))?;
-    assert!(
-        passage(&text, LAST_RUN)?.contains("FAIL: 1 of 2 studies pass; 1 judged, 1 shown, 1 known failure"),
-        "{text}"
-    );
-    assert_eq!(passage(&text, LIMITS)?, known::markdown());
-    assert!(
-        text.starts_with("before\n<!-- last")
-            && text.contains(" -->\nbetween\n<!-- ")
-            && text.ends_with(" -->\nafter\n"),
-        "{text}"
-    );
+    let said = written(&root, LAST_RUN)?;
+    assert!(said.contains("FAIL: 1 of 2 studies pass; 1 judged, 1 shown, 1 known failure"), "{said}");
+    assert_eq!(written(&root, LIMITS)?, known::markdown());
+    for (file, name) in [LAST_RUN, LIMITS] {
+        let text = fs::read_to_string(root.join(file))?;
+        let around = (format!("before\n<!-- {name} -->\n"), format!("<!-- /{name} -->\nafter\n"));
+        assert!(text.starts_with(&around.0) && text.ends_with(&around.1), "{text}");
+    }
     Ok(())
 }
 
 #[test]
 fn a_tree_with_changes_is_no_commit() -> Result<(), Box<dyn std::error::Error>> {
     let root = folder("no_commit")?;
-    fs::write(root.join("README.md"), README)?;
     let git = |arguments: &[&str]| {
         let settings = ["-c", "user.name=nobody", "-c", "user.email=nobody@example.org", "-c", "commit.gpgsign=false"];
         Command::new("git").args(settings).args(arguments).current_dir(&root).output()
     };
     let said = || -> Result<String, io::Error> {
         Run::starting(&root)?.keep(&root, &root.join("target"), &findings(), b"")?;
-        Ok(passage(&fs::read_to_string(root.join("README.md"))?, LAST_RUN)?.to_owned())
+        written(&root, LAST_RUN)
     };
     for arguments in [&["init", "-q"][..], &["add", "."], &["commit", "-q", "-m", "all"]] {
         assert!(git(arguments)?.status.success(), "git {arguments:?}");
@@ -107,17 +108,16 @@ fn a_tree_with_changes_is_no_commit() -> Result<(), Box<dyn std::error::Error>> 
 }
 
 #[test]
-fn a_readme_without_the_passages_is_refused_before_the_run() -> io::Result<()> {
+fn documents_without_the_passages_are_refused_before_the_run() -> io::Result<()> {
     let root = folder("no_passages")?;
-    let last_run = "<!-- last-full-verification -->\nold\n<!-- /last-full-verification -->\n";
-    for text in [
-        String::new(),
-        README.replace(last_run, ""),
-        README.replace("<!-- /known", "<!-- known"),
-        format!("{README}{last_run}"),
-    ] {
-        fs::write(root.join("README.md"), &text)?;
-        assert!(Run::starting(&root).is_err(), "{text}");
+    for ((file, name), whole) in [(LAST_RUN, README), (LIMITS, MANUAL)] {
+        let end = format!("<!-- /{name} -->");
+        for text in [String::new(), whole.replace(&end, ""), format!("{whole}{end}\n")] {
+            fs::write(root.join(file), &text)?;
+            assert!(Run::starting(&root).is_err(), "{file}: {text}");
+        }
+        fs::write(root.join(file), whole)?;
+        assert!(Run::starting(&root).is_ok(), "{file}");
     }
     Ok(())
 }

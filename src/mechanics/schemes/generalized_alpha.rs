@@ -20,8 +20,10 @@ use std::fmt::{Display, Formatter};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(description = "The generalised-α method; α_m, α_f, β and γ follow from ρ∞.")]
 pub struct GeneralizedAlpha {
-    /// ρ∞ (no unit), 0 to 1: what a step leaves of a vibration much faster than it; 1 damps nothing, 0 ends it in one step.
+    /// The spectral radius ρ∞ (no unit), 0 to 1: the share of a vibration much faster than the time step that is left after one step. 1 damps
+    /// nothing.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub spectral_radius: f64,
 }

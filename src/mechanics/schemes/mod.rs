@@ -54,7 +54,7 @@ pub trait Scheme: Debug + Display + Send + Sync {
     }
 }
 
-/// What a scene writes: the key of a scheme, with its parameters if it has some.
+/// The time scheme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Inertia")]
@@ -62,9 +62,9 @@ pub enum Parameters {
     /// Dynamics, by Newmark's method.
     #[default]
     Newmark,
-    /// Dynamics, by the generalised-α method of Chung and Hulbert, which damps what the time steps do not resolve and is of second order.
+    /// Dynamics, by the generalised-α method of Chung and Hulbert. It is of second order, and damps vibrations that the time step does not resolve.
     GeneralizedAlpha(GeneralizedAlpha),
-    /// Quasi-statics: time only says which loads act and how far prescribed motions have come.
+    /// Statics: time only sets the loads and the prescribed motions.
     None,
     /// Quasi-statics along the path of equilibria, where loads may fall after they have risen (snap-through). The first step brings the loads of
     /// the time `step`; all others are as long as it, in motion, and the column `load` of `history.csv` says which time's loads act. For dead

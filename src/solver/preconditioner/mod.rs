@@ -101,12 +101,12 @@ pub enum Preconditioning {
 }
 
 /// Particles in 1D, 2D and 3D from which on multigrid was the faster one; and with splines, which diagonal blocks serve better: in 3D it is
-/// not at half a million (README, "Speed").
+/// not at half a million (`docs/src/choosing.md`).
 const MANY: [usize; 3] = [500, 10_000, 50_000];
 const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
 
 /// Particles up to which a factorisation, in programs that have it, was the fastest in beams and no slower than what else would be taken in
-/// blocks; in 3D it never was (README, "Only what a scene requires").
+/// blocks; in 3D it never was (`docs/src/choosing.md`).
 const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
 const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
 

@@ -1,0 +1,139 @@
+//! What bodies are filled with: how, where their surface is, and what came of it.
+
+use super::Scene;
+use super::body::Body;
+use super::boundary::Face;
+use crate::grid::{Grid, indices};
+use crate::mechanics::kept::Renewal;
+use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around};
+use crate::simulation::Simulation;
+use crate::tensor::Vector;
+use std::fmt::{Display, Formatter};
+
+/// What a body was filled with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyUse {
+    /// Its name.
+    pub name: String,
+    /// Particles.
+    pub particles: usize,
+    /// Their volume (area in 2D, length in 1D).
+    pub volume: f64,
+    /// Their mass.
+    pub mass: f64,
+    /// The volume of its shape, if it has one.
+    pub drawn: Option<f64>,
+}
+
+impl Display for BodyUse {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Self { name, particles, volume, mass, drawn } = self;
+        write!(f, "{name}: {particles} particles, mass {mass:.6e}, volume {volume:.6}")?;
+        match drawn {
+            Some(drawn) => write!(f, "; its shape's is {drawn:.6}, {:+.2} %", 100.0 * (volume / drawn - 1.0)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Scene {
+    /// How the shape of a body is filled.
+    ///
+    /// ```
+    /// use bfree::shape::Layout;
+    ///
+    /// // Load steps keep their grid, on which Gauss's points stay what they are.
+    /// for (name, layout) in [("elastica", Layout::Gauss), ("rebound", Layout::Regular)] {
+    ///     let scene = bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &[])?;
+    ///     assert_eq!(scene.filling(&scene.bodies[0]).layout, layout);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn filling(&self, body: &Body) -> Filling {
+        let kept = self.grid.renewed(self.time.inertia) != Renewal::EveryStep;
+        let by_itself = if kept && !self.approximation.one_half_width() { Layout::Gauss } else { Layout::Regular };
+        Filling { per_axis: body.particles_per_cell, layout: body.layout.unwrap_or(by_itself), rule: body.fill }
+    }
+
+    /// What its bodies were filled with, beside what is drawn.
+    ///
+    /// ```
+    /// // The paper's disc of radius 1.5: its particles count in full or not at all.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let disc = scene.filled(&scene.build::<2>("scenes".as_ref())?).remove(0);
+    /// assert_eq!((disc.particles, disc.volume), (112, 7.0));
+    /// assert!((disc.drawn.ok_or("a shape")? / (2.25 * std::f64::consts::PI) - 1.0).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn filled<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<BodyUse> {
+        let (grid, particles) = (&simulation.grid, &simulation.particles);
+        let drawn = |shape: &super::shape::Shape| {
+            let (shape, edges) = (shape.build::<D>()?, Vector::repeat(grid.spacing));
+            let (first, count) = around(grid, &shape);
+            let lower = |cell: [u64; D]| grid.position(std::array::from_fn(|k| (first[k] + cell[k]) as u32));
+            Some(indices(count).map(|cell| shape.part(&lower(cell), &edges, grid.spacing).0).sum::<f64>())
+        };
+        let of = |(number, body): (usize, &Body)| {
+            let own =
+                || (0..particles.len()).filter(|&p| particles.body[p] as usize == number && particles.is_solid(p));
+            BodyUse {
+                name: body.name.clone(),
+                particles: own().count(),
+                volume: own().map(|p| particles.volume[p]).sum(),
+                mass: own().map(|p| particles.mass[p]).sum(),
+                drawn: body.shape.as_ref().and_then(drawn),
+            }
+        };
+        self.bodies.iter().enumerate().map(of).collect()
+    }
+
+    /// The surface of a body in the boxes of its particles. Where the box ends and holds the motion across, the body goes on: a plane
+    /// of symmetry is no surface.
+    pub(super) fn facets<const D: usize>(
+        &self,
+        body: &Body,
+        shape: &Shape<D>,
+        region: Option<&Shape<D>>,
+        grid: &Grid<D>,
+    ) -> Vec<Facet<D>> {
+        let (h, n) = (grid.spacing, u64::from(body.particles_per_cell));
+        let edges = Vector::repeat(h / n as f64);
+        let (first, count) = around(grid, shape);
+        let goes_on = |facet: &Facet<D>| {
+            (0..2 * D).any(|face| {
+                let (k, upper) = (face / 2, face % 2 == 1);
+                let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
+                let there = (facet.position[k] - wall).abs() < HAIR * h && facet.normal[k] * outward > 0.5;
+                there && self.boundary.face(k, upper).holds_across(k)
+            })
+        };
+        let mut facets = Vec::new();
+        for cell in indices(count) {
+            let corner: Vector<f64, D> = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
+            let middle = corner.add_scalar(0.5 * h);
+            if shape.signed_distance(&middle).abs() > h * (D as f64).sqrt() {
+                continue;
+            }
+            for i in indices([n; D]) {
+                let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
+                facets.extend(shape.facets(region, &lower, &edges, h));
+            }
+        }
+        facets.retain(|facet| !goes_on(facet));
+        facets
+    }
+}
+
+impl Face {
+    /// Whether it prescribes the component across the face.
+    fn holds_across(&self, axis: usize) -> bool {
+        match self {
+            Self::Free => false,
+            Self::Sliding | Self::Fixed => true,
+            Self::Held(components) => components.get(axis) == Some(&true),
+            Self::Displacement(table) | Self::Velocity(table) => {
+                table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
+            }
+        }
+    }
+}

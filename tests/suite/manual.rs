@@ -1,0 +1,314 @@
+//! The manual: links lead somewhere, files that are named are there, the book lists its pages, and its page of keys is that of the schema.
+
+use crate::support::Failure;
+use bfree::scene;
+use bfree::scene::accuracy::levels;
+use pulldown_cmark::{BrokenLink, CodeBlockKind, Event, LinkType, Options, Parser, Tag, TagEnd};
+use serde_json::Value;
+use std::collections::{BTreeSet, VecDeque};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Documents beside the book.
+const DOCUMENTS: [&str; 7] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "tests/reference/README.md",
+    "verification/FULL.md",
+    "verification/RESULTS.md",
+    "verification/TRADEOFF.md",
+];
+
+/// Folders whose files are named in running text by their whole path.
+const FOLDERS: [&str; 9] = [".ci", "benches", "docs", "examples", "scenes", "schemas", "src", "tests", "verification"];
+
+/// A file of the repository.
+pub fn in_repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// What the tests look for in a document.
+#[derive(Default)]
+pub struct Page {
+    /// Where links and pictures lead.
+    links: Vec<String>,
+    /// Links to labels that nothing defines.
+    undefined: Vec<String>,
+    /// What links may lead to in it.
+    anchors: BTreeSet<String>,
+    /// Code in running text.
+    code: Vec<String>,
+    /// Fenced blocks: what stands behind the fence, and their text.
+    pub blocks: Vec<(String, String)>,
+}
+
+impl Page {
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let (mut page, mut undefined) = (Self::default(), Vec::new());
+        let mut note = |link: BrokenLink<'_>| {
+            if matches!(link.link_type, LinkType::Reference | LinkType::ReferenceUnknown) {
+                undefined.push(link.reference.to_string());
+            }
+            None
+        };
+        let (mut heading, mut block) = (None::<String>, None::<(String, String)>);
+        for event in Parser::new_with_broken_link_callback(&text, Options::ENABLE_TABLES, Some(&mut note)) {
+            match event {
+                Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => {
+                    page.links.push(dest_url.to_string());
+                }
+                Event::Start(Tag::Heading { .. }) => heading = Some(String::new()),
+                Event::End(TagEnd::Heading(_)) => {
+                    page.anchors.extend(heading.take().map(|heading| anchor(&heading)));
+                }
+                Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(info))) => {
+                    block = Some((info.to_string(), String::new()));
+                }
+                Event::End(TagEnd::CodeBlock) => page.blocks.extend(block.take()),
+                Event::Text(text) => {
+                    let block = block.as_mut().map(|(_, block)| block);
+                    heading.as_mut().or(block).into_iter().for_each(|part| part.push_str(&text));
+                }
+                Event::Code(code) => {
+                    heading.iter_mut().for_each(|heading| heading.push_str(&code));
+                    page.code.push(code.to_string());
+                }
+                _ => {}
+            }
+        }
+        page.undefined = undefined;
+        Ok(page)
+    }
+}
+
+/// The anchor of a heading, as mdBook and the usual sites make it.
+fn anchor(heading: &str) -> String {
+    let kept = |c: char| match c {
+        ' ' => Some('-'),
+        c if c.is_alphanumeric() || c == '-' || c == '_' => Some(c.to_ascii_lowercase()),
+        _ => None,
+    };
+    heading.chars().filter_map(kept).collect()
+}
+
+/// All pages of the book but its table of contents.
+fn book() -> Result<Vec<PathBuf>, Failure> {
+    let (mut pages, mut folders) = (Vec::new(), vec![in_repository("docs/src")]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "md") && !path.ends_with("SUMMARY.md") {
+                pages.push(path);
+            }
+        }
+    }
+    pages.sort();
+    Ok(pages)
+}
+
+#[test]
+fn every_link_leads_somewhere() -> Result<(), Failure> {
+    let (source, mut pages) = (in_repository("docs/src").canonicalize()?, book()?);
+    pages.extend(DOCUMENTS.map(in_repository));
+    pages.push(source.join("SUMMARY.md"));
+    let (mut wrong, mut followed) = (Vec::new(), 0);
+    for file in &pages {
+        let (page, file) = (Page::read(file)?, file.canonicalize()?);
+        let mut refuse = |link: &str, why: &str| wrong.push(format!("{}: {link}: {why}", file.display()));
+        page.undefined.iter().for_each(|link| refuse(link, "no such label"));
+        for link in page.links.iter().filter(|link| !link.contains("://")) {
+            let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target =
+                if path.is_empty() { Ok(file.clone()) } else { file.with_file_name("").join(path).canonicalize() };
+            followed += 1;
+            match target {
+                Err(error) => refuse(link, &error.to_string()),
+                // The book is a folder of its own when it is built.
+                Ok(target) if file.starts_with(&source) && !target.starts_with(&source) => {
+                    refuse(link, "not in the book")
+                }
+                Ok(target) if !anchor.is_empty() && !Page::read(&target)?.anchors.contains(anchor) => {
+                    refuse(link, "no such heading")
+                }
+                Ok(_) => {}
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(followed > 50, "{followed}");
+    Ok(())
+}
+
+#[test]
+fn files_that_are_named_are_there() -> Result<(), Failure> {
+    let mut pages = book()?;
+    pages.extend(["README.md", "CONTRIBUTING.md"].map(in_repository));
+    let (mut wrong, mut found) = (Vec::new(), 0);
+    for file in pages {
+        let whole = |code: &String| {
+            let in_folder = code.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+            in_folder && !code.contains("NAME") && code.chars().all(|c| c.is_ascii_alphanumeric() || "./_-".contains(c))
+        };
+        for code in Page::read(&file)?.code.into_iter().filter(whole) {
+            found += 1;
+            if !in_repository(&code).exists() {
+                wrong.push(format!("{}: `{code}`", file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(found > 50, "{found}");
+    Ok(())
+}
+
+#[test]
+fn the_book_lists_all_its_pages() -> Result<(), Failure> {
+    let source = in_repository("docs/src");
+    let mut listed: Vec<PathBuf> =
+        Page::read(&source.join("SUMMARY.md"))?.links.iter().map(|link| source.join(link)).collect();
+    listed.sort();
+    assert_eq!(listed, book()?);
+    Ok(())
+}
+
+#[test]
+fn the_page_of_keys_is_that_of_the_schema() -> Result<(), Failure> {
+    let (path, asked) = (in_repository("docs/src/scenes.md"), keys());
+    if std::env::var_os("BFREE_WRITE_SCHEMA").is_some() {
+        std::fs::write(&path, &asked)?;
+    }
+    let stored = std::fs::read_to_string(&path)?;
+    assert!(stored == asked, "renew it: BFREE_WRITE_SCHEMA=1 cargo test --release --test suite schema");
+    Ok(())
+}
+
+/// The table of `accuracy`, row by row.
+#[test]
+fn the_manual_gives_the_levels_of_accuracy() -> Result<(), Failure> {
+    let page = std::fs::read_to_string(in_repository("docs/src/choosing.md"))?;
+    for level in levels() {
+        let named = level.name.map_or_else(|| format!("{{\"error\": {}}}", level.error), |name| format!("{name:?}"));
+        let percent = (level.error * 1e6).round() / 1e4;
+        let row = format!("| `{named}` | {percent} % | {} | {} |\n", level.cells, level.courant);
+        assert!(page.contains(&row), "not in the page: {row}");
+    }
+    Ok(())
+}
+
+/// What stands above the keys.
+const ABOUT_SCENES: &str = "\
+# Scenes
+
+<!-- Written from the schema: BFREE_WRITE_SCHEMA=1 cargo test --release --test suite schema -->
+
+A scene is one JSON file. This page lists every key. It is generated from the schema, `schemas/scene.schema.json`, which `bfree schema`
+prints too; `bfree new` writes it beside a scene, so that editors complete and explain the keys.
+
+Units are your own consistent set, such as m, kg, s or mm, t, s. Lists of numbers have one entry per dimension of the grid. Where
+`accuracy` is given, `grid.spacing` and `time.step` may be left out.
+
+`bfree check SCENE` validates a scene and says what it needs. On the command line `--set KEY.PATH=JSON` replaces a key:
+`--set grid.spacing=0.25`, `--set bodies.0.density=2`.
+";
+
+/// The page: the scene, then every type in the order in which it is met.
+fn keys() -> String {
+    let schema = scene::schema().to_value();
+    let mut writer = Writer { text: ABOUT_SCENES.to_owned(), met: BTreeSet::new(), next: VecDeque::new() };
+    writer.section("The scene", &schema);
+    while let Some(name) = writer.next.pop_front() {
+        writer.section(&name, &schema["$defs"][&name]);
+    }
+    writer.text
+}
+
+struct Writer {
+    text: String,
+    met: BTreeSet<String>,
+    next: VecDeque<String>,
+}
+
+impl Writer {
+    fn section(&mut self, name: &str, schema: &Value) {
+        // Writing to a string cannot fail.
+        let _ = write!(self.text, "\n## {name}\n\n{}\n", about(schema));
+        if let Some(variants) = schema["oneOf"].as_array() {
+            self.text.push_str("\n| write | where | |\n|---|---|---|\n");
+            for variant in variants {
+                self.variant(variant);
+            }
+        } else if let Some(keys) = schema["properties"].as_object() {
+            self.text.push_str("\n| key | value | |\n|---|---|---|\n");
+            let required = required(schema);
+            for (key, value) in keys {
+                let must = if required.contains(&key.as_str()) { "**Required.** " } else { "" };
+                let kind = self.kind(value);
+                self.row(&format!("`{key}`"), &kind, &format!("{must}{}", about(value)));
+            }
+        } else {
+            let kind = self.kind(schema);
+            let _ = writeln!(self.text, "\nA {kind}.");
+        }
+    }
+
+    /// A word, or an object with one key.
+    fn variant(&mut self, variant: &Value) {
+        let key = variant["properties"].as_object().and_then(|keys| keys.iter().next());
+        match (variant["const"].as_str(), key) {
+            (Some(word), _) => self.row(&format!("`{}`", Value::from(word)), "", &about(variant)),
+            (None, Some((key, value))) => {
+                let parts = value["properties"].as_object();
+                let kind = if parts.is_some() { String::new() } else { format!("… is {}", self.kind(value)) };
+                self.row(&format!("`{{\"{key}\": …}}`"), &kind, &about(variant));
+                for (part, value) in parts.into_iter().flatten() {
+                    let kind = self.kind(value);
+                    self.row(&format!("`{key}.{part}`"), &kind, &about(value));
+                }
+            }
+            (None, None) => {}
+        }
+    }
+
+    fn row(&mut self, first: &str, second: &str, third: &str) {
+        // A bar would end the cell, in code too.
+        let cell = |text: &str| text.replace('|', "\\|");
+        let _ = writeln!(self.text, "| {} | {} | {} |", cell(first), cell(second), cell(third));
+    }
+
+    /// What may be written for a value; a type with a section of its own is linked, and its section is due.
+    fn kind(&mut self, schema: &Value) -> String {
+        if let Some(name) = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/")) {
+            if self.met.insert(name.to_owned()) {
+                self.next.push_back(name.to_owned());
+            }
+            return format!("[{name}](#{})", anchor(name));
+        }
+        if let Some(one) = schema["anyOf"].as_array().and_then(|any| any.iter().find(|one| one["type"] != "null")) {
+            return self.kind(one);
+        }
+        if let Some(parts) = schema["prefixItems"].as_array() {
+            let parts: Vec<String> = parts.iter().map(|part| self.kind(part)).collect();
+            return format!("pair: {}", parts.join(", "));
+        }
+        let name = schema["type"].as_str().or_else(|| schema["type"].as_array().and_then(|types| types[0].as_str()));
+        match name {
+            Some("array") => format!("list of {}", self.kind(&schema["items"])),
+            Some("string") => "text".to_owned(),
+            Some("boolean") => "true or false".to_owned(),
+            Some(name) => name.to_owned(),
+            None => String::new(),
+        }
+    }
+}
+
+fn about(schema: &Value) -> String {
+    schema["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn required(schema: &Value) -> Vec<&str> {
+    schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect()
+}

@@ -1,0 +1,138 @@
+//! The tutorials, as a reader does them: the commands of a page in an empty folder, and what it says comes out.
+
+use crate::manual::{Page, in_repository};
+use crate::support::Failure;
+use std::path::Path;
+use std::process::Command;
+
+/// How far, relative to the known answer, a number in the text may be from the one that came out: it is rounded.
+const ROUNDED: f64 = 1e-3;
+
+/// Runs every block of commands of a page in `folder`, with the program where the shell finds it.
+fn follow(page: &Page, folder: &Path) -> Result<(), Failure> {
+    let program = Path::new(env!("CARGO_BIN_EXE_bfree")).parent().ok_or("no folder")?;
+    let path = std::env::join_paths(
+        std::iter::once(program.to_owned()).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
+    )?;
+    for (_, commands) in page.blocks.iter().filter(|(kind, _)| kind == "sh") {
+        let output = Command::new("bash")
+            .args(["-euo", "pipefail", "-c", commands])
+            .env("PATH", &path)
+            .current_dir(folder)
+            .output()?;
+        assert!(output.status.success(), "{commands}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    Ok(())
+}
+
+/// A row of the table of a tutorial: `` | `FILE`: `COLUMN` | time | known | bfree | error | ``.
+struct Claim {
+    file: String,
+    column: String,
+    time: f64,
+    known: f64,
+    found: f64,
+    error: f64,
+}
+
+fn number(text: &str) -> Result<f64, Failure> {
+    Ok(text.replace('−', "-").parse().map_err(|error| format!("`{text}`: {error}"))?)
+}
+
+fn claims(text: &str) -> Result<Vec<Claim>, Failure> {
+    let mut claims = Vec::new();
+    for line in text.lines().filter(|line| line.starts_with("| `out/")) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let [place, time, known, found, error] = cells[..] else { return Err(line.into()) };
+        let (file, column) = place.split_once(": ").ok_or(line)?;
+        let unquoted = |code: &str| code.trim_matches('`').to_owned();
+        let error = number(error.strip_suffix(" %").ok_or(line)?)? / 100.0;
+        claims.push(Claim {
+            file: unquoted(file),
+            column: unquoted(column),
+            time: number(time)?,
+            known: number(known)?,
+            found: number(found)?,
+            error,
+        });
+    }
+    Ok(claims)
+}
+
+/// The value of a column of a table of results at a time.
+fn value(table: &str, column: &str, time: f64) -> Option<f64> {
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next()?.split(',').collect();
+    let place = |name: &str| header.iter().position(|one| *one == name);
+    let (at, of) = (place("time")?, place(column)?);
+    let mut rows = lines.map(|line| line.split(',').map(str::parse::<f64>).collect::<Vec<_>>());
+    let row = rows.find(|row| row[at].as_ref().is_ok_and(|t| (t - time).abs() < 1e-9 * time.abs()))?;
+    row[of].as_ref().ok().copied()
+}
+
+/// Does a tutorial, and compares what comes out, which is returned, with what it says and with the known answers.
+fn tutorial<const ROWS: usize>(name: &str) -> Result<[f64; ROWS], Failure> {
+    let (file, folder) = (in_repository(&format!("docs/src/tutorial/{name}.md")), tempfile::tempdir()?);
+    follow(&Page::read(&file)?, folder.path())?;
+    let claims = claims(&std::fs::read_to_string(&file)?)?;
+    let mut values = Vec::new();
+    for Claim { file, column, time, known, found, error } in claims {
+        let table = std::fs::read_to_string(folder.path().join(&file))?;
+        let came_out = value(&table, &column, time).ok_or_else(|| format!("{file}: no {column} at {time}"))?;
+        let what = format!("{file}, {column} at t = {time}: {came_out}; {known} is known, the text says {found}");
+        assert!((came_out - found).abs() <= ROUNDED * known.abs(), "{what}");
+        assert!((came_out - known).abs() <= error * known.abs(), "{what}, within {error}");
+        values.push(came_out);
+    }
+    values.try_into().map_err(|values: Vec<f64>| format!("{name} has a table of {} rows", values.len()).into())
+}
+
+#[test]
+fn a_beam_bends_as_the_elastica() -> Result<(), Failure> {
+    tutorial::<4>("beam").map(drop)
+}
+
+#[test]
+fn cook_s_membrane_nears_the_elements() -> Result<(), Failure> {
+    let [_, fine, finer] = tutorial("membrane")?;
+    // Of first order: extrapolated to h = 0, as the text does.
+    let extrapolated = 2.0 * finer - fine;
+    assert!((extrapolated / 14.505 - 1.0).abs() < 1e-3, "{extrapolated}");
+    Ok(())
+}
+
+#[test]
+fn a_ring_under_pressure_nears_lame() -> Result<(), Failure> {
+    tutorial::<4>("ring").map(drop)
+}
+
+#[test]
+fn a_cylinder_rebounds() -> Result<(), Failure> {
+    tutorial::<4>("rebound").map(drop)
+}
+
+/// The example is a member of the workspace, so that `cargo test --workspace` runs its tests.
+#[test]
+fn the_code_of_the_own_law_is_that_of_the_example() -> Result<(), Failure> {
+    let page = Page::read(&in_repository("docs/src/tutorial/own_law.md"))?;
+    let example = std::fs::read_to_string(in_repository("examples/own_law/src/lib.rs"))?;
+    let code: Vec<&String> = page.blocks.iter().filter(|(kind, _)| kind == "rust").map(|(_, code)| code).collect();
+    assert_eq!(code.len(), 3);
+    for code in code {
+        assert!(example.contains(code.as_str()), "not in the example:\n{code}");
+    }
+    Ok(())
+}
+
+/// The scene of the README, written to the file that its command runs.
+#[test]
+fn the_readme_s_scene_runs() -> Result<(), Failure> {
+    let (page, folder) = (Page::read(&in_repository("README.md"))?, tempfile::tempdir()?);
+    let (_, scene) = page.blocks.iter().find(|(kind, _)| kind == "json").ok_or("no scene")?;
+    std::fs::write(folder.path().join("drop.json"), scene)?;
+    let mut run = Command::new(env!("CARGO_BIN_EXE_bfree"));
+    let output = run.args(["run", "drop.json", "--quiet"]).current_dir(&folder).output()?;
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(folder.path().join("out/drop/history.csv").exists());
+    Ok(())
+}
