@@ -29,7 +29,8 @@ pub struct Ghost {
 impl Ghost {
     pub(super) fn of<const D: usize, L: Law>(step: &Step<'_, D, L>) -> Option<Self> {
         let at_all = step.ghost > 0.0;
-        if !at_all && step.loads.surface.is_empty() {
+        let mut points = step.loads.surface.iter().flat_map(|load| &load.points);
+        if !at_all && points.all(|point| step.particles.is_solid(point.particle)) {
             return None;
         }
         let (grid, nodes) = (step.supports.grid(), step.supports.active());

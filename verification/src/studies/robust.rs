@@ -232,19 +232,16 @@ fn elastica() -> Result<Report, StudyError> {
     let overrides = ["grid.spacing=0.125", "output.probes=[]"];
     let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
     let start = simulation.particles.by_id().position;
-    let last = start.iter().fold(0.0_f64, |last, x| last.max(x[0]));
-    let (length, distance) = (20.0, 2.0 * (20.0 - last));
+    let length = 20.0;
     for (load, along, down) in ELASTICA {
         while simulation.clock.nominal_steps() < load {
             simulation.advance()?;
         }
-        let now = simulation.particles.by_id().position;
-        let mean = |x: f64| {
-            let at: Vec<_> = (0..now.len()).filter(|&p| (start[p][0] - x).abs() < 0.1 * distance).collect();
-            at.iter().map(|&p| now[p] - start[p]).sum::<Vector<f64, 2>>() / at.len() as f64
-        };
-        // The end is half a particle beyond the last ones.
-        let end = (mean(last) * 1.5 - mean(last - distance) * 0.5) / -length;
+        // The mean over the points of the load.
+        let now = simulation.particles.by_id();
+        let at: Vec<_> = (0..now.len()).filter(|&p| !now.is_solid(p)).collect();
+        let moved: Vector<f64, 2> = at.iter().map(|&p| now.position[p] - start[p]).sum();
+        let end = moved / (at.len() as f64 * -length);
         for (quantity, found, exact) in [("u/L", end[0], along), ("w/L", end[1], down)] {
             let labels = [&format!("{quantity}: error over w/L")[..], &load.to_string()];
             report.push(&labels, (found - exact).abs() / down, Bound::AtMost(BEAM));
