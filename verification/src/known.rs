@@ -146,14 +146,6 @@ pub const KNOWN: &[Known] = &[
         cells: &[short_effort(&["linear, D = 3", "eps = 0: momentum"], 1.1e-12)],
     },
     Known {
-        study: "column",
-        what: "the column of LME 1.4 in one load step: order of the stress from 40 to 80 cells; 0.95 asked, 1 by theory",
-        why: "Not known: it falls from 1.27 and 1.13 before. The displacement keeps to order 2.",
-        since: "22 November 2026",
-        factor: 1.05,
-        cells: &[full_effort(&["order of the stress", "LME 1.4", "1"], 0.9441)],
-    },
-    Known {
         study: "order",
         what: "a block of J from 0.3 to 1.7 on 32 cells, 2 x 2 particles in each, the grid renewed after half of the load: error of the \
                stress; 0.05 and 0.01 asked, what a prototype left",
