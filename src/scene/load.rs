@@ -35,39 +35,39 @@ pub struct Profile {
     pub factor: Curve,
 }
 
-/// A force per reference area that keeps its direction, on the particles less than one particle spacing below a body's surface.
-/// A particle in an edge or a corner carries the area of each loaded face.
+/// A force per reference area that keeps its direction. It acts on points of the body's surface, one for each side of a particle's box
+/// there, that go along with the body. Planes of symmetry (faces of the box that hold the motion across) are no surface.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded: what of it lies in this region. (Where `surface` is given, the particles that do.)
-    /// Default: all of it.
+    /// The part of the surface that is loaded: what of it lies in this region. For one face alone, a `half_space` that begins on it; what
+    /// reaches below loads the sides there too. (Where `surface` is given, the particles that lie in it.) Default: all of it.
     pub region: Option<Shape>,
     /// The force per reference area (stress).
     pub traction: Vec<f64>,
     /// A factor in time. Default: 1.
     pub curve: Option<Curve>,
-    /// Normal and area of the loaded particles; needed for bodies read from a file, otherwise found from the shape.
+    /// Normal and area of particles that carry the load themselves: needed for bodies read from a file, otherwise found from the shape.
     pub surface: Option<Surface>,
 }
 
-/// A pressure that follows the surface, on the particles less than one particle spacing below a body's surface. A particle in an
-/// edge or a corner carries the area of each loaded face.
+/// A pressure that follows the surface. It acts on points of the body's surface, one for each side of a particle's box there, that go
+/// along with the body. Planes of symmetry (faces of the box that hold the motion across) are no surface.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pressure {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded: what of it lies in this region. (Where `surface` is given, the particles that do.)
-    /// Default: all of it.
+    /// The part of the surface that is loaded: what of it lies in this region. For one face alone, a `half_space` that begins on it; what
+    /// reaches below loads the sides there too. (Where `surface` is given, the particles that lie in it.) Default: all of it.
     pub region: Option<Shape>,
     /// The pressure on the deformed surface (stress); positive pushes inwards.
     pub pressure: f64,
     /// A factor in time. Default: 1.
     pub curve: Option<Curve>,
-    /// Normal and area of the loaded particles; needed for bodies read from a file, otherwise found from the shape.
+    /// Normal and area of particles that carry the load themselves: needed for bodies read from a file, otherwise found from the shape.
     pub surface: Option<Surface>,
 }
 

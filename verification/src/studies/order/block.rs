@@ -45,7 +45,7 @@ impl Case {
 /// of O(h) in the stress over a layer of width h, 1.5 in the mean square, and 2.5 of the displacement, if the particles are Gauss points of
 /// the pieces; if they are not, their sums leave the displacement 2. Quadratic functions have their kinks in the middle of cells.
 ///
-/// After a renewal, what a prototype (robust.md) found not to fall with h any more, with 2 × 2 regular particles.
+/// After a renewal, what an independent prototype found not to fall with h any more, with 2 × 2 regular particles.
 fn curved() -> Vec<Case> {
     let (lme, wide) = (Lme::new(3.0, 1e-6), Lme::new(1.4, 1e-6));
     let (quadratic, cubic) = (Bspline::Quadratic, Bspline::Cubic);
