@@ -167,19 +167,6 @@ pub const KNOWN: &[Known] = &[
         cells: &[full_effort(&["iterations", "block", "2", "LME 1.4", "0.0125"], 22.67)],
     },
     Known {
-        study: "robust",
-        what: "linear iterations with multigrid, two bodies of contrast 1e4 that meet inside of cells; 50 asked",
-        why: "A sliver of the stiff body, a tenth of a cell, stands in cells of the soft one, and coarse grids average both.",
-        since: "22 November 2026",
-        factor: 1.3,
-        cells: &[
-            short_effort(&["contrast 1e4", "quadratic", "upper body stiffer"], 70.33),
-            short_effort(&["contrast 1e4", "cubic", "upper body stiffer"], 414.3),
-            short_effort(&["contrast 1e4", "LME 1.4", "upper body stiffer"], 411.3),
-            short_effort(&["contrast 1e4", "LME 1.4", "lower body stiffer"], 72.67),
-        ],
-    },
-    Known {
         study: "tradeoff",
         what: "a default beside what errs no more, in work: the work of that over the default's, beyond its scatter; 1 asked \
                (seconds decide: on a busy machine they may pass)",

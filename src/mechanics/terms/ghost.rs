@@ -74,7 +74,8 @@ impl Ghost {
                 if !at_all && least > EMPTY {
                     continue;
                 }
-                let softest = all.into_iter().map(modulus).fold(softest_body, f64::min);
+                let of_all = all.into_iter().map(modulus).fold(f64::INFINITY, f64::min);
+                let softest = if of_all.is_finite() { of_all } else { softest_body };
                 if softest.is_finite() {
                     let factor = if at_all { step.ghost } else { OF_EMPTY };
                     let stiffness = factor * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
