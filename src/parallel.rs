@@ -73,6 +73,26 @@ pub(crate) fn sort<K: Ord + Send>(keys: &mut [K]) {
     keys.par_sort_unstable();
 }
 
+/// Of several failures, of any threads, the one with the smallest number.
+pub(crate) struct First<E>(Mutex<Option<(usize, E)>>);
+
+impl<E> First<E> {
+    pub(crate) fn none() -> Self {
+        Self(Mutex::new(None))
+    }
+
+    pub(crate) fn keep(&self, number: usize, error: E) {
+        let mut first = held(&self.0);
+        if first.as_ref().is_none_or(|(before, _)| number < *before) {
+            *first = Some((number, error));
+        }
+    }
+
+    pub(crate) fn check(self) -> Result<(), E> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), |(_, error)| Err(error))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,14 +1,18 @@
 //! What bodies are filled with: how, where their surface is, and what came of it.
 
-use super::Scene;
 use super::body::Body;
 use super::boundary::Face;
+use super::build::{dimension, vector};
+use super::particle_file;
+use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
 use crate::mechanics::kept::Renewal;
-use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around};
+use crate::particles::Particles;
+use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around, fill};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use std::fmt::{Display, Formatter};
+use std::path::Path;
 
 /// What a body was filled with.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +40,96 @@ impl Display for BodyUse {
     }
 }
 
+/// What bodies are filled from and into.
+pub(super) struct Means<'a> {
+    /// Where particle files are.
+    pub folder: &'a Path,
+    /// Bytes that can be had.
+    pub memory: u64,
+}
+
+impl Means<'_> {
+    /// Room for `more` particles. A step needs the state at its start, as much for that at its end, and shape functions and
+    /// frozen tangents that are larger still: what it needs in all is known once the shape functions are, and less than this never.
+    pub fn make_room<const D: usize>(
+        &self,
+        path: &str,
+        particles: &mut Particles<D>,
+        more: usize,
+    ) -> Result<(), BuildError> {
+        let count = particles.len() + more;
+        let (needed, memory) = (3 * (count * Particles::<D>::BYTES) as u64, self.memory);
+        if needed > memory {
+            return Err(BuildError::Memory { path: path.to_owned(), particles: count, needed, memory });
+        }
+        particles.reserve(more);
+        Ok(())
+    }
+}
+
 impl Scene {
+    /// The particles of body `number`, behind those before it.
+    pub(super) fn fill<const D: usize>(
+        &self,
+        body: &Body,
+        path: &str,
+        means: &Means<'_>,
+        grid: &Grid<D>,
+        number: u32,
+        particles: &mut Particles<D>,
+    ) -> Result<(), BuildError> {
+        let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
+            let mass = body.density * volume;
+            if self.time.inertia.has_inertia() {
+                particles.push(x, velocity, volume, mass, number)
+            } else {
+                particles.push_without_inertia(x, volume, mass, number)
+            }
+        };
+        let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
+        if let Some(shape) = &body.shape {
+            let path = format!("{path}.shape");
+            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let velocity = common.unwrap_or_else(Vector::zeros);
+            let seeds = fill(grid, &shape, self.filling(body))
+                .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
+            means.make_room(&path, particles, seeds.len())?;
+            for seed in seeds {
+                push(particles, seed.position, velocity, seed.volume);
+            }
+        } else if let Some(file) = &body.particles {
+            let path = format!("{path}.particles.file");
+            let place = means.folder.join(&file.file);
+            let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
+                path: path.clone(),
+                file: place.display().to_string(),
+                source: Box::new(source),
+            })?;
+            if read.velocities.is_some() {
+                let why = if !self.time.inertia.has_inertia() {
+                    Some("there is no inertia; remove its columns vx, … or the key time.inertia")
+                } else {
+                    let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
+                    self.initial_velocity.as_ref().map(|_| twice)
+                };
+                if let Some(why) = why {
+                    return Err(BuildError::Velocities { path, file: place.display().to_string(), why });
+                }
+            }
+            means.make_room(&path, particles, read.positions.len())?;
+            for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
+                if !grid.contains(x) {
+                    let position = x.iter().copied().collect();
+                    return Err(BuildError::Outside { path, particle: k + 1, position });
+                }
+                let own = read.velocities.as_ref().map(|velocities| velocities[k]);
+                let velocity = common.or(own).unwrap_or_else(Vector::zeros);
+                push(particles, *x, velocity, volume);
+            }
+        }
+        Ok(())
+    }
+
     /// How the shape of a body is filled.
     ///
     /// ```

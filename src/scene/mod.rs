@@ -18,7 +18,9 @@ pub mod time;
 pub mod transfer;
 
 mod build;
+mod build_error;
 mod filling;
+mod loading;
 mod overrides;
 mod place;
 mod read;
@@ -26,7 +28,7 @@ mod scale;
 mod suggest;
 
 pub use crate::problems::{Place, Problem, Problems};
-pub use build::BuildError;
+pub use build_error::BuildError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};

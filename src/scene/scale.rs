@@ -1,8 +1,8 @@
 //! Whether the numbers that a step forms fit into floating point: forces are squared for norms, moduli multiplied by volumes.
 
+use super::BuildError;
 use super::Scene;
 use super::boundary::{Face, Table};
-use super::build::BuildError;
 use super::load::Curve;
 use crate::material::p_wave_modulus;
 use crate::mechanics::loads::Pressing;

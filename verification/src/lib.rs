@@ -22,6 +22,7 @@ pub mod random;
 pub mod record;
 pub mod report;
 pub mod riemann;
+mod settling;
 pub mod sheet;
 pub mod shipped;
 pub mod start;

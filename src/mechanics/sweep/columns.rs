@@ -3,8 +3,8 @@
 //! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, each
 //! particle asks for its list.
 
-use super::WIDEST;
 use super::lanes::{LANES, Lanes, Widest, WithLanes};
+use super::supports::WIDEST;
 use crate::approximation::{
     self, ApproximationError, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED, Separable,
     Shipped,

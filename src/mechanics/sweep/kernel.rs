@@ -9,6 +9,8 @@
 use super::Flow;
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::{Arithmetic, Real};
+use crate::tensor::Vector;
+use nalgebra::SMatrix;
 use num_traits::One;
 
 /// The widest window along x of a group of neighbouring cells, and the widest tile that a kernel sums at a time.
@@ -54,6 +56,13 @@ impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
     #[inline(always)]
     pub fn zero() -> Self {
         Self { value: [[X::zero(); LANES]; C], gradient: [[[X::zero(); LANES]; D]; C] }
+    }
+
+    /// u and L of one particle.
+    #[inline(always)]
+    pub fn lane(&self, lane: usize) -> (Vector<X, C>, SMatrix<X, C, D>) {
+        let value = Vector::from_fn(|c, _| self.value[c][lane]);
+        (value, SMatrix::from_fn(|c, k| self.gradient[c][k][lane]))
     }
 }
 

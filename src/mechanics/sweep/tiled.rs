@@ -3,16 +3,17 @@
 //! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
+use super::SupportError;
 use super::block::{Block, Group};
 use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::lanes::LANES;
 use super::order::{self, Key};
-use super::{First, SupportError};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::parallel;
+use crate::parallel::First;
 use crate::tensor::Vector;
 
 /// Shape functions of all particles, by axis.

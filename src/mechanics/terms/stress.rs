@@ -5,7 +5,8 @@ use super::{
 };
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{First, Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
+use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
+use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 

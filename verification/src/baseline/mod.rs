@@ -5,15 +5,11 @@
 
 mod b_free;
 mod blocks;
-#[cfg(feature = "direct")]
-mod direct;
 mod problem;
 mod voigt;
 
 pub use b_free::BFree;
 pub use blocks::{BlockMatrix, Pattern, TooManyBlocks};
-#[cfg(feature = "direct")]
-pub use direct::{DirectError, solve};
 pub use problem::Assembled;
 pub use voigt::Voigt;
 

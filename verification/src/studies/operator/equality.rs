@@ -1,6 +1,7 @@
 //! The same answer from the fast and the plain sweep, for every law, shape function and D.
 
-use super::block::{General, block, lame};
+use super::general::General;
+use crate::settling::{block, lame};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use crate::studies::StudyError;

@@ -2,8 +2,8 @@
 //!
 //! Short effort compares answers and counts operations. Full effort measures as well: times are tables, never verdicts.
 
-mod block;
 mod equality;
+mod general;
 mod machine;
 mod timing;
 mod work;

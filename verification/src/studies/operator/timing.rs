@@ -1,6 +1,7 @@
 //! Rates and seconds: tables, no verdicts. All times are the best of several, on one thread unless said otherwise.
 
-use super::block::{General, block};
+use super::general::General;
+use crate::settling::block;
 use super::machine::{copy_bandwidth, peak, read_bandwidth};
 use super::work::Work;
 use crate::baseline::{BFree, Pattern, assemble};

@@ -1,6 +1,6 @@
 //! Operations and bytes of one tangent product.
 
-use super::block::block;
+use crate::settling::block;
 use crate::prepared::Prepared;
 use crate::studies::StudyError;
 use crate::table::Table;

@@ -34,6 +34,20 @@ struct Run {
     iterations: usize,
 }
 
+impl Run {
+    fn lost(&self) -> f64 {
+        ENERGY - self.energy
+    }
+}
+
+/// A passive wall gives nothing; how much is lost, only the independent program says, and of no order is anything known.
+fn judge(report: &mut Report, case: &str, (walls, name): (WallUpdate, &str), run: &Run, expected: Option<f64>) {
+    if let (Some(expected), WallUpdate::Literal) = (expected, walls) {
+        report.push(&["energy - reference", case, name], (run.energy - expected).abs(), Bound::AtMost(AGREEMENT));
+    }
+    report.push(&["energy lost", case, name], run.lost(), Bound::AtLeast(0.0));
+}
+
 /// The rebound up to t = 30.
 fn rebound(overrides: &[&str], walls: WallUpdate) -> Result<Run, StudyError> {
     let mut simulation: Simulation<2> = shipped::scene("rebound", overrides)?.build(&shipped::folder())?;
@@ -60,7 +74,7 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyErro
         let mut points: Vec<(f64, f64)> = Vec::new();
         for &(dt, expected) in steps {
             let run = rebound(&[circle, &format!("time.step={dt}")], walls)?;
-            let lost = ENERGY - run.energy;
+            let lost = run.lost();
             let order = points.last().map_or_else(
                 || "-".into(),
                 |&(dt_before, before)| format!("{:.2}", (before / lost).ln() / (dt_before / dt).ln()),
@@ -74,12 +88,7 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyErro
                 run.iterations.to_string(),
             ]);
             let label = format!("dt = {dt}");
-            if let (Some(expected), WallUpdate::Literal) = (expected, walls) {
-                let difference = (run.energy - expected).abs();
-                report.push(&["energy - reference", &label, name], difference, Bound::AtMost(AGREEMENT));
-            }
-            // A passive wall gives nothing; how much is lost, only the independent program says, and of no order is anything known.
-            report.push(&["energy lost", &label, name], lost, Bound::AtLeast(0.0));
+            judge(&mut report, &label, (walls, name), &run, expected);
             if let Some(&(_, before)) = points.last() {
                 report.push(&["lost / lost at twice the step", &label, name], lost / before, Bound::Reported);
             }
@@ -96,20 +105,14 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyErro
                 continue;
             }
             let run = rebound(&[circle, &format!("time.lumping={lumping}")], walls)?;
-            let lost = ENERGY - run.energy;
             by_lumping.push([
                 format!("{lumping}"),
                 name.into(),
                 format!("{:.4}", run.energy),
-                format!("{lost:.4}"),
+                format!("{:.4}", run.lost()),
                 run.iterations.to_string(),
             ]);
-            let label = format!("eps = {lumping}");
-            if let (Some(expected), WallUpdate::Literal) = (expected, walls) {
-                let difference = (run.energy - expected).abs();
-                report.push(&["energy - reference", &label, name], difference, Bound::AtMost(AGREEMENT));
-            }
-            report.push(&["energy lost", &label, name], lost, Bound::AtLeast(0.0));
+            judge(&mut report, &format!("eps = {lumping}"), (walls, name), &run, expected);
         }
     }
 
@@ -121,14 +124,13 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyErro
         for (walls, name) in WALLS {
             for (h, dt) in [(0.5, 0.05), (0.25, 0.05), (0.25, 0.025), (0.125, 0.0125)] {
                 let run = rebound(&[&format!("grid.spacing={h}"), &format!("time.step={dt}")], walls)?;
-                let lost = ENERGY - run.energy;
-                report.push(&["energy lost", &format!("h = {h}, dt = {dt}"), name], lost, Bound::AtLeast(0.0));
+                judge(&mut report, &format!("h = {h}, dt = {dt}"), (walls, name), &run, None);
                 by_spacing.push([
                     format!("{h}"),
                     format!("{dt}"),
                     name.into(),
                     format!("{:.4}", run.energy),
-                    format!("{lost:.4}"),
+                    format!("{:.4}", run.lost()),
                     run.iterations.to_string(),
                 ]);
             }

@@ -1,57 +1,29 @@
-//! The block that compacts under gravity: 2ᴰ jittered particles a cell, Courant number 1 by √((Λ+2G)/ρ).
+//! The block that settles under gravity: 2ᴰ jittered particles a cell, Courant number 1 by √((Λ+2G)/ρ).
 
 use crate::random::Random;
 use crate::studies::StudyError;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Elastic, Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::particles::{Body, Particles};
-use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, Krylov, NewtonSettings};
-use bfree::tensor::{Deformation, Tensor, Vector};
+use bfree::tensor::Vector;
 
 /// E = 1000, ν = 0.3, ρ = 1, h = 1.
-pub(super) fn lame() -> Result<Lame, StudyError> {
+pub(crate) fn lame() -> Result<Lame, StudyError> {
     Ok(Lame::from_young_poisson(1000.0, 0.3)?)
 }
 
-/// A law without its closed form: frozen from ℂmat, block by block.
-#[derive(Clone, Debug)]
-pub(super) struct General(pub Material);
-
-impl Elastic for General {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        self.0.energy(at, &Start::NONE)
-    }
-
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        self.0.stress(at, &Start::NONE)
-    }
-
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.0.elasticity(at, &Start::NONE, x)
-    }
-
-    fn tangent_density<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
-        self.0.tangent_density(at, &Start::NONE, v, b)
-    }
-}
-
 /// `cells`ᴰ cells on a sliding floor; `jitter` is the largest displacement of a particle along an axis, in cells.
-pub(super) fn block<const D: usize>(
+pub(crate) fn block<const D: usize>(
     approximation: Approximation,
     law: Option<Material>,
     cells: u32,
     jitter: f64,
-            lumping: f64,
+    lumping: f64,
 ) -> Result<Simulation<D>, StudyError> {
     let lame = lame()?;
     let mut random = Random::new(3);
@@ -69,16 +41,15 @@ pub(super) fn block<const D: usize>(
     let floor = Prescribed { name: "floor".into(), on: Selection::Face { axis: D - 1, upper: false }, motion };
     let acceleration = Vector::from_fn(|i, _| if i == D - 1 { -0.05 } else { 0.0 });
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] };
-    let bodies = vec![Body {
-            name: "block".into(),
-            law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()),
-            density: 1.0,
-        }];
-    Ok(Simulation { loads: Loads {
+    let bodies =
+        vec![Body { name: "block".into(), law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()), density: 1.0 }];
+    Ok(Simulation {
+        loads: Loads {
             gravity: Some(Gravity { acceleration, curve: Curve::constant(1.0) }),
             prescribed: vec![floor],
             ..Loads::default()
-        }, settings: Settings {
+        },
+        settings: Settings {
             lumping,
             newton: NewtonSettings {
                 relative_tolerance: 1e-8,
@@ -87,5 +58,13 @@ pub(super) fn block<const D: usize>(
                 ..NewtonSettings::default()
             },
             ..Settings::default()
-        }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0)) })
+        },
+        ..Simulation::new(
+            grid,
+            approximation,
+            bodies,
+            particles,
+            Clock::new(1.0 / (lame.lambda + 2.0 * lame.shear).sqrt(), 0),
+        )
+    })
 }

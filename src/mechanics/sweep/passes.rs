@@ -1,0 +1,264 @@
+//! The passes through all particles that the rest of the program asks for.
+
+use super::kernel::At;
+use super::supports::{Way, either};
+use super::{Fill, Flow, Group, Laned, Linear, Number, Quadratic, Supports, Weights};
+use crate::parallel::First;
+use crate::scalar::Real;
+use crate::tensor::{Tensor, Vector};
+
+impl<const D: usize> Supports<D> {
+    /// `f_I += Σ_p q N_I + σ ∇_n N_I` with q and σ that `point(group, u and L, q and σ)` adds to zero, for C components: 1 or D. Without
+    /// a field u and L are not specified.
+    ///
+    /// # Errors
+    /// Of the errors of `point`, each with a number, the one with the smallest; what was added is then unspecified.
+    pub fn sweep<T: Number, const C: usize, E: Send>(
+        &self,
+        field: Option<&[Vector<T, C>]>,
+        flow: Flow,
+        out: &mut [Vector<T, C>],
+        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
+    ) -> Result<(), E> {
+        const { assert!(C == 1 || C == D) };
+        self.pass();
+        let failure = First::none();
+        let point = |group: Group<'_>, fields: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            if let Err((number, error)) = T::at(fields, sums, |at, sums| point(group, at, sums)) {
+                failure.keep(number, error);
+            }
+        };
+        let field = field.map(T::flat);
+        T::add_flat(out, |out| {
+            either!(self, way => way.sweep::<f64, C>(T::FIELDS, field.as_deref(), flow, out, &point));
+        });
+        failure.check()
+    }
+
+    /// As [`Self::sweep`], for D plain numbers a node in either precision: what a product with a tangent is.
+    pub(crate) fn product<X: Laned>(&self, field: &[X], flow: Flow, out: &mut [X], point: &Linear<'_, X, D>) {
+        self.pass();
+        let point = |group: Group<'_>, at: &[At<X, D, D>], sums: &mut [At<X, D, D>]| point(group, &at[0], &mut sums[0]);
+        either!(self, way => way.sweep::<X, D>(1, Some(field), flow, out, &point));
+    }
+
+    /// `fill(group, L, rows)` of every group, each with `count` rows of its own.
+    pub(crate) fn fill_rows<Y: Send>(
+        &self,
+        field: &[Vector<f64, D>],
+        count: usize,
+        rows: &mut [Y],
+        fill: &Fill<'_, Y, D>,
+    ) {
+        self.pass();
+        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
+    }
+
+    /// `out_I +=` the diagonal blocks Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I of the quadratic forms that `quadratic` adds up, group by group.
+    pub(crate) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
+        self.pass();
+        either!(self, way => way.blocks(out, quadratic));
+    }
+
+    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
+    /// ∇u_p = Σ u_I ⊗ ∇_n N_I.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::tensor::{Tensor, Vector, contract};
+    /// use std::convert::Infallible;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// // Virtual work: Σ_I f_I·w_I = Σ_p (σ_p : ∇w_p + q_p·w_p), for forces f and any w.
+    /// let (u, w) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
+    /// let state = |u: Vector<f64, 2>, gradient: Tensor<f64, 2>| (u * 3.0, gradient * 2.0);
+    /// let mut force = vec![Vector::zeros(); nodes.len()];
+    /// supports.assemble(&u, &mut force, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// let at_nodes: f64 = force.iter().zip(&w).map(|(f, w)| f.dot(w)).sum();
+    /// let states = supports.interpolate(&u, |_, u, gradient| Ok::<_, Infallible>(state(u, gradient)))?;
+    /// let work = supports.interpolate(&w, |p, w, gradient| {
+    ///     let (q, sigma) = states[p];
+    ///     Ok::<_, Infallible>(contract(&sigma, &gradient) + q.dot(&w))
+    /// })?;
+    /// assert!((at_nodes - work.iter().sum::<f64>()).abs() < 1e-10);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The error of the first particle in memory whose `point` fails.
+    pub fn assemble<T: Number, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+    ) -> Result<(), E> {
+        self.sweep(Some(field), Flow::BOTH, out, each_lane(point))
+    }
+
+    /// As [`Self::assemble`] with |N_I| and |∇_n N_I| in the sum.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::tensor::{Tensor, Vector};
+    /// use std::convert::Infallible;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// // A uniform pressure acts on the rim of a body: within, the forces of the particles around a node cancel, and their sizes do not.
+    /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
+    /// let (field, mut force) = (direction(nodes.len(), 1), vec![Vector::zeros(); nodes.len()]);
+    /// let mut magnitude = force.clone();
+    /// supports.assemble(&field, &mut force, pressure)?;
+    /// supports.assemble_magnitudes(&field, &mut magnitude, pressure)?;
+    /// assert!(force.iter().zip(&magnitude).all(|(f, size)| f.abs().norm() <= size.norm() * (1.0 + 1e-15)));
+    /// let inside = nodes.number(simulation.grid.id([5, 5])).ok_or("in the middle of the disc")?;
+    /// assert!(force[inside].norm() < 1e-3 * magnitude[inside].norm());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::assemble`].
+    pub fn assemble_magnitudes<T: Number, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        out: &mut [Vector<T, D>],
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+    ) -> Result<(), E> {
+        self.sweep(Some(field), Flow { weights: Weights::Magnitude, ..Flow::BOTH }, out, each_lane(point))
+    }
+
+    /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
+    pub fn spread<const C: usize>(&self, out: &mut [Vector<f64, C>], value: impl Fn(usize) -> Vector<f64, C> + Sync) {
+        self.spread_with(Weights::Signed, out, value);
+    }
+
+    /// As [`Self::spread`], with other weights than N.
+    pub(crate) fn spread_with<const C: usize>(
+        &self,
+        weights: Weights,
+        out: &mut [Vector<f64, C>],
+        value: impl Fn(usize) -> Vector<f64, C> + Sync,
+    ) {
+        const { assert!(C == 1 || C == D) };
+        self.pass();
+        let point = |group: Group<'_>, _: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let value = value(p as usize);
+                (0..C).for_each(|c| sums[0].value[c][lane] = value[c]);
+            }
+        };
+        let flow = Flow { weights, ..Flow::VALUE };
+        either!(self, way => way.sweep::<f64, C>(1, None, flow, bytemuck::cast_slice_mut(out), &point));
+    }
+
+    /// Σ u_I N_I at every particle.
+    pub fn values<const C: usize>(&self, field: &[Vector<f64, C>]) -> Vec<Vector<f64, C>> {
+        let mut values = vec![Vector::zeros(); self.particles()];
+        self.each_value(field, |p, value| values[p] = value);
+        values
+    }
+
+    /// `take(p, Σ u_I N_I)` of every particle, in an order that does not depend on the number of threads.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// let field = direction::<2>(nodes.len(), 1);
+    /// let (values, mut visited) = (supports.values(&field), 0);
+    /// supports.each_value(&field, |p, value| {
+    ///     assert_eq!(value, values[p]);
+    ///     visited += 1;
+    /// });
+    /// assert_eq!(visited, values.len());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], mut take: impl FnMut(usize, Vector<f64, C>)) {
+        const { assert!(C == 1 || C == D) };
+        self.pass();
+        let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
+        let field = bytemuck::cast_slice(field);
+        either!(self, way => way.each::<_, C>(1, field, Flow::VALUE, &point, &mut take));
+    }
+
+    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
+    ///
+    /// ```
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid) = (&simulation.particles, &simulation.grid);
+    /// let (supports, nodes) = bfree::mechanics::sweep::Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// // A rotation about the origin, u = ω × x, has no divergence.
+    /// let rotation: Vec<_> = nodes.positions(grid).map(|(_, x)| bfree::tensor::Vector::from([-x[1], x[0]])).collect();
+    /// let mut visited = vec![false; particles.len()];
+    /// supports.each_particle(&rotation, |_, _, gradient| gradient.trace(), |p, divergence| {
+    ///     assert!(divergence.abs() < 1e-12);
+    ///     visited[p] = true;
+    /// });
+    /// assert!(visited.iter().all(|&once| once));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn each_particle<T: Number, R: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> R + Sync,
+        mut take: impl FnMut(usize, R),
+    ) {
+        self.pass();
+        let point = |p: usize, fields: &[At<f64, D, D>], lane: usize| {
+            let value = Vector::from_fn(|c, _| T::from_fields(|i| fields[i].value[c][lane]));
+            let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
+            point(p, value, gradient)
+        };
+        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Flow::BOTH, &point, &mut take));
+    }
+
+    /// `point(p, u_p, ∇u_p)` of every particle, in their order.
+    ///
+    /// Example: [`Self::assemble`].
+    ///
+    /// # Errors
+    /// The error of the first particle in memory whose `point` fails.
+    pub fn interpolate<T: Number, R: Send, E: Send>(
+        &self,
+        field: &[Vector<T, D>],
+        point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<R, E> + Sync,
+    ) -> Result<Vec<R>, E> {
+        let mut results: Vec<Option<R>> = (0..self.particles()).map(|_| None).collect();
+        let failure = First::none();
+        self.each_particle(field, point, |p, result| match result {
+            Ok(result) => results[p] = Some(result),
+            Err(error) => failure.keep(p, error),
+        });
+        failure.check()?;
+        Ok(results.into_iter().flatten().collect())
+    }
+}
+
+/// A point function of the particles, one after the other.
+fn each_lane<T: Real, E, const D: usize>(
+    point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
+) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), (usize, E)> + Sync {
+    move |group, at, sums| {
+        let failure = First::none();
+        for (lane, &p) in group.particles.iter().enumerate() {
+            let (value, gradient) = at.lane(lane);
+            match point(p as usize, value, gradient) {
+                Ok((q, sigma)) => {
+                    for c in 0..D {
+                        sums.value[c][lane] += q[c];
+                        (0..D).for_each(|k| sums.gradient[c][k][lane] += sigma[(c, k)]);
+                    }
+                }
+                Err(error) => failure.keep(p as usize, (p as usize, error)),
+            }
+        }
+        failure.check()
+    }
+}

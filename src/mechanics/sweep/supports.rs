@@ -1,0 +1,381 @@
+//! Shape functions of all particles, evaluated once, and the way of the sweep through them.
+
+use super::block::Group;
+use super::plain::Plain;
+use super::tiled::Tiled;
+use crate::approximation::{ApproximationError, ShapeFunction};
+use crate::grid::Grid;
+use crate::nodes::Nodes;
+use crate::pooled::{Element, Pool, Pooled};
+use crate::scalar::Real;
+use crate::solver::Precision;
+use crate::tensor::{Tensor, Vector};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
+const LEAPS: usize = 8;
+
+/// Products with more nodes than this along an axis take the plain sweep: the box of a block would leave the cache.
+pub(super) const WIDEST: usize = 16;
+
+/// Shape functions of all particles at the last converged positions, and the active nodes they name.
+///
+/// ```
+/// use bfree::approximation::Lme;
+/// use bfree::grid::Grid;
+/// use bfree::mechanics::sweep::Supports;
+/// use bfree::shape::{Ball, Filling, fill};
+/// use bfree::tensor::{Vector, identity};
+///
+/// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
+/// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
+/// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
+/// let positions: Vec<_> = seeds.iter().map(|seed| seed.position).collect();
+/// let (supports, nodes) = Supports::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
+/// assert_eq!(supports.particles(), positions.len());
+/// // What particles see of the field x_I is x and I: Σ N x_I = x, Σ x_I ⊗ ∇N = I.
+/// let x: Vec<_> = nodes.positions(&grid).map(|(_, x)| x).collect();
+/// let apart = supports.values(&x).iter().zip(&positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+/// assert!(apart < 1e-13);
+/// assert!((supports.gradient_at(7, &x) - identity()).norm() < 1e-12);
+/// let sum: f64 = supports.of(7).map(|(_, n, _)| n).sum();
+/// assert!((sum - 1.0).abs() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Supports<const D: usize> {
+    pub(super) way: Way<D>,
+    grid: Grid<D>,
+    /// Active nodes.
+    nodes: Nodes,
+    /// h, if weights in single precision are there.
+    unit: Option<f64>,
+    /// How often the sweeps have gone through all particles.
+    passes: AtomicU64,
+    /// Where fields take their memory from.
+    pool: Pool,
+}
+
+impl<const D: usize> Clone for Supports<D> {
+    fn clone(&self) -> Self {
+        let Self { way, grid, nodes, unit, pool, .. } = self;
+        let passes = AtomicU64::new(self.passes());
+        Self { way: way.clone(), grid: *grid, nodes: nodes.clone(), unit: *unit, passes, pool: pool.clone() }
+    }
+}
+
+/// A way through the particles.
+#[derive(Clone, Debug)]
+pub(super) enum Way<const D: usize> {
+    Plain(Plain<D>),
+    Tiled(Tiled<D>),
+}
+
+/// The shape functions of a particle could not be evaluated.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("particle {particle} has no shape functions")]
+pub struct SupportError {
+    /// Id of the particle; where none are given, its place.
+    pub particle: usize,
+    /// What went wrong.
+    pub source: ApproximationError,
+}
+
+/// Calls the same method of the way taken.
+macro_rules! either {
+    ($self:expr, $way:ident => $call:expr) => {
+        match &$self.way {
+            Way::Plain($way) => $call,
+            Way::Tiled($way) => $call,
+        }
+    };
+}
+
+pub(super) use either;
+
+impl<const D: usize> Supports<D> {
+    /// Evaluates the shape functions at all positions and numbers the active nodes.
+    ///
+    /// # Errors
+    /// The first particle that lies outside the grid or whose shape functions do not exist.
+    pub fn new<A: ShapeFunction>(
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+    ) -> Result<(Self, Nodes), SupportError> {
+        Self::with_precision(approximation, grid, positions, Precision::Double)
+    }
+
+    /// As [`Self::new`], prepared for products in single precision if they are asked for and shape functions are products.
+    ///
+    /// Example: [`single_tangent`](crate::mechanics::residual::Equilibrium::single_tangent).
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_precision<A: ShapeFunction>(
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+        precision: Precision,
+    ) -> Result<(Self, Nodes), SupportError> {
+        Self::renewed(None, approximation, grid, positions, None, precision, &Pool::default())
+    }
+
+    /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
+    /// particles. What comes out does not depend on them. Nor does it on the places of particles in memory, if `ids` tells them apart:
+    /// sums are taken in the order of cells and ids.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::pooled::Pool;
+    /// use bfree::solver::Precision;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (shape, grid) = (&simulation.approximation, &simulation.grid);
+    /// let before = &simulation.particles.position;
+    /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
+    /// let (last, _) = Supports::new(shape, grid, before)?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double, &Pool::default())?;
+    /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
+    /// assert_eq!(nodes, same_nodes);
+    /// let field = direction::<2>(nodes.len(), 1);
+    /// assert_eq!(renewed.values(&field), anew.values(&field));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn renewed<A: ShapeFunction>(
+        spare: Option<Self>,
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+        ids: Option<&[u32]>,
+        precision: Precision,
+        pool: &Pool,
+    ) -> Result<(Self, Nodes), SupportError> {
+        match approximation.separable() {
+            Some(product) if product.width() <= WIDEST => {
+                let single = precision == Precision::Mixed;
+                let spare = spare.and_then(|spare| match spare.way {
+                    Way::Plain(_) => None,
+                    Way::Tiled(tiled) => Some(tiled),
+                });
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
+                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, single.then_some(grid.spacing), pool), nodes))
+            }
+            _ => {
+                let id = |particle: usize| ids.map_or(particle, |ids| ids[particle] as usize);
+                let by_id = |error: SupportError| SupportError { particle: id(error.particle), ..error };
+                let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
+                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, pool), nodes))
+            }
+        }
+    }
+
+    /// As [`Self::new`], by the plain sweep whatever the shape function: the specification of the fast one.
+    ///
+    /// ```
+    /// use bfree::approximation::Lme;
+    /// use bfree::grid::Grid;
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::shape::{Ball, Filling, fill};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 12] };
+    /// let disc = Ball { center: Vector::from([3.0, 3.0]), radius: 2.0 }.into();
+    /// let seeds = fill(&grid, &disc, Filling { per_axis: 2, ..Filling::default() })?;
+    /// let (lme, positions) = (Lme::new(3.0, 1e-6), seeds.iter().map(|seed| seed.position).collect::<Vec<_>>());
+    /// let (fast, nodes) = Supports::new(&lme, &grid, &positions)?;
+    /// let (plain, same_nodes) = Supports::plain(&lme, &grid, &positions)?;
+    /// assert_eq!(nodes, same_nodes);
+    /// let field = direction::<2>(nodes.len(), 1);
+    /// let apart = fast.values(&field).into_iter().zip(plain.values(&field)).map(|(a, b)| (a - b).norm());
+    /// assert!(apart.fold(0.0, f64::max) < 1e-14);
+    /// // The fast one keeps functions of one coordinate, not N and ∇N of every node; and particles that share their nodes together.
+    /// assert!(fast.bytes() < plain.bytes());
+    /// assert_eq!(fast.windows().iter().map(|(_, particles)| particles).sum::<usize>(), positions.len());
+    /// assert!(plain.windows().is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn plain<A: ShapeFunction>(
+        approximation: &A,
+        grid: &Grid<D>,
+        positions: &[Vector<f64, D>],
+    ) -> Result<(Self, Nodes), SupportError> {
+        let (plain, nodes) = Plain::new(approximation, grid, positions)?;
+        Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, &Pool::default()), nodes))
+    }
+
+    fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
+        Self { way, grid: *grid, nodes: nodes.clone(), unit, passes: AtomicU64::new(0), pool: pool.clone() }
+    }
+
+    /// A nodal field of zeros, one entry for each active node.
+    pub(crate) fn field<T: Element + num_traits::Zero>(&self) -> Pooled<T> {
+        self.pool.filled(self.nodes.len(), T::zero())
+    }
+
+    /// Where fields take their memory from.
+    pub(crate) fn pool(&self) -> &Pool {
+        &self.pool
+    }
+
+    /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
+    /// eight.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// // A disc with its last particle first: the sweep goes backwards through memory, cell by cell.
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &mut simulation.particles;
+    /// let backwards: Vec<u32> = (0..particles.len() as u32).rev().collect();
+    /// particles.rearrange(&backwards);
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// particles.rearrange(&supports.leaping().ok_or("backwards")?);
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// assert_eq!(supports.leaping(), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn leaping(&self) -> Option<Vec<u32>> {
+        let Way::Tiled(tiled) = &self.way else { return None };
+        let mut next = 0;
+        let leaps = tiled.order().filter(|&p| std::mem::replace(&mut next, p + 1) != p).count();
+        (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
+    }
+
+    /// The same, the particles having been put in [`Self::leaping`]'s order.
+    pub(crate) fn rearranged(mut self) -> Self {
+        if let Way::Tiled(tiled) = &mut self.way {
+            tiled.rearrange();
+        }
+        self
+    }
+
+    /// The same, to count passes anew.
+    pub(crate) fn again(self) -> Self {
+        self.passes.store(0, Ordering::Relaxed);
+        self
+    }
+
+    /// Number of particles.
+    pub fn particles(&self) -> usize {
+        either!(self, way => way.particles())
+    }
+
+    /// Number of active nodes.
+    ///
+    /// Example: [`Self::passes`].
+    pub fn nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The active nodes.
+    pub fn active(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    /// The grid they are of.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// How often the methods below have gone through all particles so far.
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// assert_eq!(supports.nodes(), nodes.len());
+    /// let before = supports.passes();
+    /// supports.values(&direction::<2>(nodes.len(), 1));
+    /// assert_eq!(supports.passes(), before + 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn passes(&self) -> u64 {
+        self.passes.load(Ordering::Relaxed)
+    }
+
+    /// Another pass through the particles begins.
+    pub(super) fn pass(&self) {
+        self.passes.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The spacing in which weights in single precision are measured; `None` where there are none.
+    pub fn unit(&self) -> Option<f64> {
+        self.unit
+    }
+
+    /// Whether functions are products, so that particles are summed in vector lanes.
+    pub fn is_tiled(&self) -> bool {
+        matches!(self.way, Way::Tiled(_))
+    }
+
+    /// Visits all groups, in the order of their numbers.
+    pub(crate) fn each_group(&self, mut visit: impl FnMut(Group<'_>)) {
+        either!(self, way => way.each_group(&mut visit));
+    }
+
+    /// Number of groups.
+    pub(crate) fn groups(&self) -> usize {
+        either!(self, way => way.groups())
+    }
+
+    /// The groups of particles that share a window of nodes in vector lanes: nodes along each axis, and particles; none where the
+    /// sweep has no vector lanes. For counting operations.
+    ///
+    /// Example: [`Self::plain`].
+    pub fn windows(&self) -> Vec<([usize; 3], usize)> {
+        match &self.way {
+            Way::Plain(_) => Vec::new(),
+            Way::Tiled(tiled) => tiled.windows(),
+        }
+    }
+
+    /// Along any axis, the largest difference of the indices of two nodes that share a particle, or a little more.
+    pub(crate) fn reach(&self) -> u32 {
+        if let Way::Tiled(tiled) = &self.way {
+            let widths = tiled.windows().into_iter().flat_map(|(window, _)| window);
+            return widths.max().map_or(0, |width| width.saturating_sub(1) as u32);
+        }
+        let across = |p: usize| {
+            let (mut least, mut most) = ([u32::MAX; D], [0; D]);
+            for (node, ..) in self.of(p) {
+                let index = self.grid.index(self.nodes.ids()[node]);
+                (0..D).for_each(|k| (least[k], most[k]) = (least[k].min(index[k]), most[k].max(index[k])));
+            }
+            (0..D).map(|k| most[k].saturating_sub(least[k])).max().unwrap_or(0)
+        };
+        (0..self.particles()).map(across).max().unwrap_or(0)
+    }
+
+    /// Bytes of all arrays.
+    ///
+    /// Example: [`Self::plain`].
+    pub fn bytes(&self) -> usize {
+        either!(self, way => way.bytes())
+    }
+
+    /// The entries (active node, N, ∇_n N) of one particle.
+    pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
+        either!(self, way => way.of(particle)).into_iter()
+    }
+
+    /// Σ u_I ⊗ ∇_n N_I at one particle.
+    pub fn gradient_at<T: Real>(&self, particle: usize, field: &[Vector<T, D>]) -> Tensor<T, D> {
+        let mut gradient = Tensor::<T, D>::zeros();
+        for (node, _, grad_n) in self.of(particle) {
+            gradient += field[node] * grad_n.map(T::lit).transpose();
+        }
+        gradient
+    }
+}
