@@ -67,7 +67,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
             let free = 0.5 * GRAVITY * t * t;
             assert!((fallen - free).abs() < 1e-9 * free.abs(), "t = {t}: {fallen}, not {free}");
         }
-        impulse += step.reactions[0][1] * step.dt;
+        impulse += step.reactions[0].force[1] * step.dt;
         lowest = lowest.min(start + fallen);
     }
     let (t, momentum) = (simulation.clock.time(), simulation.particles.momentum()[1]);

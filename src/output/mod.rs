@@ -5,7 +5,7 @@
 //! | file | content |
 //! |---|---|
 //! | `history.csv` | energies, momentum, Newton and Krylov iterations of every step |
-//! | `reactions.csv` | force of every prescribed condition on the bodies, if there are any |
+//! | `reactions.csv` | force of every prescribed condition on the bodies, torque of rotations, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
 //! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end, and stays beside it only where there are checkpoints |

@@ -1,11 +1,11 @@
-//! `reactions.csv`: the force of every prescribed condition on the bodies, at the end of every step.
+//! `reactions.csv`: the force of every prescribed condition on the bodies, and the torque of rotations, at the end of every step.
 
 use super::OutputError;
 use super::csv::{Row, Table};
 use super::files::Written;
 use super::history::AXES;
 use crate::mechanics::loads::Loads;
-use crate::tensor::Vector;
+use crate::simulation::StepReport;
 use std::path::PathBuf;
 
 /// Writes `reactions.csv`.
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub(crate) struct Reactions(pub(crate) Table);
 
 impl Reactions {
-    /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition; or continues one whose first `kept`
+    /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition, and `name_torque` of a rotation; or continues one whose first `kept`
     /// bytes are good.
     pub(crate) fn open<const D: usize>(
         path: PathBuf,
@@ -23,15 +23,24 @@ impl Reactions {
         let mut columns = vec!["time".to_owned()];
         for condition in &loads.prescribed {
             columns.extend(AXES.iter().take(D).map(|axis| format!("{}_{axis}", condition.name)));
+            columns.extend(condition.rotation().map(|_| format!("{}_torque", condition.name)));
         }
         Ok(Self(Table::open(path, &columns, kept)?))
     }
 
-    /// Appends the forces at `time`.
-    pub(crate) fn write<const D: usize>(&mut self, time: f64, forces: &[Vector<f64, D>]) -> Result<(), OutputError> {
+    /// Appends what acted at the end of a step.
+    pub(crate) fn write<const D: usize>(
+        &mut self,
+        time: f64,
+        loads: &Loads<D>,
+        step: &StepReport<D>,
+    ) -> Result<(), OutputError> {
         let mut row = Row::default();
         row.push(time);
-        row.extend(forces.iter().flatten().copied());
+        for (condition, reaction) in loads.prescribed.iter().zip(&step.reactions) {
+            row.extend(reaction.force.iter().copied());
+            row.extend(condition.rotation().map(|_| reaction.torque));
+        }
         self.0.row(&row)
     }
 }

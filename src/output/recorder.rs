@@ -229,7 +229,7 @@ impl<const D: usize> Recorder<D> {
         self.seconds.add(step);
         self.newton.write(simulation.clock.time(), step)?;
         if let Some(reactions) = &mut self.reactions {
-            reactions.write(simulation.clock.time(), &step.reactions)?;
+            reactions.write(simulation.clock.time(), &simulation.loads, step)?;
         }
         let newton = &step.newton.history;
         let cost = Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };

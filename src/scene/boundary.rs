@@ -1,5 +1,6 @@
 //! Conditions at the faces of the box and prescribed motion inside of it.
 
+use super::load::Curve;
 use super::shape::Shape;
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
@@ -39,6 +40,8 @@ pub enum Face {
     Displacement(Table),
     /// Follow a table of velocities; constant after the last row.
     Velocity(Table),
+    /// Rotate.
+    Rotation(Rotation),
 }
 
 /// A motion: rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
@@ -60,30 +63,70 @@ pub struct Prescribed {
     pub displacement: Option<Table>,
     /// A table of velocities; constant after the last row.
     pub velocity: Option<Table>,
+    /// A rotation. The region stays where it is, and what the grid holds there rotates: a region should be round about the axis where the
+    /// grid is renewed.
+    pub rotation: Option<Rotation>,
+}
+
+/// A rotation about a fixed axis, of 2D and 3D. Its torque is in `reactions.csv`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    /// A point of the axis.
+    pub center: Vec<f64>,
+    /// The direction of the axis, of any length but zero; in 3D alone, in 2D it is z.
+    pub axis: Option<Vec<f64>>,
+    /// The angle in radians, counterclockwise where the axis points at the reader: rows `[t, angle]`, linear in between and constant
+    /// outside, from 0 at t = 0 on.
+    pub angle: Curve,
+}
+
+/// A motion that is given.
+#[derive(Clone, Copy)]
+pub(super) enum Driving<'a> {
+    Displacement(&'a Table),
+    Velocity(&'a Table),
+    Rotation(&'a Rotation),
 }
 
 impl Face {
     /// The motion it follows.
-    pub(super) fn table(&self) -> Option<&Table> {
+    pub(super) fn driving(&self) -> Option<Driving<'_>> {
         match self {
-            Self::Displacement(table) | Self::Velocity(table) => Some(table),
-            _ => None,
+            Self::Displacement(table) => Some(Driving::Displacement(table)),
+            Self::Velocity(table) => Some(Driving::Velocity(table)),
+            Self::Rotation(rotation) => Some(Driving::Rotation(rotation)),
+            Self::Free | Self::Sliding | Self::Fixed | Self::Held(_) => None,
         }
     }
 }
 
-impl Table {
-    /// Whether anything in it is not zero.
-    pub(super) fn moves(&self) -> bool {
-        self.0.iter().flat_map(|row| &row.1).flatten().any(|&value| value != 0.0)
+impl Driving<'_> {
+    /// Its key.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            Self::Displacement(_) => "displacement",
+            Self::Velocity(_) => "velocity",
+            Self::Rotation(_) => "rotation",
+        }
     }
-}
 
-/// What a table holds.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Quantity {
-    Displacement,
-    Velocity,
+    /// Whether anything in it is not zero.
+    pub(super) fn moves(self) -> bool {
+        match self {
+            Self::Displacement(table) | Self::Velocity(table) => table.largest() > 0.0,
+            Self::Rotation(rotation) => rotation.angle.0.iter().any(|row| row[1] != 0.0),
+        }
+    }
+
+    fn check(self, problems: &mut Problems, path: &str, dimension: usize) {
+        let path = format!("{path}.{}", self.key());
+        match self {
+            Self::Displacement(table) => table.check(problems, &path, dimension, true),
+            Self::Velocity(table) => table.check(problems, &path, dimension, false),
+            Self::Rotation(rotation) => rotation.check(problems, &path, dimension),
+        }
+    }
 }
 
 impl Boundary {
@@ -127,13 +170,9 @@ impl Boundary {
                 Face::Held(held) => {
                     problems.length(&format!("{path}.held"), held.len(), dimension);
                 }
-                Face::Displacement(table) => {
-                    table.check(problems, &format!("{path}.displacement"), dimension, Quantity::Displacement);
-                }
-                Face::Velocity(table) => {
-                    table.check(problems, &format!("{path}.velocity"), dimension, Quantity::Velocity);
-                }
+                Face::Displacement(_) | Face::Velocity(_) | Face::Rotation(_) => {}
             }
+            face.driving().into_iter().for_each(|driving| driving.check(problems, &path, dimension));
         }
     }
 }
@@ -141,23 +180,63 @@ impl Boundary {
 impl Prescribed {
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         self.region.check(problems, &format!("{path}.region"), dimension);
-        match (&self.displacement, &self.velocity) {
-            (Some(table), None) => {
-                table.check(problems, &format!("{path}.displacement"), dimension, Quantity::Displacement);
-            }
-            (None, Some(table)) => table.check(problems, &format!("{path}.velocity"), dimension, Quantity::Velocity),
-            (Some(_), Some(_)) => {
-                problems.refuse(path, "a displacement and a velocity", "give one of the two");
-            }
-            (None, None) => {
-                problems.refuse(path, "a region alone", "give its displacement or its velocity");
+        let given: Vec<_> = self.given().collect();
+        given.iter().for_each(|driving| driving.check(problems, path, dimension));
+        match given.as_slice() {
+            [_] => {}
+            [] => problems.refuse(path, "a region alone", "give its displacement, its velocity or its rotation"),
+            several => {
+                let keys: Vec<_> = several.iter().map(|driving| driving.key()).collect();
+                problems.refuse(path, keys.join(" and "), "give one of them");
             }
         }
+    }
+
+    /// All motions given, of which a checked scene has one.
+    pub(super) fn given(&self) -> impl Iterator<Item = Driving<'_>> {
+        let (displacement, velocity, rotation) = (&self.displacement, &self.velocity, &self.rotation);
+        let tables = displacement.iter().map(Driving::Displacement).chain(velocity.iter().map(Driving::Velocity));
+        tables.chain(rotation.iter().map(Driving::Rotation))
+    }
+}
+
+impl Rotation {
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        problems.vector(&format!("{path}.center"), &self.center, dimension);
+        let axis_path = format!("{path}.axis");
+        match (&self.axis, dimension) {
+            (_, 1) => problems.refuse(path, "a rotation", "a grid of one dimension has none"),
+            (None, 3) => problems.refuse(path, "a rotation without an axis", "give its axis, three numbers"),
+            (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2D it is z: remove it"),
+            (Some(axis), _) => {
+                problems.vector(&axis_path, axis, dimension);
+                let some = axis.iter().any(|&x| x != 0.0);
+                problems.require(some, &axis_path, "zero", "must have a length");
+            }
+            (None, _) => {}
+        }
+        let path = format!("{path}.angle");
+        self.angle.check(problems, &path);
+        if let Some([t, angle]) = self.angle.0.first().filter(|first| **first != [0.0, 0.0]) {
+            let allowed = "must be [0, 0]: angles are counted from the start";
+            problems.refuse(&format!("{path}[0]"), format!("[{}, {}]", Number(*t), Number(*angle)), allowed);
+        }
+    }
+
+    /// The largest |θ'|.
+    pub(super) fn fastest(&self) -> f64 {
+        let pieces = self.angle.0.windows(2).map(|rows| (rows[1][1] - rows[0][1]) / (rows[1][0] - rows[0][0]));
+        pieces.fold(0.0, |most: f64, slope| most.max(slope.abs()))
     }
 }
 
 impl Table {
-    fn check(&self, problems: &mut Problems, path: &str, dimension: usize, quantity: Quantity) {
+    /// The largest number without its sign.
+    pub(super) fn largest(&self) -> f64 {
+        self.0.iter().flat_map(|row| row.1.iter().flatten()).fold(0.0, |most: f64, x| most.max(x.abs()))
+    }
+
+    fn check(&self, problems: &mut Problems, path: &str, dimension: usize, from_zero: bool) {
         check_times(problems, path, self.0.iter().map(|row| row.0));
         let Some(first) = self.0.first() else { return };
         if first.0 != 0.0 {
@@ -183,7 +262,7 @@ impl Table {
             problems.refuse(&format!("{path}[0][1]"), "a row without numbers", "must prescribe at least one component");
         }
         for (k, start) in first.1.iter().enumerate() {
-            let Some(start) = start.filter(|start| quantity == Quantity::Displacement && *start != 0.0) else {
+            let Some(start) = start.filter(|start| from_zero && *start != 0.0) else {
                 continue;
             };
             let allowed = "must be 0: displacements are counted from the start";

@@ -227,6 +227,7 @@ impl Face {
             Self::Displacement(table) | Self::Velocity(table) => {
                 table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
             }
+            Self::Rotation(_) => true,
         }
     }
 }

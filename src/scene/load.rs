@@ -83,7 +83,7 @@ pub struct Surface {
 }
 
 impl Curve {
-    fn check(&self, problems: &mut Problems, path: &str) {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str) {
         check_times(problems, path, self.0.iter().map(|row| row[0]));
         for (i, row) in self.0.iter().enumerate() {
             problems.number(&format!("{path}[{i}][1]"), row[1]);

@@ -1,13 +1,13 @@
 //! What acts on the bodies of a scene: body forces, held faces and regions, loads on surfaces.
 
-use super::boundary::{Face, Table};
+use super::boundary::{Driving, Face, Rotation, Table};
 use super::build::{dimension, vector};
 use super::filling::Means;
 use super::load::{self, Loaded};
 use super::{BuildError, Scene};
 use crate::grid::Grid;
 use crate::mechanics::loads::{
-    Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
+    self, Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use crate::mechanics::terms::ForceField;
 use crate::particles::Particles;
@@ -48,11 +48,10 @@ impl Scene {
         for (i, prescribed) in self.prescribed.iter().enumerate() {
             let path = format!("prescribed[{i}]");
             let region = prescribed.region.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
-            let motion = match (&prescribed.displacement, &prescribed.velocity) {
-                (Some(table), _) => table.motion(&format!("{path}.displacement"), Motion::Displacement)?,
-                (None, Some(table)) => table.motion(&format!("{path}.velocity"), Motion::Velocity)?,
-                (None, None) => std::array::from_fn(|_| None),
-            };
+            let mut motion = std::array::from_fn(|_| None);
+            if let Some(driving) = prescribed.given().next() {
+                motion = driving.motion(&path)?;
+            }
             loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });
         }
         for (i, traction) in self.tractions.iter().enumerate() {
@@ -129,16 +128,42 @@ impl Scene {
 
 impl Face {
     /// The motion of each component on a face across `axis`.
-    fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion>; D], BuildError> {
+    fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion<D>>; D], BuildError> {
+        if let Some(driving) = self.driving() {
+            return driving.motion(path);
+        }
         let held = |holds: &dyn Fn(usize) -> bool| std::array::from_fn(|i| holds(i).then_some(Motion::Rest));
         Ok(match self {
-            Self::Free => held(&|_| false),
             Self::Sliding => held(&|i| i == axis),
             Self::Fixed => held(&|_| true),
             Self::Held(components) => held(&|i| components.get(i) == Some(&true)),
-            Self::Displacement(table) => table.motion(&format!("{path}.displacement"), Motion::Displacement)?,
-            Self::Velocity(table) => table.motion(&format!("{path}.velocity"), Motion::Velocity)?,
+            Self::Free | Self::Displacement(_) | Self::Velocity(_) | Self::Rotation(_) => held(&|_| false),
         })
+    }
+}
+
+impl Driving<'_> {
+    /// The motion of each component.
+    fn motion<const D: usize>(self, path: &str) -> Result<[Option<Motion<D>>; D], BuildError> {
+        let path = format!("{path}.{}", self.key());
+        match self {
+            Self::Displacement(table) => table.motion(&path, Motion::Displacement),
+            Self::Velocity(table) => table.motion(&path, Motion::Velocity),
+            Self::Rotation(rotation) => {
+                let motion = Motion::Rotation(rotation.built(&path)?);
+                Ok(std::array::from_fn(|_| Some(motion.clone())))
+            }
+        }
+    }
+}
+
+impl Rotation {
+    fn built<const D: usize>(&self, path: &str) -> Result<loads::Rotation<D>, BuildError> {
+        let axis = match &self.axis {
+            Some(axis) => vector::<3>(path, axis)?.into(),
+            None => [0.0, 0.0, 1.0],
+        };
+        Ok(loads::Rotation::new(vector(path, &self.center)?, axis, curve(path, Some(&self.angle))?))
     }
 }
 
@@ -147,8 +172,8 @@ impl Table {
     fn motion<const D: usize>(
         &self,
         path: &str,
-        kind: impl Fn(Curve) -> Motion,
-    ) -> Result<[Option<Motion>; D], BuildError> {
+        kind: impl Fn(Curve) -> Motion<D>,
+    ) -> Result<[Option<Motion<D>>; D], BuildError> {
         let mut motion = std::array::from_fn(|_| None);
         for (i, motion) in motion.iter_mut().enumerate() {
             let points: Vec<[f64; 2]> = self.0.iter().filter_map(|row| Some([row.0, (*row.1.get(i)?)?])).collect();

@@ -277,13 +277,11 @@ impl Scene {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
         let faces = self.boundary.faces().into_iter().filter_map(|(name, face)| Some((name, face?)));
-        for (name, _) in faces.filter(|(_, face)| face.table().is_some_and(boundary::Table::moves)) {
+        for (name, _) in faces.filter(|(_, face)| face.driving().is_some_and(boundary::Driving::moves)) {
             problems.refuse(&format!("boundary.{name}"), "a motion", allowed);
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
-            let moves =
-                [&prescribed.displacement, &prescribed.velocity].into_iter().flatten().any(boundary::Table::moves);
-            if moves {
+            if prescribed.given().any(boundary::Driving::moves) {
                 problems.refuse(&format!("prescribed[{i}]"), "a motion", allowed);
             }
         }

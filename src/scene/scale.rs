@@ -2,7 +2,7 @@
 
 use super::BuildError;
 use super::Scene;
-use super::boundary::{Face, Table};
+use super::boundary::{Driving, Face};
 use super::load::Curve;
 use crate::material::p_wave_modulus;
 use crate::mechanics::loads::Pressing;
@@ -62,23 +62,22 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
         let weight = heaviest * largest * factor(gravity.curve.as_ref()) * factor(profile);
         require("gravity", &[("the weight of a particle", weight, 0.0, MOST)])?;
     }
-    let driven = |path: &str, displacement: Option<&Table>, velocity: Option<&Table>| {
-        let largest = |table: Option<&Table>| {
-            let entries = table.into_iter().flat_map(|table| &table.0).flat_map(|row| row.1.iter().flatten());
-            entries.fold(0.0, |most: f64, x| most.max(x.abs()))
+    let across = simulation.grid.spacing * simulation.grid.cells.iter().map(|&n| f64::from(n)).sum::<f64>();
+    let driven = |path: &str, driving: Driving<'_>| {
+        let motion = match driving {
+            Driving::Displacement(table) => alphas.a1 * table.largest(),
+            Driving::Velocity(table) => alphas.a2 * table.largest(),
+            Driving::Rotation(rotation) => alphas.a2 * rotation.fastest() * across,
         };
-        let force = heaviest * (alphas.a1 * largest(displacement) + alphas.a2 * largest(velocity));
-        require(path, &[("the force that moves a particle so in one step", force, 0.0, MOST)])
+        require(path, &[("the force that moves a particle so in one step", heaviest * motion, 0.0, MOST)])
     };
     for (name, face) in scene.boundary.faces().into_iter().take(2 * D) {
-        match face {
-            Some(Face::Displacement(table)) => driven(&format!("boundary.{name}"), Some(table), None)?,
-            Some(Face::Velocity(table)) => driven(&format!("boundary.{name}"), None, Some(table))?,
-            Some(Face::Free | Face::Sliding | Face::Fixed | Face::Held(_)) | None => {}
+        if let Some(driving) = face.and_then(Face::driving) {
+            driven(&format!("boundary.{name}"), driving)?;
         }
     }
     for (i, motion) in scene.prescribed.iter().enumerate() {
-        driven(&format!("prescribed[{i}]"), motion.displacement.as_ref(), motion.velocity.as_ref())?;
+        motion.given().try_for_each(|driving| driven(&format!("prescribed[{i}]"), driving))?;
     }
     let curves = scene.tractions.iter().map(|load| &load.curve).chain(scene.pressures.iter().map(|load| &load.curve));
     for ((k, load), curve) in simulation.loads.surface.iter().enumerate().zip(curves) {

@@ -4,7 +4,7 @@ mod report;
 mod settings;
 mod step;
 
-pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
+pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 
 use crate::approximation::{Approximation, ShapeFunction, Shipped};

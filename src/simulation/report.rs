@@ -9,6 +9,16 @@ use crate::phases::Stopwatch;
 use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport};
 use crate::tensor::Vector;
 
+/// What a condition does to the bodies: the reaction at t_{n+1}, and spread over the step the impulse with which a wall takes along nodes
+/// that do not move with it yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reaction<const D: usize> {
+    /// Σ r_I
+    pub force: Vector<f64, D>,
+    /// The moment about its axis, if it rotates; else 0.
+    pub torque: f64,
+}
+
 /// What a step did.
 #[derive(Clone, Debug)]
 pub struct StepReport<const D: usize> {
@@ -20,9 +30,8 @@ pub struct StepReport<const D: usize> {
     pub newton: NewtonReport,
     /// Iterations of the projection (42), 0 for a lumped mass.
     pub projection_iterations: usize,
-    /// Force of each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed) on the bodies: the reaction at t_{n+1}, and spread over the step the impulse
-    /// with which a wall takes along nodes that do not move with it yet.
-    pub reactions: Vec<Vector<f64, D>>,
+    /// Of each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed).
+    pub reactions: Vec<Reaction<D>>,
     /// Its local error in units of the grid spacing, where a tolerance asks for it; above the tolerance only if it could not be halved.
     pub error: Option<f64>,
     /// Whether the grid was new.

@@ -1,7 +1,7 @@
 //! The step on one page: the paper's Algorithm 1.
 
 use super::report::Spent;
-use super::{AdvanceError, FailedAttempt, InitialGuess, Simulation, StepError, StepReport, Workspace};
+use super::{AdvanceError, FailedAttempt, InitialGuess, Reaction, Simulation, StepError, StepReport, Workspace};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::check::direction;
@@ -67,7 +67,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let pool = self.workspace.pool.clone();
         let supports = self.supports(kept.is_some())?;
         let nodes = supports.active().clone();
-        let prescribed = self.prescribed(&nodes);
+        let prescribed = self.prescribed_from(&nodes, kept.as_ref());
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
         let projected = match kept {
@@ -246,7 +246,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn prescribed(&self, nodes: &Nodes) -> Vec<PrescribedDof> {
-        prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, self.clock.time(), self.clock.step())
+        self.prescribed_from(nodes, self.kept.as_ref())
+    }
+
+    fn prescribed_from(&self, nodes: &Nodes, kept: Option<&Kept<D>>) -> Vec<PrescribedDof> {
+        let moved = kept.map_or(&[][..], |kept| &kept.motion);
+        prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, moved, self.clock.time(), self.clock.step())
     }
 
     /// The equilibrium at time `t` on given supports.
@@ -386,7 +391,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         dt: f64,
         dphi: &[Vector<f64, D>],
         update: &Update<'_, D>,
-    ) -> Result<(Vec<Vector<f64, D>>, f64, f64), StepError> {
+    ) -> Result<(Vec<Reaction<D>>, f64, f64), StepError> {
         let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
         let mut end = balanced;
         let after;
@@ -396,14 +401,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             after.forces(Role::Stores, phi)?;
             end = &after;
         }
-        let mut reactions = vec![Vector::zeros(); self.loads.prescribed.len()];
+        let conditions = &self.loads.prescribed;
+        let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
         let mut work = 0.0;
         if !end.prescribed.is_empty() {
             let mut residual: Pooled<Vector<f64, D>> = supports.field();
             end.residual_into::<f64>(phi, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
-                reactions[dof.owner][dof.component] += reaction + blow;
+                reactions[dof.owner].force[dof.component] += reaction + blow;
+                if let Some(rotation) = conditions[dof.owner].rotation() {
+                    let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
+                    reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
+                }
                 work += (0.5 * reaction + blow) * dof.step.increment;
             }
         }

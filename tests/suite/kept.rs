@@ -109,7 +109,7 @@ fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
     let mut by_floor = Vec::new();
     while simulation.clock.time() < 1.0 - 1e-9 {
         let step = simulation.advance()?;
-        by_floor.push((step.renewed, step.reactions[0][1]));
+        by_floor.push((step.renewed, step.reactions[0].force[1]));
     }
     let renewals: Vec<usize> = (0..by_floor.len()).filter(|&step| by_floor[step].0).collect();
     // Within a cell of the floor after 0.2 and some, and from the next step on the floor carries.

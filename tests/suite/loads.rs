@@ -1,5 +1,7 @@
 //! Moving walls, follower pressure, tractions: facts about loads on whole runs.
 
+mod rotation;
+
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
@@ -65,7 +67,7 @@ fn accelerating_walls_take_the_body_along_and_their_work_is_its_energy() -> Resu
     let mut simulation: Simulation<2> = build(&carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01))?;
     let mut reactions = Vector::zeros();
     for _ in 0..100 {
-        reactions = simulation.advance()?.reactions.iter().sum();
+        reactions = simulation.advance()?.reactions.iter().map(|one| one.force).sum();
     }
     let mass: f64 = simulation.particles.mass.iter().sum();
     let mean = simulation.particles.momentum() / mass;
@@ -147,7 +149,7 @@ fn struck(step: f64) -> Result<[f64; 4], Failure> {
     let mut impulse = 0.0;
     while simulation.clock.time() < 0.06 - 1e-9 {
         let report = simulation.advance()?;
-        impulse += report.dt * report.reactions.iter().sum::<Vector<f64, 1>>()[0];
+        impulse += report.dt * report.reactions.iter().map(|one| one.force[0]).sum::<f64>();
     }
     let energy = simulation.particles.kinetic_energy() + simulation.strain_energy();
     Ok([simulation.particles.momentum()[0], impulse, energy, simulation.external_work])

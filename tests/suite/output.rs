@@ -138,7 +138,7 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
         recorder.record(&simulation, &step)?;
         energies.push(simulation.particles.kinetic_energy() + simulation.strain_energy());
         newton.push(step.newton.history.iterations.len());
-        floor.push(step.reactions[0][1]);
+        floor.push(step.reactions[0].force[1]);
         let top = simulation.particles.place(63).ok_or("the particle is lost")?;
         tops.push(simulation.particles.position[top][1] - initial.particles.position[63][1]);
     }

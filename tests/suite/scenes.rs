@@ -290,7 +290,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
         r#", "displacement": [[0, [0, null]], [1, [0.1, null]]]"#,
         "",
         "prescribed[0]",
-        &["a region alone", "give its displacement or its velocity"],
+        &["a region alone", "give its displacement, its velocity or its rotation"],
     ),
     ("[0, -9.81]", "[-9.81]", "gravity.acceleration", &["length 1", "2 components"]),
     ("[[0, 0], [1, 1]]", "[]", "gravity.curve", &["empty"]),

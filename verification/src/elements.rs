@@ -187,7 +187,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
             ..Nodal::default()
         };
         // Walls at rest alone: u = 0 there.
-        let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, t, dt);
+        let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, &[], t, dt);
         let nodal = nodal.with_prescribed(&prescribed);
         let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);
         let (nodal, lumping, time) = (&nodal, 0.0, t + theta * dt);

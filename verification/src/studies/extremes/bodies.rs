@@ -95,12 +95,12 @@ pub(super) fn block<const D: usize>(cells: u32, approximation: Approximation, dt
 }
 
 /// A condition on one face of the box.
-pub(super) fn face<const D: usize>(axis: usize, upper: bool, motion: [Option<Motion>; D]) -> Prescribed<D> {
+pub(super) fn face<const D: usize>(axis: usize, upper: bool, motion: [Option<Motion<D>>; D]) -> Prescribed<D> {
     Prescribed { name: format!("face {axis} {upper}"), on: Selection::Face { axis, upper }, motion }
 }
 
 /// The normal component held, or moved.
-pub(super) fn normal<const D: usize>(axis: usize, upper: bool, motion: Motion) -> Prescribed<D> {
+pub(super) fn normal<const D: usize>(axis: usize, upper: bool, motion: Motion<D>) -> Prescribed<D> {
     face(axis, upper, std::array::from_fn(|k| (k == axis).then(|| motion.clone())))
 }
 

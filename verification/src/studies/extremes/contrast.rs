@@ -67,7 +67,7 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     let what = format!("confined compression, {name}, D = {D}");
     let case = format!("nu = {poisson}");
     let stepped = simulation.step();
-    let reaction = stepped.as_ref().map(|report| (report.reactions[moving][D - 1] / force - 1.0).abs());
+    let reaction = stepped.as_ref().map(|report| (report.reactions[moving].force[D - 1] / force - 1.0).abs());
     let strains = simulation.particles.displacement_gradient.iter().map(|h| (h - exact).norm() / exact.norm());
     let strains = strains.fold(0.0, worse);
     // Round-off of the pressure, Λ eps |H|, is taken up by shear alone: an error of H that is Λ/G times larger.

@@ -101,7 +101,9 @@ const BUILDER: &str = "src/mechanics/sweep/builder.rs";
 const PLAIN: &str = "src/mechanics/sweep/plain.rs";
 const ALPHAS: &str = "src/mechanics/schemes/mod.rs";
 const NEWMARK: &str = "src/mechanics/schemes/newmark.rs";
-const LOADING: &str = "src/mechanics/loads.rs";
+const LOADING: &str = "src/mechanics/loads/mod.rs";
+const PRESCRIBED: &str = "src/mechanics/loads/prescribed.rs";
+const ROTATION: &str = "src/mechanics/loads/rotation.rs";
 const STEP: &str = "src/simulation/step.rs";
 const GENERALIZED: &str = "src/mechanics/schemes/generalized_alpha.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
@@ -453,10 +455,22 @@ pub(super) const PATCHES: &[Patch] = &[
         "point.normal * (pressure * point.area)",
         "point.normal * pressure",
         Killed(&[LOADS], &[DYNAMICS, BALANCE])),
-    patch("a wall's velocity not integrated", LOADING,
+    patch("a wall's velocity not integrated", PRESCRIBED,
         "g.integral(t, t + dt)",
         "g.value(t) * dt",
         Killed(&[LOADS], &[TANGENT, DYNAMICS])),
+    patch("a rotation along its tangent", ROTATION,
+        "2.0 * (0.5 * angle).sin().powi(2)",
+        "0.0",
+        Killed(&[LOADS], &[DYNAMICS])),
+    patch("no centripetal acceleration", ROTATION,
+        "start * start * inwards[i]",
+        "0.0",
+        Killed(&[LOADS], &[DYNAMICS])),
+    patch("a torque of the other sense", ROTATION,
+        "force * self.axis.cross(&self.arm(x))[i]",
+        "force * self.arm(x).cross(&self.axis)[i]",
+        Killed(&[LOADS], &[DYNAMICS])),
     patch("gravity without its curve", BODY_FORCE,
         "gravity.acceleration * gravity.curve.value(step.time)",
         "gravity.acceleration",

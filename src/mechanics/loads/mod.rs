@@ -1,0 +1,116 @@
+//! Loads and prescribed motion: gravity and its curve, tractions, follower pressure, moving walls.
+
+mod curve;
+mod prescribed;
+mod rotation;
+
+pub use curve::{Curve, CurveError};
+pub use prescribed::{Motion, MotionStep, Prescribed, PrescribedDof, Selection, prescribed_dofs};
+pub use rotation::Rotation;
+
+use crate::mechanics::terms::{ForceField, Rayleigh};
+use crate::tensor::Vector;
+use std::collections::HashSet;
+
+/// Gravity, b(t) = curve(t) · acceleration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gravity<const D: usize> {
+    /// The acceleration at a factor of 1.
+    pub acceleration: Vector<f64, D>,
+    /// The factor in time.
+    pub curve: Curve,
+}
+
+/// A particle that stands for a piece of surface: one of its own, without volume, or one of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint<const D: usize> {
+    /// The place of the particle in memory.
+    pub particle: usize,
+    /// Outward normal N in the reference configuration, the mean of unit normals over A.
+    pub normal: Vector<f64, D>,
+    /// Reference area A it stands for.
+    pub area: f64,
+}
+
+/// What acts on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pressing<const D: usize> {
+    /// Nominal traction T (force per reference area), a dead load.
+    Traction(Vector<f64, D>),
+    /// Follower pressure p: T = −p J F⁻ᵀ N.
+    Pressure(f64),
+}
+
+/// A load on surface particles, times a curve in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceLoad<const D: usize> {
+    /// Traction or pressure.
+    pub pressing: Pressing<D>,
+    /// The factor in time.
+    pub curve: Curve,
+    /// The loaded particles.
+    pub points: Vec<SurfacePoint<D>>,
+}
+
+/// All loads of a simulation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Loads<const D: usize> {
+    /// Gravity, if any.
+    pub gravity: Option<Gravity<D>>,
+    /// Loads on surface particles.
+    pub surface: Vec<SurfaceLoad<D>>,
+    /// Prescribed motion; where two hold the same component of a node, the later one wins.
+    pub prescribed: Vec<Prescribed<D>>,
+    /// A body force that varies in space, given in code.
+    pub field: Option<ForceField<D>>,
+    /// Damping, if any.
+    pub damping: Option<Rayleigh>,
+}
+
+/// p A N of a particle under follower pressure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressurePoint<const D: usize> {
+    /// The place of the particle in memory.
+    pub particle: usize,
+    /// p A N
+    pub force: Vector<f64, D>,
+}
+
+impl<const D: usize> Loads<D> {
+    /// How many particles carry loads of a kind.
+    pub(crate) fn loaded(&self, kind: impl Fn(&Pressing<D>) -> bool) -> usize {
+        let of_kind = self.surface.iter().filter(|load| kind(&load.pressing));
+        of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()
+    }
+
+    /// p A N of every particle under follower pressure at time `t`.
+    ///
+    /// ```
+    /// use bfree::mechanics::loads::{Curve, Loads, Pressing, SurfaceLoad, SurfacePoint};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // On a closed surface, Σ p A N = 0: here the four sides of a square, under p = 3 that doubles by t = 1.
+    /// let sides = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+    /// let side = |(particle, normal)| SurfacePoint { particle, normal: Vector::from(normal), area: 0.5 };
+    /// let points = sides.into_iter().enumerate().map(side).collect();
+    /// let curve = Curve::new(vec![[0.0, 1.0], [1.0, 2.0]])?;
+    /// let loads = Loads { surface: vec![SurfaceLoad { pressing: Pressing::Pressure(3.0), curve, points }], ..Loads::default() };
+    /// let pressures = loads.pressures(1.0);
+    /// assert_eq!(pressures[0].force, Vector::from([2.0 * 3.0 * 0.5, 0.0]));
+    /// assert_eq!(pressures.iter().map(|point| point.force).sum::<Vector<f64, 2>>().norm(), 0.0);
+    /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
+    /// ```
+    pub fn pressures(&self, t: f64) -> Vec<PressurePoint<D>> {
+        let mut points = Vec::new();
+        for load in &self.surface {
+            if let Pressing::Pressure(pressure) = load.pressing {
+                let pressure = pressure * load.curve.value(t);
+                points.extend(load.points.iter().map(|point| PressurePoint {
+                    particle: point.particle,
+                    force: point.normal * (pressure * point.area),
+                }));
+            }
+        }
+        points
+    }
+}
