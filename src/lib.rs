@@ -43,8 +43,8 @@
 //!
 //! On a box of nodes they factorise into functions of one coordinate, each one scalar root away ([`approximation::Lme`]); the
 //! paper's circle of nodes is [`approximation::LmeCircle`]. [`approximation::Linear`], [`approximation::Gimp`] and
-//! [`approximation::Bspline`] are there too. At a point on a wall of the box only the nodes of that wall have N ≠ 0, for every family,
-//! so that prescribed motion is nodal.
+//! [`approximation::Bspline`] are there too, and [`approximation::NotAKnotBspline`], which curve at walls. At a point on a wall of the box
+//! only the nodes of that wall have N ≠ 0, for every family, so that prescribed motion is nodal.
 //!
 //! **2. To the nodes** ([`mechanics::transfer::Nodal::project`]) (40)–(42):
 //!

@@ -2,7 +2,9 @@
 
 use super::interior::Lane;
 use super::kernel::{Kernel, folded};
-use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
+use super::{
+    Approximation, ApproximationError, AxisWeights, Cells, Listed, NotAKnotBspline, Separable, Shipped, Validate,
+};
 use crate::grid::Axis;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -36,17 +38,24 @@ impl Default for BsplineParameters {
 impl Listed for Bspline {
     type Parameters = BsplineParameters;
 
-    fn build(given: &BsplineParameters, _: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+    fn build(given: &BsplineParameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
         problems.whole(&format!("{path}.degree"), given.degree, 2, 3);
-        match given.degree {
-            2 => Some(Self::Quadratic.into()),
-            3 => Some(Self::Cubic.into()),
-            _ => None,
-        }
+        let spline = match given.degree {
+            2 => Self::Quadratic,
+            3 => Self::Cubic,
+            _ => return None,
+        };
+        Some(if cells.integrated { NotAKnotBspline(spline).into() } else { spline.into() })
     }
 
     fn examples() -> Vec<(&'static str, Approximation)> {
-        vec![("quadratic", Self::Quadratic.into()), ("cubic", Self::Cubic.into())]
+        let not_a_knot = |spline| NotAKnotBspline(spline).into();
+        vec![
+            ("quadratic", Self::Quadratic.into()),
+            ("cubic", Self::Cubic.into()),
+            ("not-a-knot quadratic", not_a_knot(Self::Quadratic)),
+            ("not-a-knot cubic", not_a_knot(Self::Cubic)),
+        ]
     }
 }
 

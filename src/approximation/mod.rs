@@ -26,6 +26,7 @@ mod interior;
 mod kernel;
 mod linear;
 mod lme;
+mod not_a_knot;
 mod product;
 
 pub use bspline::{Bspline, BsplineParameters};
@@ -35,6 +36,7 @@ pub use interior::Shipped;
 pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
 pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport, SMALLEST_TOLERANCE};
+pub use not_a_knot::NotAKnotBspline;
 pub use product::{AxisWeights, Separable};
 pub(crate) use product::{Place, check, list};
 
@@ -200,6 +202,8 @@ pub struct Cells {
     pub dimension: usize,
     /// Particles along each axis of a cell.
     pub particles_per_axis: u32,
+    /// Whether sums over particles are integrals, of Gauss's points, and no mass is lumped.
+    pub integrated: bool,
 }
 
 /// Makes of the list of families what every family is in.
@@ -236,7 +240,7 @@ macro_rules! approximations {
             /// use bfree::scene::Problems;
             ///
             /// let written: Parameters = serde_json::from_str(r#""gimp""#)?;
-            /// let cells = Cells { dimension: 2, particles_per_axis: 2 };
+            /// let cells = Cells { dimension: 2, particles_per_axis: 2, integrated: false };
             /// let functions = written.functions(cells, &mut Problems::default(), "approximation");
             /// assert_eq!(functions, Some(Gimp { half_width: 0.25 }.into()));
             /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -295,10 +299,18 @@ approximations! {
     /// Products of one-dimensional uGIMP functions; the half width of a particle follows from the bodies'
     /// `particles_per_cell`, which must all agree.
     "gimp" => Gimp;
-    /// Products of B-splines centred on the nodes.
-    "bspline" => Bspline(given: BsplineParameters);
+    /// Products of B-splines centred on the nodes. At walls they curve in load steps with Gauss's points on a kept grid; with inertia, or
+    /// with regular particles, their second derivative is zero there.
+    "bspline" => Bspline(given: BsplineParameters) or NotAKnotBspline;
     /// Local maximum entropy functions.
     "lme" => Lme(given: LmeParameters) or LmeCircle;
+}
+
+impl Parameters {
+    /// Whether they are polynomials between the middles of cells.
+    pub(crate) fn has_kinks_in_middles(&self) -> bool {
+        matches!(self, Self::Bspline(given) if given.degree == 2)
+    }
 }
 
 /// Cells the shape functions measured, those that nothing beats in error and work at once (study `tradeoff`).

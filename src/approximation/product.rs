@@ -83,6 +83,11 @@ pub trait Separable: Validate + Send + Sync {
     fn shipped(&self) -> Option<Shipped<'_>> {
         None
     }
+
+    /// Whether they are B-splines, away from walls: diagonal blocks serve those better than other functions of that width.
+    fn is_spline(&self) -> bool {
+        matches!(self.shipped(), Some(Shipped::Bspline(_)))
+    }
 }
 
 /// As [`Separable::axis`], and not longer than [`Separable::width`]: the sweep has no room for more.

@@ -99,7 +99,7 @@ impl Scene {
     /// The shape functions; or `None`, and what is wrong with them.
     pub(super) fn shape_functions(&self, problems: &mut Problems) -> Option<Approximation> {
         let particles_per_axis = self.bodies.first().map_or(2, |body| body.particles_per_cell);
-        let cells = Cells { dimension: self.dimension(), particles_per_axis };
+        let cells = Cells { dimension: self.dimension(), particles_per_axis, integrated: self.is_integrated() };
         self.approximation.functions(cells, problems, "approximation")
     }
 

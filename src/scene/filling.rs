@@ -143,9 +143,24 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn filling(&self, body: &Body) -> Filling {
-        let kept = self.grid.renewed(self.time.inertia) != Renewal::EveryStep;
-        let by_itself = if kept && !self.approximation.one_half_width() { Layout::Gauss } else { Layout::Regular };
-        Filling { per_axis: body.particles_per_cell, layout: body.layout.unwrap_or(by_itself), rule: body.fill }
+        let gauss = self.is_kept() && !self.approximation.one_half_width();
+        let by_itself = if gauss { Layout::Gauss } else { Layout::Regular };
+        Filling {
+            per_axis: body.particles_per_cell,
+            layout: body.layout.unwrap_or(by_itself),
+            rule: body.fill,
+            kinks_in_middles: self.approximation.has_kinks_in_middles(),
+        }
+    }
+
+    fn is_kept(&self) -> bool {
+        self.grid.renewed(self.time.inertia) != Renewal::EveryStep
+    }
+
+    /// Whether sums over particles are integrals, of Gauss's points on a grid that is kept, and no mass is lumped.
+    pub(super) fn is_integrated(&self) -> bool {
+        let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
+        !self.time.inertia.has_inertia() && self.is_kept() && self.bodies.iter().all(gauss)
     }
 
     /// What its bodies were filled with, beside what is drawn.

@@ -1,6 +1,7 @@
 //! Filling a solid with particles.
 
-use super::{EDGE, Shape};
+use super::layout::between_middles;
+use super::{EDGE, Layout, Shape};
 use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -23,18 +24,6 @@ pub enum Fill {
     Cells,
 }
 
-/// Where particles are in a whole cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Layout {
-    /// In the middle of equal boxes.
-    #[default]
-    Regular,
-    /// At the points of Gauss's rule, with its weights: smooth stresses are integrated to a higher order. Cells that the surface cuts
-    /// have boxes of half the size. For grids that are kept: particles that move to other cells are no Gauss points there.
-    Gauss,
-}
-
 /// How a solid is filled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Filling {
@@ -44,6 +33,9 @@ pub struct Filling {
     pub layout: Layout,
     /// What becomes of those at the surface.
     pub rule: Fill,
+    /// Whether shape functions have their kinks in the middle of cells, as quadratic B-splines have: Gauss's points are then those of the
+    /// pieces between middles.
+    pub kinks_in_middles: bool,
 }
 
 /// A particle to be: its place, and the volume it stands for.
@@ -116,7 +108,16 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     if candidates > MAX_CANDIDATES {
         return Err(FillError::TooMany { candidates });
     }
-    let (whole, pieces) = (how.layout.points(how.per_axis), how.layout.pieces(how.per_axis));
+    let pieces = how.layout.pieces(how.per_axis);
+    // By whether the cell below is full, and the one above.
+    let between = how.kinks_in_middles && how.layout == Layout::Gauss;
+    let points = [[false, false], [true, false], [false, true], [true, true]]
+        .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
+    let is_full = |cell: [u64; D]| {
+        let lower = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
+        shape.part(&lower, &Vector::repeat(h), h).0 > (1.0 - NOTHING) * h.powi(D as i32)
+    };
+    let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
     let edges: Vector<f64, D> = Vector::repeat(h / f64::from(pieces));
     let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
     for (id, cell) in (0..).zip(indices(count)) {
@@ -156,10 +157,18 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 continue;
             }
         }
-        for i in indices([u64::from(how.per_axis); D]) {
-            let x = position(Vector::from_fn(|k, _| whole[i[k] as usize].0));
+        let goes_on = |beside: Option<u64>| beside.and_then(|id| full.get(id as usize)).is_some_and(|&full| full);
+        let mut stride = 1;
+        let along: [&[(f64, f64)]; D] = std::array::from_fn(|k| {
+            let below = (cell[k] > 0).then(|| id - stride);
+            let above = (cell[k] + 1 < count[k]).then(|| id + stride);
+            stride *= count[k];
+            points[usize::from(goes_on(below)) + 2 * usize::from(goes_on(above))].as_slice()
+        });
+        for i in indices(along.map(|points| points.len() as u64)) {
+            let x = position(Vector::from_fn(|k, _| along[k][i[k] as usize].0));
             if how.rule != Fill::Particles || shape.holds(&x, h) {
-                let volume = (0..D).map(|k| whole[i[k] as usize].1 * h).product();
+                let volume = (0..D).map(|k| along[k][i[k] as usize].1 * h).product();
                 filling.seeds.push(Seed { position: x, volume });
             }
         }
@@ -181,43 +190,6 @@ pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64;
         count[k] = (upper.min(f64::from(grid.cells[k])) as u64).saturating_sub(first[k]);
     }
     (first, count)
-}
-
-impl Layout {
-    /// The points of an axis of a cell and their weights, both in cells.
-    pub(super) fn points(self, n: u32) -> Vec<(f64, f64)> {
-        let n_f = f64::from(n);
-        match self {
-            Self::Regular => (0..n).map(|i| ((f64::from(i) + 0.5) / n_f, 1.0 / n_f)).collect(),
-            Self::Gauss => (0..n).map(|i| gauss(n, i)).collect(),
-        }
-    }
-
-    /// Boxes along an axis of a cell that is cut.
-    fn pieces(self, n: u32) -> u32 {
-        match self {
-            Self::Regular => n,
-            Self::Gauss => 2 * n,
-        }
-    }
-}
-
-/// Point i of Gauss's rule of n on 0 … 1, and its weight: a zero of Legendre's P_n by Newton's method, w = 1/((1 − x²) P_n′²) there.
-fn gauss(n: u32, i: u32) -> (f64, f64) {
-    let n = f64::from(n);
-    let mut x = -(std::f64::consts::PI * (f64::from(i) + 0.75) / (n + 0.5)).cos();
-    let mut slope = 1.0;
-    for _ in 0..10 {
-        // (k + 1) P_{k+1} = (2k + 1) x P_k − k P_{k−1},   (x² − 1) P_n′ = n (x P_n − P_{n−1})
-        let (mut before, mut value, mut k) = (0.0, 1.0, 0.0);
-        while k < n {
-            (before, value) = (value, ((2.0 * k + 1.0) * x * value - k * before) / (k + 1.0));
-            k += 1.0;
-        }
-        slope = n * (x * value - before) / (x * x - 1.0);
-        x -= value / slope;
-    }
-    (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
 }
 
 /// Seeds cell by cell.

@@ -7,6 +7,7 @@ mod cone;
 mod cut;
 mod fill;
 mod half_space;
+mod layout;
 mod polygon;
 mod similar;
 
@@ -19,8 +20,9 @@ pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;
 pub(crate) use fill::around;
-pub use fill::{Fill, FillError, Filling, Layout, MAX_CANDIDATES, Seed, fill};
+pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, Seed, fill};
 pub use half_space::HalfSpace;
+pub use layout::Layout;
 pub use polygon::{Polygon, PolygonError};
 pub use similar::{Similar, rotation};
 

@@ -323,8 +323,9 @@ fn particles_have_the_volume_and_the_first_moments_of_the_shape() {
         (plate, 37.0 * 0.26, vector([21.5, 7.26])),
         (beside, 37.0 * 1.01, vector([21.5, 7.505])),
     ] {
-        for layout in [Layout::Regular, Layout::Gauss] {
-            let seeds = fill(&grid, &shape, Filling { per_axis: 2, layout, rule: Fill::Cut }).unwrap();
+        for (layout, kinks_in_middles) in [(Layout::Regular, false), (Layout::Gauss, false), (Layout::Gauss, true)] {
+            let seeds =
+                fill(&grid, &shape, Filling { per_axis: 2, layout, kinks_in_middles, ..Filling::default() }).unwrap();
             let found: f64 = seeds.iter().map(|seed| seed.volume).sum();
             let moment: Vector<f64, 2> = seeds.iter().map(|seed| seed.position * seed.volume).sum();
             assert!((found / volume - 1.0).abs() < 1e-9, "{shape:?}: {found}");
@@ -344,6 +345,22 @@ fn gauss_points_integrate_polynomials_of_degree_2_n_minus_1() {
         for degree in 0..2 * n as i32 {
             let sum: f64 = points.iter().map(|(x, w)| w * x.powi(degree)).sum();
             assert!((sum * f64::from(degree + 1) - 1.0).abs() < 1e-13, "{n}, {degree}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn between_middles_gauss_points_integrate_polynomials_of_degree_2_n_minus_1() {
+    // Cells 1 to 5 of 7: half a piece, four, and half a piece.
+    let grid = Grid { origin: vector([0.0]), spacing: 1.0, cells: [7] };
+    for per_axis in 1..7 {
+        let how = Filling { per_axis, layout: Layout::Gauss, kinks_in_middles: true, ..Filling::default() };
+        let seeds = fill(&grid, &block([1.0], [6.0]), how).unwrap();
+        assert_eq!(seeds.len() as u32, 6 * per_axis + 4 * (per_axis % 2), "those on a node are two");
+        for degree in 0..2 * per_axis as i32 {
+            let integrand = |x: f64| (x + 0.5).fract().powi(degree);
+            let sum: f64 = seeds.iter().map(|seed| seed.volume * integrand(seed.position[0])).sum();
+            assert!((sum * f64::from(degree + 1) / 5.0 - 1.0).abs() < 1e-13, "{per_axis}, {degree}: {sum}");
         }
     }
 }

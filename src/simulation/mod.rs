@@ -7,7 +7,7 @@ mod step;
 pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 
-use crate::approximation::{Approximation, ShapeFunction, Shipped};
+use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{Law, Material, p_wave_modulus};
@@ -208,8 +208,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let across = self.clock.nominal() / self.grid.spacing;
         let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
         let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
-        let shipped = self.approximation.separable().and_then(|functions| functions.shipped());
-        let splines = matches!(shipped, Some(Shipped::Bspline(_)));
+        let splines = self.approximation.separable().is_some_and(|functions| functions.is_spline());
         let on_path = self.settings.scheme.follows_path();
         self.settings.preconditioner.chosen::<D>(self.particles.len(), splines, long, on_path)
     }

@@ -1,8 +1,8 @@
 //! What every shape function promises, for every family in 1, 2 and 3 dimensions.
 
 use bfree::approximation::{
-    Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, Scratch, Separable,
-    ShapeFunction, Support, Validate,
+    Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, NotAKnotBspline, Scratch,
+    Separable, ShapeFunction, Support, Validate,
 };
 use bfree::grid::{Axis, Grid};
 use bfree::mechanics::sweep::Supports;
@@ -174,6 +174,27 @@ fn values_are_nodal_at_walls_and_the_normal_derivative_has_its_limit() {
     walls_are_nodal::<1>();
     walls_are_nodal::<2>();
     walls_are_nodal::<3>();
+}
+
+/// x² of quadratic and x³ of cubic ones, whose coefficients are x² − h²/4 and x³ − h² x; at the walls they are values.
+#[test]
+fn splines_without_a_knot_at_walls_reproduce_polynomials_of_their_degree() {
+    let axis = Axis { origin: 0.0, spacing: H, cells: 9 };
+    let mut weights = AxisWeights::default();
+    for (spline, degree, less) in [(Bspline::Quadratic, 2, 0.25 * H * H), (Bspline::Cubic, 3, H * H)] {
+        let coefficient = |node: u32| {
+            let x = f64::from(node) * H;
+            x.powi(degree) - if node.is_multiple_of(axis.cells) { 0.0 } else { less * x.powi(degree - 2) }
+        };
+        for i in 0..=900 {
+            let x = f64::from(i) * 0.01 * H;
+            NotAKnotBspline(spline).axis(&axis, x, &mut weights).expect("on the axis");
+            let sum = |list: &[f64]| (weights.first..).zip(list).map(|(node, n)| n * coefficient(node)).sum::<f64>();
+            let (value, slope) = (sum(&weights.values), sum(&weights.derivatives));
+            assert!((value - x.powi(degree)).abs() < 1e-12, "{spline:?} at {x}: {value}");
+            assert!((slope - f64::from(degree) * x.powi(degree - 1)).abs() < 1e-11, "{spline:?} at {x}: {slope}");
+        }
+    }
 }
 
 #[test]

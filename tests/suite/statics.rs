@@ -1,6 +1,7 @@
 //! Load steps without inertia.
 
 use crate::support::{Failure, moved_in_column, piola, scene, stretch};
+use bfree::approximation::{Approximation, Bspline, NotAKnotBspline};
 use bfree::causes;
 use bfree::field::Field;
 use bfree::output::Reference;
@@ -288,6 +289,23 @@ fn the_krylov_method_is_chosen_by_the_symmetry_of_the_tangent() -> Result<(), Fa
         if let Some(other) = other {
             assert_ne!(first(other)?.2.counts.tangent_products, chosen.2.counts.tangent_products);
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn splines_curve_at_walls_where_sums_are_integrals_and_no_mass_is_lumped() -> Result<(), Failure> {
+    let gauss = r#"bodies.0.layout="gauss""#;
+    let kept = r#"grid.renewed="never""#;
+    let (quadratic, cubic) = (r#"approximation={"bspline":{"degree":2}}"#, r#"approximation={"bspline":{"degree":3}}"#);
+    for (name, overrides, expected) in [
+        ("elastica.json", vec![], NotAKnotBspline(Bspline::Cubic).into()),
+        ("elastica.json", vec![quadratic], NotAKnotBspline(Bspline::Quadratic).into()),
+        ("elastica.json", vec![r#"bodies.0.layout="regular""#], Bspline::Cubic.into()),
+        ("elastica.json", vec![gauss, r#"grid.renewed="every_step""#], Bspline::Cubic.into()),
+        ("rebound.json", vec![cubic, gauss, kept], Approximation::from(Bspline::Cubic)),
+    ] {
+        assert_eq!(scene::<2>(name, &overrides)?.approximation, expected, "{name}, {overrides:?}");
     }
     Ok(())
 }

@@ -22,8 +22,8 @@ const WEIGHT: (f64, f64, f64) = (2700.0, 9.81, 1.0);
 const SHAPES: [(&str, &str, f64, f64, f64); 6] = [
     ("linear", "\"linear\"", 0.95, 0.2, 0.015),
     ("uGIMP", "\"gimp\"", 0.95, 0.03, 0.015),
-    ("quadratic B-splines", r#"{"bspline":{"degree":2}}"#, 1.45, 0.03, 0.015),
-    ("cubic B-splines", r#"{"bspline":{"degree":3}}"#, 1.45, 0.01, 0.007),
+    ("quadratic B-splines", r#"{"bspline":{"degree":2}}"#, 1.95, 0.03, 0.015),
+    ("cubic B-splines", r#"{"bspline":{"degree":3}}"#, 2.95, 0.01, 0.007),
     ("LME 3", r#"{"lme":{"gamma":3}}"#, 0.95, 0.07, 0.015),
     ("LME 1.4", r#"{"lme":{"gamma":1.4}}"#, 0.95, 0.07, 0.007),
 ];

@@ -51,7 +51,7 @@ fn shapes() -> Vec<(&'static str, Approximation)> {
             "cubic" => "bspline3",
             "lme 1.8" => "lme",
             "lme circle 1.8" => "lme circle",
-            "lme 0.8" | "lme 3" | "lme circle 3" => return None,
+            "lme 0.8" | "lme 3" | "lme circle 3" | "not-a-knot quadratic" | "not-a-knot cubic" => return None,
             other => other,
         };
         Some((name, shape))
