@@ -110,7 +110,7 @@ const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
 const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
-const MATERIAL: &str = "src/material/mod.rs";
+const PIOLA: &str = "src/material/piola.rs";
 const TENSOR: &str = "src/tensor.rs";
 const GMRES: &str = "src/solver/gmres.rs";
 const CONJUGATE: &str = "src/solver/conjugate_gradient.rs";
@@ -531,7 +531,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "self.0.energy(&seeded(e, &direction(i, k))).eps",
         "self.0.energy(&seeded(e, &direction(i, k))).eps * T::lit(if i == k { 1.0 } else { 2.0 })",
         Killed(&[TANGENT], &[DYNAMICS, POINTS])),
-    patch("P = S F for F S", MATERIAL,
+    patch("P = S F for F S", PIOLA,
         "f_left * law.stress(at, start)",
         "law.stress(at, start) * f_left",
         Killed(&[TANGENT, POINTS, DYNAMICS], &[DIGITS])),

@@ -1,0 +1,308 @@
+//! What a law is: the traits that the residual asks.
+
+use super::{ClosedTangent, Material, embed};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, Vector, outer};
+
+/// What a particle remembers of a law from step to step: one number, by name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Remembered {
+    /// As in outputs, checkpoints and `bfree check`.
+    pub name: &'static str,
+    /// Its value in a body at rest.
+    pub at_rest: f64,
+}
+
+/// What a law is given beside F: how long the step is, and what the particle remembers at its beginning.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Δt
+    pub dt: f64,
+    /// The numbers that [`Law::memory`] names, at t_n.
+    pub memory: &'a [f64],
+}
+
+impl Start<'_> {
+    /// Nothing to remember, and no time: all that an elastic law needs.
+    pub const NONE: Self = Self { dt: 0.0, memory: &[] };
+}
+
+/// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions, as the residual asks it. An elastic law is written as
+/// [`Elastic`], and is one; a law with memory says here what it remembers and what becomes of that in a step.
+///
+/// ```
+/// use bfree::material::{Law, Remembered, Start};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Deformation, Tensor, symmetric};
+///
+/// /// S = 2G e^{−d} E, softer by the largest |E| met so far, d.
+/// struct Softening { shear: f64 }
+///
+/// impl Softening {
+///     fn damage<const D: usize>(&self, e: f64, start: &Start<'_>) -> f64 {
+///         start.memory[0].max(e)
+///     }
+/// }
+///
+/// impl Law for Softening {
+///     fn memory(&self) -> &[Remembered] {
+///         &[Remembered { name: "damage", at_rest: 0.0 }]
+///     }
+///     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+///         let e = at.green_lagrange();
+///         bfree::tensor::contract(&e, &e) * T::lit(self.shear * (-start.memory[0]).exp())
+///     }
+///     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+///         at.green_lagrange().map(|e| e * T::lit(2.0 * self.shear * (-start.memory[0]).exp()))
+///     }
+///     fn elasticity<T: Real, const D: usize>(
+///         &self, _: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
+///     ) -> Tensor<T, D> {
+///         symmetric(x).map(|x| x * T::lit(2.0 * self.shear * (-start.memory[0]).exp()))
+///     }
+///     fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+///         next[0] = self.damage::<D>(at.green_lagrange().norm(), start);
+///     }
+/// }
+///
+/// let (law, mut next) = (Softening { shear: 1.0 }, [0.0]);
+/// let at = Deformation::<f64, 1>::new(Tensor::from_element(1.0)); // E = 3/2
+/// law.remember(&at, &Start { dt: 1.0, memory: &[0.5] }, &mut next);
+/// assert_eq!(next, [1.5]);
+/// assert!(law.stress(&at, &Start { dt: 1.0, memory: &next })[(0, 0)] < law.stress(&at, &Start { dt: 1.0, memory: &[0.5] })[(0, 0)]);
+/// ```
+pub trait Law: Send + Sync {
+    /// What a particle remembers; nothing of an elastic law.
+    fn memory(&self) -> &[Remembered] {
+        &[]
+    }
+
+    /// Whether ℂ has major symmetry.
+    fn is_symmetric(&self) -> bool {
+        true
+    }
+
+    /// Whether stresses derive from [`Self::energy`] within a step.
+    fn has_potential(&self) -> bool {
+        true
+    }
+
+    /// Strain energy density `W`, or the incremental potential of the step.
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T;
+
+    /// Second Piola–Kirchhoff stress `S`, symmetric.
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D>;
+
+    /// `ℂ:X = ∂S/∂E : sym X`.
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D>;
+
+    /// The B-free tangent density, `ℂmat{v,b} a = [ℂ:(a ⊗ b)] v` (eq. 37).
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        density(v, |a| self.elasticity(at, start, &outer(a, b)))
+    }
+
+    /// As [`Elastic::closed`].
+    fn closed<const D: usize>(
+        &self,
+        _f_n: &Tensor<f64, D>,
+        _at: &Deformation<f64, D>,
+        _volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        None
+    }
+
+    /// What is remembered at the end of a step that ends at `at`.
+    fn remember<const D: usize>(&self, _at: &Deformation<f64, D>, _start: &Start<'_>, _next: &mut [f64]) {}
+
+    /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, Material, NeoHookean};
+    ///
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let material = Material::from(law);
+    /// // The law in the list is one of the shipped ones: itself.
+    /// assert_eq!(material.shipped(), Some(&material));
+    /// assert_eq!(law.shipped(), None);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    fn shipped(&self) -> Option<&Material> {
+        None
+    }
+
+    /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
+    /// By embedding into 3D.
+    ///
+    /// ```
+    /// use bfree::material::{Lame, Law, Start, StVenantKirchhoff};
+    /// use bfree::tensor::{Deformation, Tensor};
+    ///
+    /// // Uniaxial strain, small: σ_zz = Λ ε = ν (σ_xx + σ_yy)
+    /// let law = StVenantKirchhoff { lame: Lame::from_young_poisson(2.5, 0.25)? };
+    /// let strain = 1e-9;
+    /// let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
+    /// assert!((law.out_of_plane_stress(&at, &Start::NONE) / (law.lame.lambda * strain) - 1.0).abs() < 1e-8);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    fn out_of_plane_stress<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>) -> f64 {
+        let embedded = Deformation::new(embed(&at.h));
+        // σ_zz = P_zz F_zz / J with F_zz = 1
+        self.stress(&embedded, start)[(2, 2)] / at.jacobian
+    }
+}
+
+/// ℂmat{v, b}, column by column from what ℂ makes of a ⊗ b.
+fn density<T: Real, const D: usize>(
+    v: &Vector<T, D>,
+    elasticity: impl Fn(&Vector<T, D>) -> Tensor<T, D>,
+) -> Tensor<T, D> {
+    let mut density: Tensor<T, D> = Tensor::zeros();
+    for k in 0..D {
+        let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
+        density.set_column(k, &(elasticity(&e_k) * v));
+    }
+    density
+}
+
+/// A pointwise hyperelastic law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions: a [`Law`] that remembers nothing.
+///
+/// Every method takes the deformation as H = F − I wrapped in a [`Deformation`] whose Jacobian is positive (the callers in this
+/// module make sure of it). Stresses have the unit of the law's moduli; `W` is per unit reference volume.
+///
+/// ```
+/// use bfree::material::{Elastic, Lame, NeoHookean};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Deformation, Tensor, Vector, contract, outer, symmetric};
+/// use num_dual::Dual64;
+///
+/// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+/// let delta = Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0);
+/// // What δF makes of the strain: δE = sym(Fᵀ δF)
+/// let strain = symmetric(&(at.f.transpose() * delta));
+/// // S = ∂W/∂E and ℂ:δE = δS, by dual numbers through the law itself.
+/// let dual = Deformation::new(at.h.zip_map(&delta, Dual64::new));
+/// assert!((law.energy(&dual).eps - contract(&law.stress(&at), &strain)).abs() < 1e-15);
+/// let change = law.elasticity(&at, &strain);
+/// assert!((law.stress(&dual).map(|s| s.eps) - change).norm() < 1e-14);
+/// // ℂmat{v, b} a = [ℂ : (a ⊗ b)] v   (37)
+/// let (a, b, v) = (Vector::from([1.0, 2.0]), Vector::from([0.5, -1.0]), Vector::from([3.0, 1.0]));
+/// let (left, right) = (law.tangent_density(&at, &v, &b) * a, law.elasticity(&at, &outer(&a, &b)) * v);
+/// assert!((left - right).norm() < 1e-14);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+pub trait Elastic: Send + Sync {
+    /// Strain energy density `W`.
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T;
+
+    /// Second Piola–Kirchhoff stress `S = ∂W/∂E`, symmetric.
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D>;
+
+    /// `ℂ:X = ∂S/∂E : sym X`.
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D>;
+
+    /// The B-free tangent density, `ℂmat{v,b} a = [ℂ:(a ⊗ b)] v` (eq. 37).
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        density(v, |a| self.elasticity(at, &outer(a, b)))
+    }
+
+    /// The whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`, for gradients taken in the
+    /// configuration `n` whose deformation gradient is `f_n`, if it has this form; the same answer at every state.
+    ///
+    /// ```
+    /// use bfree::material::{Elastic, Lame, NeoHookean, first_piola};
+    /// use bfree::tensor::{Deformation, Tensor, identity};
+    /// use num_dual::Dual64;
+    ///
+    /// // V₀ δP, geometric and material together, is the derivative of V₀ P = V₀ F S. Here F_n = I, so that δF = L.
+    /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+    /// let (h, l) = (Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1), Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0));
+    /// let closed = law.closed(&identity(), &Deformation::new(h), 3.0).ok_or("closed")?;
+    /// let dual = h.zip_map(&l, Dual64::new);
+    /// let delta = first_piola(&law, &Deformation::new(dual).f, dual)?.map(|x| 3.0 * x.eps);
+    /// assert!((closed.apply(&l) - delta).norm() < 1e-14 * delta.norm());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    fn closed<const D: usize>(
+        &self,
+        _f_n: &Tensor<f64, D>,
+        _at: &Deformation<f64, D>,
+        _volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        None
+    }
+}
+
+/// An elastic law as the residual asks it.
+impl<E: Elastic> Law for E {
+    #[inline(always)]
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> T {
+        Elastic::energy(self, at)
+    }
+    #[inline(always)]
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> Tensor<T, D> {
+        Elastic::stress(self, at)
+    }
+    #[inline(always)]
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        _: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        Elastic::elasticity(self, at, x)
+    }
+    #[inline(always)]
+    fn tangent_density<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        _: &Start<'_>,
+        v: &Vector<T, D>,
+        b: &Vector<T, D>,
+    ) -> Tensor<T, D> {
+        Elastic::tangent_density(self, at, v, b)
+    }
+    #[inline(always)]
+    fn closed<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        volume: f64,
+    ) -> Option<ClosedTangent<f64, D>> {
+        Elastic::closed(self, f_n, at, volume)
+    }
+}
+
+/// The largest modulus of pressure waves along an axis of the body at rest, ℂ₁₁₁₁; Λ + 2G of isotropic laws.
+///
+/// ```
+/// use bfree::material::{Lame, NeoHookean, p_wave_modulus};
+///
+/// let lame = Lame::from_young_poisson(100.0, 0.3)?;
+/// assert_eq!(p_wave_modulus(&NeoHookean::logarithmic(lame)), lame.p_wave_modulus());
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+pub fn p_wave_modulus<L: Law>(law: &L) -> f64 {
+    let rest = Deformation::<f64, 3>::new(Tensor::zeros());
+    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
+    let start = Start { dt: 0.0, memory: &memory };
+    let along =
+        |k| law.elasticity(&rest, &start, &Tensor::from_fn(|i, j| if i == k && j == k { 1.0 } else { 0.0 }))[(k, k)];
+    along(0).max(along(1)).max(along(2))
+}
