@@ -117,6 +117,18 @@ impl Clock {
         self.nominal
     }
 
+    /// Whole steps that reach `end`, to within a billionth of a step; a last step may lead beyond it.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// // 0.3 / 0.1 is 2.9999999999999996.
+    /// assert_eq!((Clock::new(0.1, 0).whole_steps(0.3), Clock::new(0.1, 0).whole_steps(0.31)), (3, 4));
+    /// ```
+    pub fn whole_steps(&self, end: f64) -> u64 {
+        (end / self.nominal - 1e-9).ceil().max(0.0) as u64
+    }
+
     /// Steps taken so far.
     pub fn steps(&self) -> u64 {
         self.steps

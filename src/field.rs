@@ -16,6 +16,9 @@ macro_rules! fields {
         }
 
         impl Field {
+            /// All fields.
+            pub const ALL: &[Self] = &[$(Self::$field),+];
+
             /// The name, as in scenes and files.
             ///
             /// ```

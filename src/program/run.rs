@@ -1,7 +1,7 @@
 //! `bfree run`.
 
 use super::probes::{Bound, bound_probes};
-use super::scene_arguments::{SceneArguments, steps_until, what_accuracy_sets};
+use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
@@ -137,7 +137,7 @@ impl Run {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.scene.plan(&simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
-        let until = steps_until(&simulation, scene.time.end);
+        let until = simulation.clock.whole_steps(scene.time.end);
         let last = self.steps.map_or(until, |steps| steps.min(until));
         let directory = self.out.clone().unwrap_or_else(|| {
             Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))

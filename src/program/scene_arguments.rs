@@ -2,7 +2,6 @@
 
 use super::probes::bound_probes;
 use super::{Failure, print, tell};
-use bfree::material::Material;
 use bfree::memory;
 use bfree::particles::Particles;
 use bfree::plan::Plan;
@@ -81,7 +80,7 @@ impl SceneArguments {
     fn check_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
         let simulation = self.build::<D>(scene)?;
         let mut text = scene.title.as_ref().map_or_else(String::new, |title| format!("{title}\n"));
-        let steps = steps_until(&simulation, scene.time.end);
+        let steps = simulation.clock.whole_steps(scene.time.end);
         // Writing to a string cannot fail.
         if let Some(set) = what_accuracy_sets(scene) {
             let _ = writeln!(text, "accuracy      {set}");
@@ -115,9 +114,4 @@ pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
     let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();
     let set = if set.is_empty() { "nothing: the scene gives every key".to_owned() } else { set.join(", ") };
     Some(format!("{accuracy} sets {set}"))
-}
-
-/// Whole steps that reach `end`, to within a billionth of a step; a last step may lead beyond it.
-pub fn steps_until<const D: usize>(simulation: &Simulation<D, Material>, end: f64) -> u64 {
-    (end / simulation.clock.nominal() - 1e-9).ceil().max(0.0) as u64
 }

@@ -1,9 +1,11 @@
 //! A simulation: the state at the last converged step, and how it goes on (`step.rs`).
 
+mod coming;
 mod report;
 mod settings;
 mod step;
 
+pub use coming::Coming;
 pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 

@@ -327,7 +327,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The mass of the nodes, where something asks for it.
-    fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
+    pub(super) fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
         let weighs = self.settings.scheme.has_inertia() || self.loads.gravity.is_some();
         if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
     }

@@ -21,7 +21,8 @@ const DOCUMENTS: [&str; 7] = [
 ];
 
 /// Folders whose files are named in running text by their whole path.
-const FOLDERS: [&str; 9] = [".ci", "benches", "docs", "examples", "scenes", "schemas", "src", "tests", "verification"];
+const FOLDERS: [&str; 10] =
+    [".ci", "benches", "docs", "examples", "python", "scenes", "schemas", "src", "tests", "verification"];
 
 /// A file of the repository.
 pub fn in_repository(path: &str) -> PathBuf {

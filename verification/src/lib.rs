@@ -9,23 +9,37 @@
 //! # Ok::<(), bfree::material::LameError>(())
 //! ```
 
+#[cfg(feature = "studies")]
 pub mod baseline;
 mod check;
+#[cfg(feature = "studies")]
 pub mod double_double;
+#[cfg(feature = "studies")]
 pub mod elements;
+#[cfg(feature = "studies")]
 pub mod figure;
+#[cfg(feature = "studies")]
 pub mod known;
+#[cfg(feature = "studies")]
 pub mod manufactured;
 pub mod prepared;
+#[cfg(feature = "studies")]
 pub mod processor;
 pub mod random;
+#[cfg(feature = "studies")]
 pub mod record;
 pub mod report;
+#[cfg(feature = "studies")]
 pub mod riemann;
+#[cfg(feature = "studies")]
 mod settling;
+#[cfg(feature = "studies")]
 pub mod sheet;
+#[cfg(feature = "studies")]
 pub mod shipped;
+#[cfg(feature = "studies")]
 pub mod start;
+#[cfg(feature = "studies")]
 pub mod studies;
 pub mod table;
 

@@ -2,6 +2,8 @@
 
 mod approximation;
 mod material;
+// The studies use more of it than the checks do.
+#[cfg_attr(not(feature = "studies"), allow(dead_code))]
 pub(crate) mod regime;
 pub(crate) mod tangent;
 

@@ -1,0 +1,96 @@
+//! What the coming step solves, to look at: its equilibrium, and all that it is made from.
+
+use super::{Simulation, StepError, Workspace};
+use crate::approximation::{Approximation, ShapeFunction};
+use crate::material::{Law, Material};
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::sweep::Supports;
+use crate::mechanics::transfer::Nodal;
+use crate::nodes::Nodes;
+use crate::tensor::Vector;
+
+/// The coming step of a simulation, which it does not touch.
+///
+/// ```
+/// use bfree::tensor::Vector;
+///
+/// // Of a body in free flight the first step is solved by Δφ = Δt v.
+/// let simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+/// let coming = simulation.coming()?;
+/// let dphi = vec![Vector::from([0.5, 0.0]) * simulation.clock.step(); coming.nodes().len()];
+/// let (equilibrium, phi) = (coming.equilibrium(), coming.motion(&dphi));
+/// let residual = equilibrium.residual(&phi)?;
+/// assert!(residual.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt() < 1e-13 * equilibrium.magnitude(&phi)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Coming<const D: usize, L = Material, A = Approximation> {
+    /// With the particles where the grid was new.
+    simulation: Simulation<D, L, A>,
+    supports: Supports<D>,
+    nodal: Nodal<D>,
+    prescribed: Vec<PrescribedDof>,
+}
+
+impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, A> {
+    /// The coming step, of the length that the clock has now.
+    ///
+    /// Example: [`Coming`].
+    ///
+    /// # Errors
+    /// A particle without shape functions, or velocities so large that their projection overflows.
+    pub fn coming(&self) -> Result<Coming<D, L, A>, StepError> {
+        let mut simulation = Self { workspace: Workspace::default(), ..self.clone() };
+        let mut kept = simulation.kept.take();
+        kept.iter_mut().for_each(|kept| kept.exchange(&mut simulation.particles));
+        simulation.particles.remember(&simulation.bodies);
+        let (supports, nodes) =
+            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+        let prescribed = self.prescribed(&nodes);
+        let projected = match &kept {
+            Some(kept) => kept.state(simulation.masses(&supports), supports.pool()),
+            None => simulation.project(&supports)?,
+        };
+        let nodal = projected.with_prescribed(&prescribed);
+        Ok(Coming { simulation, supports, nodal, prescribed })
+    }
+}
+
+impl<const D: usize, L: Law, A: ShapeFunction> Coming<D, L, A> {
+    /// The active nodes.
+    pub fn nodes(&self) -> &Nodes {
+        self.supports.active()
+    }
+
+    /// Their positions.
+    pub fn positions(&self) -> impl Iterator<Item = Vector<f64, D>> {
+        self.nodes().positions(&self.simulation.grid).map(|(_, x)| x)
+    }
+
+    /// What is not solved for; the increments belong to the whole step.
+    pub fn prescribed(&self) -> &[PrescribedDof] {
+        &self.prescribed
+    }
+
+    /// φ of the nodes since the grid was new, where they have moved by Δφ since t_n.
+    pub fn motion(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
+        dphi.iter().zip(self.nodal.moved(dphi.len())).map(|(dphi, before)| dphi + before).collect()
+    }
+
+    /// The equilibrium, as a function of φ, at the instant where forces are in balance: the end of the step, but for generalised-α.
+    pub fn equilibrium(&self) -> Equilibrium<'_, D, L> {
+        let simulation = &self.simulation;
+        let (dt, scheme) = (simulation.clock.step(), &simulation.settings.scheme);
+        let load = match scheme.follows_path() {
+            true => simulation.path.load_step(dt),
+            false => simulation.clock.time() + scheme.instant() * dt,
+        };
+        simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, scheme.balance(dt), load)
+    }
+
+    /// Which part of the step ends where forces are in balance, θ.
+    pub fn instant(&self) -> f64 {
+        self.simulation.settings.scheme.instant()
+    }
+}
