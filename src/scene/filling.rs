@@ -195,7 +195,7 @@ impl Scene {
         self.bodies.iter().enumerate().map(of).collect()
     }
 
-    /// The surface of a body in the boxes of its particles. Where the box ends and holds the motion across, the body goes on: a plane
+    /// The surface of a body, in the boxes that cut cells have. Where the box ends and holds the motion across, the body goes on: a plane
     /// of symmetry is no surface.
     pub(super) fn facets<const D: usize>(
         &self,
@@ -204,7 +204,7 @@ impl Scene {
         region: Option<&Shape<D>>,
         grid: &Grid<D>,
     ) -> Vec<Facet<D>> {
-        let (h, n) = (grid.spacing, u64::from(body.particles_per_cell));
+        let (h, n) = (grid.spacing, u64::from(self.filling(body).boxes()));
         let edges = Vector::repeat(h / n as f64);
         let (first, count) = around(grid, shape);
         let goes_on = |facet: &Facet<D>| {

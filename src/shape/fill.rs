@@ -38,6 +38,16 @@ pub struct Filling {
     pub kinks_in_middles: bool,
 }
 
+impl Filling {
+    /// Boxes along an axis of a cell that is cut.
+    pub(crate) fn boxes(self) -> u32 {
+        match self.layout {
+            Layout::Regular => self.per_axis,
+            Layout::Gauss => 2 * self.per_axis,
+        }
+    }
+}
+
 /// A particle to be: its place, and the volume it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed<const D: usize> {
@@ -108,7 +118,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     if candidates > MAX_CANDIDATES {
         return Err(FillError::TooMany { candidates });
     }
-    let pieces = how.layout.pieces(how.per_axis);
+    let pieces = how.boxes();
     // By whether the cell below is full, and the one above.
     let between = how.kinks_in_middles && how.layout == Layout::Gauss;
     let points = [[false, false], [true, false], [false, true], [true, true]]

@@ -29,14 +29,6 @@ impl Layout {
             Self::Gauss => (0..n).map(|i| gauss(n, i)).collect(),
         }
     }
-
-    /// Boxes along an axis of a cell that is cut.
-    pub(super) fn pieces(self, n: u32) -> u32 {
-        match self {
-            Self::Regular => n,
-            Self::Gauss => 2 * n,
-        }
-    }
 }
 
 /// Gauss's points of a cell of functions with kinks in the middle of cells: from the middle of the cell before to that of this one, and on
