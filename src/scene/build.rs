@@ -4,6 +4,7 @@ use super::body::Body;
 use super::boundary::{Face, Table};
 use super::load::{self, Loaded};
 use super::particle_file::{self, ParticleFileError};
+use super::surface_file::SurfaceFileError;
 use super::transfer::Transfer;
 use super::{Problems, Scene, scale};
 use crate::approximation::{Approximation, Cells};
@@ -77,6 +78,16 @@ pub enum BuildError {
         file: String,
         /// What is wrong.
         source: Box<ParticleFileError>,
+    },
+    /// A surface file.
+    #[error("{path}: {file} {source}")]
+    SurfaceFile {
+        /// The key.
+        path: String,
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: Box<SurfaceFileError>,
     },
     /// A particle of a file that lies outside the grid.
     #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]
@@ -212,7 +223,10 @@ impl Scene {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
         let means = Means { folder, memory };
-        let mut problems = Problems::default();
+        let mut problems = self.read_surfaces(folder)?;
+        if !problems.is_empty() {
+            return Err(BuildError::Values(problems));
+        }
         let mut particles = Particles::default();
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {
