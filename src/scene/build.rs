@@ -62,7 +62,10 @@ impl Scene {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
         let means = Means { folder, memory };
-        let mut problems = Problems::default();
+        let mut problems = self.read_surfaces(folder)?;
+        if !problems.is_empty() {
+            return Err(BuildError::Values(problems));
+        }
         let mut particles = Particles::default();
         let mut bodies = Vec::new();
         for (i, body) in self.bodies.iter().enumerate() {

@@ -2,6 +2,7 @@
 
 use super::Problems;
 use super::particle_file::ParticleFileError;
+use super::surface_file::SurfaceFileError;
 use crate::mechanics::loads::CurveError;
 use crate::shape::FillError;
 use crate::simulation::StepError;
@@ -61,6 +62,16 @@ pub enum BuildError {
         file: String,
         /// What is wrong.
         source: Box<ParticleFileError>,
+    },
+    /// A surface file.
+    #[error("{path}: {file} {source}")]
+    SurfaceFile {
+        /// The key.
+        path: String,
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: Box<SurfaceFileError>,
     },
     /// A particle of a file that lies outside the grid.
     #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]

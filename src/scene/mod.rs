@@ -14,6 +14,7 @@ pub mod output;
 pub mod particle_file;
 pub mod shape;
 pub mod solver;
+pub mod surface_file;
 pub mod time;
 pub mod transfer;
 

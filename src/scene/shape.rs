@@ -1,8 +1,9 @@
 //! Regions of space in a scene.
 
+use super::surface_file::SurfaceFile;
 use crate::problems::{LARGEST, MOST, Number, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
-use crate::tensor::{Vector, identity};
+use crate::tensor::{Tensor, Vector, identity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +87,9 @@ pub enum Shape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         factor: f64,
     },
+    /// The inside of a closed surface of triangles, from a file (3D only). A file in other units is brought to those of the scene by
+    /// `scaled`.
+    Surface(SurfaceFile),
 }
 
 impl Shape {
@@ -121,11 +125,10 @@ impl Shape {
             Self::Rotated { of, about, angle, axis } => {
                 let axis = axis.as_ref().map(|axis| vector(axis).ok_or(())).transpose().ok()?;
                 let rotation = rotation(*angle, axis.as_ref())?;
-                shape::Similar { of: part(of)?, about: vector(about)?, rotation, factor: 1.0 }.into()
+                similar(of.build()?, vector(about)?, rotation, 1.0)
             }
-            Self::Scaled { of, about, factor } => {
-                shape::Similar { of: part(of)?, about: vector(about)?, rotation: identity(), factor: *factor }.into()
-            }
+            Self::Scaled { of, about, factor } => similar(of.build()?, vector(about)?, identity(), *factor),
+            Self::Surface(file) => file.surface.get()?.in_dimension()?.into(),
         })
     }
 
@@ -200,7 +203,56 @@ impl Shape {
                 ok &= problems.vector(&format!("{path}.about"), about, dimension);
                 problems.positive(&format!("{path}.factor"), *factor) && ok
             }
+            Self::Surface(_) if dimension != 3 => {
+                let allowed = format!("it needs a grid of 3 dimensions, and this one has {dimension}");
+                refused(problems, &format!("{path}.surface"), "a surface", &allowed)
+            }
+            Self::Surface(file) if !file.has_format() => refused(
+                problems,
+                &format!("{path}.surface.file"),
+                &format!("{:?}", file.file),
+                "must end in .stl or .ply",
+            ),
+            Self::Surface(_) => true,
         }
+    }
+
+    /// Visits the files in it, each with its path.
+    pub(super) fn each_file<E>(
+        &self,
+        path: &str,
+        visit: &mut impl FnMut(&str, &SurfaceFile) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut all = |parts: &[Self], key: &str| {
+            let mut parts = parts.iter().enumerate();
+            parts.try_for_each(|(i, part)| part.each_file(&format!("{path}.{key}[{i}]"), visit))
+        };
+        match self {
+            Self::Union(parts) => all(parts, "union"),
+            Self::Intersection(parts) => all(parts, "intersection"),
+            Self::Difference { of, minus } => {
+                of.each_file(&format!("{path}.difference.of"), visit)?;
+                minus.each_file(&format!("{path}.difference.minus"), visit)
+            }
+            Self::Rotated { of, .. } => of.each_file(&format!("{path}.rotated.of"), visit),
+            Self::Scaled { of, .. } => of.each_file(&format!("{path}.scaled.of"), visit),
+            Self::Surface(file) => visit(&format!("{path}.surface.file"), file),
+            Self::Box { .. } | Self::Ball { .. } | Self::HalfSpace { .. } => Ok(()),
+            Self::Polygon(_) | Self::Cylinder { .. } | Self::Cone { .. } => Ok(()),
+        }
+    }
+}
+
+/// A solid turned and scaled; a surface has its corners moved, and keeps what it knows of whole rows of boxes.
+fn similar<const D: usize>(
+    of: shape::Shape<D>,
+    about: Vector<f64, D>,
+    rotation: Tensor<f64, D>,
+    factor: f64,
+) -> shape::Shape<D> {
+    match of {
+        shape::Shape::Surface(surface) => surface.moved(&about, &rotation, factor).into(),
+        of => shape::Similar { of: Box::new(of), about, rotation, factor }.into(),
     }
 }
 

@@ -20,6 +20,12 @@ pub struct Difference<const D: usize> {
     pub minus: Box<Shape<D>>,
 }
 
+/// The only part of these whose surface comes so near, if all others are all out of reach, on the side of this sign.
+fn only<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, radius: f64, sign: f64) -> Option<&'a Shape<D>> {
+    let mut near = parts.iter().filter(|part| sign * part.signed_distance(x) < radius);
+    near.next().filter(|_| near.next().is_none())
+}
+
 impl<const D: usize> Solid<D> for Union<D> {
     /// d = min dᵢ
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
@@ -33,6 +39,10 @@ impl<const D: usize> Solid<D> for Union<D> {
 
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         self.0.iter().map(|part| part.solid().reach(n)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
+        Some((only(&self.0, x, radius, 1.0)?, false))
     }
 }
 
@@ -51,6 +61,10 @@ impl<const D: usize> Solid<D> for Intersection<D> {
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         self.0.iter().map(|part| part.solid().reach(n)).fold(f64::INFINITY, f64::min)
     }
+
+    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
+        Some((only(&self.0, x, radius, -1.0)?, false))
+    }
 }
 
 impl<const D: usize> Solid<D> for Difference<D> {
@@ -68,5 +82,15 @@ impl<const D: usize> Solid<D> for Difference<D> {
     /// An upper bound.
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         self.of.solid().reach(n)
+    }
+
+    fn alone(&self, x: &Vector<f64, D>, radius: f64) -> Option<(&Shape<D>, bool)> {
+        if self.minus.signed_distance(x) >= radius {
+            Some((&self.of, false))
+        } else if self.of.signed_distance(x) <= -radius {
+            Some((&self.minus, true))
+        } else {
+            None
+        }
     }
 }

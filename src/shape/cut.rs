@@ -64,12 +64,35 @@ impl<const D: usize> Shape<D> {
     /// assert!((volume - 4.5).abs() < 1e-14 && (centroid - Vector::from([-2.0, 1.0])).norm() < 1e-14);
     /// ```
     pub fn part(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, spacing: f64) -> (f64, Vector<f64, D>) {
+        if let Some(one) = self.row(lower, edges, 1).and_then(|row| row.into_iter().next()) {
+            return one;
+        }
+        let (center, radius) = around(lower, edges);
+        if let Some((part, outside)) = self.solid().alone(&center, radius) {
+            let (volume, centroid) = part.part(lower, edges, spacing);
+            if !outside {
+                return (volume, centroid);
+            }
+            let rest = edges.product() - volume;
+            return (rest.max(0.0), if rest > 0.0 { center + (center - centroid) * (volume / rest) } else { center });
+        }
         let (mut volume, mut moment) = (0.0, Vector::zeros());
         self.pieces(None, lower, edges, FLAT * spacing, &mut |piece| {
             volume += piece.volume;
             moment += piece.centroid * piece.volume;
         });
         (volume, if volume > 0.0 { moment / volume } else { lower + edges * 0.5 })
+    }
+
+    /// As [`Self::part`], of `count` boxes next to each other along the first axis, the first one from `lower`; `None` of a shape that
+    /// does not know them all at once.
+    pub(super) fn row(
+        &self,
+        lower: &Vector<f64, D>,
+        edges: &Vector<f64, D>,
+        count: usize,
+    ) -> Option<Vec<(f64, Vector<f64, D>)>> {
+        self.solid().row(lower, edges, count)
     }
 
     /// The pieces of surface in that box, and in `region` if there is one: one for each of its sides there.
@@ -93,24 +116,40 @@ impl<const D: usize> Shape<D> {
         edges: &Vector<f64, D>,
         spacing: f64,
     ) -> Vec<Facet<D>> {
+        let (center, radius) = around(lower, edges);
+        if let Some((part, outside)) = self.solid().alone(&center, radius) {
+            let mut facets = part.facets(region, lower, edges, spacing);
+            facets.iter_mut().filter(|_| outside).for_each(|facet| facet.normal = -facet.normal);
+            return facets;
+        }
         let mut sides: Vec<Facet<D>> = Vec::new();
+        let mut add = |facet: Facet<D>, departure: f64| {
+            let slack = departure + EDGE * spacing;
+            if region.is_some_and(|region| region.signed_distance(&facet.position) > slack) {
+                return;
+            }
+            let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > ALIKE * side.normal.norm();
+            let Some(side) = sides.iter_mut().find(side) else {
+                sides.push(facet);
+                return;
+            };
+            let area = side.area + facet.area;
+            let mean = |a: Vector<f64, D>, b: Vector<f64, D>| (a * side.area + b * facet.area) / area;
+            let (position, normal) = (mean(side.position, facet.position), mean(side.normal, facet.normal));
+            *side = Facet { position, normal, area };
+        };
+        let mut planes = Vec::new();
+        region.iter().for_each(|region| _ = region.solid().add_planes(&center, radius, &mut planes));
+        if let Some(facets) = self.solid().facets(lower, edges, &planes) {
+            facets.into_iter().for_each(|facet| add(facet, 0.0));
+            return sides;
+        }
         self.pieces(region, lower, edges, FLAT * spacing, &mut |piece| {
             let Some((simplex, cut)) = piece.cut else { return };
             for apex in 0..=D {
-                let Some(facet) = self.facet(simplex, apex, piece.volume, cut, spacing) else { continue };
-                let slack = cut.departure + EDGE * spacing;
-                if region.is_some_and(|region| region.signed_distance(&facet.position) > slack) {
-                    continue;
+                if let Some(facet) = self.facet(simplex, apex, piece.volume, cut, spacing) {
+                    add(facet, cut.departure);
                 }
-                let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > ALIKE * side.normal.norm();
-                let Some(side) = sides.iter_mut().find(side) else {
-                    sides.push(facet);
-                    continue;
-                };
-                let area = side.area + facet.area;
-                let mean = |a: Vector<f64, D>, b: Vector<f64, D>| (a * side.area + b * facet.area) / area;
-                let (position, normal) = (mean(side.position, facet.position), mean(side.normal, facet.normal));
-                *side = Facet { position, normal, area };
             }
         });
         sides
@@ -152,8 +191,7 @@ impl<const D: usize> Shape<D> {
         flat: f64,
         visit: &mut dyn FnMut(Piece<'_, D>),
     ) {
-        // A hair more, for faces that the box touches.
-        let (center, radius) = (lower + edges * 0.5, (0.5 + EDGE) * edges.norm());
+        let (center, radius) = around(lower, edges);
         let distance = self.signed_distance(&center);
         if distance >= radius {
             return;
@@ -204,6 +242,11 @@ impl<const D: usize> Shape<D> {
             }
         }
     }
+}
+
+/// The centre of a box, and how far its corners are; a hair more, for faces that it touches.
+fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
+    (lower + edges * 0.5, (0.5 + EDGE) * edges.norm())
 }
 
 /// The D! simplices of a box (Kuhn): from the lower corner to the upper one, an axis at a time.

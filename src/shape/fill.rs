@@ -130,42 +130,64 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
     let edges: Vector<f64, D> = Vector::repeat(h / f64::from(pieces));
     let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
+    let mut rows = None;
     for (id, cell) in (0..).zip(indices(count)) {
         let corner: [f64; D] = std::array::from_fn(|k| (first[k] + cell[k]) as f64);
         let position = |within: Vector<f64, D>| Vector::from_fn(|k, _| grid.origin[k] + (corner[k] + within[k]) * h);
-        let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
-        let all = match how.rule {
-            Fill::Cells => distance <= EDGE * h,
-            Fill::Particles => true,
-            Fill::Cut => distance < 0.5 * h * (D as f64).sqrt(),
+        let boxes = || {
+            indices([u64::from(pieces); D]).map(|i| position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(pieces))))
         };
-        if !all {
-            continue;
+        if how.rule == Fill::Cut && cell[0] == 0 {
+            // The boxes of a row of cells, if the shape knows them all at once.
+            let along = count[0] as usize * pieces as usize;
+            rows = boxes()
+                .step_by(pieces as usize)
+                .map(|lower| shape.row(&lower, &edges, along))
+                .collect::<Option<Vec<_>>>();
+        }
+        let mut parts = None;
+        if let Some(rows) = &rows {
+            let from = cell[0] as usize * pieces as usize;
+            let of_cell = rows.iter().flat_map(|row| row.iter().skip(from).take(pieces as usize).copied());
+            parts = Some(of_cell.collect())
+                .filter(|parts: &Vec<(f64, Vector<f64, D>)>| parts.iter().any(|part| part.0 > 0.0));
+            if parts.is_none() {
+                continue;
+            }
+        } else {
+            let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
+            let across = 0.5 * h * (D as f64).sqrt();
+            let all = match how.rule {
+                Fill::Cells => distance <= EDGE * h,
+                Fill::Particles => true,
+                Fill::Cut => distance < across,
+            };
+            if !all {
+                continue;
+            }
+            if how.rule == Fill::Cut && distance > -across {
+                parts = Some(boxes().map(|lower| shape.part(&lower, &edges, h)).collect());
+            }
         }
         if how.rule == Fill::Cut {
             filling.cells.push((id, filling.seeds.len()));
         }
-        if how.rule == Fill::Cut && distance > -0.5 * h * (D as f64).sqrt() {
-            let mut parts = Vec::new();
-            for i in indices([u64::from(pieces); D]) {
-                let lower = position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(pieces)));
-                parts.push(shape.part(&lower, &edges, h));
-            }
-            if parts.iter().any(|part| part.0 < (1.0 - NOTHING) * edges.product()) {
-                for (i, (volume, centroid)) in indices([u64::from(pieces); D]).zip(parts) {
-                    let share = volume / edges.product();
-                    if share > 1.0 - NOTHING {
-                        let middle = Vector::from_fn(|k, _| (i[k] as f64 + 0.5) / f64::from(pieces));
-                        filling.seeds.push(Seed { position: position(middle), volume: edges.product() });
-                    } else if share > NOTHING {
-                        if share < SLIVER {
-                            filling.slivers.push((id, filling.seeds.len()));
-                        }
-                        filling.seeds.push(Seed { position: centroid, volume });
+        if let Some(parts) = parts
+            && parts.iter().any(|part| part.0 < (1.0 - NOTHING) * edges.product())
+        {
+            for (i, (volume, centroid)) in indices([u64::from(pieces); D]).zip(parts) {
+                let share = volume / edges.product();
+                if share > 1.0 - NOTHING {
+                    let middle = Vector::from_fn(|k, _| (i[k] as f64 + 0.5) / f64::from(pieces));
+                    filling.seeds.push(Seed { position: position(middle), volume: edges.product() });
+                } else if share > NOTHING {
+                    if share < SLIVER {
+                        filling.slivers.push((id, filling.seeds.len()));
                     }
+                    filling.seeds.push(Seed { position: centroid, volume });
                 }
-                continue;
             }
+            continue;
         }
         let goes_on = |beside: Option<u64>| beside.and_then(|id| full.get(id as usize)).is_some_and(|&full| full);
         let mut stride = 1;

@@ -10,6 +10,7 @@ mod half_space;
 mod layout;
 mod polygon;
 mod similar;
+mod surface;
 
 #[cfg(test)]
 mod tests;
@@ -25,6 +26,7 @@ pub use half_space::HalfSpace;
 pub use layout::Layout;
 pub use polygon::{Polygon, PolygonError};
 pub use similar::{Similar, rotation};
+pub use surface::{Surface, SurfaceError};
 
 use crate::tensor::Vector;
 
@@ -48,6 +50,27 @@ trait Solid<const D: usize> {
 
     /// How far it reaches in a direction of any length: the largest n·x, or more.
     fn reach(&self, n: &Vector<f64, D>) -> f64;
+
+    /// The part whose surface is the only one within `radius` of `x`, and whether this solid is what lies outside of it there.
+    fn alone(&self, _x: &Vector<f64, D>, _radius: f64) -> Option<(&Shape<D>, bool)> {
+        None
+    }
+
+    /// The surface in a box, in pieces; `None` of a solid whose surface is found by its planes.
+    fn facets(&self, _lower: &Vector<f64, D>, _edges: &Vector<f64, D>, _planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
+        None
+    }
+
+    /// Volume and centroid of what lies in each of `count` boxes with these `edges`, the first one from `lower`, each next to the last
+    /// along the first axis; `None` of a solid that is cut by the planes of its surface.
+    fn row(
+        &self,
+        _lower: &Vector<f64, D>,
+        _edges: &Vector<f64, D>,
+        _count: usize,
+    ) -> Option<Vec<(f64, Vector<f64, D>)>> {
+        None
+    }
 }
 
 macro_rules! shapes {
@@ -96,6 +119,8 @@ shapes! {
     Intersection;
     /// A solid turned and scaled.
     Similar;
+    /// The inside of a closed surface of triangles.
+    Surface;
 }
 
 impl<const D: usize> Shape<D> {

@@ -39,6 +39,12 @@ fn solids() -> Vec<Shape<3>> {
         oblique_cone([0.7, 0.3]).into(),
         oblique_cone([0.0, 0.5]).into(),
         turned_and_scaled(block([-0.5, -0.25, -0.125], [0.5, 0.25, 0.75])),
+        Surface::new(
+            [[-0.9, -0.4, -0.6], [0.8, -0.5, -0.3], [-0.1, 0.9, -0.2], [0.2, 0.1, 0.7]].map(vector).to_vec(),
+            vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        )
+        .unwrap()
+        .into(),
     ]
 }
 

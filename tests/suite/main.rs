@@ -32,6 +32,7 @@ mod smoothing;
 mod statics;
 mod storage;
 mod support;
+mod surfaces;
 mod sweep;
 mod transfer;
 mod tutorial;

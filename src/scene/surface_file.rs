@@ -1,0 +1,247 @@
+//! Surfaces of triangles from files of STL and PLY.
+
+use super::BuildError;
+use super::shape::Shape;
+use super::{Problems, Scene};
+use crate::shape::{Surface, SurfaceError};
+use crate::tensor::Vector;
+use ply_rs_bw::parser::Parser;
+use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::fs::{self, File};
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// Bytes of a file, at most.
+pub const MAX_BYTES: u64 = 1 << 30;
+
+/// A surface from a file.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceFile {
+    /// Path of the file, which ends in `.stl` or `.ply`, relative to the scene's folder. Its surface must be closed and may not cross
+    /// itself; corners at the same place are one.
+    #[schemars(length(min = 1))]
+    pub file: PathBuf,
+    /// What was read.
+    #[serde(skip)]
+    pub(super) surface: OnceLock<Surface<3>>,
+}
+
+/// A file that gives no solid.
+#[derive(Debug, thiserror::Error)]
+pub enum SurfaceFileError {
+    /// It cannot be read, or is not of its format.
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    /// It is a folder, a device or a pipe.
+    #[error("is no regular file")]
+    NoFile,
+    /// It is too long.
+    #[error("has {0} bytes; at most {MAX_BYTES} are read")]
+    TooLong(u64),
+    /// The ending names no format that is read.
+    #[error("must end in .stl or .ply")]
+    Ending,
+    /// A PLY file without a list of corners or their coordinates.
+    #[error("has no {0}")]
+    Lacks(&'static str),
+    /// A face of a PLY file with fewer than three corners.
+    #[error("face {face} has {corners} corners (faces are counted from 0)")]
+    Face {
+        /// Its number.
+        face: usize,
+        /// Its corners.
+        corners: usize,
+    },
+    /// What it holds bounds no solid.
+    #[error("holds {0}")]
+    Surface(#[from] SurfaceError),
+}
+
+/// Corners, and the three numbers of corners of each triangle.
+type Triangles = (Vec<[f64; 3]>, Vec<[usize; 3]>);
+
+/// The formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Stl,
+    Ply,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "stl" => Some(Self::Stl),
+            "ply" => Some(Self::Ply),
+            _ => None,
+        }
+    }
+}
+
+impl SurfaceFile {
+    /// Whether its name is that of a format.
+    pub(super) fn has_format(&self) -> bool {
+        Format::of(&self.file).is_some()
+    }
+
+    /// Reads it, unless that was done.
+    ///
+    /// # Errors
+    /// As [`read_file`].
+    pub(super) fn read(&self, folder: &Path) -> Result<(), SurfaceFileError> {
+        if self.surface.get().is_none() {
+            let _ = self.surface.set(read_file(&folder.join(&self.file))?);
+        }
+        Ok(())
+    }
+}
+
+impl Scene {
+    /// Reads the surfaces of shapes from their files; and what is wrong with the scene now that they are known.
+    pub(super) fn read_surfaces(&self, folder: &Path) -> Result<Problems, BuildError> {
+        let mut any = false;
+        let mut read = |path: &str, file: &SurfaceFile| {
+            any = true;
+            let named = |source| BuildError::SurfaceFile {
+                path: path.to_owned(),
+                file: folder.join(&file.file).display().to_string(),
+                source: Box::new(source),
+            };
+            file.read(folder).map_err(named)
+        };
+        for (path, shape) in self.shapes() {
+            shape.each_file(&path, &mut read)?;
+        }
+        Ok(if any { self.check() } else { Problems::default() })
+    }
+
+    /// All shapes, with their paths.
+    fn shapes(&self) -> Vec<(String, &Shape)> {
+        let bodies = self.bodies.iter().enumerate();
+        let bodies = bodies.filter_map(|(i, body)| Some((format!("bodies[{i}].shape"), body.shape.as_ref()?)));
+        let prescribed = self.prescribed.iter().enumerate();
+        let prescribed = prescribed.map(|(i, one)| (format!("prescribed[{i}].region"), &one.region));
+        let tractions = self.tractions.iter().map(|one| one.region.as_ref()).enumerate();
+        let tractions = tractions.filter_map(|(i, region)| Some((format!("tractions[{i}].region"), region?)));
+        let pressures = self.pressures.iter().map(|one| one.region.as_ref()).enumerate();
+        let pressures = pressures.filter_map(|(i, region)| Some((format!("pressures[{i}].region"), region?)));
+        let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes).enumerate();
+        let initial = initial.map(|(i, one)| (format!("initial_velocity.nodes[{i}].region"), &one.region));
+        bodies.chain(prescribed).chain(tractions).chain(pressures).chain(initial).collect()
+    }
+}
+
+/// The solid inside of the surface in a file.
+///
+/// ```
+/// use bfree::scene::surface_file::read_file;
+/// use bfree::shape::Shape;
+/// use bfree::tensor::Vector;
+///
+/// let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+///     element face 4\nproperty list uchar int vertex_indices\nend_header\n\
+///     0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+/// let file = tempfile::Builder::new().suffix(".ply").tempfile()?;
+/// std::fs::write(file.path(), text)?;
+/// let corner = Shape::from(read_file(file.path())?);
+/// assert!(corner.contains(&Vector::from([0.1, 0.1, 0.1])) && !corner.contains(&Vector::from([0.5, 0.5, 0.5])));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// A file that cannot be read, or whose surface is open, faces both ways or crosses itself, and where.
+pub fn read_file(path: &Path) -> Result<Surface<3>, SurfaceFileError> {
+    let format = Format::of(path).ok_or(SurfaceFileError::Ending)?;
+    let about = fs::metadata(path)?;
+    // A pipe may wait for ever.
+    if !about.is_file() {
+        return Err(SurfaceFileError::NoFile);
+    }
+    if about.len() > MAX_BYTES {
+        return Err(SurfaceFileError::TooLong(about.len()));
+    }
+    let mut file = BufReader::new(File::open(path)?);
+    let (corners, triangles): Triangles = match format {
+        Format::Stl => {
+            let mesh = stl_io::read_stl(&mut file)?;
+            let corners = mesh.vertices.iter().map(|x| x.0.map(f64::from)).collect();
+            (corners, mesh.faces.iter().map(|face| face.vertices).collect())
+        }
+        Format::Ply => of_ply(&mut file)?,
+    };
+    Ok(joined(&corners, &triangles)?)
+}
+
+/// The surface with corners at the same place made one.
+fn joined(corners: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Surface<3>, SurfaceError> {
+    if corners.len().max(triangles.len()) >= u32::MAX as usize {
+        return Err(SurfaceError::TooMany(triangles.len()));
+    }
+    let (mut numbers, mut vertices, mut number_of) = (Vec::new(), Vec::new(), HashMap::new());
+    for corner in corners {
+        // −0 is 0.
+        let key = corner.map(|x| (x + 0.0).to_bits());
+        let number = *number_of.entry(key).or_insert_with(|| {
+            vertices.push(Vector::from(*corner));
+            vertices.len() as u32 - 1
+        });
+        numbers.push(number);
+    }
+    let number = |corner: usize| numbers.get(corner).copied().unwrap_or(u32::MAX);
+    Surface::new(vertices, triangles.iter().map(|triangle| triangle.map(number)).collect())
+}
+
+/// An entry of a PLY file: a vertex or a face.
+#[derive(Default)]
+struct Entry {
+    place: [Option<f64>; 3],
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for Entry {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
+        if let Some(place) = axis.and_then(|axis| self.place.get_mut(axis)) {
+            *place = match property {
+                Property::Double(x) => Some(x),
+                Property::Float(x) => Some(f64::from(x)),
+                Property::Int(x) => Some(f64::from(x)),
+                other => other.to_f32_lossy().map(f64::from),
+            };
+        } else if ["vertex_indices", "vertex_index"].contains(&name) {
+            self.corners = property.to_u32_list();
+        } else {
+            return PropertyAccessResult::Ignored;
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+/// Corners and triangles of a PLY file; a face of more corners is a fan.
+fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, SurfaceFileError> {
+    let ply = Parser::<Entry>::new().read_ply(file).map_err(io::Error::other)?;
+    let list = |name| ply.payload.get(name).map_or(&[][..], Vec::as_slice);
+    let place = |entry: &Entry| match entry.place {
+        [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
+        _ => Err(SurfaceFileError::Lacks("x, y and z of its vertices")),
+    };
+    let corners = list("vertex").iter().map(place).collect::<Result<Vec<_>, _>>()?;
+    let mut triangles = Vec::new();
+    for (face, entry) in list("face").iter().enumerate() {
+        let list = entry.corners.as_ref().ok_or(SurfaceFileError::Lacks("vertex_indices of its faces"))?;
+        let [first, rest @ ..] = list.as_slice() else { return Err(SurfaceFileError::Face { face, corners: 0 }) };
+        if rest.len() < 2 {
+            return Err(SurfaceFileError::Face { face, corners: list.len() });
+        }
+        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]].map(|corner| corner as usize)));
+    }
+    Ok((corners, triangles))
+}

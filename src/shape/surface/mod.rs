@@ -1,0 +1,318 @@
+//! Solids inside of a closed surface of triangles, as files of STL and PLY have them.
+
+mod rows;
+mod sound;
+mod tree;
+
+pub use sound::SurfaceError;
+
+use super::{Face, Facet, Solid};
+use crate::tensor::{Tensor, Vector};
+use nalgebra::{Matrix3, Vector3};
+use sound::{crossing, neighbours};
+use std::sync::Arc;
+use tree::{Bounds, Tree};
+
+/// Planes that stand for the triangles near a point one by one, at most: where there are more, those that face alike have one.
+const PLANES: usize = 6;
+
+/// The cosine of the angle between triangles that face alike.
+const ALIKE: f64 = 0.9;
+
+/// What lies inside of a closed surface of triangles, in 3D.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface<const D: usize> {
+    mesh: Arc<Mesh>,
+}
+
+/// The triangles, counter-clockwise as seen from outside, and what they know of each other.
+#[derive(Debug, PartialEq)]
+struct Mesh {
+    vertices: Vec<Vector3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    /// The triangle beyond each edge.
+    neighbours: Vec<[u32; 3]>,
+    /// Outward unit normals of triangles; 0 of those that are lines.
+    normals: Vec<Vector3<f64>>,
+    /// Σ angle × normal of the triangles around each vertex.
+    at_vertices: Vec<Vector3<f64>>,
+    tree: Tree,
+}
+
+/// Where on a triangle the point nearest to another is.
+enum Foot {
+    Inside,
+    Edge(usize),
+    Vertex(usize),
+}
+
+impl<const D: usize> Surface<D> {
+    /// The inside of these triangles, which have numbers of vertices and face all outwards or all inwards; `D` must be 3.
+    ///
+    /// ```
+    /// use bfree::shape::{Shape, Surface, SurfaceError};
+    /// use bfree::tensor::Vector;
+    ///
+    /// // A tetrahedron at the corner of the axes.
+    /// let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vector::from).to_vec();
+    /// let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    /// let corner = Shape::from(Surface::<3>::new(vertices.clone(), triangles.clone())?);
+    /// assert_eq!(corner.signed_distance(&Vector::from([0.125, 0.25, 0.25])), -0.125);
+    /// assert_eq!(corner.normal(&Vector::from([0.25, 0.25, -1.0])), Vector::from([0.0, 0.0, -1.0]));
+    /// // Without one of its sides there is no inside.
+    /// let open = Surface::<3>::new(vertices, triangles[..3].to_vec());
+    /// assert!(matches!(open, Err(SurfaceError::Open(..))));
+    /// # Ok::<(), SurfaceError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A surface that is open, faces both ways, crosses itself or encloses nothing; and where.
+    pub fn new(vertices: Vec<Vector<f64, D>>, triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
+        if D != 3 {
+            return Err(SurfaceError::Dimension(D));
+        }
+        let vertices = vertices.iter().map(|x| Vector3::from_fn(|k, _| x[k])).collect();
+        Ok(Self { mesh: Arc::new(Mesh::new(vertices, triangles)?) })
+    }
+
+    /// The same by another name of its dimension, if that is 3.
+    pub(crate) fn in_dimension<const E: usize>(&self) -> Option<Surface<E>> {
+        (E == 3).then(|| Surface { mesh: self.mesh.clone() })
+    }
+
+    /// The same surface turned and scaled about a point, x ↦ c + s R (x − c).
+    pub fn moved(&self, about: &Vector<f64, D>, rotation: &Tensor<f64, D>, factor: f64) -> Self {
+        let (c, r) = (space(about), Matrix3::from_fn(|i, k| rotation[(i, k)]));
+        let old = &self.mesh;
+        let vertices: Vec<_> = old.vertices.iter().map(|x| c + r * (x - c) * factor).collect();
+        let mesh = Mesh {
+            tree: Mesh::tree(&vertices, &old.triangles),
+            vertices,
+            triangles: old.triangles.clone(),
+            neighbours: old.neighbours.clone(),
+            normals: old.normals.iter().map(|n| r * n).collect(),
+            at_vertices: old.at_vertices.iter().map(|n| r * n).collect(),
+        };
+        Self { mesh: Arc::new(mesh) }
+    }
+}
+
+fn space<const D: usize>(x: &Vector<f64, D>) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| x[k])
+}
+
+fn plane<const D: usize>(x: Vector3<f64>) -> Vector<f64, D> {
+    Vector::from_fn(|k, _| x[k])
+}
+
+impl Mesh {
+    fn new(vertices: Vec<Vector3<f64>>, mut triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
+        // One of two equal corners is a line, and its neighbours meet there.
+        triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+        if triangles.is_empty() {
+            return Err(SurfaceError::Empty);
+        }
+        if triangles.len().max(vertices.len()) > u32::MAX as usize {
+            return Err(SurfaceError::TooMany(triangles.len()));
+        }
+        if let Some(x) = vertices.iter().find(|x| !x.iter().all(|x| x.is_finite())) {
+            return Err(SurfaceError::NotFinite([x[0], x[1], x[2]]));
+        }
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&vertex| vertex as usize >= vertices.len()) {
+                return Err(SurfaceError::NoVertex { triangle, vertex, vertices: vertices.len() });
+            }
+        }
+        // 6 V = Σ a·(b × c), about a point near the surface
+        let origin = vertices[triangles[0][0] as usize];
+        let corner = |i: u32| vertices[i as usize] - origin;
+        let volumes = triangles.iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))));
+        let volume = volumes.sum::<f64>();
+        if volume < 0.0 {
+            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        let neighbours = neighbours(&vertices, &triangles)?;
+        if volume == 0.0 || !volume.is_finite() {
+            return Err(SurfaceError::Flat);
+        }
+        let tree = Self::tree(&vertices, &triangles);
+        if let Some(x) = crossing(&vertices, &triangles, &tree) {
+            return Err(SurfaceError::Crossing([x[0], x[1], x[2]]));
+        }
+        let (mut normals, mut at_vertices) = (Vec::new(), vec![Vector3::zeros(); vertices.len()]);
+        for triangle in &triangles {
+            let [a, b, c] = triangle.map(|i| vertices[i as usize]);
+            let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+            normals.push(normal);
+            for (i, angle) in
+                triangle.iter().zip([(b - a).angle(&(c - a)), (c - b).angle(&(a - b)), (a - c).angle(&(b - c))])
+            {
+                at_vertices[*i as usize] += normal * angle;
+            }
+        }
+        Ok(Self { vertices, triangles, neighbours, normals, at_vertices, tree })
+    }
+
+    fn tree(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Tree {
+        let bounds = |triangle: &[u32; 3]| Bounds::of(triangle.iter().map(|&i| vertices[i as usize]));
+        Tree::new(triangles.iter().map(bounds).collect())
+    }
+
+    fn corners(&self, triangle: usize) -> [Vector3<f64>; 3] {
+        self.triangles[triangle].map(|i| self.vertices[i as usize])
+    }
+
+    /// The nearest point of a triangle (Ericson, Real-Time Collision Detection, 5.1.5).
+    fn foot(&self, triangle: usize, x: &Vector3<f64>) -> (Vector3<f64>, Foot) {
+        let [a, b, c] = self.corners(triangle);
+        let (ab, ac) = (b - a, c - a);
+        let along = |from: Vector3<f64>| (ab.dot(&(x - from)), ac.dot(&(x - from)));
+        let ((d1, d2), (d3, d4), (d5, d6)) = (along(a), along(b), along(c));
+        if d1 <= 0.0 && d2 <= 0.0 {
+            return (a, Foot::Vertex(0));
+        }
+        if d3 >= 0.0 && d4 <= d3 {
+            return (b, Foot::Vertex(1));
+        }
+        if d6 >= 0.0 && d5 <= d6 {
+            return (c, Foot::Vertex(2));
+        }
+        let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
+        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+            return (a + ab * (d1 / (d1 - d3)), Foot::Edge(0));
+        }
+        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+            return (a + ac * (d2 / (d2 - d6)), Foot::Edge(2));
+        }
+        if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+            return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Foot::Edge(1));
+        }
+        let sum = va + vb + vc;
+        (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
+    }
+
+    /// d and ∇d. The side of a point is that of the normals of the triangles that meet where it is nearest, each by its angle (Bærentzen
+    /// and Aanæs, 2005).
+    fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let distance = |triangle: usize| {
+            let (at, foot) = self.foot(triangle, x);
+            ((x - at).norm_squared(), (at, foot))
+        };
+        let Some((squared, triangle, (at, foot))) = self.tree.nearest(x, distance) else {
+            return (f64::INFINITY, Vector3::x());
+        };
+        let outward = match foot {
+            Foot::Inside => self.normals[triangle],
+            Foot::Edge(i) => self.normals[triangle] + self.normals[self.neighbours[triangle][i] as usize],
+            Foot::Vertex(i) => self.at_vertices[self.triangles[triangle][i] as usize],
+        };
+        let away = x - at;
+        let side = if away.dot(&outward) < 0.0 { -1.0 } else { 1.0 };
+        let distance = side * squared.sqrt();
+        // On the surface, and so near to it that its direction is round-off, the normal is that of the surface.
+        let direction = match foot {
+            Foot::Inside => self.normals[triangle],
+            _ if squared > 0.0 => away / distance,
+            _ => outward.try_normalize(0.0).unwrap_or_else(Vector3::x),
+        };
+        (distance, direction)
+    }
+}
+
+impl<const D: usize> Solid<D> for Surface<D> {
+    fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
+        let (distance, normal) = self.mesh.nearest(&space(x));
+        (distance, plane(normal))
+    }
+
+    /// The planes of the triangles that come so near, if they are few; else one for those that face alike, through their middle.
+    fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
+        let (mesh, x, reach) = (&self.mesh, space(x), Vector3::repeat(radius));
+        let mut near = Vec::new();
+        mesh.tree.meeting(&Bounds(x - reach, x + reach), |i| {
+            if mesh.normals[i] != Vector3::zeros() && (mesh.foot(i, &x).0 - x).norm() < radius {
+                near.push(i);
+            }
+        });
+        near.sort_unstable();
+        let height = |i: usize, from: &Vector3<f64>| mesh.normals[i].dot(&(from - mesh.corners(i)[0]));
+        let mut single: Vec<Face<D>> = Vec::new();
+        for &i in &near {
+            let face = (height(i, &x), plane(mesh.normals[i]));
+            let same = |other: &Face<D>| (other.1 - face.1).norm() <= 1e-9 && (other.0 - face.0).abs() <= 1e-9 * radius;
+            if single.len() <= PLANES && !single.iter().any(same) {
+                single.push(face);
+            }
+        }
+        if single.len() <= PLANES {
+            planes.extend(single);
+            return 0.0;
+        }
+        let mut departure: f64 = 0.0;
+        while let Some(&first) = near.first() {
+            let alike = |i: &usize| mesh.normals[*i].dot(&mesh.normals[first]) > ALIKE;
+            let group: Vec<usize> = near.iter().copied().filter(alike).collect();
+            near.retain(|i| !alike(i));
+            let sum: Vector3<f64> = group.iter().map(|&i| mesh.normals[i]).sum();
+            let Some(normal) = sum.try_normalize(0.0) else { continue };
+            let corners =
+                group.iter().flat_map(|&i| rows::clipped(mesh.corners(i).map(|corner| corner - x).to_vec(), &reach, 0));
+            let (low, high) = corners
+                .map(|corner| normal.dot(&corner))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+            planes.push((-0.5 * (low + high), plane(normal)));
+            departure = departure.max(0.5 * (high - low));
+        }
+        departure
+    }
+
+    fn reach(&self, n: &Vector<f64, D>) -> f64 {
+        let n = space(n);
+        self.mesh.vertices.iter().map(|x| n.dot(x)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Its triangles, clipped.
+    fn facets(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
+        let (mesh, half) = (&self.mesh, space(edges) * 0.5);
+        let center = space(lower) + half;
+        let mut near = Vec::new();
+        mesh.tree.meeting(&Bounds(center - half, center + half), |i| near.push(i));
+        near.sort_unstable();
+        let mut facets = Vec::new();
+        for i in near {
+            let corners = mesh.corners(i).map(|corner| corner - center).to_vec();
+            // What lies in a face of the box bounds the box that the solid is in.
+            let outside = |k: usize, sign: f64| {
+                sign * mesh.normals[i][k] < 0.0 && corners.iter().all(|corner| sign * corner[k] >= half[k])
+            };
+            if (0..3).any(|k| outside(k, 1.0) || outside(k, -1.0)) {
+                continue;
+            }
+            let mut polygons = vec![rows::clipped(corners, &half, 0)];
+            for (distance, normal) in planes {
+                let normal = space(normal);
+                let halves = polygons.iter().map(|polygon| rows::split(polygon, |x| distance + normal.dot(x)));
+                polygons = halves.flat_map(|(below, above)| [below, above]).collect();
+            }
+            for polygon in polygons {
+                let fan = polygon.iter().skip(1).zip(polygon.iter().skip(2)).map(|(b, c)| [polygon[0], *b, *c]);
+                for [a, b, c] in fan {
+                    let area = 0.5 * (b - a).cross(&(c - a)).norm();
+                    if area > 0.0 {
+                        facets.push(Facet {
+                            position: plane(center + (a + b + c) / 3.0),
+                            normal: plane(mesh.normals[i]),
+                            area,
+                        });
+                    }
+                }
+            }
+        }
+        Some(facets)
+    }
+
+    fn row(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, count: usize) -> Option<Vec<(f64, Vector<f64, D>)>> {
+        let row = self.mesh.row(&space(lower), &space(edges), count);
+        Some(row.into_iter().map(|(volume, centroid)| (volume, plane(centroid))).collect())
+    }
+}

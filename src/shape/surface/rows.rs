@@ -1,0 +1,130 @@
+//! What lies inside of a closed surface, box by box along a row: exact but for round-off.
+//!
+//! A line along the row leaves the solid where it meets a triangle that faces forwards, and enters it where it meets one that faces back.
+//! So what of a line lies in the solid and in [x₀, x₁] is Σ ± (clamp(x, x₀, x₁) − x₀), and the volume is that over the section of the
+//! row: ∫ clamp(x) − x₀ over the projections of the triangles, each with the sign of its side.
+
+use super::Mesh;
+use super::tree::Bounds;
+use nalgebra::Vector3;
+
+/// ∫ 1, ξ, y, z over a volume, ξ from the beginning of a box, y and z from the middle of the section.
+type Moments = [f64; 4];
+
+/// A triangle, clipped.
+type Polygon = Vec<Vector3<f64>>;
+
+/// Cuts a convex polygon where a linear function is 0: what is below, and what is above. One that lies there is below.
+pub fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> (Polygon, Polygon) {
+    let values: Vec<f64> = polygon.iter().map(f).collect();
+    if values.iter().all(|&value| value <= 0.0) {
+        return (polygon.to_vec(), Polygon::new());
+    }
+    if values.iter().all(|&value| value >= 0.0) {
+        return (Polygon::new(), polygon.to_vec());
+    }
+    let (mut below, mut above) = (Polygon::new(), Polygon::new());
+    for (i, a) in polygon.iter().enumerate() {
+        let next = (i + 1) % polygon.len();
+        let (here, there) = (values[i], values[next]);
+        if here <= 0.0 {
+            below.push(*a);
+        }
+        if here >= 0.0 {
+            above.push(*a);
+        }
+        if here * there < 0.0 {
+            let cut = a + (polygon[next] - a) * (here / (here - there));
+            below.push(cut);
+            above.push(cut);
+        }
+    }
+    (below, above)
+}
+
+/// What of a polygon lies in −r_k ≤ x_k ≤ r_k along the axes from `first` on.
+pub fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon {
+    for k in first..3 {
+        polygon = split(&polygon, |x| -r[k] - x[k]).0;
+        polygon = split(&polygon, |x| x[k] - r[k]).0;
+    }
+    polygon
+}
+
+/// ∫ f, f²/2, y f, z f over the projection of a polygon along the row, f being linear.
+fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Moments {
+    let mut sums = [0.0; 4];
+    let Some((a, rest)) = polygon.split_first() else { return sums };
+    for pair in rest.windows(2) {
+        let (b, c) = (&pair[0], &pair[1]);
+        let twice_area = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1]);
+        let corners = [a, b, c];
+        let values = corners.map(&f);
+        let sum: f64 = values.iter().sum();
+        // ∫ f g = A/12 (Σf Σg + Σ f g) of linear f and g
+        let product = |g: [f64; 3]| {
+            let both: f64 = values.iter().zip(&g).map(|(f, g)| f * g).sum();
+            twice_area / 24.0 * (sum * g.iter().sum::<f64>() + both)
+        };
+        let of_triangle = [
+            twice_area / 6.0 * sum,
+            0.5 * product(values),
+            product(corners.map(|x| x[1])),
+            product(corners.map(|x| x[2])),
+        ];
+        sums.iter_mut().zip(of_triangle).for_each(|(sum, of)| *sum += of);
+    }
+    sums
+}
+
+impl Mesh {
+    /// Volume and centroid of what lies in `count` boxes with these edges, the first one from `lower`, each next to the last along the
+    /// first axis.
+    pub fn row(&self, lower: &Vector3<f64>, edges: &Vector3<f64>, count: usize) -> Vec<(f64, Vector3<f64>)> {
+        let h = edges[0];
+        let middle = Vector3::new(lower[0], lower[1] + 0.5 * edges[1], lower[2] + 0.5 * edges[2]);
+        let mut parts = vec![[0.0; 4]; count];
+        // Of what lies beyond box k all boxes before it have their whole length.
+        let mut beyond = vec![[0.0; 4]; count + 1];
+        let upper = lower + edges;
+        let all = f64::INFINITY;
+        let mut triangles = Vec::new();
+        self.tree.meeting(&Bounds(*lower, Vector3::new(all, upper[1], upper[2])), |i| triangles.push(i));
+        triangles.sort_unstable();
+        for triangle in triangles {
+            let mut polygon = clipped(self.corners(triangle).map(|x| x - middle).to_vec(), &(edges * 0.5), 1);
+            let Some(first) = polygon.iter().map(|x| x[0]).reduce(f64::min) else { continue };
+            // `as` saturates at 0.
+            let mut k = ((first / h).floor() as usize).min(count);
+            (_, polygon) = split(&polygon, |x| x[0]);
+            while k < count && !polygon.is_empty() {
+                let from = k as f64 * h;
+                let (part, rest) = split(&polygon, |x| x[0] - (from + h));
+                let inside = integrals(&part, |x| x[0] - from);
+                let ahead = integrals(&part, |_| 1.0);
+                for j in 0..4 {
+                    parts[k][j] += inside[j];
+                    beyond[k][j] += ahead[j];
+                }
+                polygon = rest;
+                k += 1;
+            }
+            let ahead = integrals(&polygon, |_| 1.0);
+            (0..4).for_each(|j| beyond[count][j] += ahead[j]);
+        }
+        let mut ahead = [0.0; 4];
+        let mut row: Vec<_> = (0..count)
+            .rev()
+            .map(|k| {
+                (0..4).for_each(|j| ahead[j] += beyond[k + 1][j]);
+                let whole = [h * ahead[0], 0.5 * h * h * ahead[0], h * ahead[2], h * ahead[3]];
+                let [volume, x, y, z] = std::array::from_fn(|j| parts[k][j] + whole[j]);
+                let from = middle + Vector3::new(k as f64 * h, 0.0, 0.0);
+                let inside = volume > 0.0;
+                (volume.max(0.0), if inside { from + Vector3::new(x, y, z) / volume } else { from })
+            })
+            .collect();
+        row.reverse();
+        row
+    }
+}

@@ -1,0 +1,407 @@
+//! Surfaces of triangles: against the same solids drawn otherwise, against formulas, and files that are none.
+
+use crate::support::Failure;
+use bfree::grid::Grid;
+use bfree::scene;
+use bfree::shape::{
+    Ball, Block, Difference, Filling, Intersection, Shape, Similar, Surface, SurfaceError, Union, fill, rotation,
+};
+use bfree::tensor::Vector;
+use serde_json::{Value, json};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+type Point = Vector<f64, 3>;
+type Triangles = (Vec<Point>, Vec<[u32; 3]>);
+
+fn point(x: [f64; 3]) -> Point {
+    Vector::from(x)
+}
+
+/// A closed sheet of n × m quadrilaterals, each in two triangles; `place` of two angles, counter-clockwise as seen from outside.
+fn sheet(n: u32, m: u32, place: impl Fn(f64, f64) -> Point) -> Triangles {
+    let angle = |i: u32, of: u32| TAU * f64::from(i) / f64::from(of);
+    let vertices = (0..n * m).map(|i| place(angle(i / m, n), angle(i % m, m))).collect();
+    let at = |i: u32, k: u32| (i % n) * m + k % m;
+    let both = |i, k| [[at(i, k), at(i + 1, k), at(i + 1, k + 1)], [at(i, k), at(i + 1, k + 1), at(i, k + 1)]];
+    (vertices, (0..n * m).flat_map(|i| both(i / m, i % m)).collect())
+}
+
+/// A torus about the z-axis through `center`.
+fn torus(n: u32, m: u32, center: Point, [large, small]: [f64; 2]) -> Triangles {
+    sheet(n, m, move |a, b| {
+        let r = large + small * b.cos();
+        center + point([r * a.cos(), r * a.sin(), small * b.sin()])
+    })
+}
+
+/// Radius of a bone at s from 0 to 1 along it: thin in the middle, thick at its ends, which are round.
+fn bone_radius(s: f64) -> f64 {
+    let t = 2.0 * s - 1.0;
+    (1.0 - t.powi(8)).max(0.0).sqrt() * (0.15 + 0.2 * t * t)
+}
+
+/// A bone of length 2.4 along z with elliptic sections that wind about a curved axis, by rings and two poles.
+fn bone(rings: u32, around: u32, start: Point) -> Triangles {
+    let axis = |s: f64| start + point([0.15 * (PI * s).sin(), 0.0, 2.4 * s]);
+    let along = |i: u32| 0.5 - 0.5 * (PI * f64::from(i) / f64::from(rings + 1)).cos();
+    let mut vertices = vec![axis(0.0), axis(1.0)];
+    for i in 1..=rings {
+        let s = along(i);
+        for k in 0..around {
+            let (sin, cos) = (TAU * f64::from(k) / f64::from(around)).sin_cos();
+            let (x, y) = (1.2 * bone_radius(s) * cos, 0.8 * bone_radius(s) * sin);
+            let (wind, turn) = (2.0 * s).sin_cos();
+            vertices.push(axis(s) + point([x * turn - y * wind, x * wind + y * turn, 0.0]));
+        }
+    }
+    let at = |ring: u32, k: u32| 2 + ring * around + k % around;
+    let mut triangles = Vec::new();
+    for k in 0..around {
+        triangles.push([0, at(0, k + 1), at(0, k)]);
+        triangles.push([1, at(rings - 1, k), at(rings - 1, k + 1)]);
+        for ring in 0..rings - 1 {
+            triangles.push([at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)]);
+            triangles.push([at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)]);
+        }
+    }
+    (vertices, triangles)
+}
+
+/// A box with a corner at each place of its bits, x first.
+fn cuboid(min: Point, max: Point) -> Triangles {
+    let corner = |i: usize| Vector::from_fn(|k, _| if (i >> k) & 1 == 1 { max[k] } else { min[k] });
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    ((0..8).map(corner).collect(), sides.into_iter().flat_map(halves).collect())
+}
+
+fn surface((vertices, triangles): Triangles) -> Result<Shape<3>, SurfaceError> {
+    Ok(Surface::new(vertices, triangles)?.into())
+}
+
+/// Points without any symmetry in a box.
+fn points(min: Point, max: Point) -> impl Iterator<Item = Point> {
+    let fraction = |i: u32, k: usize| (f64::from(i) * [0.618034, 0.414214, 0.732051][k]).fract();
+    (1..500).map(move |i| Vector::from_fn(|k, _| min[k] + (max[k] - min[k]) * fraction(i, k)))
+}
+
+fn filled(shape: &Shape<3>, spacing: f64, cells: [u32; 3]) -> Result<(usize, f64, Point), Failure> {
+    let grid = Grid { origin: Vector::zeros(), spacing, cells };
+    let seeds = fill(&grid, shape, Filling { per_axis: 2, ..Filling::default() })?;
+    let volume = seeds.iter().map(|seed| seed.volume).sum::<f64>();
+    Ok((seeds.len(), volume, seeds.iter().map(|seed| seed.position * seed.volume).sum::<Point>() / volume))
+}
+
+#[test]
+fn a_torus_and_a_bone_of_a_hundred_thousand_triangles_have_their_volumes() -> Result<(), Failure> {
+    let center = point([1.503, 1.497, 0.601]);
+    let ring = torus(500, 100, center, [1.0, 0.4]);
+    assert_eq!(ring.1.len(), 100_000);
+    let (_, volume, middle) = filled(&surface(ring)?, 0.1, [30, 30, 13])?;
+    // 2 π² R r²
+    assert!((volume / (2.0 * PI * PI * 0.16) - 1.0).abs() < 1e-3, "{volume}");
+    assert!((middle - center).norm() < 1e-9);
+
+    let bone = bone(249, 200, point([0.7, 0.6, 0.1]));
+    assert_eq!(bone.1.len(), 99_600);
+    let (_, volume, _) = filled(&surface(bone)?, 0.05, [30, 24, 52])?;
+    // Sections are ellipses of area π 1.2 r 0.8 r, wherever their centres are: ∫ by 10⁵ midpoints.
+    let area = |s: f64| PI * 0.96 * bone_radius(s).powi(2);
+    let exact = 2.4 * (0..100_000).map(|i| area((f64::from(i) + 0.5) / 1e5)).sum::<f64>() / 1e5;
+    assert!((volume / exact - 1.0).abs() < 1e-3, "{volume} for {exact}");
+    Ok(())
+}
+
+#[test]
+fn a_box_of_triangles_is_the_box() -> Result<(), Failure> {
+    let (min, max) = (point([-0.5, -0.25, 0.125]), point([0.5, 1.0, 0.75]));
+    let (drawn, block) = (Surface::new(cuboid(min, max).0, cuboid(min, max).1)?, Shape::from(Block { min, max }));
+    let (about, factor) = (point([0.1, 0.2, 0.3]), 1.25);
+    let rotation = rotation(50.0, Some(&point([1.0, 2.0, -0.5]))).ok_or("space")?;
+    let turned = Shape::from(drawn.moved(&about, &rotation, factor));
+    let similar = Shape::from(Similar { of: Box::new(block.clone()), about, rotation, factor });
+    for (one, other) in [(Shape::from(drawn), block), (turned, similar)] {
+        for x in points(point([-1.0; 3]), point([1.5; 3])) {
+            let ((d, n), (e, m)) = (one.distance_and_normal(&x), other.distance_and_normal(&x));
+            assert!((d - e).abs() < 1e-14, "{x}: {d} and {e}");
+            assert!((n - m).norm() < 1e-12, "{x}: {n} and {m}");
+        }
+        for lower in points(point([-1.0; 3]), point([1.0; 3])) {
+            let edges = point([0.3, 0.2, 0.25]);
+            let ((v, x), (w, y)) = (one.part(&lower, &edges, 1.0), other.part(&lower, &edges, 1.0));
+            assert!((v - w).abs() < 1e-14, "{lower}: {v} and {w}");
+            assert!(w < 1e-6 || (x - y).norm() < 1e-9, "{lower}: {x} and {y}");
+            let sums = |shape: &Shape<3>| {
+                let facets = shape.facets(None, &lower, &edges, 1.0);
+                facets
+                    .iter()
+                    .fold((0.0, point([0.0; 3])), |(a, n), facet| (a + facet.area, n + facet.normal * facet.area))
+            };
+            let ((a, n), (b, m)) = (sums(&one), sums(&other));
+            assert!((a - b).abs() < 1e-9 && (n - m).norm() < 1e-9, "{lower}: area {a} and {b}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_side_of_a_point_is_right_at_edges_that_bend_inwards() -> Result<(), Failure> {
+    // A cross of two bars, whose corners bend in: the outline of a plus sign, as a prism.
+    let outline = [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 2], [0, 2], [0, 1], [1, 1]];
+    let n = outline.len() as u32;
+    let at = |z: f64| outline.map(|[x, y]: [i32; 2]| point([f64::from(x), f64::from(y), z]));
+    let vertices = at(0.0).into_iter().chain(at(1.0)).collect();
+    let mut triangles: Vec<[u32; 3]> =
+        (0..n).flat_map(|i| [[i, (i + 1) % n, n + (i + 1) % n], [i, n + (i + 1) % n, n + i]]).collect();
+    for [a, b, c] in [
+        [0, 1, 2],
+        [0, 2, 11],
+        [2, 3, 4],
+        [2, 4, 5],
+        [5, 6, 7],
+        [5, 7, 8],
+        [8, 9, 10],
+        [8, 10, 11],
+        [11, 2, 5],
+        [11, 5, 8],
+    ] {
+        triangles.push([n + a, n + b, n + c]);
+        triangles.push([a, c, b]);
+    }
+    let cross = surface((vertices, triangles))?;
+    let bar = |min, max| Shape::from(Block { min: point(min), max: point(max) });
+    let bars = Shape::from(Union(vec![bar([1.0, 0.0, 0.0], [2.0, 3.0, 1.0]), bar([0.0, 1.0, 0.0], [3.0, 2.0, 1.0])]));
+    for x in points(point([-1.0; 3]), point([4.0, 4.0, 2.0])) {
+        let (d, e) = (cross.signed_distance(&x), bars.signed_distance(&x));
+        // Outside, the distance from a union is exact; inside it is no larger.
+        assert!(if e > 0.0 { (d - e).abs() < 1e-14 } else { d <= e + 1e-14 }, "{x}: {d} and {e}");
+    }
+    let (_, volume, center) = filled(&cross, 0.3, [11, 11, 4])?;
+    assert!((volume - 5.0).abs() < 1e-12 && (center - point([1.5, 1.5, 0.5])).norm() < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn surfaces_are_combined_with_other_shapes() -> Result<(), Failure> {
+    let center = point([1.503, 1.497, 0.601]);
+    let ring = surface(torus(60, 30, center, [1.0, 0.4]))?;
+    let (_, whole, _) = filled(&ring, 0.1, [30, 30, 13])?;
+    let ball = |at: Point, radius| Box::new(Shape::from(Ball { center: at, radius }));
+    let hole = Difference { of: Box::new(ring.clone()), minus: ball(center + point([1.0, 0.0, 0.0]), 0.3) };
+    let (_, volume, _) = filled(&hole.into(), 0.1, [30, 30, 13])?;
+    let of_ball = 4.0 / 3.0 * PI * 0.027;
+    assert!(((whole - volume) / of_ball - 1.0).abs() < 1e-3, "{whole} {volume}");
+    let beside = Union(vec![ring.clone(), *ball(center, 0.3)]);
+    let (_, volume, _) = filled(&beside.into(), 0.1, [30, 30, 13])?;
+    assert!(((volume - whole) / of_ball - 1.0).abs() < 1e-3, "{whole} {volume}");
+    // Halved by a plane of symmetry, where two surfaces meet.
+    let half = Block { min: point([0.0; 3]), max: point([3.0, center[1], 1.3]) };
+    let (_, volume, _) = filled(&Intersection(vec![ring, half.into()]).into(), 0.1, [30, 30, 13])?;
+    assert!((volume / whole - 0.5).abs() < 1e-4, "{whole} {volume}");
+    Ok(())
+}
+
+#[test]
+fn the_facets_of_a_surface_are_all_of_it() -> Result<(), Failure> {
+    let (large, small, center) = (1.0, 0.4, point([1.503, 1.497, 0.601]));
+    let (vertices, triangles) = torus(60, 30, center, [large, small]);
+    let corner = |i: u32| vertices[i as usize];
+    let area_of = |[a, b, c]: &[u32; 3]| 0.5 * (corner(*b) - corner(*a)).cross(&(corner(*c) - corner(*a))).norm();
+    let exact: f64 = triangles.iter().map(area_of).sum();
+    let ring = surface((vertices, triangles))?;
+    let upper = Shape::from(Block { min: point([-9.0, -9.0, center[2]]), max: point([9.0; 3]) });
+    for (region, share) in [(None, 1.0), (Some(&upper), 0.5)] {
+        let (mut area, mut normals) = (0.0, point([0.0; 3]));
+        for i in 0..30 * 30 * 13 {
+            let lower = point([f64::from(i % 30), f64::from(i / 30 % 30), f64::from(i / 900)]) * 0.1;
+            for facet in ring.facets(region, &lower, &Vector::repeat(0.1), 0.1) {
+                area += facet.area;
+                normals += facet.normal * facet.area;
+            }
+        }
+        assert!((area / (share * exact) - 1.0).abs() < 1e-9, "{area} of {exact}");
+        // Closed, ∫ n dA = 0; its upper half has the normals of the ring's shadow, seen from below.
+        let shadow = if share == 1.0 { 0.0 } else { 4.0 * PI * large * small };
+        assert!((normals - point([0.0, 0.0, shadow])).norm() < 1e-2 * shadow.max(1e-9), "{normals}");
+    }
+    Ok(())
+}
+
+#[test]
+fn surfaces_that_bound_nothing_are_refused_with_the_place() {
+    let (vertices, triangles) = cuboid(point([0.0; 3]), point([1.0; 3]));
+    let new = |vertices: &[Point], triangles: Vec<[u32; 3]>| Surface::new(vertices.to_vec(), triangles).map(|_| ());
+    assert_eq!(new(&vertices, triangles.clone()), Ok(()));
+    let inside_out = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    assert_eq!(new(&vertices, inside_out), Ok(()));
+    assert_eq!(new(&vertices, triangles[1..].to_vec()), Err(SurfaceError::Open([0.0; 3], [1.0, 1.0, 0.0])));
+    let mut turned = triangles.clone();
+    turned[0].swap(0, 1);
+    assert!(matches!(new(&vertices, turned), Err(SurfaceError::Unorientable(..))));
+    let twice = [triangles.clone(), triangles.clone()].concat();
+    assert!(matches!(new(&vertices, twice), Err(SurfaceError::Unorientable(..))));
+    assert_eq!(new(&vertices, vec![[0, 1, 8]]), Err(SurfaceError::NoVertex { triangle: 0, vertex: 8, vertices: 8 }));
+    assert_eq!(new(&vertices, vec![]), Err(SurfaceError::Empty));
+    assert_eq!(new(&vertices, vec![[0, 0, 1]]), Err(SurfaceError::Empty));
+    assert_eq!(new(&vertices, vec![[0, 1, 2], [0, 2, 1]]), Err(SurfaceError::Flat));
+    let mut lost = vertices.clone();
+    lost[3][1] = f64::NAN;
+    assert!(matches!(new(&lost, triangles.clone()), Err(SurfaceError::NotFinite(_))));
+    // Two boxes that overlap, through faces and, exactly, through a diagonal; apart they are one solid in two parts.
+    let both = |by: Point| {
+        let (others, more) = cuboid(by, by + point([1.0; 3]));
+        let all: Vec<Point> = vertices.iter().copied().chain(others).collect();
+        new(&all, triangles.iter().copied().chain(more.iter().map(|triangle| triangle.map(|i| i + 8))).collect())
+    };
+    assert_eq!(both(point([2.0, 0.0, 0.0])), Ok(()));
+    for by in [point([0.5; 3]), point([0.3, 0.4, 0.7])] {
+        let Err(SurfaceError::Crossing(at)) = both(by) else { panic!("{:?}", both(by)) };
+        let (low, high) = (by.min(), 1.0);
+        assert!(
+            at.iter().all(|&x| x >= low && x <= high) && at.iter().any(|&x| x == 1.0 || by.iter().any(|&y| y == x)),
+            "{at:?}"
+        );
+    }
+}
+
+fn stl((vertices, triangles): &Triangles, path: &Path) -> Result<(), Failure> {
+    let vertex = |i: u32| stl_io::Vertex::new(std::array::from_fn(|k| vertices[i as usize][k] as f32));
+    let faces = triangles
+        .iter()
+        .map(|triangle| stl_io::Triangle { normal: stl_io::Normal::new([0.0; 3]), vertices: triangle.map(vertex) });
+    stl_io::write_stl(&mut std::fs::File::create(path)?, faces)?;
+    Ok(())
+}
+
+fn ascii_stl((vertices, triangles): &Triangles) -> String {
+    let vertex = |i: &u32| vertices[*i as usize];
+    let facet = |triangle: &[u32; 3]| {
+        let corners =
+            triangle.iter().map(vertex).map(|x| format!("vertex {} {} {}\n", x[0], x[1], x[2])).collect::<String>();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    format!("solid box\n{}endsolid box\n", triangles.iter().map(facet).collect::<String>())
+}
+
+fn ply((vertices, _): &Triangles) -> String {
+    let header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
+                  element face 6\nproperty list uchar int vertex_indices\nend_header\n";
+    let places: String = vertices.iter().map(|x| format!("{} {} {}\n", x[0], x[1], x[2])).collect();
+    format!("{header}{places}4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n")
+}
+
+fn with_shape(shape: &Value) -> Value {
+    json!({
+        "grid": {"size": [4, 4, 4], "spacing": 0.25}, "time": {"step": 1, "end": 1, "inertia": "none"},
+        "bodies": [{"name": "body", "shape": shape, "density": 1, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}],
+        "prescribed": [{"region": shape, "displacement": [[0, [0, 0, 0]]]}]
+    })
+}
+
+#[test]
+fn a_body_has_the_shape_in_a_file() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    let cube = cuboid(point([1.0; 3]), point([2.0, 2.5, 1.75]));
+    stl(&cube, &at("cube.stl"))?;
+    std::fs::write(at("text.STL"), ascii_stl(&cube))?;
+    std::fs::write(at("cube.ply"), ply(&cube))?;
+    let build = |shape: &Value| -> Result<_, Failure> {
+        Ok(scene::read(&with_shape(shape).to_string(), &[])?.build::<3>(folder.path())?)
+    };
+    let drawn = build(&json!({"box": {"min": [1, 1, 1], "max": [2, 2.5, 1.75]}}))?;
+    for name in ["cube.stl", "text.STL", "cube.ply"] {
+        let mut read = build(&json!({"surface": {"file": name}}))?;
+        let (one, other) = (&read.particles, &drawn.particles);
+        assert_eq!(one.len(), other.len(), "{name}");
+        let near = |(x, y): (&Point, &Point)| (x - y).norm() < 1e-12;
+        assert!(one.position.iter().zip(&other.position).all(near), "{name}");
+        assert!(one.volume.iter().zip(&other.volume).all(|(v, w)| (v - w).abs() < 1e-12));
+        // All of its nodes are held: it is a region, too.
+        let before = read.particles.position.clone();
+        read.advance()?;
+        assert_eq!(read.particles.position, before);
+    }
+    let doubled = json!({"scaled": {"of": {"surface": {"file": "cube.stl"}}, "about": [1, 1, 1], "factor": 1.5}});
+    let turned = json!({"rotated": {"of": doubled, "about": [2, 2, 2], "angle": 20, "axis": [0, 0, 1]}});
+    let volume = build(&turned)?.particles.volume.iter().sum::<f64>();
+    assert!((volume / (1.125 * 1.5_f64.powi(3)) - 1.0).abs() < 1e-9, "{volume}");
+    Ok(())
+}
+
+#[test]
+fn files_that_are_no_surface_are_named_with_the_key_and_the_place() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    let cube = cuboid(point([1.0; 3]), point([2.0; 3]));
+    stl(&(cube.0.clone(), cube.1[1..].to_vec()), &at("open.stl"))?;
+    stl(&cuboid(point([1.0; 3]), point([5.0; 3])), &at("large.stl"))?;
+    std::fs::write(at("short.stl"), [0; 100])?;
+    std::fs::write(at("cut.ply"), &ply(&cube).into_bytes()[..230])?;
+    std::fs::write(at("lines.ply"), ply(&cube).replace("4 0 2 3 1\n", "2 0 2\n"))?;
+    std::fs::write(at("flat.ply"), ply(&cube).replace("property double z", "property double w"))?;
+    std::fs::write(at("far.ply"), ply(&cube).replace("4 0 2 3 1\n", "4 0 2 3 99\n"))?;
+    std::fs::create_dir(at("folder.stl"))?;
+    let wrong = [
+        ("open.stl", "open surface: only one triangle has the edge from [1.0, 1.0, 1.0]"),
+        ("large.stl", "x = 1 to 5 is not allowed; must lie in the grid, from x = 0 to 4"),
+        ("short.stl", "cannot be read"),
+        ("cut.ply", "cannot be read"),
+        ("lines.ply", "face 0 has 2 corners"),
+        ("flat.ply", "has no x, y and z of its vertices"),
+        ("far.ply", "has the vertex"),
+        ("folder.stl", "is no regular file"),
+        ("nowhere.stl", "No such file"),
+    ];
+    for (name, words) in wrong {
+        let scene = scene::read(&with_shape(&json!({"union": [{"surface": {"file": name}}]})).to_string(), &[])?;
+        let error = scene.build::<3>(folder.path()).err().ok_or(name)?.to_string();
+        let key = if name == "large.stl" { "bodies[0].shape: " } else { "bodies[0].shape.union[0].surface.file: " };
+        assert!(error.starts_with(key) && error.contains(words), "{name}: {error}");
+    }
+    let error =
+        scene::read(&with_shape(&json!({"surface": {"file": "bone.obj"}})).to_string(), &[]).unwrap_err().to_string();
+    assert!(
+        error.contains("bodies[0].shape.surface.file: \"bone.obj\" is not allowed; must end in .stl or .ply"),
+        "{error}"
+    );
+    let mut plane = with_shape(&json!({"surface": {"file": "bone.stl"}}));
+    plane["grid"]["size"] = json!([4, 4]);
+    let error = scene::read(&plane.to_string(), &[]).unwrap_err().to_string();
+    assert!(
+        error.contains("bodies[0].shape.surface: a surface is not allowed; it needs a grid of 3 dimensions"),
+        "{error}"
+    );
+    Ok(())
+}
+
+#[test]
+fn damaged_files_are_refused_or_read_and_nothing_worse() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let cube = cuboid(point([1.0; 3]), point([2.0; 3]));
+    stl(&cube, &folder.path().join("cube.stl"))?;
+    let binary = std::fs::read(folder.path().join("cube.stl"))?;
+    let whole = [("stl", binary), ("stl", ascii_stl(&cube).into_bytes()), ("ply", ply(&cube).into_bytes())];
+    let (mut state, mut refused) = (1_u64, 0);
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    for i in 0..3000 {
+        let (ending, mut bytes) = whole[i % 3].clone();
+        for _ in 0..=random(4) {
+            let place = random(bytes.len());
+            match random(3) {
+                0 => bytes.truncate(place.max(1)),
+                1 => bytes[place] = random(256) as u8,
+                _ => bytes[place] = b"0123456789-. \n"[random(14)],
+            }
+        }
+        let path = folder.path().join(format!("damaged.{ending}"));
+        std::fs::write(&path, bytes)?;
+        refused += usize::from(scene::surface_file::read_file(&path).is_err());
+    }
+    assert!((1000..3000).contains(&refused), "{refused}");
+    Ok(())
+}
