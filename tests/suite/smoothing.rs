@@ -195,6 +195,15 @@ fn a_limited_front_does_not_ring_and_is_hardly_wider_than_one_that_does() -> Res
     Ok(())
 }
 
+#[test]
+fn the_shipped_jump_lies_in_the_middle_as_that_of_the_study() -> Result<(), Failure> {
+    // Half of the mass moves: the node under the jump has the mean velocity, and not that of the left.
+    let bar: Simulation<1> = scene("riemann_jump.json", &[])?;
+    let mean = bar.particles.momentum()[0] / bar.particles.mass.iter().sum::<f64>();
+    assert!((mean - 500.0).abs() < 1e-9, "{mean}");
+    Ok(())
+}
+
 /// The shipped bar, cut short.
 fn bar(transfer: &str) -> Result<Simulation<1>, Failure> {
     let overrides = ["bodies.0.shape.box.min=[48]", "bodies.0.shape.box.max=[52]", "time.lumping=1", transfer];
