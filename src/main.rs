@@ -3,7 +3,7 @@
 mod program;
 
 use bfree::causes;
-use bfree::output::plot::plot_run;
+use bfree::output::plot::{plot_frames, plot_run};
 use bfree::scene;
 use clap::{Parser, Subcommand};
 use program::{Failure, INTERRUPTED, New, Run, SceneArguments, print, tell};
@@ -27,10 +27,14 @@ enum Command {
     Check(SceneArguments),
     /// Write a scene to start from, and explain its keys; without a problem, list them.
     New(New),
-    /// Draw energies, iterations and particles of a run as SVG and PNG.
+    /// Draw energies, iterations and particles of a run as SVG and PNG, and all of it with a player as one page, report.html.
     Plot {
         /// The directory of the run's results.
         directory: PathBuf,
+        /// Draw every snapshot instead, as frame_0000.png and on in this directory, for an encoder:
+        /// ffmpeg -framerate 10 -i FRAMES/frame_%04d.png -pix_fmt yuv420p movie.mp4
+        #[arg(long, value_name = "FRAMES")]
+        movie: Option<PathBuf>,
     },
     /// Print the JSON schema of scenes.
     Schema,
@@ -43,7 +47,7 @@ fn main() -> ExitCode {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
         Command::New(new) => new.execute(),
-        Command::Plot { directory } => plot(&directory),
+        Command::Plot { directory, movie } => plot(&directory, movie.as_deref()),
         Command::Schema => print_schema(),
     };
     let (error, code) = match result {
@@ -61,8 +65,9 @@ fn main() -> ExitCode {
     ExitCode::from(code)
 }
 
-fn plot(directory: &Path) -> Result<(), Failure> {
-    let pictures = plot_run(directory).map_err(Failure::run)?;
+fn plot(directory: &Path, movie: Option<&Path>) -> Result<(), Failure> {
+    let pictures = movie.map_or_else(|| plot_run(directory), |frames| plot_frames(directory, frames));
+    let pictures = pictures.map_err(Failure::run)?;
     print(pictures.iter().map(|picture| picture.display().to_string()).collect::<Vec<_>>().join("\n"))
 }
 

@@ -11,7 +11,7 @@
 //! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end, and stays beside it only where there are checkpoints |
 //! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, what was warned of |
 //!
-//! [`plot::plot_run`] draws pictures of a directory. Floats in text files have as many digits as it takes to read the same bits back.
+//! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have as many digits as it takes to read the same bits back.
 
 mod csv;
 mod error;
@@ -34,7 +34,7 @@ pub mod warnings;
 pub use error::OutputError;
 pub use probes::{Place, Probe, nearest};
 pub use progress::Audience;
-pub use recorder::{Mark, OutputSettings, Recorder};
+pub use recorder::{Mark, OutputSettings, Recorder, foreign};
 pub use reference::Reference;
 pub use report::Outcome;
 pub use summary::Summary;

@@ -133,13 +133,20 @@ impl Watch {
         }
         if 2 * cost.newton > newton_limit && newton_limit > 1 {
             self.warn(step, Kind::NewtonClimbs, || {
-                format!("Newton's method took {} of {newton_limit} allowed iterations", cost.newton)
+                format!(
+                    "Newton's method took {} of {newton_limit} allowed iterations, where a few are usual: shorten time.step, or raise \
+                     solver.newton.max_iterations",
+                    cost.newton
+                )
             });
         }
         let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
         if self.seen >= USUAL_AFTER && krylov > CLIMB.0 * usual && krylov > CLIMB.1 {
             self.warn(step, Kind::KrylovClimbs, || {
-                format!("the linear solver took {krylov} iterations in a step; {usual:.0} had been usual")
+                format!(
+                    "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
+                     ghost_stiffness, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
+                )
             });
         }
         let Watched { limited, stagnated, krylov_limit, .. } = *step;
@@ -216,11 +223,13 @@ mod tests {
         assert!(watch.see(&Watched { error: Some((1e-3, 1e-3)), ..step(22) }).is_empty());
         assert!(watch.see(&inaccurate).iter().any(|warning| warning.message.contains("errs by 2.00e-3 grid spacings")));
         let newton = Watched { cost: Cost { newton: 16, ..step(0).cost }, ..step(23) };
-        assert!(watch.see(&newton).iter().any(|warning| warning.message.contains("16 of 30")));
+        let words = ["16 of 30", "shorten time.step"];
+        assert!(watch.see(&newton).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
         // 30 steps of 30 before, and that of 150
-        assert!(watch.see(&krylov(180)).iter().any(|warning| warning.message.contains("180 iterations in a step; 34")));
+        let words = ["180 iterations in a step; 34", "ghost_stiffness", "multigrid"];
+        assert!(watch.see(&krylov(180)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let limited = Watched { limited: 2, ..step(25) };
         assert!(watch.see(&limited).iter().any(
             |warning| warning.message.starts_with("2 linear systems") && warning.message.contains("the 2000 iter")

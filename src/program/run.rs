@@ -1,11 +1,11 @@
 //! `bfree run`.
 
 use super::probes::{Bound, bound_probes};
-use super::scene_arguments::{SceneArguments, what_accuracy_sets};
+use super::scene_arguments::{SceneArguments, beyond, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
-use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
+use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, foreign};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
@@ -29,7 +29,7 @@ pub struct Run {
     /// Directory of the results [default: out/ and the scene's name].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// End at this time instead of the scene's time.end; the same values are allowed.
+    /// End at this time instead of the scene's time.end, or at the first whole step that reaches it; the same values are allowed.
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = number)]
     until: Option<f64>,
     /// Take at most this many whole time steps; 0 writes the initial state only.
@@ -99,6 +99,8 @@ enum Lost {
     Ended,
     #[error("a run that another program is just writing: write elsewhere by --out")]
     Alive,
+    #[error("{}, which no run wrote and a run would replace: move it, or write elsewhere by --out", .0.display())]
+    Foreign(PathBuf),
 }
 
 /// No place for results.
@@ -144,6 +146,9 @@ impl Run {
         });
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
             self.say("accuracy", &format!("accuracy {set}"));
+        }
+        if let Some(end) = beyond(scene, until).filter(|_| last == until) {
+            self.say("warning", &format!("{until} steps of {} go {end}", scene.time.step));
         }
         let probes = bound_probes(scene, &simulation);
         probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
@@ -260,6 +265,9 @@ impl Run {
     /// Makes room for a new run; one that could be continued is lost only on request.
     fn begin(&self, directory: &Path) -> Result<(), Failure> {
         let lost = |why| Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why }));
+        if let Some(path) = foreign(directory) {
+            return lost(Lost::Foreign(path));
+        }
         match checkpoint::unfinished(directory) {
             Some(found) if !self.discard => lost(Lost::Unfinished(found)),
             None if !self.discard && checkpoint::ended(directory) => lost(Lost::Ended),

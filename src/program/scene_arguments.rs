@@ -85,9 +85,16 @@ impl SceneArguments {
         if let Some(set) = what_accuracy_sets(scene) {
             let _ = writeln!(text, "accuracy      {set}");
         }
-        let _ = writeln!(text, "steps         {steps} of {} to t = {}", scene.time.step, scene.time.end);
+        let end = beyond(scene, steps).unwrap_or_else(|| format!("to t = {}", scene.time.end));
+        let _ = writeln!(text, "steps         {steps} of {} {end}", scene.time.step);
         for body in scene.filled(&simulation) {
             let _ = writeln!(text, "body          {body}");
+        }
+        if simulation.bodies.len() > 1 {
+            let _ = writeln!(
+                text,
+                "contact       where bodies share nodes, before their surfaces meet: docs/src/limits.md says how far"
+            );
         }
         let _ = write!(text, "{}", self.plan(&simulation)?);
         let _ = write!(text, "\noutput        {}", written(scene));
@@ -114,4 +121,10 @@ pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
     let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();
     let set = if set.is_empty() { "nothing: the scene gives every key".to_owned() } else { set.join(", ") };
     Some(format!("{accuracy} sets {set}"))
+}
+
+/// Where whole steps end that do not end at the time asked for, beyond the 1e-9 of a step that [`Clock::whole_steps`](bfree::clock::Clock::whole_steps) overlooks.
+pub fn beyond(scene: &Scene, steps: u64) -> Option<String> {
+    let (end, last) = (scene.time.end, steps as f64 * scene.time.step);
+    (last > end + 1e-6 * scene.time.step).then(|| format!("to t = {last}, the first of them to reach {end}"))
 }

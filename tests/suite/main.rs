@@ -4,6 +4,7 @@ mod accuracy;
 mod adaptive;
 mod approximation;
 mod compaction;
+mod contact;
 mod damping;
 mod direct;
 mod dynamics;

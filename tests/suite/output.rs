@@ -6,7 +6,7 @@ use bfree::field::Field;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Motion, Prescribed, Selection};
-use bfree::output::plot::plot_run;
+use bfree::output::plot::{plot_frames, plot_run};
 use bfree::output::vtu::{Snapshot, Values};
 use bfree::output::{Audience, Outcome, OutputError, OutputSettings, Place, Probe, Recorder, Reference, nearest};
 use bfree::particles::{Body, Particles};
@@ -219,10 +219,28 @@ fn a_run_that_dies_leaves_what_it_did() -> Result<(), Failure> {
     let pictures = plot_run(directory.path())?;
     let names: Vec<_> =
         pictures.iter().filter_map(|path| path.file_stem()).map(|name| name.to_string_lossy()).collect();
-    let drawn = ["energies", "momentum", "iterations", "convergence", "particles"];
+    let drawn = ["energies", "momentum", "reactions", "iterations", "convergence", "particles"];
     assert_eq!(names, [&drawn.map(|name| [name; 2]).concat()[..], &["report"]].concat());
     let page = std::fs::read_to_string(directory.path().join("report.html"))?;
     assert!(page.contains("killed") && page.matches("<svg").count() == 5 && page.ends_with("</html>\n"));
+    // The player has all snapshots, two at least, and every number: 16 bits of each that varies.
+    let between = |start: &str, end: &str| page.split(start).nth(1).and_then(|rest| rest.split(end).next());
+    let meta: Value = serde_json::from_str(between("id=\"snapshots\">", "</script>").ok_or("no snapshots")?)?;
+    let times = meta["times"].as_array().ok_or("no times")?.len();
+    let series = std::fs::read_to_string(directory.path().join("particles.pvd"))?;
+    assert_eq!((times, &meta["shown"]), (series.matches("<DataSet").count(), &json!(64)));
+    let varying = |still: bool| {
+        let channels = meta["channels"].as_array().into_iter().flatten().enumerate();
+        channels.filter(|(k, channel)| (*k < 4) == still && !channel["start"].is_null()).count()
+    };
+    let numbers = between("id=\"numbers\">", "</script>").ok_or("no numbers")?;
+    let bytes = 2 * 64 * (varying(true) + times * varying(false));
+    assert!(times > 1 && numbers.len() == bytes.div_ceil(3) * 4, "{bytes} bytes, {} letters", numbers.len());
+    // A movie has a frame for each.
+    let frames = plot_frames(directory.path(), &directory.path().join("frames"))?;
+    assert_eq!(frames.len(), times);
+    assert!(frames.iter().all(|frame| std::fs::read(frame).is_ok_and(|png| png.starts_with(b"\x89PNG"))));
+    assert!(plot_frames(&directory.path().join("frames"), directory.path()).is_err(), "there are no snapshots");
     for picture in pictures.iter().filter(|path| path.extension().is_some_and(|extension| extension == "png")) {
         assert!(std::fs::read(picture)?.starts_with(b"\x89PNG"));
     }

@@ -109,7 +109,15 @@ fn told(arguments: &[&str], directory: &Path) -> Result<(Option<i32>, String), F
 fn what_is_there_is_not_lost() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let out = folder.path().join("run");
-    assert_eq!(told(&[], &out)?.0, Some(0));
+    let pictures = |directory: &Path| -> Result<usize, Failure> {
+        let names =
+            std::fs::read_dir(directory)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, Failure>>()?;
+        let drawn =
+            |path: &&PathBuf| path.extension().is_some_and(|end| ["svg", "png", "html"].iter().any(|one| end == *one));
+        Ok(names.iter().filter(drawn).count())
+    };
+    assert_eq!(told(&["--plot"], &out)?.0, Some(0));
+    let drawn = pictures(&out)?;
     let history = std::fs::read(out.join("history.csv"))?;
     let (code, text) = told(&["--set", "time.step=0.01"], &out)?;
     assert!(code == Some(2) && text.contains("holds the results of a run") && text.contains("--discard"), "{text}");
@@ -122,6 +130,19 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     assert_eq!(told(&["--discard"], &out)?.0, Some(0));
     assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
+    // No picture of what is gone stays beside it.
+    assert_eq!((drawn, pictures(&out)?), (15, 0));
+    // Nor is what a run did not write taken for its own.
+    let own = folder.path().join("own");
+    std::fs::create_dir(&own)?;
+    for name in ["energies.png", "particles_000007.vtu", "history.csv"] {
+        std::fs::write(own.join(name), "mine")?;
+        for option in [&[][..], &["--discard"]] {
+            let (code, text) = told(option, &own)?;
+            assert!(code == Some(2) && text.contains("which no run wrote"), "{text}");
+        }
+        assert_eq!(std::fs::read_to_string(own.join(name))?, "mine");
+    }
     let (code, text) = told(&[], &foreign)?;
     assert!(code == Some(1) && text.contains("not a directory"), "{text}");
     assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
@@ -238,6 +259,26 @@ fn options_are_judged_like_the_scene() -> Result<(), Failure> {
         }
         assert!(!out.exists(), "{option} {value} wrote something");
     }
+    Ok(())
+}
+
+#[test]
+fn an_end_between_two_steps_is_said_to_be_one() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    // 4 / 0.05 is 80 up to rounding; 0.22 / 0.05 is not whole.
+    for (until, words) in
+        [("0.3", None), ("0.22", Some("5 steps of 0.05 go to t = 0.25, the first of them to reach 0.22"))]
+    {
+        let output = rebound(directory.path(), &["--until", until, "--discard"])?;
+        let text = String::from_utf8(output.stderr)?;
+        assert_eq!(text.contains("warning"), words.is_some(), "{text}");
+        assert!(words.is_none_or(|words| text.contains(words)), "{text}");
+    }
+    let check = |set: &str| -> Result<String, Failure> {
+        Ok(String::from_utf8(program().arg("check").arg(scene("rebound.json")).args(["--set", set]).output()?.stdout)?)
+    };
+    assert!(check("time.end=4")?.contains("80 of 0.05 to t = 4\n"));
+    assert!(check("time.end=0.22")?.contains("5 of 0.05 to t = 0.25, the first of them to reach 0.22"));
     Ok(())
 }
 

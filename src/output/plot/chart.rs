@@ -4,8 +4,11 @@ use super::{PlotError, draw_error};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-/// Size of a figure, in SVG units.
-const SIZE: (u32, u32) = (900, 640);
+/// Width of a figure, in SVG units.
+const WIDTH: u32 = 900;
+
+/// Width of a letter of a legend, at most; letters of a name, at most; height of its line.
+const LEGEND: (u32, usize, i32) = (8, 30, 17);
 
 /// Above so many points, a line is thinned to the extremes of as many intervals.
 const INTERVALS: usize = 1500;
@@ -32,19 +35,19 @@ pub(super) struct Panel {
     /// Numbers at it, at most.
     pub x_labels: usize,
     /// Label of the upright axis.
-    pub y: &'static str,
+    pub y: String,
     /// The lines.
     pub lines: Vec<Line>,
     /// Height in parts of the sum over all panels.
     pub share: u32,
 }
 
-/// The figure as SVG.
-pub(super) fn draw(name: &'static str, title: &str, panels: &[Panel]) -> Result<String, PlotError> {
+/// The figure as SVG, so many units high.
+pub(super) fn draw(name: &'static str, title: &str, height: u32, panels: &[Panel]) -> Result<String, PlotError> {
     let fail = draw_error(name);
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
         root.fill(&WHITE).map_err(|e| fail(&e))?;
         let mut rest = root.titled(title, TITLE).map_err(|e| fail(&e))?;
         let mut shares: u32 = panels.iter().map(|panel| panel.share).sum();
@@ -63,9 +66,13 @@ pub(super) fn draw(name: &'static str, title: &str, panels: &[Panel]) -> Result<
 fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Result<(), Box<dyn std::error::Error>> {
     let points = || panel.lines.iter().flat_map(|line| &line.points);
     let (x, y) = (range(points().map(|point| point.0), 0.0), range(points().map(|point| point.1), 0.06));
+    // One line that is called what its axis is needs no legend.
+    let named: Vec<&Line> = panel.lines.iter().filter(|line| !line.label.is_empty()).collect();
+    let named = if panel.lines.len() == 1 && named.iter().all(|line| line.label == panel.y) { vec![] } else { named };
+    let letters = named.iter().map(|line| shortened(&line.label).chars().count() as u32).max();
     let mut chart = ChartBuilder::on(area)
         .margin(8)
-        .margin_right(24)
+        .margin_right(24 + LEGEND.0 * letters.unwrap_or(0))
         .x_label_area_size(42)
         .y_label_area_size(86)
         .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
@@ -74,7 +81,7 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.12))
         .x_desc(panel.x)
-        .y_desc(panel.y)
+        .y_desc(&panel.y)
         .label_style(LABEL)
         .axis_desc_style(LABEL)
         .x_label_formatter(&|at| tick(*at, x))
@@ -82,30 +89,41 @@ fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Resul
         .x_labels(panel.x_labels)
         .y_labels(6)
         .draw()?;
-    // One line that is called what its axis is needs no legend.
-    let named = panel.lines.len() > 1 || panel.lines.iter().any(|line| line.label != panel.y);
     for line in &panel.lines {
-        let color = line.color;
         let width = if line.label.is_empty() { 1 } else { 2 };
-        let drawn = chart.draw_series(LineSeries::new(thinned(&line.points), color.stroke_width(width)))?;
-        if line.label.is_empty() || !named {
-            continue;
-        }
-        drawn.label(&line.label).legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], color.stroke_width(2)));
+        chart.draw_series(LineSeries::new(thinned(&line.points), line.color.stroke_width(width)))?;
     }
-    if !named {
-        return Ok(());
+    // Names stand where their curves end, from top to bottom, as far apart as letters need.
+    let base = area.get_base_pixel();
+    let end = |line: &&Line| thinned(&line.points).last().map_or(0, |point| chart.backend_coord(point).1 - base.1);
+    let mut ends: Vec<(i32, &Line)> = named.iter().map(|line| (end(line), *line)).collect();
+    ends.sort_by_key(|(height, _)| *height);
+    let heights = apart(ends.iter().map(|(height, _)| *height).collect(), area.dim_in_pixel().1 as i32 - 42);
+    let right = chart.backend_coord(&(x.1, y.0)).0 - base.0;
+    for ((_, line), height) in ends.iter().zip(heights) {
+        let style = LABEL.into_font().color(&line.color);
+        area.draw(&Text::new(shortened(&line.label), (right + 8, height - LEGEND.2 / 2), style))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .margin(6)
-        .legend_area_size(28)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.2))
-        .label_font(LABEL)
-        .draw()?;
     Ok(())
+}
+
+/// A name that leaves room for the curves.
+fn shortened(name: &str) -> String {
+    let short: String = name.chars().take(LEGEND.1 - 1).collect();
+    if name.chars().count() > LEGEND.1 { format!("{short}…") } else { name.to_owned() }
+}
+
+/// Heights in ascending order, moved until lines of text fit between them, none below `lowest` as long as there is room above.
+fn apart(mut heights: Vec<i32>, lowest: i32) -> Vec<i32> {
+    for k in 1..heights.len() {
+        heights[k] = heights[k].max(heights[k - 1] + LEGEND.2);
+    }
+    let mut below = lowest + LEGEND.2;
+    for height in heights.iter_mut().rev() {
+        *height = (*height).min(below - LEGEND.2);
+        below = *height;
+    }
+    heights
 }
 
 /// The range of the finite values, `padding` wider at either end, and never so narrow that axes could not be labelled.
@@ -168,6 +186,24 @@ mod tests {
         let kept = thinned(&points);
         assert!(kept.len() <= 2 * INTERVALS && kept.contains(&(54_321.0, 7.0)));
         assert!(kept.is_sorted_by(|a, b| a.0 <= b.0) && kept.iter().all(|point| point.1.is_finite()));
+    }
+
+    #[test]
+    fn names_that_would_cover_each_other_move_apart() {
+        assert_eq!(apart(vec![10, 100, 103, 104, 300], 400), [10, 100, 117, 134, 300]);
+        assert_eq!(apart(vec![10, 395, 398], 400), [10, 383, 400]);
+        assert!(apart(vec![], 400).is_empty());
+        assert_eq!(shortened(&"ä".repeat(40)).chars().count(), 30);
+    }
+
+    #[test]
+    fn a_name_cannot_break_the_picture() -> Result<(), PlotError> {
+        let line = |label: &str| Line { label: label.to_owned(), color: BLACK, points: vec![(0.0, 0.0), (1.0, 1.0)] };
+        let lines = vec![line("</text><script>&"), line("x")];
+        let panel = Panel { x: "time", x_labels: 5, y: "<script>\"&".to_owned(), lines, share: 1 };
+        let svg = draw("names", "<script>", 300, &[panel])?;
+        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;"), "{svg}");
+        Ok(())
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<P
     lines.push(Line { label, color: palette::VERMILLION, points: fall(worst) });
     // Whole iterations only.
     let x_labels = worst.newton_residuals.len().clamp(2, 12);
-    Ok(Some(Panel { x: "Newton iteration", x_labels, y: "log10 of |R| / |R_0|", lines, share: 1 }))
+    Ok(Some(Panel { x: "Newton iteration", x_labels, y: "log10 of |R| / |R_0|".to_owned(), lines, share: 1 }))
 }
 
 /// The steps of a run that goes on or was killed; its last line may break off.

@@ -1,7 +1,22 @@
 //! `report.html`: the pictures and the numbers of a run on one page that needs nothing else.
 
+use super::moves;
+use super::player::Played;
 use serde_json::Value;
 use std::fmt::Write;
+
+/// What shows the snapshots.
+const PLAYER: &str = include_str!("player.js");
+
+/// What the player is steered by.
+const CONTROLS: &str = "<noscript>particles.png shows the last snapshot; the player needs JavaScript.</noscript>
+<div id=\"player\"><div class=\"stage\"><canvas id=\"scene\"></canvas><canvas id=\"above\"></canvas></div>
+<p><button id=\"play\">▶</button><input id=\"frame\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"snapshot\"><output id=\"time\"></output></p>
+<p><label>colour <select id=\"field\"></select></label>
+<label><input id=\"now\" type=\"checkbox\"> range of this time</label>
+<label><input id=\"outline\" type=\"checkbox\" checked> undeformed outline</label>
+<label>deformation × <input id=\"deformation\" type=\"number\" value=\"1\" step=\"any\"></label>
+<button id=\"home\">whole view</button></p></div>";
 
 const STYLE: &str = "
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 960px; margin: 2em auto; padding: 0 1em }
@@ -15,11 +30,16 @@ table { border-collapse: collapse; margin: .5em 0 } caption { text-align: left; 
 td { padding: .15em 1.2em .15em 0; border-bottom: 1px solid #eee } td.number { text-align: right; font-variant-numeric: tabular-nums }
 .bar { display: inline-block; height: .7em; background: #0072b2; vertical-align: baseline }
 figure { margin: 1em 0 } svg { max-width: 100%; height: auto }
-pre { background: #f6f6f6; padding: 1em; overflow: auto; border-radius: 6px; font-size: 13px }
+.stage { position: relative; height: 560px } .stage canvas { position: absolute; width: 100%; height: 100% }
+#above { touch-action: none; cursor: grab } #above:active { cursor: grabbing }
+#player p { display: flex; flex-wrap: wrap; gap: .5em 1.2em; align-items: center; margin: .4em 0 } #frame { flex: 1; min-width: 12em }
+#play { width: 3em } #time { min-width: 15em; font-variant-numeric: tabular-nums } #deformation { width: 6em }
+details td { vertical-align: top; font-size: 13px } .note { color: #555 }
 ";
 
-/// The page, of a run's pictures (name and SVG) and its report; without one, of a run that was killed.
-pub(super) fn page(report: Option<&Value>, pictures: &[(&str, String)]) -> String {
+/// The page, of a run's snapshots, its pictures (name and SVG) and its report; without one, of a
+/// run that was killed.
+pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[(&str, String)]) -> String {
     let nothing = Value::Null;
     let report = report.unwrap_or(&nothing);
     let text = |key: &str| report[key].as_str().unwrap_or_default();
@@ -40,10 +60,17 @@ pub(super) fn page(report: Option<&Value>, pictures: &[(&str, String)]) -> Strin
     let _ = writeln!(out, "<p class=\"lead\">{}</p>", escaped(&command(report)));
     let _ = writeln!(out, "<p class=\"outcome {outcome}\"><b>{outcome}</b>: {}</p>", escaped(message));
     warnings(&mut out, &report["warnings"]);
+    if let Some(played) = played {
+        let _ = writeln!(out, "{CONTROLS}");
+        let note = |text: &String| writeln!(out, "<p class=\"note\">{}</p>", escaped(text));
+        let _ = played.note.as_ref().map(note);
+    }
     if report.is_object() {
         out.push_str("<h2>Numbers</h2>\n<div class=\"tables\">\n");
-        table(&mut out, "Energy at the end", &report["energies"]);
-        table(&mut out, "Counts", &report["counts"]);
+        // Of load steps the balance says nothing: work is done by loads that are there at once.
+        let left_out: &[&str] = if moves(Some(report)) { &[] } else { &["balance", "kinetic"] };
+        table(&mut out, "Energy at the end", &report["energies"], left_out);
+        table(&mut out, "Counts", &report["counts"], &[]);
         seconds(&mut out, &report["seconds"]);
         out.push_str("</div>\n");
     }
@@ -60,12 +87,43 @@ pub(super) fn page(report: Option<&Value>, pictures: &[(&str, String)]) -> Strin
         ("probes", "Probes"),
     ] {
         if report[key].as_array().map_or(!report[key].is_null(), |list| !list.is_empty()) {
-            let json = serde_json::to_string_pretty(&report[key]).unwrap_or_default();
-            let _ = writeln!(out, "<details><summary>{caption}</summary><pre>{}</pre></details>", escaped(&json));
+            let _ = writeln!(out, "<details><summary>{caption}</summary><table>");
+            rows(&mut out, String::new(), &report[key]);
+            out.push_str("</table></details>\n");
         }
+    }
+    if let Some(Played { meta, numbers, .. }) = played {
+        let _ = writeln!(out, "<script type=\"application/json\" id=\"snapshots\">{meta}</script>");
+        let _ =
+            writeln!(out, "<script type=\"text/plain\" id=\"numbers\">{numbers}</script>\n<script>{PLAYER}</script>");
     }
     out.push_str("</body></html>\n");
     out
+}
+
+/// A row for every value, under its path; lists of mere values are one.
+fn rows(out: &mut String, path: String, value: &Value) {
+    let plain = |value: &Value| match value {
+        Value::String(text) => text.clone(),
+        Value::Array(_) | Value::Object(_) => String::new(),
+        value => value.to_string(),
+    };
+    match value {
+        Value::Null => {}
+        Value::Object(keys) => {
+            let dot = if path.is_empty() { "" } else { "." };
+            keys.iter().for_each(|(key, value)| rows(out, format!("{path}{dot}{key}"), value));
+        }
+        Value::Array(list) if list.iter().any(|one| one.is_object() || one.is_array()) => {
+            list.iter().enumerate().for_each(|(k, value)| rows(out, format!("{path}[{k}]"), value));
+        }
+        value => {
+            let text = value.as_array().map(|list| list.iter().map(plain).collect::<Vec<_>>().join(", "));
+            let text = text.unwrap_or_else(|| plain(value));
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", escaped(&path), escaped(&text));
+        }
+    }
 }
 
 /// Program, scene, particles, steps and time on one line.
@@ -95,9 +153,9 @@ fn warnings(out: &mut String, warnings: &Value) {
     out.push_str("</ul>\n");
 }
 
-fn table(out: &mut String, caption: &str, rows: &Value) {
+fn table(out: &mut String, caption: &str, rows: &Value, left_out: &[&str]) {
     let _ = writeln!(out, "<table><caption>{caption}</caption>");
-    for (name, value) in rows.as_object().into_iter().flatten() {
+    for (name, value) in rows.as_object().into_iter().flatten().filter(|(name, _)| !left_out.contains(&name.as_str())) {
         let value = value.as_f64().map_or_else(|| escaped(value.as_str().unwrap_or_default()), shown);
         let _ = writeln!(out, "<tr><td>{}</td><td class=\"number\">{value}</td></tr>", words(name));
     }
@@ -159,7 +217,7 @@ mod tests {
             "energies": {"kinetic": 0.5, "strain": "NaN"}, "counts": {"max_active_nodes": 7}, "seconds": {"newton": 1.0, "total": 4.0},
             "warnings": [{"time": 0.25, "step": 5, "kind": "energy_created", "message": "more & more"}],
         });
-        let page = page(Some(&report), &[("energies", "<?xml?><svg>x</svg>".to_owned())]);
+        let page = page(Some(&report), None, &[("energies", "<?xml?><svg>x</svg>".to_owned())]);
         for words in [
             "&lt;script&gt;",
             "<b>failed</b>: a &lt; b",
@@ -173,6 +231,6 @@ mod tests {
             assert!(page.contains(words), "no {words} in {page}");
         }
         assert!(!page.contains("<script>") && !page.contains("<?xml") && !page.contains("http"), "{page}");
-        assert!(super::page(None, &[]).contains("killed"));
+        assert!(super::page(None, None, &[]).contains("killed"));
     }
 }

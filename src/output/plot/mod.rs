@@ -1,21 +1,27 @@
-//! Pictures of a finished (or killed) run: energies, momentum, iterations, Newton's convergence, the particles of the last snapshot;
-//! and all of them with the numbers of the run on one page, `report.html`, that opens anywhere.
+//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, iterations, Newton's convergence, the particles of
+//! the last snapshot; and all of them with the numbers of the run and a player of its snapshots on one page, `report.html`, that
+//! opens anywhere.
 //!
 //! Everything is drawn as SVG; the PNG beside it is made from the SVG with an embedded DejaVu Sans, so that no fonts need to be installed.
 
 mod chart;
 mod convergence;
+mod histories;
 mod html;
 mod palette;
 mod particles;
+mod player;
 pub mod png;
+mod series;
 mod table;
 
 use super::files::write_atomically;
-use super::snapshots::SERIES;
-use super::vtu::{ReadError, Snapshot};
+use super::vtu::Snapshot;
 use super::{OutputError, vtu};
+use crate::mechanics::schemes::Parameters;
 use chart::{Line, Panel};
+use player::Recording;
+use serde::Deserialize;
 use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -38,7 +44,7 @@ pub enum PlotError {
         /// The table.
         path: PathBuf,
         /// The column.
-        column: &'static str,
+        column: String,
     },
     /// A cell of a table is no number.
     #[error("{}, line {line}: {cell:?} is not a number", path.display())]
@@ -61,6 +67,12 @@ pub enum PlotError {
     /// A snapshot cannot be read.
     #[error(transparent)]
     Snapshot(#[from] vtu::ReadError),
+    /// There is nothing to make a movie of.
+    #[error("{} holds no snapshots: give the scene output.every", directory.display())]
+    NoSnapshots {
+        /// The directory.
+        directory: PathBuf,
+    },
     /// The drawing library refused.
     #[error("cannot draw {name}: {reason}")]
     Draw {
@@ -74,9 +86,24 @@ pub enum PlotError {
     Write(#[from] OutputError),
 }
 
+/// The pictures that there may be.
+const PICTURES: [&str; 7] = ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "particles"];
+
+/// Height of a picture, in SVG units.
+const HEIGHT: u32 = 640;
+
+/// The page.
+const PAGE: &str = "report.html";
+
+/// Whether a file of this name is one that [`plot_run`] writes.
+pub(crate) fn is_picture(file: &str) -> bool {
+    let picture = file.strip_suffix(".svg").or(file.strip_suffix(".png"));
+    file == PAGE || picture.is_some_and(|name| PICTURES.contains(&name))
+}
+
 /// Draws what is in the directory of a run, as `.svg` and `.png`, into the same directory: `energies`, `momentum`, `iterations`,
-/// `convergence` once there are steps, and `particles` if there are snapshots; and writes `report.html`, with all of them in it.
-/// Returns the files written.
+/// `convergence` once there are steps, `probes` and `reactions` of a run that has them, and `particles` if there are snapshots; and
+/// writes `report.html`, with all of them in it, and a player of the snapshots. Returns the files written.
 ///
 /// ```
 /// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::plot_run};
@@ -99,21 +126,26 @@ pub enum PlotError {
 /// ```
 ///
 /// # Errors
-/// `history.csv` is missing or damaged, or the report or the last snapshot is damaged; the system refuses.
+/// `history.csv` is missing or damaged, or another table, the report or a snapshot is damaged; the system refuses.
 pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let history = Columns::read(directory.join("history.csv"))?;
     let report = report(directory)?;
     let line = |column: &'static str, label: &str, color| -> Result<Line, PlotError> {
         Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
     };
-    let panel = |y, lines, share| Panel { x: "time", x_labels: 10, y, lines, share };
-    let energies = vec![
-        line("total", "total", palette::BLACK)?,
-        line("kinetic", "kinetic", palette::BLUE)?,
-        line("strain", "strain", palette::VERMILLION)?,
-        line("external", "external work", palette::GREEN)?,
-    ];
-    let balance = vec![line("balance", "total - initial - external work", palette::PURPLE)?];
+    let panel = |y: &str, lines, share| Panel { x: "time", x_labels: 10, y: y.to_owned(), lines, share };
+    // Load steps have no momentum, and their work is done by loads that are there at once: the balance says nothing.
+    let moves = moves(report.as_ref());
+    let mut energies =
+        vec![line("strain", "strain", palette::VERMILLION)?, line("external", "external work", palette::GREEN)?];
+    if moves {
+        energies.extend([line("total", "total", palette::BLACK)?, line("kinetic", "kinetic", palette::BLUE)?]);
+    }
+    let mut energies = vec![panel("energy", energies, 3)];
+    if moves {
+        let balance = line("balance", "total - initial - external work", palette::PURPLE)?;
+        energies.push(panel("balance", vec![balance], 2));
+    }
     let axes = [
         ("momentum_x", "x", palette::BLUE),
         ("momentum_y", "y", palette::VERMILLION),
@@ -127,23 +159,38 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let newton = vec![of_steps(line("newton", "Newton", palette::BLUE)?)];
     let krylov = vec![of_steps(line("krylov", "Krylov", palette::VERMILLION)?)];
 
-    let mut pictures = vec![
-        ("energies", chart::draw("energies", "Energy", &[panel("energy", energies, 3), panel("balance", balance, 2)])?),
-        ("momentum", chart::draw("momentum", "Momentum", &[panel("momentum", momentum, 1)])?),
-        (
-            "iterations",
-            chart::draw(
-                "iterations",
-                "Iterations per step",
-                &[panel("Newton", newton, 1), panel("Krylov", krylov, 1)],
-            )?,
-        ),
-    ];
-    if let Some(panel) = convergence::panel(report.as_ref(), directory)? {
-        pictures.push(("convergence", chart::draw("convergence", "Convergence of Newton's method", &[panel])?));
+    let mut pictures = vec![("energies", chart::draw("energies", "Energy", HEIGHT, &energies)?)];
+    if moves {
+        pictures.push(("momentum", chart::draw("momentum", "Momentum", HEIGHT, &[panel("momentum", momentum, 1)])?));
     }
-    if let Some(path) = last_snapshot(directory)? {
-        pictures.push(("particles", particles::draw("particles", &Snapshot::read(&path)?)?));
+    for name in ["probes", "reactions"] {
+        let path = directory.join(format!("{name}.csv"));
+        if !path.is_file() {
+            continue;
+        }
+        let (panels, there) = histories::panels(&Columns::read(path)?)?;
+        let title = if panels.len() < there {
+            format!("{name}: the first {} of {there}", panels.len())
+        } else {
+            name.to_owned()
+        };
+        pictures.push((name, chart::draw(name, &title, 60 + 210 * panels.len() as u32, &panels)?));
+    }
+    let iterations = [panel("Newton", newton, 1), panel("Krylov", krylov, 1)];
+    pictures.push(("iterations", chart::draw("iterations", "Iterations per step", HEIGHT, &iterations)?));
+    if let Some(panel) = convergence::panel(report.as_ref(), directory)? {
+        let title = "Convergence of Newton's method";
+        pictures.push(("convergence", chart::draw("convergence", title, HEIGHT, &[panel])?));
+    }
+    let snapshots = series::files(directory)?;
+    let mut played = None;
+    // Not on the page: the player shows it.
+    let mut last = None;
+    if let (Some(recording), Some(path)) = (Recording::read(&snapshots)?, snapshots.last()) {
+        let snapshot = Snapshot::read(path)?;
+        let view = series::view(snapshot.background.dimension, recording.motion());
+        last = Some(("particles", particles::draw("particles", &snapshot, view, None)?));
+        played = Some(recording.page(view));
     }
     let mut written = Vec::new();
     let mut keep = |file: &str, content: &[u8]| -> Result<(), PlotError> {
@@ -152,15 +199,50 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
         written.push(path);
         Ok(())
     };
-    for (name, svg) in &pictures {
+    for (name, svg) in pictures.iter().chain(&last) {
         keep(&format!("{name}.svg"), svg.as_bytes())?;
         keep(&format!("{name}.png"), &png::from_svg(name, svg)?)?;
     }
-    // What one looks at first stands first.
-    let shift = usize::from(pictures.last().is_some_and(|(name, _)| *name == "particles"));
-    pictures.rotate_right(shift);
-    keep("report.html", html::page(report.as_ref(), &pictures).as_bytes())?;
+    keep(PAGE, html::page(report.as_ref(), played.as_ref(), &pictures).as_bytes())?;
     Ok(written)
+}
+
+/// Draws all snapshots of a run into the directory `frames`, which is made, as `frame_0000.png` and on: a movie for whatever
+/// encoder there is. All have the same axes and the same colours. Returns the files written.
+///
+/// # Errors
+/// There are no snapshots, or one is damaged; the system refuses.
+pub fn plot_frames(directory: &Path, frames: &Path) -> Result<Vec<PathBuf>, PlotError> {
+    let snapshots = series::files(directory)?;
+    let Some(first) = snapshots.first() else {
+        return Err(PlotError::NoSnapshots { directory: directory.to_owned() });
+    };
+    std::fs::create_dir_all(frames).map_err(OutputError::io("create", frames))?;
+    let first = Snapshot::read(first)?;
+    let (mut motion, mut range) = ([0.0_f64; 3], (f64::INFINITY, f64::NEG_INFINITY));
+    for path in &snapshots {
+        let snapshot = Snapshot::read(path)?;
+        for (x, start) in snapshot.points.iter().zip(&first.points) {
+            motion = std::array::from_fn(|axis| motion[axis].max((x[axis] - start[axis]).abs()));
+        }
+        let (low, high) = particles::extremes(&snapshot);
+        range = (range.0.min(low), range.1.max(high));
+    }
+    let view = series::view(first.background.dimension, motion);
+    let mut written = Vec::new();
+    for (number, path) in snapshots.iter().enumerate() {
+        let svg = particles::draw("a frame", &Snapshot::read(path)?, view, Some(range))?;
+        let (png, path) = (png::from_svg("a frame", &svg)?, frames.join(format!("frame_{number:04}.png")));
+        write_atomically(&path, |file| file.write_all(&png))?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// Whether bodies had inertia, as far as the report says.
+fn moves(report: Option<&Value>) -> bool {
+    let scheme = report.map(|report| Parameters::deserialize(&report["settings"]["time"]["inertia"]));
+    scheme.and_then(Result::ok).is_none_or(|scheme| scheme.has_inertia())
 }
 
 /// The report of a run that has ended.
@@ -168,20 +250,6 @@ fn report(directory: &Path) -> Result<Option<Value>, PlotError> {
     let path = directory.join("report.json");
     match std::fs::read(&path) {
         Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| PlotError::Report { path, source }),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(PlotError::Read { path, source }),
-    }
-}
-
-/// The file of the last snapshot in the series, if there is a series.
-fn last_snapshot(directory: &Path) -> Result<Option<PathBuf>, PlotError> {
-    let path = directory.join(SERIES);
-    match std::fs::read_to_string(&path) {
-        Ok(series) => {
-            let file = series.rsplit_once("file=\"").and_then(|(_, rest)| rest.split('"').next());
-            let damaged = || ReadError::Format { path: path.clone(), what: "the series lists no file".to_owned() };
-            Ok(Some(directory.join(file.ok_or_else(damaged)?)))
-        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(PlotError::Read { path, source }),
     }

@@ -11,7 +11,7 @@ pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
 pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 
 /// Viridis (Smith, van der Walt; CC0), every eighth of its range.
-const VIRIDIS: [[f64; 3]; 9] = [
+pub(super) const VIRIDIS: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
     [71.0, 44.0, 122.0],
     [59.0, 81.0, 139.0],

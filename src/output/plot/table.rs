@@ -12,7 +12,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Reads a table whose header has no quotes. A last line that breaks off, as a killed run may leave it, is dropped.
+    /// Reads a table. A last line that breaks off, as a killed run may leave it, is dropped.
     pub(super) fn read(path: PathBuf) -> Result<Self, PlotError> {
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
@@ -21,7 +21,7 @@ impl Columns {
         // Behind the last line break stands nothing, or a line that breaks off.
         let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
         let mut lines = whole.lines();
-        let names: Vec<String> = lines.next().unwrap_or_default().split(',').map(str::to_owned).collect();
+        let names: Vec<String> = names(lines.next().unwrap_or_default());
         let mut cells = Vec::new();
         for (k, line) in lines.enumerate() {
             let damaged = |cell: &str| PlotError::Cell { path: path.clone(), line: k + 2, cell: cell.to_owned() };
@@ -40,13 +40,60 @@ impl Columns {
         self.names.iter().any(|name| name == column)
     }
 
+    /// The names of all columns.
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// The pairs (x, y) of two columns.
-    pub(super) fn pairs(&self, x: &'static str, y: &'static str) -> Result<Vec<(f64, f64)>, PlotError> {
-        let find = |column: &'static str| {
+    pub(super) fn pairs(&self, x: &str, y: &str) -> Result<Vec<(f64, f64)>, PlotError> {
+        let find = |column: &str| {
             let place = self.names.iter().position(|name| name == column);
-            place.ok_or_else(|| PlotError::Column { path: self.path.clone(), column })
+            place.ok_or_else(|| PlotError::Column { path: self.path.clone(), column: column.to_owned() })
         };
         let (x, y) = (find(x)?, find(y)?);
         Ok(self.cells.chunks(self.names.len()).map(|row| (row[x], row[y])).collect())
+    }
+}
+
+/// The cells of a header, of which some may stand in quotes (RFC 4180).
+fn names(header: &str) -> Vec<String> {
+    let mut names = vec![String::new()];
+    let mut quoted = false;
+    let mut letters = header.chars().peekable();
+    while let Some(letter) = letters.next() {
+        match letter {
+            // Two quotes within quotes are one of the name.
+            '"' if quoted && letters.next_if_eq(&'"').is_some() => {
+                names.last_mut().into_iter().for_each(|name| name.push('"'))
+            }
+            '"' => quoted = !quoted,
+            ',' if !quoted => names.push(String::new()),
+            letter => names.last_mut().into_iter().for_each(|name| name.push(letter)),
+        }
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_with_commas_and_quotes_are_one_cell() {
+        assert_eq!(names(r#"time,"left, ""low""_x",wall_x"#), ["time", r#"left, "low"_x"#, "wall_x"]);
+    }
+
+    #[test]
+    fn a_row_that_breaks_off_is_dropped_and_a_damaged_one_refused() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("t.csv");
+        std::fs::write(&path, "time,a\n0,1\n1,NaN\n2,")?;
+        let table = Columns::read(path.clone())?;
+        assert_eq!(table.pairs("time", "a")?.len(), 2);
+        assert!(table.pairs("time", "b").is_err());
+        std::fs::write(&path, "time,a\n0,1,2\n")?;
+        assert!(Columns::read(path).is_err());
+        Ok(())
     }
 }

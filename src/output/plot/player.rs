@@ -1,0 +1,274 @@
+//! The snapshots of a run for `player.js`, which shows them on the page: one block of 16-bit numbers, and where what begins in it.
+
+use super::PlotError;
+use super::palette::VIRIDIS;
+use super::series::damaged;
+use crate::output::vtu::{Array, Background, Snapshot, Values};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use serde_json::{Value, json};
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+
+/// The most numbers on a page: 20 MB, and 27 MB as base64.
+const MOST: usize = 10_000_000;
+
+/// Of runs that have more numbers, at most so many snapshots are shown, and the particles are sampled.
+const MOST_SNAPSHOTS: usize = 100;
+
+/// What stands for a number that is none, above the 65535 steps between the least and the largest.
+const NONE: u16 = u16::MAX;
+
+/// The axes, as they name components.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What a page needs to show a run.
+pub(super) struct Played {
+    /// What the numbers are, as JSON that ends no element of a page.
+    pub meta: String,
+    /// The numbers, in base64.
+    pub numbers: String,
+    /// What is left out.
+    pub note: Option<String>,
+}
+
+/// Channels of the first snapshot alone: positions, and distances of neighbours.
+const RESTING: usize = 4;
+
+/// One number of every particle that is shown, at one time or at all.
+struct Channel {
+    field: String,
+    /// Empty for a scalar.
+    component: String,
+    /// Snapshot after snapshot.
+    values: Vec<f64>,
+}
+
+impl Channel {
+    /// The least and the largest number; 0 where there is none.
+    fn range(&self) -> (f64, f64) {
+        let finite = self.values.iter().filter(|x| x.is_finite());
+        let range = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+        if range.0 <= range.1 { range } else { (0.0, 0.0) }
+    }
+
+    /// Whether one number says it all.
+    fn is_constant(&self) -> bool {
+        let (low, high) = self.range();
+        low == high && self.values.iter().all(|x| x.is_finite())
+    }
+}
+
+/// The snapshots of a run, or an even sample of them.
+pub(super) struct Recording {
+    background: Background,
+    times: Vec<f64>,
+    /// Snapshots and particles there are.
+    snapshots: usize,
+    particles: usize,
+    /// Particles shown.
+    shown: usize,
+    /// Positions in the first snapshot, the distances of neighbours there, displacements since, then what was written.
+    channels: Vec<Channel>,
+}
+
+impl Recording {
+    /// Reads the snapshots in `files`; `None` if there are no files.
+    pub(super) fn read(files: &[PathBuf]) -> Result<Option<Self>, PlotError> {
+        let Some(path) = files.first() else { return Ok(None) };
+        let first = Snapshot::read(path)?;
+        let particles = first.points.len();
+        let numbers =
+            3 + first.arrays.iter().filter(|array| is_coloured(array)).map(|a| a.components.len()).sum::<usize>();
+        let too_many = files.len().saturating_mul(particles).saturating_mul(numbers) > MOST;
+        let snapshots = if too_many { files.len().min(MOST_SNAPSHOTS) } else { files.len() };
+        let ids = sample(particles, MOST / (numbers * snapshots));
+        let mut recording = Self {
+            background: first.background,
+            times: Vec::new(),
+            snapshots: files.len(),
+            particles,
+            shown: ids.len(),
+            channels: channels(&first, &ids),
+        };
+        for k in 0..snapshots {
+            // The first, the last, and evenly between them.
+            let path = &files[k * (files.len() - 1) / (snapshots - 1).max(1)];
+            let snapshot = Snapshot::read(path)?;
+            let shape =
+                |s: &Snapshot| s.arrays.iter().map(|a| (a.name.clone(), a.components.len())).collect::<Vec<_>>();
+            if snapshot.points.len() != particles || shape(&snapshot) != shape(&first) {
+                return Err(damaged(path, "it has other particles or fields than the first"));
+            }
+            recording.times.push(snapshot.time);
+            let (_, moving) = recording.channels.split_at_mut(RESTING);
+            let (displacements, written) = moving.split_at_mut(3);
+            for (axis, channel) in displacements.iter_mut().enumerate() {
+                channel.values.extend(ids.iter().map(|&p| snapshot.points[p][axis] - first.points[p][axis]));
+            }
+            let mut written = written.iter_mut();
+            for array in snapshot.arrays.iter().filter(|array| is_coloured(array)) {
+                let width = array.components.len();
+                for (component, channel) in (0..width).zip(written.by_ref()) {
+                    channel.values.extend(ids.iter().map(|&p| number(array, p * width + component)));
+                }
+            }
+        }
+        Ok(Some(recording))
+    }
+
+    /// The largest displacement along each axis.
+    pub(super) fn motion(&self) -> [f64; 3] {
+        let largest = |channel: &Channel| channel.values.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+        std::array::from_fn(|axis| self.channels.get(RESTING + axis).map_or(0.0, largest))
+    }
+
+    /// For `player.js`, with the axes of the picture.
+    pub(super) fn page(&self, [right, up]: [usize; 2]) -> Played {
+        let (mut numbers, mut list): (Vec<u8>, Vec<Value>) = (Vec::new(), Vec::new());
+        for channel in &self.channels {
+            let (low, high) = channel.range();
+            // In units of 2: where the numbers of the channel begin.
+            let start = (!channel.is_constant()).then_some(numbers.len() / 2);
+            if start.is_some() {
+                numbers.extend(channel.values.iter().flat_map(|&x| quantized(x, low, high).to_le_bytes()));
+            }
+            let Channel { field, component, .. } = channel;
+            list.push(json!({ "field": field, "component": component, "low": low, "high": high, "start": start }));
+        }
+        let Background { dimension, origin, spacing, cells } = self.background;
+        let meta = json!({
+            "dimension": dimension, "origin": origin, "cell": spacing, "cells": cells, "right": right, "up": up,
+            "times": self.times, "snapshots": self.snapshots, "particles": self.particles, "shown": self.shown,
+            "channels": list, "colours": VIRIDIS,
+        });
+        Played {
+            meta: meta.to_string().replace('<', "\\u003c"),
+            numbers: BASE64_STANDARD.encode(numbers),
+            note: self.note(),
+        }
+    }
+
+    /// What is left out, so that the page stays small.
+    fn note(&self) -> Option<String> {
+        let part = |shown: usize, of: usize, what: &str| (shown < of).then(|| format!("{shown} of {of} {what}"));
+        let parts =
+            [part(self.shown, self.particles, "particles"), part(self.times.len(), self.snapshots, "snapshots")];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        (!parts.is_empty())
+            .then(|| format!("The page shows {}, evenly chosen; the files have all.", parts.join(" and ")))
+    }
+}
+
+/// Displacements are had from the positions.
+fn is_coloured(array: &Array) -> bool {
+    array.name != "displacement"
+}
+
+fn number(array: &Array, place: usize) -> f64 {
+    let found = match &array.values {
+        Values::Float(values) => values.get(place).copied(),
+        Values::Index(values) => values.get(place).map(|&x| f64::from(x)),
+    };
+    found.unwrap_or(f64::NAN)
+}
+
+/// The channels of a run that begins with `first`; positions are there, all others empty.
+fn channels(first: &Snapshot, ids: &[usize]) -> Vec<Channel> {
+    let channel = |field: &str, component: &str, values| Channel {
+        field: field.replace('_', " "),
+        component: component.to_owned(),
+        values,
+    };
+    let rest = AXES.iter().enumerate().map(|(axis, name)| {
+        channel("position at the start", name, ids.iter().map(|&p| first.points[p][axis]).collect())
+    });
+    let distances = channel("distance of neighbours", "", distances(first, ids));
+    let displacement = AXES.iter().map(|name| channel("displacement", name, Vec::new()));
+    let coloured = first.arrays.iter().filter(|array| is_coloured(array));
+    let written = coloured.flat_map(|array| array.components.iter().map(|name| channel(&array.name, name, Vec::new())));
+    rest.chain([distances]).chain(displacement).chain(written).collect()
+}
+
+/// About `most` of `count` ids, evenly whatever the order they were made in (Knuth's multiplicative hash: multiples of the golden
+/// ratio modulo 1); all if there are not more.
+fn sample(count: usize, most: usize) -> Vec<usize> {
+    let part = most as f64 / count.max(1) as f64;
+    let kept = |id: &usize| f64::from((*id as u32).wrapping_mul(2_654_435_769)) < part * 2_f64.powi(32);
+    (0..count).filter(|id| part >= 1.0 || kept(id)).collect()
+}
+
+/// How far the neighbours of each of `ids` are, two along each axis as on a lattice; of those that are few of many, or alone, what is
+/// the mean.
+fn distances(snapshot: &Snapshot, ids: &[usize]) -> Vec<f64> {
+    let Background { dimension, origin, spacing, .. } = snapshot.background;
+    let bin = |x: &[f64; 3], side: f64| [0, 1, 2].map(|k| ((x[k] - origin[k]) / side).floor() as i64);
+    // The side of a particle's part of the cells that hold any.
+    let cells: HashSet<_> = snapshot.points.iter().map(|x| bin(x, spacing)).collect();
+    let part = cells.len() as f64 / ids.len().max(1) as f64;
+    let mean = spacing * part.powf(1.0 / f64::from(dimension));
+    if ids.len() < snapshot.points.len() {
+        return vec![mean; ids.len()];
+    }
+    let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    ids.iter().for_each(|&p| bins.entry(bin(&snapshot.points[p], 2.0 * mean)).or_default().push(p));
+    let nearest = |&p: &usize| {
+        let x = &snapshot.points[p];
+        let [i, j, k] = bin(x, 2.0 * mean);
+        let around = (-1..=1).flat_map(|c| (-1..=1).flat_map(move |b| (-1..=1).map(move |a| [i + a, j + b, k + c])));
+        let others = around.filter_map(|bin| bins.get(&bin)).flatten().filter(|&&q| q != p);
+        let square = |&q: &usize| (0..3).map(|k| (snapshot.points[q][k] - x[k]).powi(2)).sum::<f64>();
+        let mut squares: Vec<f64> = others.map(square).collect();
+        squares.sort_by(f64::total_cmp);
+        squares.truncate(2 * dimension as usize);
+        let sum: f64 = squares.iter().map(|square| square.sqrt()).sum();
+        if sum > 0.0 { sum / squares.len() as f64 } else { mean }
+    };
+    ids.iter().map(nearest).collect()
+}
+
+/// `x` in steps of (high − low)/65534.
+fn quantized(x: f64, low: f64, high: f64) -> u16 {
+    if x.is_finite() { ((x - low) / (high - low) * f64::from(NONE - 1)).round() as u16 } else { NONE }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_to_half_a_step_and_what_is_none_stays_none() {
+        let (low, high) = (-3.0, 1e7);
+        let back = |q: u16| low + f64::from(q) / 65534.0 * (high - low);
+        for x in [low, -2.9, 0.0, 12.5, 9_999_999.0, high] {
+            assert!((back(quantized(x, low, high)) - x).abs() <= 0.5001 * (high - low) / 65534.0, "{x}");
+        }
+        assert_eq!([f64::NAN, f64::INFINITY].map(|x| quantized(x, low, high)), [NONE; 2]);
+    }
+
+    #[test]
+    fn neighbours_are_found_at_their_distance() {
+        let background = Background { dimension: 2, origin: [0.0; 3], spacing: 1.0, cells: [9, 9, 0] };
+        let points = vec![[0.2, 0.2, 0.0], [0.8, 0.2, 0.0], [1.1, 0.2, 0.0], [7.5, 7.5, 0.0]];
+        let snapshot = Snapshot { time: 0.0, background, points, arrays: vec![] };
+        let found = distances(&snapshot, &[0, 1, 2, 3]);
+        // 4 points in 3 cells, the last one alone
+        let wanted = [0.75, 0.45, 0.6, 0.75_f64.sqrt()];
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert_eq!(distances(&snapshot, &[0, 2]), [1.5_f64.sqrt(); 2]);
+    }
+
+    #[test]
+    fn a_sample_has_the_size_asked_for_and_no_gaps() {
+        assert_eq!(sample(5, 7), [0, 1, 2, 3, 4]);
+        let ids = sample(100_000, 15_384);
+        assert!(ids.len().abs_diff(15_384) < 20, "{}", ids.len());
+        // of rows of any length, every part is taken evenly: no stripes
+        for row in [7, 13, 40, 64] {
+            let mut columns = vec![0; row];
+            ids.iter().for_each(|id| columns[id % row] += 1);
+            let mean = ids.len() / row;
+            assert!(columns.iter().all(|n: &usize| n.abs_diff(mean) < mean / 4), "{row}: {columns:?}");
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! How far apart the surfaces of two bodies are when they begin to feel each other: the table of `docs/src/limits.md`, measured.
+
+use crate::support::Failure;
+use bfree::scene;
+
+/// Two bars of 8 cells, 5 cells apart at the start, run into each other at half a cell in a unit of time each. How far apart they are
+/// when the first hundredth of their kinetic energy is gone, in cells; `place` shifts both along the grid.
+fn distance(approximation: &str, place: f64) -> Result<f64, Failure> {
+    let bar = |name: &str, start: f64, velocity: f64| {
+        let (from, to) = (start + place, start + 8.0 + place);
+        format!(
+            r#"{{"name": "{name}", "density": 1, "velocity": [{velocity}], "shape": {{"box": {{"min": [{from}], "max": [{to}]}}}},
+                 "material": {{"neo_hookean": {{"young": 100, "poisson": 0}}}}}}"#
+        )
+    };
+    let (left, right) = (bar("left", 8.0, 0.5), bar("right", 21.0, -0.5));
+    let text = format!(
+        r#"{{"grid": {{"size": [40], "spacing": 1}}, "time": {{"step": 0.02, "end": 8}}, "approximation": {approximation},
+             "bodies": [{left}, {right}]}}"#
+    );
+    let mut simulation = scene::read(&text, &[])?.build::<1>(".".as_ref())?;
+    let start = simulation.particles.kinetic_energy();
+    while simulation.particles.kinetic_energy() > 0.99 * start {
+        simulation.step()?;
+        assert!(simulation.clock.time() < 5.0, "{approximation} at {place}: the bars ran through each other");
+    }
+    Ok(5.0 - simulation.clock.time())
+}
+
+#[test]
+fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
+    let manual = include_str!("../../docs/src/limits.md");
+    let mut rows = 0;
+    for row in manual.lines().filter(|row| row.starts_with("| `\"approximation\": ")) {
+        let [approximation, least, most] =
+            <[&str; 3]>::try_from(row.trim_matches(['|', ' ']).split(" | ").collect::<Vec<_>>()).map_err(|_| row)?;
+        let approximation = approximation.trim_matches('`').trim_start_matches("\"approximation\": ");
+        let places = (0..10).map(|tenth| distance(approximation, 0.1 * f64::from(tenth)));
+        let found = places.collect::<Result<Vec<_>, Failure>>()?;
+        let range = found.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &x| (low.min(x), high.max(x)));
+        // As it is written there: in tenths of a cell, rounded.
+        for (found, said) in [(range.0, least), (range.1, most)] {
+            assert!((found - said.parse::<f64>()?).abs() < 0.06, "{row}: {found}");
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, 6);
+    Ok(())
+}
