@@ -40,11 +40,12 @@ const LEVELS: Check = Check::Test("multigrid::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const SOLVER: Check = Check::Unit("solver::");
+const SOLIDS: Check = Check::Unit("shape::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, SOLVER,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, SOLVER, SOLIDS,
 ];
 
 /// What is to become of a patch.
@@ -120,6 +121,11 @@ const SEARCH: &str = "src/solver/newton/search.rs";
 const LINEAR: &str = "src/solver/newton/linear.rs";
 const BLOCKS: &str = "src/solver/preconditioner/block_jacobi.rs";
 const MULTIGRID: &str = "src/solver/preconditioner/multigrid.rs";
+const CUT: &str = "src/shape/cut.rs";
+const FILL: &str = "src/shape/fill.rs";
+const LAYOUT: &str = "src/shape/layout.rs";
+const SURFACE: &str = "src/scene/filling.rs";
+const NOT_A_KNOT: &str = "src/approximation/not_a_knot.rs";
 
 use Fate::{Equivalent, Killed};
 
@@ -699,4 +705,64 @@ pub(super) const PATCHES: &[Patch] = &[
         "met.is_empty()",
         "(met.len() < usize::MAX)",
         Killed(&[KEPT], &[DYNAMICS])),
+    patch("pieces of boxes a twentieth too small", CUT,
+        "[1.0, 1.0, 2.0, 6.0][D.min(3)]",
+        "[1.0, 1.0, 2.1, 6.3][D.min(3)]",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("the centroid of a piece at the corner of its box", CUT,
+        "moment += piece.centroid * piece.volume;",
+        "moment += lower * piece.volume;",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("which side of a hole is the body's by its plane alone", CUT,
+        "cut.distance(plane, x) * along(&plane) <= 0.0",
+        "cut.distance(plane, x) <= 0.0",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("a surface's normal inwards", CUT,
+        "Facet { position, normal: outward, area }",
+        "Facet { position, normal: -outward, area }",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("half of a surface in 2D, a third in 3D", CUT,
+        "D as f64 * volume / height(plane).abs()",
+        "volume / height(plane).abs()",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("a curved surface by one plane a box", CUT,
+        "(departure > flat || distinct.len() > MANY)",
+        "(distinct.len() > MANY)",
+        Killed(&[SOLIDS], &[PATCH])),
+    patch("a sliver's volume lost", FILL,
+        "*volume + small.volume",
+        "*volume",
+        Killed(&[SOLIDS], &[PATCH])),
+    patch("slivers left alone", FILL,
+        "share < SLIVER",
+        "share < 0.0",
+        Killed(&[SOLIDS], &[PATCH])),
+    patch("particles of cut boxes for their whole box", FILL,
+        "Seed { position: centroid, volume }",
+        "Seed { position: centroid, volume: edges.product() }",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("particles of cut boxes in their corner", FILL,
+        "Seed { position: centroid, volume }",
+        "Seed { position: position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(pieces))), volume }",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("Gauss points between middles where the body ends", LAYOUT,
+        "if goes_on { (n / 2..n).map(whole).collect() } else { (0..n).map(part).collect() }",
+        "(n / 2..n).map(whole).collect::<Points>()",
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("no surface in cells whose middle is a quarter off", SURFACE,
+        "h * (D as f64).sqrt()",
+        "h * 0.25",
+        Killed(&[ORDER, LOADS], &[PATCH])),
+    patch("planes of symmetry are surfaces", SURFACE,
+        "facets.retain(|facet| !goes_on(facet));",
+        "{}",
+        Killed(&[LOADS], &[PATCH])),
+    patch("slopes at an upper wall as at a lower one", NOT_A_KNOT,
+        "-slope / axis.spacing",
+        "slope / axis.spacing",
+        Killed(&[SHAPES, PATCH, ORDER], &[SOLIDS])),
+    patch("functions at a wall a thousandth off in s cubed", NOT_A_KNOT,
+        "own + s * (b + s * (c + s * e))",
+        "own + s * (b + s * (c + s * e * 1.001))",
+        Killed(&[SHAPES, PATCH], &[SOLIDS])),
 ];

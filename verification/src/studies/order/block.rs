@@ -1,11 +1,11 @@
 //! In space, without inertia: a block between walls, J from 0.3 to 1.7.
 
-use super::{GAUSS, GAUSS_3, GAUSS_OF_HALVES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
+use super::{GAUSS, GAUSS_3, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
 use crate::manufactured::Block;
 use crate::report::{Bound, Report};
 use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
-use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
+use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
 use bfree::mechanics::kept::Renewal;
 use bfree::mechanics::schemes::Statics;
@@ -44,6 +44,8 @@ impl Case {
 /// Functions that are consistent to first order: 2 and 1. B-splines at a wall continue the field linearly, u″ = 0 where it is not: an error
 /// of O(h) in the stress over a layer of width h, 1.5 in the mean square, and 2.5 of the displacement, if the particles are Gauss points of
 /// the pieces; if they are not, their sums leave the displacement 2. Quadratic functions have their kinks in the middle of cells.
+/// Without a knot there, nothing is lost: of degree p, p + 1 and p; but two points a cell are Gauss's for the forces of cubic ones away from
+/// walls only, where errors of neighbours cancel: 3.5 and 2.5 are asked of them, less than the 3.7 and 2.8 of an independent prototype.
 ///
 /// After a renewal, what an independent prototype found not to fall with h any more, with 2 × 2 regular particles.
 fn curved() -> Vec<Case> {
@@ -62,13 +64,16 @@ fn curved() -> Vec<Case> {
         Case::new("quadratic", quadratic, &GAUSS, [2.0, 1.5]),
         Case::new("cubic", cubic, &GAUSS, [2.5, 1.5]),
         Case::new("cubic", cubic, &GAUSS_3, [2.5, 1.5]),
+        Case::new("not-a-knot quadratic", NotAKnotBspline(quadratic), &GAUSS_OF_MIDDLES, [3.0, 2.0]),
+        Case::new("not-a-knot cubic", NotAKnotBspline(cubic), &GAUSS, [3.5, 2.5]),
+        Case::new("not-a-knot cubic", NotAKnotBspline(cubic), &GAUSS_3, [4.0, 3.0]),
     ]
 }
 
 /// What is asked of Gauss points where u″ at the walls is zero, and the walls do not show: of degree p, p + 1 and p.
 fn straight() -> [Case; 2] {
     [
-        Case::new("quadratic", Bspline::Quadratic, &GAUSS_OF_HALVES, [3.0, 2.0]),
+        Case::new("quadratic", Bspline::Quadratic, &GAUSS_OF_MIDDLES, [3.0, 2.0]),
         Case::new("cubic", Bspline::Cubic, &GAUSS, [4.0, 3.0]),
     ]
 }
@@ -83,7 +88,7 @@ fn loaded<const D: usize>(
 ) -> Result<Held<Block, D>, StudyError> {
     let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; D] };
     let settings = Settings { scheme: Arc::new(Statics), renewal, ..Settings::default() };
-    Held::new(block, grid, (&case.shape, case.layout), f64::from(steps).recip(), settings)?.after(steps)
+    Held::new(block, grid, (&case.shape, case.layout), None, f64::from(steps).recip(), settings)?.after(steps)
 }
 
 /// Orders of one case.

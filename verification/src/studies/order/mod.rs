@@ -1,8 +1,11 @@
 //! Orders in h and in Δt at large deformation: whole steps on a grid that is kept, against solutions that are known; what renewing it
 //! costs; and the energy that an impact loses.
 
+mod beam;
 mod block;
+mod hole;
 mod rebound;
+mod ring;
 mod vortex;
 
 use super::{Effort, Outcome, StudyError};
@@ -14,8 +17,9 @@ use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
 use bfree::material::{Lame, Law, Material, NeoHookean, Start};
-use bfree::mechanics::loads::{self, Loads, Prescribed, Selection};
+use bfree::mechanics::loads::{self, Curve, Loads, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint};
 use bfree::particles::{Body, Particles};
+use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, Seed, Shape, fill};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::tensor::{Deformation, Tensor, Vector};
 
@@ -27,43 +31,27 @@ pub(super) const ABOUT: &str =
 /// p + 2 (1/16 − 1/32)/ln 2.
 const NEAR: f64 = 0.1;
 
-/// Where the particles of a cell lie along each axis, and the part of it that each stands for.
+/// Where the particles of a cell are.
 struct Layout {
     name: &'static str,
-    points: &'static [(f64, f64)],
+    filling: Filling,
 }
 
-const REGULAR: Layout = Layout { name: "regular", points: &[(0.25, 0.5), (0.75, 0.5)] };
+impl Layout {
+    const fn new(name: &'static str, per_axis: u32, layout: shape::Layout, kinks_in_middles: bool) -> Self {
+        Self { name, filling: Filling { per_axis, layout, rule: Fill::Cut, kinks_in_middles } }
+    }
+}
 
-/// Gauss points of a cell, ½ ± 1/(2√3): those of functions that are polynomials between nodes.
-const GAUSS: Layout =
-    Layout { name: "Gauss", points: &[(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)] };
+const REGULAR: Layout = Layout::new("regular", 2, shape::Layout::Regular, false);
 
-/// Gauss points from the middle of a cell to the middle of the next, ± 1/(2√3) about each node: those of quadratic B-splines, which are
-/// polynomials there.
-const GAUSS_OF_MIDDLES: Layout =
-    Layout { name: "Gauss, of middles", points: &[(0.288_675_134_594_812_9, 0.5), (0.711_324_865_405_187_1, 0.5)] };
+/// Those of functions that are polynomials between nodes.
+const GAUSS: Layout = Layout::new("Gauss", 2, shape::Layout::Gauss, false);
 
-/// Gauss points of each half of a cell, ¼ ± 1/(4√3) and ¾ ± 1/(4√3): of quadratic B-splines at walls as well, where they are cut at a node.
-const GAUSS_OF_HALVES: Layout = Layout {
-    name: "Gauss, of halves",
-    points: &[
-        (0.105_662_432_702_593_6, 0.25),
-        (0.394_337_567_297_406_4, 0.25),
-        (0.605_662_432_702_593_6, 0.25),
-        (0.894_337_567_297_406_4, 0.25),
-    ],
-};
+/// Those of quadratic B-splines, which are polynomials from the middle of a cell to that of the next.
+const GAUSS_OF_MIDDLES: Layout = Layout::new("Gauss, of middles", 2, shape::Layout::Gauss, true);
 
-/// ½ and ½ ± ½ √(3/5)
-const GAUSS_3: Layout = Layout {
-    name: "Gauss 3",
-    points: &[
-        (0.112_701_665_379_258_3, 5.0 / 18.0),
-        (0.5, 8.0 / 18.0),
-        (0.887_298_334_620_741_7, 5.0 / 18.0),
-    ],
-};
+const GAUSS_3: Layout = Layout::new("Gauss 3", 3, shape::Layout::Gauss, false);
 
 /// A body that fills the box of its grid and is held at its faces, moved by the body force of a known motion.
 struct Held<M, const D: usize> {
@@ -80,23 +68,18 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
         motion: M,
         grid: Grid<D>,
         (shape, layout): (&Approximation, &Layout),
+        hole: Option<&Ball<D>>,
         dt: f64,
         settings: Settings,
     ) -> Result<Self, StudyError> {
         let law = Material::from(NeoHookean::ciarlet(Lame::from_young_poisson(1.0, 0.3)?));
         let inertia = settings.scheme.has_inertia();
         let mut particles = Particles::default();
-        let across = grid.cells.map(|cells| cells as usize * layout.points.len());
-        for number in 0..across.iter().product() {
-            let mut rest: usize = number;
-            let (mut x, mut volume) = (grid.origin, 1.0);
-            for k in 0..D {
-                let (cell, point) = (rest % across[k] / layout.points.len(), rest % layout.points.len());
-                let (place, part) = layout.points[point];
-                x[k] += (cell as f64 + place) * grid.spacing;
-                volume *= part * grid.spacing;
-                rest /= across[k];
-            }
+        let mut body = Shape::from(Block { min: grid.origin, max: grid.position(grid.cells) });
+        if let Some(hole) = hole {
+            body = Difference { of: Box::new(body), minus: Box::new(hole.clone().into()) }.into();
+        }
+        for (number, Seed { position: x, volume }) in fill(&grid, &body, layout.filling)?.into_iter().enumerate() {
             if inertia {
                 let start = state(&motion, &x, 0.0);
                 particles.push(x, start.velocity, volume, volume, 0);
@@ -105,12 +88,14 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
                 particles.push_without_inertia(x, volume, volume, 0);
             }
         }
+        let surface = hole.map_or(Ok(Vec::new()), |hole| tractions((&motion, &law), &grid, (&body, hole), &mut particles))?;
         let reference = particles.position.clone();
         let faces = (0..D).flat_map(|axis| [false, true].map(|upper| Selection::Face { axis, upper }));
         let wall = |on| Prescribed { name: "wall".into(), on, motion: std::array::from_fn(|_| Some(loads::Motion::Rest)) };
         let loads = Loads {
             prescribed: faces.map(wall).collect(),
             field: Some(force_field(motion, law.clone(), 1.0, reference.clone())),
+            surface,
             ..Loads::default()
         };
         let settings = Settings { initial_guess: InitialGuess::LastStep, ..settings };
@@ -168,6 +153,39 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
             [(tau(particles.displacement_gradient[p]) - of_exact).norm_squared(), of_exact.norm_squared()]
         })
     }
+}
+
+/// The tractions P N of the motion at t = 1 on a hole, in proportion to t: a load for each point of the surface, which becomes a particle.
+fn tractions<M: Motion<D>, const D: usize>(
+    (motion, law): (&M, &Material),
+    grid: &Grid<D>,
+    (body, hole): (&Shape<D>, &Ball<D>),
+    particles: &mut Particles<D>,
+) -> Result<Vec<SurfaceLoad<D>>, StudyError> {
+    // As many boxes as cut cells have with Gauss points.
+    const BOXES: usize = 4;
+    let edges = Vector::repeat(grid.spacing / BOXES as f64);
+    let around = Ball { radius: hole.radius + grid.spacing, ..hole.clone() }.into();
+    let mut loads = Vec::new();
+    for number in 0..grid.cells.iter().map(|&cells| BOXES * cells as usize).product() {
+        let mut rest: usize = number;
+        let lower = Vector::from_fn(|k, _| {
+            let across = BOXES * grid.cells[k] as usize;
+            let at = rest % across;
+            rest /= across;
+            grid.origin[k] + at as f64 * edges[k]
+        });
+        for facet in body.facets(Some(&around), &lower, &edges, grid.spacing) {
+            let at = Deformation::new(state(motion, &facet.position, 1.0).displacement_gradient);
+            let traction = at.f * law.stress(&at, &Start::NONE) * facet.normal;
+            let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
+            // A hair inside, in the cell where the body is.
+            particles.push_without_inertia(facet.position - facet.normal * (1e-6 * grid.spacing), 0.0, 0.0, 0);
+            let curve = Curve::new(vec![[0.0, 0.0], [1.0, 1.0]])?;
+            loads.push(SurfaceLoad { pressing: Pressing::Traction(traction), curve, points: vec![point] });
+        }
+    }
+    Ok(loads)
 }
 
 /// Errors of one case on finer and finer grids.
@@ -243,12 +261,15 @@ fn figure(name: &str, title: &str, lines: Vec<Line>) -> Figure {
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
     block::run(*effort, &mut outcome);
+    hole::run(&mut outcome);
+    ring::run(&mut outcome);
+    beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
     rebound::run(*effort, &mut outcome)?;
     outcome.remarks.push(
         "On a grid that is kept, functions of degree p on Gauss points of their own pieces have order p + 1 in the displacement and p in the \
-         stress. B-splines at a held wall where the displacement is curved have 2.5 and 1.5, whatever p; regular particles 2 and 1.5. The pieces \
-         of quadratic ones end in the middle of cells: Gauss points of cells are no better for them than regular ones. A lumped mass leaves order 2."
+         stress. B-splines that do not curve at a wall where the displacement does have 2.5 and 1.5, whatever p; without a knot beside the \
+         wall they have their own order again. Regular particles have 2 and 1.5. A lumped mass leaves order 2."
             .into(),
     );
     Ok(outcome)

@@ -30,7 +30,7 @@ fn spun(
 ) -> Result<Held<Vortex, 2>, StudyError> {
     let grid = Grid { origin: Vector::repeat(-HALF), spacing: 2.0 * HALF / f64::from(cells), cells: [cells; 2] };
     let settings = Settings { scheme, lumping, renewal: Renewal::Never, ..Settings::default() };
-    Held::new(Vortex::default(), grid, (shape, layout), END / f64::from(steps), settings)?.after(steps)
+    Held::new(Vortex::default(), grid, (shape, layout), None, END / f64::from(steps), settings)?.after(steps)
 }
 
 /// Δt falls with h², so that the time scheme does not show. With ε = 1 the lumped mass makes errors of order 2, whatever the functions; with

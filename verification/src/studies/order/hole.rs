@@ -1,0 +1,55 @@
+//! A block with a round hole that cuts cells: on the hole act the tractions P N of the known motion.
+
+use super::{GAUSS, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
+use crate::manufactured::Block;
+use crate::report::{Bound, Report};
+use crate::studies::Outcome;
+use crate::table::Table;
+use bfree::approximation::{Approximation, Bspline, Linear, Lme, NotAKnotBspline};
+use bfree::grid::Grid;
+use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::schemes::Statics;
+use bfree::shape::Ball;
+use bfree::simulation::Settings;
+use bfree::tensor::Vector;
+use std::sync::Arc;
+
+/// J is between 1 − this and 1 + this: the surface of a hole that is compressed by half wrinkles.
+const CHANGE: f64 = 0.3;
+
+/// What scenes without inertia have.
+const GHOST: f64 = 1e-3;
+
+/// Of the displacement 2 and of the stress 1.5, of functions that are consistent to first order 1: what the issue asks of bodies whose surface
+/// cuts cells.
+pub(super) fn run(outcome: &mut Outcome) {
+    let title = "a block with a round hole under tractions, J from 0.7 to 1.3, no inertia, the grid kept";
+    let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout"]);
+    let header = ["shape", "layout", "cells", "displacement", "order", "stress", "order", "products x particles"];
+    let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
+    let cases: [(&str, Approximation, &Layout, f64); 5] = [
+        ("linear", Linear.into(), &REGULAR, 1.0),
+        ("linear", Linear.into(), &GAUSS, 1.0),
+        ("LME 3", Lme::new(3.0, 1e-6).into(), &GAUSS, 1.0),
+        ("not-a-knot quadratic", NotAKnotBspline(Bspline::Quadratic).into(), &GAUSS_OF_MIDDLES, 1.5),
+        ("not-a-knot cubic", NotAKnotBspline(Bspline::Cubic).into(), &GAUSS, 1.5),
+    ];
+    let block = Block::curved_at_walls::<2>(CHANGE);
+    let hole = Ball { center: Vector::from([0.47, 0.52]), radius: 0.23 };
+    let mut lines = Vec::new();
+    for (name, shape, layout, of_stress) in cases {
+        let [displacement, stress] = [2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));
+        let least = [("displacement, round hole", displacement), ("stress, round hole", stress)];
+        let refined = Refined { report: &mut report, table: &mut table, least };
+        let found = refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
+            let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
+            let settings = Settings { scheme: Arc::new(Statics), renewal: Renewal::Never, ghost: GHOST, ..Settings::default() };
+            let held = Held::new(block, grid, (&shape, layout), Some(&hole), 1.0, settings)?.after(1)?;
+            Ok(([held.displacement(), held.stress()], held.work))
+        });
+        lines.push(line(&format!("{name}, {}", layout.name), found.iter().map(|(cells, errors)| (*cells, errors[1]))));
+    }
+    outcome.figures.push(figure("hole", "stress of a block with a hole", lines));
+    outcome.reports.push(report);
+    outcome.tables.push(table);
+}
