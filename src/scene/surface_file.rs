@@ -191,7 +191,8 @@ fn joined(corners: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Surface<3>, 
         });
         numbers.push(number);
     }
-    let number = |corner: usize| numbers.get(corner).copied().unwrap_or(u32::MAX);
+    // One that is not there keeps its number, and is refused.
+    let number = |corner: usize| numbers.get(corner).copied().unwrap_or(corner as u32);
     Surface::new(vertices, triangles.iter().map(|triangle| triangle.map(number)).collect())
 }
 

@@ -337,7 +337,7 @@ fn files_that_are_no_surface_are_named_with_the_key_and_the_place() -> Result<()
     let cube = cuboid(point([1.0; 3]), point([2.0; 3]));
     stl(&(cube.0.clone(), cube.1[1..].to_vec()), &at("open.stl"))?;
     stl(&cuboid(point([1.0; 3]), point([5.0; 3])), &at("large.stl"))?;
-    std::fs::write(at("short.stl"), [0; 100])?;
+    std::fs::write(at("short.stl"), [1; 100])?;
     std::fs::write(at("cut.ply"), &ply(&cube).into_bytes()[..230])?;
     std::fs::write(at("lines.ply"), ply(&cube).replace("4 0 2 3 1\n", "2 0 2\n"))?;
     std::fs::write(at("flat.ply"), ply(&cube).replace("property double z", "property double w"))?;
@@ -350,7 +350,7 @@ fn files_that_are_no_surface_are_named_with_the_key_and_the_place() -> Result<()
         ("cut.ply", "cannot be read"),
         ("lines.ply", "face 0 has 2 corners"),
         ("flat.ply", "has no x, y and z of its vertices"),
-        ("far.ply", "has the vertex"),
+        ("far.ply", "holds a triangle with vertex 99, of 8"),
         ("folder.stl", "is no regular file"),
         ("nowhere.stl", "No such file"),
     ];

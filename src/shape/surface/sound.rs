@@ -23,7 +23,7 @@ pub enum SurfaceError {
     #[error("a vertex at {0:?}, which is no place")]
     NotFinite([f64; 3]),
     /// A triangle of vertices that are not there.
-    #[error("triangle {triangle} has the vertex {vertex}, of {vertices}")]
+    #[error("a triangle with vertex {vertex}, of {vertices} (triangle {triangle}, both counted from 0)")]
     NoVertex {
         /// Its number, from 0.
         triangle: usize,
