@@ -7,6 +7,7 @@ use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms};
+use crate::mechanics::transfer::Projection;
 use crate::particles::Particles;
 use crate::simulation::Simulation;
 use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
@@ -237,6 +238,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let lumping = if moves { simulation.settings.lumping } else { 1.0 };
     let consistent = moves && lumping < 1.0;
     let smooths = moves && simulation.settings.smoothing.is_some();
+    let fits = moves && simulation.settings.projection == Projection::Affine;
     let tiled = supports.is_tiled();
     let krylov_vectors = match simulation.krylov().0 {
         // The basis; residual, correction, trial and product.
@@ -251,7 +253,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
     // What is not there does not appear.
     let keeps = simulation.settings.renewal != Renewal::EveryStep;
-    let used: [(bool, &'static str, usize); 18] = [
+    let used: [(bool, &'static str, usize); 19] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -259,6 +261,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (consistent, "particles: prediction for the consistent inertia", particles * 2 * vector),
         // The field without what nodes can carry, what it changes by, and the change of the other field.
         (smooths, "particles: smoothing", particles * 3 * vector),
+        (fits, "affine fits of v, a", particles * tensor + nodes * 4 * (tensor + vector)),
         (true, "shape functions: N, dN/dx by axis", supports.bytes()),
         (tiled, "particles: the order of the sweep", particles * 2 * size_of::<u64>()),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.

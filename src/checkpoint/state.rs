@@ -18,13 +18,14 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         approximation: _,
         bodies: _,
         particles,
-        loads: _,
+        loads,
         settings: _,
         clock: _,
         external_work,
         dissipated,
         path: Path { load, increment, speed, weight },
         kept,
+        held,
         workspace: _,
     } = simulation;
     let Particles {
@@ -40,8 +41,10 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         remembered: _,
     } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
+    let held: Vec<f64> = (0..loads.prescribed.len()).map(|one| u8::from(held.contains(&one)).into()).collect();
     let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
         ("id", id.into()),
+        ("held", held.into()),
         ("position", bytemuck::cast_slice(position).into()),
         ("velocity", bytemuck::cast_slice(velocity).into()),
         ("acceleration", bytemuck::cast_slice(acceleration).into()),
@@ -118,6 +121,8 @@ pub(super) fn restore<const D: usize, L, A>(
     simulation.kept = None;
     simulation.rearrange(&order);
     simulation.kept = kept;
+    let held = arrays.iter().filter(|array| array.name == "held").flat_map(|array| &array.values);
+    simulation.held = held.enumerate().filter(|(_, held)| **held > 0.0).map(|(one, _)| one).collect();
     let path = &mut simulation.path;
     let mut numbers = arrays.iter().filter(|array| array.name == "path").flat_map(|array| &array.values);
     for number in [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight] {

@@ -6,6 +6,7 @@
 
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
+use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::nodes::Nodes;
 use crate::particles::Particles;
@@ -13,11 +14,15 @@ use crate::pooled::Pool;
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt::{Display, Formatter};
 
+/// A node is one body's if the number of the body varies less there than this, relative to its square.
+const ALONE: f64 = 1e-9;
+
 /// When the background grid is renewed. While a grid is kept, its held nodes stay held. It is renewed in any case where a body comes to a
-/// part of a wall, or of a prescribed region, at which no body was.
+/// part of a wall, or of a prescribed region, at which no body was; and with inertia in every step as long as a body feels the wall that it
+/// has come to, or two bodies touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Renewal {
@@ -99,15 +104,15 @@ impl<const D: usize> Kept<D> {
         self.displacement_gradient = order.iter().map(|&from| self.displacement_gradient[from as usize]).collect();
     }
 
-    /// Whether a particle has come into a cell with a prescribed node that feels nothing yet, from one without such a node of that condition.
-    pub(crate) fn meets(
+    /// The prescribed conditions that a particle has come to: it is in a cell with a node of that condition that feels nothing yet, and
+    /// was in one without any.
+    pub(crate) fn met(
         &self,
         present: &[Vector<f64, D>],
         prescribed: &[Prescribed<D>],
         grid: &Grid<D>,
         nodes: &Nodes,
-    ) -> bool {
-        let corners = |cell: [u32; D]| indices([2; D]).map(move |by| std::array::from_fn(|k| cell[k] + by[k] as u32));
+    ) -> Vec<usize> {
         let holders = |index: [u32; D]| {
             let position = grid.position(index);
             prescribed
@@ -117,24 +122,59 @@ impl<const D: usize> Kept<D> {
                 .map(|(one, _)| one)
         };
         // Conditions that hold a new node, by the lower corner of its cells.
-        let mut cells: Vec<_> = present.iter().filter_map(|x| Some(grid.id(grid.cell(x)?))).collect();
-        cells.sort_unstable();
-        cells.dedup();
-        let mut met = HashSet::new();
-        for cell in cells {
+        let mut new = HashSet::new();
+        for (cell, ()) in cells(present.iter().map(|x| (x, ())), grid) {
             for index in corners(grid.index(cell)).filter(|&index| nodes.number(grid.id(index)).is_none()) {
-                met.extend(holders(index).map(|one| (cell, one)));
+                new.extend(holders(index).map(|one| (cell, one)));
             }
         }
-        if met.is_empty() {
-            return false;
+        if new.is_empty() {
+            return Vec::new();
         }
         let was_there = |x: &Vector<f64, D>, one: usize| {
             grid.cell(x).is_some_and(|cell| corners(cell).any(|index| holders(index).any(|holder| holder == one)))
         };
-        present.iter().zip(&self.position).any(|(x, before)| {
-            let Some(cell) = grid.cell(x).map(|cell| grid.id(cell)) else { return false };
-            (0..prescribed.len()).any(|one| met.contains(&(cell, one)) && !was_there(before, one))
-        })
+        let comes = |one: usize| {
+            present.iter().zip(&self.position).any(|(x, before)| {
+                grid.cell(x).is_some_and(|cell| new.contains(&(grid.id(cell), one)) && !was_there(before, one))
+            })
+        };
+        (0..prescribed.len()).filter(|&one| comes(one)).collect()
     }
+}
+
+/// Whether two bodies touch, or did when the shape functions were made: they lie in cells with a common corner, or move a node together.
+pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, supports: &Supports<D>) -> bool {
+    let mut owners = HashMap::new();
+    let bodies = particles.position.iter().zip(particles.body.iter().copied());
+    let mut sees =
+        |(cell, body)| corners(grid.index(cell)).any(|index| *owners.entry(grid.id(index)).or_insert(body) != body);
+    if cells(bodies, grid).into_iter().any(&mut sees) {
+        return true;
+    }
+    // The variance of the number of the body, weighted with N.
+    let sum = |power: i32| {
+        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
+        supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
+        sum
+    };
+    let [weights, means, squares] = [0, 1, 2].map(sum);
+    let mut of_nodes = weights.iter().zip(&means).zip(&squares).map(|((w, m), s)| (w[0], m[0], s[0]));
+    of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
+}
+
+/// The ids of the cells that hold something, with what they hold, each once.
+fn cells<'a, const D: usize, T: Ord>(
+    held: impl Iterator<Item = (&'a Vector<f64, D>, T)>,
+    grid: &Grid<D>,
+) -> Vec<(u64, T)> {
+    let mut cells: Vec<_> = held.filter_map(|(x, what)| Some((grid.id(grid.cell(x)?), what))).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+/// The nodes of a cell.
+fn corners<const D: usize>(cell: [u32; D]) -> impl Iterator<Item = [u32; D]> {
+    indices([2; D]).map(move |by| std::array::from_fn(|k| cell[k] + by[k] as u32))
 }

@@ -1,5 +1,6 @@
 //! The weak form: transfer, loads, residual, and the matrix-free tangent.
 
+mod affine;
 mod cells;
 pub mod check;
 pub mod kept;

@@ -111,6 +111,7 @@ impl Scene {
         Settings {
             scheme: self.time.inertia.scheme(self.time.newmark()),
             lumping: self.time.lumping(),
+            projection: self.time.projection.unwrap_or_default(),
             ghost: self.ghost(),
             renewal: self.grid.renewed(self.time.inertia),
             initial_guess: self.time.initial_guess(),

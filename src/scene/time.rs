@@ -4,7 +4,7 @@ use crate::clock::MAX_HALVINGS;
 pub use crate::mechanics::schemes::Parameters as Inertia;
 
 use crate::mechanics::schemes::Newmark;
-use crate::mechanics::transfer::WallUpdate;
+use crate::mechanics::transfer::{Projection, WallUpdate};
 use crate::problems::{Number, Problems};
 use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
@@ -38,6 +38,8 @@ pub struct Time {
     pub lumping: Option<f64>,
     /// Where Newton's iteration of a step starts. Default: `"last_step"` in load steps, `"zero"` with inertia.
     pub initial_guess: Option<InitialGuess>,
+    /// How nodes get velocity and acceleration from the particles. Default: `"mass"`.
+    pub projection: Option<Projection>,
     /// How particles see prescribed nodes in their update. Default: `"literal"`.
     pub wall_update: Option<WallUpdate>,
     /// Steps as long as a tolerance allows: `step` is the longest, and it is halved `max_halvings` times at most. Default: all are `step`
@@ -105,6 +107,7 @@ impl Time {
         }
         if self.inertia.has_inertia() {
             self.lumping = Some(self.lumping());
+            self.projection.get_or_insert_default();
             self.wall_update.get_or_insert_default();
         }
     }
@@ -117,6 +120,7 @@ impl Time {
             ("time.gamma", number(self.gamma)),
             ("time.lumping", number(self.lumping)),
             ("time.initial_guess", self.initial_guess.filter(|&guess| guess == InitialGuess::Velocity).map(word)),
+            ("time.projection", self.projection.map(word)),
             ("time.wall_update", self.wall_update.map(word)),
             ("time.adaptive", self.adaptive.map(word)),
         ]

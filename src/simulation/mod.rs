@@ -24,6 +24,7 @@ use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::{Krylov, Preconditioning};
 use crate::tensor::{Deformation, Vector};
+use std::collections::BTreeSet;
 
 /// An implicit material point simulation in `D` dimensions.
 ///
@@ -69,6 +70,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     /// The grid that is kept, if it is: a step then goes on from there, and not from the places and deformations that are written into the
     /// particles by hand. Put `None` here first.
     pub kept: Option<Kept<D>>,
+    /// Prescribed conditions that bodies felt in the first step, by number, without those that one has come to since: the others are contacts.
+    pub held: BTreeSet<usize>,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
 }
@@ -129,6 +132,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
             dissipated: 0.0,
             path: Path::default(),
             kept: None,
+            held: BTreeSet::new(),
             workspace: Workspace::default(),
         }
     }
@@ -253,6 +257,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             dissipated: self.dissipated,
             path: self.path,
             kept: self.kept,
+            held: self.held,
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
     }

@@ -3,7 +3,7 @@
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
-use crate::mechanics::transfer::WallUpdate;
+use crate::mechanics::transfer::{Projection, WallUpdate};
 use crate::solver::{NewtonSettings, Preconditioning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,8 @@ pub struct Settings {
     pub scheme: Arc<dyn Scheme>,
     /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
     pub lumping: f64,
+    /// How nodes get velocity and acceleration from the particles.
+    pub projection: Projection,
     /// γ of the ghost stiffness, as a share of Λ + 2G; 0 for none. It holds nodes that have little of a body: without inertia nothing else
     /// does, and with smooth shape functions the answer needs it.
     pub ghost: f64,
@@ -59,6 +61,7 @@ impl Default for Settings {
         Self {
             scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
+            projection: Projection::default(),
             ghost: 0.0,
             renewal: Renewal::default(),
             initial_guess: InitialGuess::default(),

@@ -5,7 +5,7 @@ use super::{AdvanceError, FailedAttempt, InitialGuess, Reaction, Simulation, Ste
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::check::direction;
-use crate::mechanics::kept::{Kept, Renewal};
+use crate::mechanics::kept::{Kept, Renewal, touch};
 use crate::mechanics::loads::{PrescribedDof, prescribed_dofs};
 use crate::mechanics::path::OnPath;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
@@ -13,7 +13,7 @@ use crate::mechanics::rigid::loose;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::{self, Role};
-use crate::mechanics::transfer::{Nodal, Update};
+use crate::mechanics::transfer::{Nodal, Projection, Update};
 use crate::nodes::Nodes;
 use crate::particles::Particles;
 use crate::phases::Phase;
@@ -135,7 +135,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.path = self.path.after(to, &dphi, dt);
         }
         let passes = supports.passes();
-        self.keep(next, supports, strain);
+        self.keep(next, supports, strain, &prescribed);
         watch.lap(Phase::Update, passes);
         self.external_work += work;
         self.dissipated += dissipated;
@@ -214,16 +214,33 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// Keeps the grid, unless a strain or a wall makes it anew; and its functions, or their memory, with the particles in their order.
-    fn keep(&mut self, kept: Kept<D>, supports: Supports<D>, strain: f64) {
-        let (position, loads) = (&self.particles.position, &self.loads.prescribed);
-        let keeps = self.settings.renewal.keeps(strain) && !kept.meets(position, loads, &self.grid, supports.active());
+    /// Keeps the grid, unless a strain, a wall or another body makes it anew; and its functions, or their memory, with the particles in
+    /// their order.
+    fn keep(&mut self, kept: Kept<D>, supports: Supports<D>, strain: f64, prescribed: &[PrescribedDof]) {
+        if self.clock.steps() == 0 {
+            self.held = prescribed.iter().map(|dof| dof.owner).collect();
+        }
+        let renewal = self.settings.renewal;
+        let contact = renewal != Renewal::EveryStep && self.in_contact(&kept, &supports, prescribed);
+        let keeps = renewal.keeps(strain) && !contact;
         self.kept = keeps.then_some(kept);
         let leaping = supports.leaping();
         leaping.iter().for_each(|order| self.rearrange(order));
         self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
         // Those of particles that lie elsewhere now are good for their memory alone.
         self.workspace.serves = keeps && leaping.is_none();
+    }
+
+    /// Whether a body has come to a wall; with inertia also whether it feels one still, or another body: on a grid that is kept it would
+    /// never leave.
+    fn in_contact(&mut self, kept: &Kept<D>, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
+        let Self { particles, grid, loads, held, .. } = self;
+        let comes = kept.met(&particles.position, &loads.prescribed, grid, supports.active());
+        held.retain(|one| !comes.contains(one));
+        let inertia = self.settings.scheme.has_inertia();
+        !comes.is_empty()
+            || (inertia && prescribed.iter().any(|dof| !held.contains(&dof.owner)))
+            || (inertia && self.bodies.len() > 1 && touch(particles, grid, supports))
     }
 
     /// The degrees of freedom prescribed in the coming step.
@@ -321,7 +338,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Particle velocities so large that the projection overflows.
     pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
         if self.settings.scheme.has_inertia() {
-            return Nodal::project(&self.particles, supports, self.settings.lumping);
+            return match self.settings.projection {
+                Projection::Mass => Nodal::project(&self.particles, supports, self.settings.lumping),
+                Projection::Affine => Ok(Nodal::fit(&self.particles, supports)),
+            };
         }
         Ok(self.masses(supports))
     }

@@ -99,3 +99,28 @@ fn it_is_there_without_inertia_and_in_long_steps_alone() -> Result<(), Failure> 
     }
     Ok(())
 }
+
+/// Linear functions have nodes that only points of the loaded end see; without a tie they gave way in every step, and the run stopped.
+#[test]
+fn points_of_a_loaded_surface_stay_with_their_body() -> Result<(), Failure> {
+    for ghost in ["ghost_stiffness=0", "ghost_stiffness=0.001"] {
+        let mut simulation = scene::<2>("cantilever.json", &["approximation=\"linear\"", ghost])?;
+        // A sixteenth at the start, and the free end is hardly strained.
+        let depth = |simulation: &Simulation<2>| {
+            let (particles, solid) = (&simulation.particles, simulation.particles.solid_places());
+            let nearest = |p: usize| {
+                let distance = |&q: &u32| (particles.position[p] - particles.position[q as usize]).norm();
+                solid.iter().map(distance).fold(f64::INFINITY, f64::min)
+            };
+            simulation.loads.surface[0].points.iter().map(|point| nearest(point.particle)).fold(0.0, f64::max)
+        };
+        let start = depth(&simulation);
+        assert!((start * 16.0 - 1.0).abs() < 1e-5, "{start}");
+        for _ in 0..160 {
+            simulation.step()?;
+            let now = depth(&simulation);
+            assert!(now < 1.5 * start, "{ghost}, t = {}: {now} instead of {start}", simulation.clock.time());
+        }
+    }
+    Ok(())
+}

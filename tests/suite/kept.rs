@@ -236,3 +236,74 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
     }
     Ok(())
 }
+
+/// Where a body is in contact the grid is made anew in every step, and it is kept in flight: a disc comes back from a wall, with as much
+/// momentum as with a new grid in every step, but for what is lost in flight there.
+#[test]
+fn a_body_leaves_the_wall_that_it_has_hit() -> Result<(), Failure> {
+    let thrown = |renewed: &str| -> Result<_, Failure> {
+        let mut simulation: Simulation<2> = scene("rebound.json", &[&format!("grid.renewed=\"{renewed}\"")])?;
+        let (start, mut renewals) = (simulation.particles.momentum()[0], 0);
+        for _ in 0..800 {
+            renewals += usize::from(simulation.step()?.renewed);
+        }
+        Ok((simulation.particles.momentum()[0] / start, renewals))
+    };
+    let ((kept, renewals), (renewed, _)) = (thrown("never")?, thrown("every_step")?);
+    assert!((kept / renewed - 1.0).abs() < 0.05 && kept < -0.85, "{kept} and {renewed} of what it had");
+    // It touches the wall for some 3 of 40 units of time.
+    assert!((2..200).contains(&renewals), "{renewals}");
+    Ok(())
+}
+
+/// Two discs meet, turn each other back, and part.
+#[test]
+fn bodies_that_meet_do_not_pass_through_each_other() -> Result<(), Failure> {
+    let soft = |renewed: &str| -> Result<_, Failure> {
+        let mut simulation: Simulation<2> = scene("collision.json", &[&format!("grid.renewed=\"{renewed}\"")])?;
+        let mut renewals = 0;
+        for _ in 0..200 {
+            renewals += usize::from(simulation.step()?.renewed);
+        }
+        let particles = &simulation.particles;
+        let of = |p: usize| if particles.body[p] == 0 { particles.velocity[p][0] * particles.mass[p] } else { 0.0 };
+        Ok(((0..particles.len()).map(of).sum::<f64>(), renewals))
+    };
+    let ((kept, renewals), (renewed, _)) = (soft("never")?, soft("every_step")?);
+    assert!((kept / renewed - 1.0).abs() < 0.05 && kept < 0.0, "{kept} and {renewed}");
+    assert!((2..150).contains(&renewals), "{renewals}");
+    Ok(())
+}
+
+/// With a consistent mass, Σ m x × v of the particles is that of the nodes; forces turn nothing halfway through the step, where they are in
+/// balance, and the midpoint rule keeps every quadratic invariant of its equations.
+#[test]
+fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
+    let angular = |simulation: &Simulation<2>| -> f64 {
+        let particles = &simulation.particles;
+        let of = |p: usize| particles.mass[p] * particles.position[p].perp(&particles.velocity[p]);
+        (0..particles.len()).map(of).sum()
+    };
+    let overrides = [
+        r#"bodies.0.shape={"box":{"min":[1.5,1.5],"max":[3.5,3.5]}}"#,
+        r#"time.inertia={"generalized_alpha":{"spectral_radius":1}}"#,
+        r#"grid.renewed="never""#,
+        r#"approximation="linear""#,
+        "time.lumping=0",
+        "solver.newton.tolerance=1e-13",
+        NO_BETA,
+        NO_GAMMA,
+    ];
+    let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
+    let centre = Vector::from([2.5, 2.5]);
+    simulation.set_velocity_on_nodes(|x| Vector::from([-(x - centre)[1], (x - centre)[0]]))?;
+    let start = angular(&simulation);
+    for step in 0..300 {
+        assert_eq!(simulation.step()?.renewed, step == 0);
+        let change = angular(&simulation) / start - 1.0;
+        assert!(change.abs() < 1e-10, "step {step}: {change:e}");
+    }
+    // More than two turns.
+    assert!(simulation.clock.time() > 4.0 * std::f64::consts::PI);
+    Ok(())
+}

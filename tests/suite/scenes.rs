@@ -15,7 +15,7 @@ const GOOD: &str = r#"{
   "title": "two blocks",
   "grid": { "origin": [0, 0], "size": [4, 2], "spacing": 0.5 },
   "approximation": { "lme": { "gamma": 3, "tolerance": 1e-6, "support": "circle" } },
-  "time": { "step": 0.01, "end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 0.5, "initial_guess": "velocity", "wall_update": "consistent", "max_halvings": 3 }, "transfer": { "blend": { "order": 2, "rate": 5 } },
+  "time": { "step": 0.01, "end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 0.5, "initial_guess": "velocity", "projection": "affine", "wall_update": "consistent", "max_halvings": 3 }, "transfer": { "blend": { "order": 2, "rate": 5 } },
   "bodies": [
     { "name": "soft", "shape": { "difference": { "of": { "box": { "min": [0, 0], "max": [1, 1] } }, "minus": { "ball": { "center": [0.5, 0.5], "radius": 0.2 } } } },
       "material": { "neo_hookean": { "young": 100, "poisson": 0.3 } }, "density": 2, "velocity": [1, 0], "particles_per_cell": 3, "fill": "cells" },
@@ -138,7 +138,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
         "solver": {"newton": {"tolerance": 1e-9, "max_iterations": 30},
                    "krylov": {"method": "automatic", "forcing": {"fixed": 1e-8}, "max_iterations": 2000}},
         "output": {"fields": ["displacement", "velocity", "stress", "jacobian"], "probes": []}, "#, 1)
-        .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "wall_update": "literal", "max_halvings": 10"#)
+        .replace(r#""end": 1"#, r#""end": 1, "beta": 0.25, "gamma": 0.5, "lumping": 1, "initial_guess": "zero", "projection": "mass", "wall_update": "literal", "max_halvings": 10"#)
         .replace(r#""density": 1"#, r#""density": 1, "particles_per_cell": 2, "fill": "cut", "layout": "regular""#);
     assert_eq!(scene, scene::read(&all, &[]).unwrap_or_else(|error| panic!("{error}")));
     for (short, long) in [

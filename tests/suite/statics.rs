@@ -179,6 +179,7 @@ fn keys_of_inertia_are_refused() -> Result<(), Failure> {
         ("time.gamma=0.5", "time.gamma"),
         ("time.lumping=1", "time.lumping"),
         ("time.initial_guess=\"velocity\"", "time.initial_guess"),
+        ("time.projection=\"mass\"", "time.projection"),
         ("time.wall_update=\"literal\"", "time.wall_update"),
         ("transfer=\"flip\"", "transfer"),
         ("bodies.0.velocity=[0,0]", "bodies[0].velocity"),

@@ -2,24 +2,28 @@
 //! else holds them: rows of the tangent nearly vanish, and with smooth functions the answer itself is spoiled.
 //!
 //! Π = ½ Σ k |Δφ_{i−1} − 2 Δφ_i + Δφ_{i+1}|²  over triples of nodes along an axis that contain a node with little of a body,
-//! k = γ (1 − 2f) (Λ + 2G) h^{D−2},  f < ½ the least share of a cell that one of the three has.
+//! k = max(γ (1 − 2f), s (l − 10 f)) (Λ + 2G) h^{D−2},  f < ½ the least share of a cell that one of the three has.
 //!
-//! Nodes that only points of loaded surfaces see have nothing at all of a body: f = 0, and γ = 1e-3 without ghost stiffness too.
+//! A load on points of a surface also reaches nodes that next to nothing of the body holds. On a grid that is made anew they give way
+//! again in every step, and the points run ahead of the body. So these are tied, without ghost stiffness too: l is the share of a cell that
+//! a layer of thickness h over the points has, and s = 1. Without inertia grids are kept, nothing runs ahead, and s = 1e-3. From a node
+//! that nothing else sees a tie takes no stiffness: it hands the load on, with its moment.
 //!
 //! It is zero for every affine Δφ: momentum, moment of momentum, turning as a whole and the patch test stay exact.
 
 use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit, summed};
 use crate::material::Law;
+use crate::mechanics::loads::SurfacePoint;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::sweep::{Laned, Number};
 use crate::solver::Bend;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
-/// A share of a cell that is nothing.
-const EMPTY: f64 = 1e-14;
+/// A node that has less of the body than this part of what it has of the layer under the load gives way to the load.
+const LOOSE: f64 = 0.1;
 
-/// γ where there is nothing.
-const OF_EMPTY: f64 = 1e-3;
+/// s without inertia.
+const WITHOUT_INERTIA: f64 = 1e-3;
 
 /// Second differences at nodes with little of a body, with their stiffness.
 pub struct Ghost {
@@ -28,9 +32,10 @@ pub struct Ghost {
 
 impl Ghost {
     pub(super) fn of<const D: usize, L: Law>(step: &Step<'_, D, L>) -> Option<Self> {
-        let at_all = step.ghost > 0.0;
-        let mut points = step.loads.surface.iter().flat_map(|load| &load.points);
-        if !at_all && points.all(|point| step.particles.is_solid(point.particle)) {
+        let on_surfaces = |point: &&SurfacePoint<D>| !step.particles.is_solid(point.particle);
+        let points = || step.loads.surface.iter().flat_map(|load| &load.points).filter(on_surfaces);
+        let (at_all, loaded) = (step.ghost > 0.0, points().next().is_some());
+        if !at_all && !loaded {
             return None;
         }
         let (grid, nodes) = (step.supports.grid(), step.supports.active());
@@ -42,18 +47,26 @@ impl Ghost {
             step.supports.spread(&mut share, |p| Vector::from([value(p)]));
             share
         };
+        let mut layers = vec![Vector::zeros(); nodes.len()];
+        if loaded {
+            let mut areas = vec![0.0; step.particles.len()];
+            points().for_each(|point| areas[point.particle] = point.area);
+            layers = spread(&|p| areas[p] * grid.spacing);
+        }
         let (volumes, stiff) = (spread(&volume), spread(&|p| volume(p) * moduli[step.particles.body[p] as usize]));
         let h = grid.spacing;
         // Beyond a wall there is nothing to fill.
-        let filled = |node: usize| {
+        let cell = |node: usize| {
             let index = grid.index(nodes.ids()[node]);
             let at_walls = (0..D).filter(|&k| index[k] == 0 || index[k] == grid.cells[k]).count();
-            volumes[node][0] / (h.powi(D as i32) * 0.5_f64.powi(at_walls as i32))
+            h.powi(D as i32) * 0.5_f64.powi(at_walls as i32)
         };
+        let filled = |node: usize| volumes[node][0] / cell(node);
+        let strength = if step.nodal.is_static() { WITHOUT_INERTIA } else { 1.0 };
+        let tied = |node: usize| strength * (layers[node][0] - volumes[node][0].max(0.0) / LOOSE) / cell(node);
         let modulus =
             |node: usize| if volumes[node][0] > 0.0 { stiff[node][0] / volumes[node][0] } else { f64::INFINITY };
         let softest_body = moduli.iter().copied().filter(|&modulus| modulus > 0.0).fold(f64::INFINITY, f64::min);
-        let is_empty = |node: usize| filled(node) <= EMPTY;
         let mut bends = Vec::new();
         for axis in 0..D {
             let beside = |node: usize, by: i64| {
@@ -62,7 +75,7 @@ impl Ghost {
                 index[axis] = u32::try_from(moved).ok().filter(|&moved| moved <= grid.cells[axis])?;
                 nodes.number(grid.id(index))
             };
-            let low = (0..nodes.len()).filter(|&node| if at_all { filled(node) < 0.5 } else { is_empty(node) });
+            let low = (0..nodes.len()).filter(|&node| (at_all && filled(node) < 0.5) || tied(node) > 0.0);
             let mut centres: Vec<usize> =
                 low.flat_map(|node| [-1, 0, 1].into_iter().filter_map(move |by| beside(node, by))).collect();
             centres.sort_unstable();
@@ -71,14 +84,12 @@ impl Ghost {
                 let (Some(before), Some(after)) = (beside(centre, -1), beside(centre, 1)) else { continue };
                 let all = [before, centre, after];
                 let least = all.into_iter().map(filled).fold(f64::INFINITY, f64::min);
-                if !at_all && least > EMPTY {
-                    continue;
-                }
+                let most = all.into_iter().map(tied).fold(0.0, f64::max);
                 let of_all = all.into_iter().map(modulus).fold(f64::INFINITY, f64::min);
                 let softest = if of_all.is_finite() { of_all } else { softest_body };
                 if softest.is_finite() {
-                    let factor = if at_all { step.ghost } else { OF_EMPTY };
-                    let stiffness = factor * (1.0 - 2.0 * least.max(0.0)) * softest * h.powi(D as i32 - 2);
+                    let factor = (step.ghost * (1.0 - 2.0 * least.max(0.0))).max(most);
+                    let stiffness = factor * softest * h.powi(D as i32 - 2);
                     bends.push(Bend { nodes: all.map(|node| node as u32), stiffness });
                 }
             }
