@@ -3,7 +3,7 @@
 use super::{Ciarlet, Elastic, Lame, Listed, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, contract, determinant, identity, scaled, symmetric, trace};
+use crate::tensor::{Deformation, Tensor, contract, identity, scaled, second_invariant, symmetric, trace};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,10 +35,13 @@ pub struct MooneyRivlinParameters {
     pub bulk: f64,
 }
 
-/// 4 I₂(E) = j² − 2 (tr E − j) − 8 det E, from J² = det(I + 2E), with det E = 0 but in 3D. Turned bodies keep the digits that minors of E lose.
+/// 4 I₂(E): j² − 2 (tr E − j) where det E = 0, from J² = det(I + 2E), with the digits that minors lose in turned bodies; by minors in 3D.
 fn four_minors<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
-    let plane = at.j * at.j - at.trace_e_minus_j() * T::lit(2.0);
-    if D < 3 { plane } else { plane - determinant(&at.green_lagrange()) * T::lit(8.0) }
+    if D < 3 {
+        at.j * at.j - at.trace_e_minus_j() * T::lit(2.0)
+    } else {
+        second_invariant(&at.green_lagrange()) * T::lit(4.0)
+    }
 }
 
 impl MooneyRivlin {

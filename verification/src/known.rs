@@ -154,6 +154,14 @@ pub const KNOWN: &[Known] = &[
         cells: &[short_effort(&["linear, D = 3", "eps = 0: momentum"], 1.1e-12)],
     },
     Known {
+        study: "extremes",
+        what: "energy of Mooney and Rivlin's solid in 3D, sheared by 1000 and turned: roundings that its error amounts to; 13 asked",
+        why: "The second invariant is by minors of a strain of 5e5, one of which a turn leaves to round-off.",
+        since: "23 November 2026",
+        factor: 2.0,
+        cells: &[short_effort(&["W", "f64", "solvable", "Mooney-Rivlin", "3", "sheared and turned", "1000"], 29.44)],
+    },
+    Known {
         study: "order",
         what: "a block of J from 0.3 to 1.7 on 32 cells, 2 x 2 particles in each, the grid renewed after half of the load: error of the \
                stress; 0.05 and 0.01 asked, what a prototype left",
