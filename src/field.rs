@@ -72,6 +72,10 @@ fields! {
     "von_mises" => VonMises: Scalar;
     /// Strain energy per reference volume.
     "energy_density" => EnergyDensity: Scalar;
+    /// Accumulated plastic strain; 0 of laws that have none.
+    "plastic_strain" => PlasticStrain: Scalar;
+    /// Energy per reference volume that flow and relaxation have taken; 0 of elastic laws.
+    "dissipated_density" => DissipatedDensity: Scalar;
     /// Mass.
     "mass" => Mass: Scalar;
     /// Reference volume.

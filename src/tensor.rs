@@ -177,7 +177,7 @@ pub fn inverse<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
 
 /// I₂(A), the sum of the principal 2×2 minors (0 in 1D, det A in 2D).
 #[inline(always)]
-fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
+pub(crate) fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
     let mut sum = T::zero();
     for i in 0..D {
         for k in i + 1..D {

@@ -112,6 +112,18 @@ impl Lame {
     pub fn p_wave_modulus(&self) -> f64 {
         self.lambda + 2.0 * self.shear
     }
+
+    /// The bulk modulus K = Λ + 2G/3.
+    ///
+    /// ```
+    /// use bfree::material::Lame;
+    ///
+    /// assert_eq!(Lame::new(1.0, 1.5)?.bulk_modulus(), 2.0);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    pub fn bulk_modulus(&self) -> f64 {
+        self.lambda + 2.0 * self.shear / 3.0
+    }
 }
 
 /// Λ/G from which on a stress has less than four digits of G.

@@ -13,6 +13,12 @@ pub struct Remembered {
     pub at_rest: f64,
 }
 
+/// The name of an accumulated plastic strain: a field of the output, and particles whose number grows in a step are counted as yielding.
+pub const PLASTIC_STRAIN: &str = "plastic_strain";
+
+/// The name of the energy per reference volume that the law has taken for good: it is in the balance of energy.
+pub const DISSIPATED: &str = "dissipated";
+
 /// What a law is given beside F: how long the step is, and what the particle remembers at its beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<'a> {
@@ -25,6 +31,11 @@ pub struct Start<'a> {
 impl Start<'_> {
     /// Nothing to remember, and no time: all that an elastic law needs.
     pub const NONE: Self = Self { dt: 0.0, memory: &[] };
+
+    /// The number that `law` remembers by this name, if it does.
+    pub fn recall<L: Law>(&self, law: &L, name: &str) -> Option<f64> {
+        self.memory.get(law.memory().iter().position(|one| one.name == name)?).copied()
+    }
 }
 
 /// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions, as the residual asks it. An elastic law is written as
@@ -72,7 +83,7 @@ impl Start<'_> {
 /// assert!(law.stress(&at, &Start { dt: 1.0, memory: &next })[(0, 0)] < law.stress(&at, &Start { dt: 1.0, memory: &[0.5] })[(0, 0)]);
 /// ```
 pub trait Law: Send + Sync {
-    /// What a particle remembers; nothing of an elastic law.
+    /// What a particle remembers; nothing of an elastic law. Two names have a meaning for output: [`PLASTIC_STRAIN`] and [`DISSIPATED`].
     fn memory(&self) -> &[Remembered] {
         &[]
     }
@@ -120,6 +131,19 @@ pub trait Law: Send + Sync {
         _volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         None
+    }
+
+    /// F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ in row k and column l, of a law without a closed form: its material tangent, for gradients taken in the
+    /// configuration n. By [`Self::tangent_density`]; a law that solves something at each state gives all of them at once.
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        start: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        let unit = |k: usize| f_n.row(k).transpose();
+        let block = |k, l| at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose();
+        std::array::from_fn(|k| std::array::from_fn(|l| block(k, l)))
     }
 
     /// What is remembered at the end of a step that ends at `at`.

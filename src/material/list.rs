@@ -1,6 +1,9 @@
 //! The list of shipped laws, from which [`Material`] and [`Parameters`] are made.
 
-use super::{Ciarlet, ClosedTangent, Lame, Law, Logarithmic, NeoHookean, Remembered, StVenantKirchhoff, Start};
+use super::{
+    Ciarlet, ClosedTangent, DruckerPrager, Lame, Law, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
+    Remembered, StVenantKirchhoff, Start, Viscoelastic, VonMises,
+};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector};
@@ -39,7 +42,7 @@ macro_rules! materials {
             $($(#[$sentence])+ $law($formula)),*
         }
 
-        /// A hyperelastic law with its constants.
+        /// A law with its constants.
         #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
         #[schemars(rename = "Material")]
         pub enum Parameters {
@@ -98,6 +101,11 @@ macro_rules! materials {
             ) -> Option<ClosedTangent<f64, D>> {
                 match self { $(Self::$law(law) => Law::closed(law, f_n, at, volume)),* }
             }
+            fn tangent_blocks<const D: usize>(
+                &self, f_n: &Tensor<f64, D>, at: &Deformation<f64, D>, start: &Start<'_>,
+            ) -> [[Tensor<f64, D>; D]; D] {
+                match self { $(Self::$law(law) => law.tangent_blocks(f_n, at, start)),* }
+            }
             fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
                 match self { $(Self::$law(law) => law.remember(at, start, next)),* }
             }
@@ -134,4 +142,14 @@ materials! {
     "neo_hookean_logarithmic" => NeoHookeanLogarithmic(NeoHookean<Logarithmic>);
     /// St. Venant–Kirchhoff: linear in the Green–Lagrange strain; not for strong compression.
     "st_venant_kirchhoff" => StVenantKirchhoff(StVenantKirchhoff);
+    /// Rubber: Mooney and Rivlin's solid, with the two invariants of C, compressible.
+    "mooney_rivlin" => MooneyRivlin(MooneyRivlin);
+    /// Rubber: Ogden's solid, with powers of the principal stretches, compressible.
+    "ogden" => Ogden(Ogden);
+    /// Maxwell branches beside an elastic law, at finite strain.
+    "viscoelastic" => Viscoelastic(Viscoelastic);
+    /// Metal: linear elasticity in logarithmic strains, and flow at a von Mises stress that may harden.
+    "von_mises" => VonMises(Plastic<VonMises>);
+    /// Soil: linear elasticity in logarithmic strains, and Drucker and Prager's cone: cohesion, friction, dilatancy.
+    "drucker_prager" => DruckerPrager(Plastic<DruckerPrager>);
 }

@@ -7,21 +7,38 @@
 //! dual numbers check the geometric and the material tangent term by term.
 
 mod closed_tangent;
+mod drucker_prager;
 mod from_energy;
+mod hardening;
+mod hencky;
 mod lame;
 mod law;
 mod list;
+mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
 mod piola;
+mod plastic;
+mod spectral;
 mod st_venant_kirchhoff;
+mod viscoelastic;
+mod von_mises;
 
 pub use closed_tangent::ClosedTangent;
+pub use drucker_prager::{DruckerPrager, DruckerPragerParameters};
 pub use from_energy::{Energy, FromEnergy};
+pub use hardening::Hardening;
+pub use hencky::Radial;
 pub use lame::{Lame, LameError, LameParameters};
-pub use law::{Elastic, Law, Remembered, Start, p_wave_modulus};
+pub use law::{DISSIPATED, Elastic, Law, PLASTIC_STRAIN, Remembered, Start, p_wave_modulus};
 pub(crate) use list::LawVisitor;
 pub use list::{Listed, Material, Parameters};
+pub use mooney_rivlin::{MooneyRivlin, MooneyRivlinParameters};
 pub use neo_hookean::{Ciarlet, Logarithmic, NeoHookean, Volumetric};
+pub use ogden::{Ogden, OgdenParameters, OgdenTerm};
 pub use piola::{NonPositiveJacobian, admissible, first_piola};
 pub(crate) use piola::{admissible_or_rest, embed, piola};
+pub use plastic::{Criterion, Plastic, Returned};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
+pub use viscoelastic::{Branch, Viscoelastic, ViscoelasticParameters};
+pub use von_mises::{VonMises, VonMisesParameters};

@@ -5,7 +5,7 @@
 
 use crate::material::{ClosedTangent, Law, NonPositiveJacobian, Start, admissible_or_rest, piola};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector, identity, scaled};
+use crate::tensor::{Tensor, identity, scaled};
 
 /// A particle whose deformation is impossible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -91,29 +91,26 @@ pub(super) fn freeze<L: Law, const D: usize>(
 ) -> (Frozen<D>, f64) {
     let (at, det_f) = admissible_or_rest(compose(g, h_n));
     let f_n = identity::<f64, D>() + h_n;
+    // δF S F_nᵀ = L B with B = F_n S F_nᵀ
+    let geometric = || f_n * law.stress(&at, start) * f_n.transpose();
     let frozen = match law.closed(&f_n, &at, volume) {
         Some(closed) if part == Part::Whole => Frozen::Closed(closed),
-        Some(closed) => {
-            // δF S F_nᵀ = L B with B = F_n S F_nᵀ
-            let geometric = scaled(&(f_n * law.stress(&at, start) * f_n.transpose()), volume);
-            Frozen::Closed(closed.part(&geometric, part == Part::Geometric))
-        }
+        Some(closed) => Frozen::Closed(closed.part(&scaled(&geometric(), volume), part == Part::Geometric)),
         None => {
-            let stress = law.stress(&at, start);
-            let unit = |k: usize| f_n.transpose() * Vector::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
-            Frozen::General(std::array::from_fn(|k| {
-                std::array::from_fn(|l| {
-                    let (v, b) = (unit(k), unit(l));
-                    let mut block = Tensor::zeros();
-                    if part != Part::Geometric {
-                        block += at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose();
+            let mut blocks = match part {
+                Part::Geometric => [[Tensor::zeros(); D]; D],
+                Part::Whole | Part::Material => law.tangent_blocks(&f_n, &at, start),
+            };
+            if part != Part::Material {
+                let geometric = geometric();
+                for k in 0..D {
+                    for l in 0..D {
+                        blocks[k][l] += scaled(&identity(), geometric[(k, l)]);
                     }
-                    if part != Part::Material {
-                        block += scaled(&identity(), v.dot(&(stress * b)));
-                    }
-                    std::array::from_fn(|i| std::array::from_fn(|j| volume * block[(i, j)]))
-                })
-            }))
+                }
+            }
+            let entries = |b: Tensor<f64, D>| std::array::from_fn(|i| std::array::from_fn(|j| volume * b[(i, j)]));
+            Frozen::General(blocks.map(|row| row.map(entries)))
         }
     };
     (frozen, det_f)

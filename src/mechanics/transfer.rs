@@ -1,7 +1,7 @@
 //! Particles → nodes (eqs. 40–42) and nodes → particles (eqs. 45, 50–52).
 
 use crate::grid::Grid;
-use crate::material::{Law, Start, admissible_or_rest};
+use crate::material::{Law, PLASTIC_STRAIN, Start, admissible_or_rest};
 use crate::mechanics::affine::affine;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::mass::{Mass, is_light, lumped};
@@ -211,6 +211,15 @@ pub enum WallUpdate {
     Consistent,
 }
 
+/// What a step has done to the particles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Committed {
+    /// The largest ‖½ (F_rᵀ F_r − I)‖, of the deformation since the grid was new.
+    pub strain: f64,
+    /// Share of the volume of bodies with a plastic law that has flowed.
+    pub yielding: f64,
+}
+
 /// What the nodes give to the particles at the end of a step. Until it is committed nothing has touched them.
 ///
 /// ```
@@ -384,18 +393,20 @@ impl<'a, const D: usize> Update<'a, D> {
         first
     }
 
-    /// Writes to the particles, in place: the only place that does, once per step. Returns the largest ‖½ (F_rᵀ F_r − I)‖, of the
-    /// deformation since the grid was new.
+    /// Writes to the particles, in place: the only place that does, once per step.
     pub fn commit<L: Law>(
         self,
         particles: &mut Particles<D>,
         bodies: &[Body<L>],
         supports: &Supports<D>,
         dt: f64,
-    ) -> f64 {
+    ) -> Committed {
         let (remembered, mut largest) = (particles.remembered, 0.0_f64);
+        let place = |body: &Body<L>| body.law.memory().iter().position(|one| one.name == PLASTIC_STRAIN);
+        let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
+        let (mut plastic, mut yielding) = (0.0, 0.0);
         let mut next = vec![0.0; remembered];
-        let Particles { position, velocity, acceleration, displacement_gradient, memory, body, .. } = particles;
+        let Particles { position, velocity, acceleration, displacement_gradient, volume, memory, body, .. } = particles;
         supports.each_particle(
             self.motion(),
             |_, delta_x, g| (delta_x, g),
@@ -407,13 +418,19 @@ impl<'a, const D: usize> Update<'a, D> {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
                     let (at, _) = admissible_or_rest(displacement_gradient[p]);
                     next.copy_from_slice(memory);
-                    bodies[body[p] as usize].law.remember(&at, &Start { dt, memory }, &mut next);
+                    let body = body[p] as usize;
+                    bodies[body].law.remember(&at, &Start { dt, memory }, &mut next);
+                    if let Some(place) = plastic_strain[body] {
+                        plastic += volume[p];
+                        yielding += if next[place] > memory[place] { volume[p] } else { 0.0 };
+                    }
                     memory.copy_from_slice(&next);
                 }
             },
         );
+        let committed = Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } };
         if self.delta_velocity.is_empty() {
-            return largest;
+            return committed;
         }
         let [changed_v, changed_a] = self.smoothed.unwrap_or_default();
         for (field, delta, changed) in
@@ -423,6 +440,6 @@ impl<'a, const D: usize> Update<'a, D> {
                 field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
             });
         }
-        largest
+        committed
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{OutputError, Reference};
 use crate::field::Field;
-use crate::material::{Law, Start, admissible, piola};
+use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN, Start, admissible, piola};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 
@@ -59,6 +59,7 @@ impl Field {
             cauchy_stress(law(), &particles.start(place, 0.0), h())
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
+        let recalled = |name| particles.start(place, 0.0).recall(law(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),
             Self::Displacement => {
@@ -84,6 +85,8 @@ impl Field {
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
             Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0))),
+            Self::PlasticStrain => out.push(recalled(PLASTIC_STRAIN)),
+            Self::DissipatedDensity => out.push(recalled(DISSIPATED)),
             Self::Mass => out.push(particles.mass[place]),
             Self::Volume => out.push(particles.volume[place]),
             Self::Body => out.push(f64::from(particles.body[place])),

@@ -4,7 +4,7 @@ use super::csv::{Row, Table};
 use super::files::Written;
 use super::{OutputError, Reference};
 use crate::approximation::ShapeFunction;
-use crate::material::Law;
+use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
 use crate::simulation::Simulation;
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub struct Energies {
     pub external: f64,
     /// Kinetic and strain energy.
     pub total: f64,
-    /// What damping has taken since the start.
+    /// What damping, flow and relaxation have taken since the start.
     pub dissipated: f64,
     /// total − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
     pub balance: f64,
@@ -53,7 +53,8 @@ impl Energies {
         reference: &Reference<D>,
     ) -> Self {
         let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
-        let (external, total, dissipated) = (simulation.external_work, kinetic + strain, simulation.dissipated);
+        let dissipated = simulation.dissipated + simulation.dissipated_by_laws();
+        let (external, total) = (simulation.external_work, kinetic + strain);
         Self { kinetic, strain, external, dissipated, total, balance: total + dissipated - reference.energy - external }
     }
 }
@@ -67,6 +68,8 @@ pub struct Cost {
     pub newton: usize,
     /// Krylov iterations of all its linear systems.
     pub krylov: usize,
+    /// Share of the volume of bodies with a plastic law that flowed.
+    pub yielding: f64,
 }
 
 /// Writes `history.csv`.
@@ -90,8 +93,9 @@ pub struct Cost {
 #[derive(Debug)]
 pub struct History {
     pub(crate) table: Table,
-    damped: bool,
+    dissipates: bool,
     follows_path: bool,
+    yields: bool,
 }
 
 impl History {
@@ -104,15 +108,17 @@ impl History {
         simulation: &Simulation<D, L, A>,
         kept: Option<Written>,
     ) -> Result<Self, OutputError> {
-        let (damped, follows_path) = (simulation.dissipates(), simulation.settings.scheme.follows_path());
+        let dissipates = simulation.damps() || simulation.remembers(DISSIPATED);
+        let (follows_path, yields) = (simulation.settings.scheme.follows_path(), simulation.remembers(PLASTIC_STRAIN));
         let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
         columns.extend(follows_path.then(|| "load".into()));
         columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));
-        columns.extend(damped.then(|| "dissipated".into()));
+        columns.extend(dissipates.then(|| "dissipated".into()));
         columns.extend(["total", "balance"].map(str::to_owned));
         columns.extend(AXES.iter().take(D).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
-        Ok(Self { table: Table::open(path, &columns, kept)?, damped, follows_path })
+        columns.extend(yields.then(|| "yielding".into()));
+        Ok(Self { table: Table::open(path, &columns, kept)?, dissipates, follows_path, yields })
     }
 
     /// Appends the present state; returns its energies.
@@ -132,11 +138,12 @@ impl History {
         row.extend(self.follows_path.then_some(simulation.path.load));
         row.push(cost.dt);
         row.extend([energies.kinetic, energies.strain, energies.external]);
-        row.extend(self.damped.then_some(energies.dissipated));
+        row.extend(self.dissipates.then_some(energies.dissipated));
         row.extend([energies.total, energies.balance]);
         row.extend(simulation.particles.momentum().iter().copied());
         row.push(cost.newton);
         row.push(cost.krylov);
+        row.extend(self.yields.then_some(cost.yielding));
         self.table.row(&row)?;
         Ok(energies)
     }

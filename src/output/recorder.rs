@@ -235,7 +235,8 @@ impl<const D: usize> Recorder<D> {
             reactions.write(simulation.clock.time(), &simulation.loads, step)?;
         }
         let newton = &step.newton.history;
-        let cost = Cost { dt: step.dt, newton: newton.iterations.len(), krylov: newton.counts.krylov_iterations };
+        let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);
+        let cost = Cost { dt: step.dt, newton: iterations, krylov, yielding: step.yielding };
         let energies = self.write_state(simulation, cost)?;
         let (time, number) = (simulation.clock.time(), simulation.clock.steps());
         let newton_limit = simulation.settings.newton.max_iterations;

@@ -11,7 +11,7 @@ use crate::tensor::Vector;
 pub struct Reference<const D: usize> {
     /// Position of every particle by its id; displacements are measured from here.
     pub position: Vec<Vector<f64, D>>,
-    /// Kinetic and strain energy, less the external work done so far.
+    /// Kinetic and strain energy, and what was dissipated, less the external work done so far.
     pub energy: f64,
     /// Σ m v
     pub momentum: Vector<f64, D>,
@@ -33,7 +33,10 @@ impl<const D: usize> Reference<D> {
         let particles = &simulation.particles;
         Self {
             position: particles.places().iter().map(|&p| particles.position[p as usize]).collect(),
-            energy: particles.kinetic_energy() + simulation.strain_energy() + simulation.dissipated
+            energy: particles.kinetic_energy()
+                + simulation.strain_energy()
+                + simulation.dissipated
+                + simulation.dissipated_by_laws()
                 - simulation.external_work,
             momentum: particles.momentum(),
         }

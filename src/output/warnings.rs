@@ -114,7 +114,7 @@ impl Watch {
             let part = -100.0 * balance / self.most_energy;
             self.warn(step, Kind::EnergyLost, || {
                 format!(
-                    "energy was lost, beyond what damping took: the balance is {balance:+.3e}, {part:.1} % of the most energy so far; \
+                    "energy was lost, beyond what damping and laws took: the balance is {balance:+.3e}, {part:.1} % of the most energy so far; \
                      shorten time.step or grid.spacing, or tighten time.adaptive.tolerance"
                 )
             });
@@ -186,7 +186,7 @@ mod tests {
     fn step(number: u64) -> Watched {
         let energies =
             Energies { kinetic: 2.0, strain: 1.0, external: -1.0, dissipated: 0.0, total: 3.0, balance: -0.5 };
-        let cost = Cost { dt: 0.1, newton: 3, krylov: 30 };
+        let cost = Cost { dt: 0.1, newton: 3, krylov: 30, yielding: 0.0 };
         Watched {
             time: 0.1 * number as f64,
             step: number,

@@ -35,6 +35,7 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
+use crate::material::Law;
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::schemes::LONG_STEPS;
@@ -220,7 +221,7 @@ impl Scene {
                 problems.vector(&format!("{path}.velocity"), &node.velocity, dimension);
             }
         }
-        self.solver.check(&mut problems, !self.pressures.is_empty());
+        self.solver.check(&mut problems, self.unsymmetric());
         self.output.check(&mut problems, &self.bodies, &self.grid);
         if !self.time.inertia.has_inertia() {
             self.refuse_inertia(&mut problems);
@@ -251,6 +252,19 @@ impl Scene {
     /// Loads that need nothing of grid and particles.
     fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
         Loads { damping: self.damping, ..Loads::default() }
+    }
+
+    /// What makes the tangent unsymmetric, if something does.
+    fn unsymmetric(&self) -> Option<&'static str> {
+        let law = |body: &body::Body| body.material.law(&mut Problems::default(), "");
+        let flows = || self.bodies.iter().filter_map(law).any(|law| !law.is_symmetric());
+        if !self.pressures.is_empty() {
+            Some("pressures make")
+        } else if flows() {
+            Some("a law with friction makes")
+        } else {
+            None
+        }
     }
 
     /// Without inertia, keys that speak of it say what nobody would do.

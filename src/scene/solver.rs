@@ -66,7 +66,8 @@ impl Default for Krylov {
 }
 
 impl Solver {
-    pub(super) fn check(&self, problems: &mut Problems, with_pressures: bool) {
+    /// `unsymmetric` says what makes the tangent so, if something does.
+    pub(super) fn check(&self, problems: &mut Problems, unsymmetric: Option<&str>) {
         problems.between("solver.newton.tolerance", self.newton.tolerance, 1e-15, 0.1);
         problems.whole("solver.newton.max_iterations", self.newton.max_iterations, 1, 1000);
         problems.whole("solver.krylov.max_iterations", self.krylov.max_iterations, 1, 1_000_000);
@@ -74,8 +75,9 @@ impl Solver {
             Method::Gmres { restart } => problems.whole("solver.krylov.method.gmres.restart", restart, 1, 1000),
             Method::Automatic => {}
             Method::ConjugateGradient => {
-                let allowed = "pressures make the tangent unsymmetric: use {\"gmres\": {}}";
-                problems.require(!with_pressures, "solver.krylov.method", "\"conjugate_gradient\"", allowed);
+                let why = unsymmetric.unwrap_or_default();
+                let allowed = format_args!("{why} the tangent unsymmetric: use {{\"gmres\": {{}}}}");
+                problems.require(unsymmetric.is_none(), "solver.krylov.method", "\"conjugate_gradient\"", allowed);
             }
         }
         let absent = self.krylov.preconditioner == Preconditioning::Direct && !Preconditioning::HAS_DIRECT;

@@ -12,7 +12,7 @@ pub use settings::{InitialGuess, Settings};
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{Law, Material, p_wave_modulus};
+use crate::material::{DISSIPATED, Law, Material, p_wave_modulus};
 use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
@@ -170,9 +170,27 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
-    /// Whether something takes energy on purpose: damping, or ghost stiffness.
-    pub(crate) fn dissipates(&self) -> bool {
+    /// Whether a term of the residual takes energy on purpose: damping, or ghost stiffness.
+    pub(crate) fn damps(&self) -> bool {
         self.loads.damping.is_some() || self.settings.ghost > 0.0
+    }
+
+    /// Whether a law remembers a number by this name.
+    pub(crate) fn remembers(&self, name: &str) -> bool {
+        self.bodies.iter().any(|body| body.law.memory().iter().any(|one| one.name == name))
+    }
+
+    /// Σ V₀ of what each law says it has taken: energy lost to flow and relaxation since the start.
+    pub fn dissipated_by_laws(&self) -> f64 {
+        if !self.remembers(DISSIPATED) {
+            return 0.0;
+        }
+        let particles = &self.particles;
+        let lost = |p: usize| {
+            let law = &self.bodies[particles.body[p] as usize].law;
+            particles.volume[p] * particles.start(p, 0.0).recall(law, DISSIPATED).unwrap_or(0.0)
+        };
+        (0..particles.len()).map(lost).sum()
     }
 
     /// The method that solves the linear systems, and why it does.

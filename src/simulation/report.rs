@@ -36,6 +36,8 @@ pub struct StepReport<const D: usize> {
     pub error: Option<f64>,
     /// Whether the grid was new.
     pub renewed: bool,
+    /// Share of the volume of bodies with a plastic law that has flowed in it.
+    pub yielding: f64,
     /// Seconds, and passes over the particles, by phase.
     pub seconds: Stopwatch,
     /// The attempts before it, each of which failed or was too long, and was repeated with half of its length.

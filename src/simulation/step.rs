@@ -13,7 +13,7 @@ use crate::mechanics::rigid::loose;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::{self, Role};
-use crate::mechanics::transfer::{Nodal, Projection, Update};
+use crate::mechanics::transfer::{Committed, Nodal, Projection, Update};
 use crate::nodes::Nodes;
 use crate::particles::Particles;
 use crate::phases::Phase;
@@ -130,7 +130,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.settings.renewal != Renewal::EveryStep {
             next.renew(&self.particles, &update.end(&projected), &dphi, dt);
         }
-        let strain = update.commit(&mut self.particles, &self.bodies, &supports, dt);
+        let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, &supports, dt);
         if scheme.follows_path() {
             self.path = self.path.after(to, &dphi, dt);
         }
@@ -152,6 +152,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             reactions,
             error,
             renewed,
+            yielding,
             seconds: *watch,
             failed: Vec::new(),
         })
@@ -449,7 +450,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         work += mean_work(&end.external_force(phi)?, &start.external_force(&before)?, dphi);
         let mut dissipated = 0.0;
-        if self.dissipates() {
+        if self.damps() {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
             dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
         }

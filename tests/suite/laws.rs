@@ -1,6 +1,6 @@
 //! Laws in vector lanes against the same laws one particle at a time.
 
-use crate::support::{Failure, piola};
+use crate::support::{Failure, closed_laws, piola};
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::grid::Grid;
 use bfree::material::{ClosedTangent, Lame, Law, Material, NonPositiveJacobian, Start};
@@ -90,7 +90,7 @@ fn particles<const D: usize>(bodies: u32, regimes: &[(f64, f64)]) -> Particles<D
 }
 
 fn materials() -> Vec<Material> {
-    Material::examples(Lame { lambda: 3.0, shear: 2.0 }).into_iter().map(|(_, law)| law).collect()
+    closed_laws(Lame { lambda: 3.0, shear: 2.0 })
 }
 
 fn bodies<L>(laws: impl IntoIterator<Item = L>) -> Vec<Body<L>> {

@@ -10,6 +10,7 @@ mod direct;
 mod dynamics;
 mod equilibrium;
 mod examples;
+mod flow;
 mod ghost;
 mod hostile;
 mod kept;

@@ -1,9 +1,9 @@
 //! What the tests of whole runs share.
 
-use bfree::material::{Law, NonPositiveJacobian, Start, admissible};
+use bfree::material::{Lame, Law, Material, NonPositiveJacobian, Start, admissible};
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::Tensor;
+use bfree::tensor::{Deformation, Tensor, identity};
 use std::path::Path;
 
 pub type Failure = Box<dyn std::error::Error>;
@@ -13,6 +13,13 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
+}
+
+/// The shipped laws whose tangent has a closed form: it is these that vector lanes freeze.
+pub fn closed_laws(lame: Lame) -> Vec<Material> {
+    let at_rest = Deformation::new(Tensor::zeros());
+    let closed = |law: &Material| law.closed(&identity::<f64, 1>(), &at_rest, 1.0).is_some();
+    Material::examples(lame).into_iter().map(|(_, law)| law).filter(closed).collect()
 }
 
 /// P = F S of a law that remembers nothing.

@@ -52,6 +52,14 @@ const fn timed(labels: &'static [&'static str], value: f64) -> KnownCell {
 pub const KNOWN: &[Known] = &[
     Known {
         study: "tangent",
+        what: "diagonal blocks of a von Mises solid that flows, in 3D at J = 20: error over the size of the result; 1.6e-14 asked",
+        why: "Its pressure is a hundred times its yield stress: the blocks are what products of such numbers leave, and κ(F) does not see it.",
+        since: "23 November 2026",
+        factor: 2.0,
+        cells: &[short_effort(&["diagonal blocks", "von Mises", "3", "J=20", "lme circle"], 2.3e-14)],
+    },
+    Known {
+        study: "tangent",
         what: "damping in single precision and diagonal blocks at J = 20: error over the size of the result; 7.6e-6 and 8.1e-14 asked",
         why: "In the volume the body has then, Λ J² and Λ (J² - 1) are nearly taken from each other, and κ(F) does not see it.",
         since: "22 November 2026",
@@ -144,6 +152,14 @@ pub const KNOWN: &[Known] = &[
         since: "22 November 2026",
         factor: 100.0,
         cells: &[short_effort(&["linear, D = 3", "eps = 0: momentum"], 1.1e-12)],
+    },
+    Known {
+        study: "extremes",
+        what: "energy of Mooney and Rivlin's solid in 3D, sheared by 1000 and turned: roundings that its error amounts to; 13 asked",
+        why: "The second invariant is by minors of a strain of 5e5, one of which a turn leaves to round-off.",
+        since: "23 November 2026",
+        factor: 2.0,
+        cells: &[short_effort(&["W", "f64", "solvable", "Mooney-Rivlin", "3", "sheared and turned", "1000"], 29.44)],
     },
     Known {
         study: "order",

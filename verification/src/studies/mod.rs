@@ -95,6 +95,7 @@ studies!(
     patch,
     balance,
     digits,
+    memory,
     extremes,
     manufactured,
     minimiser,

@@ -40,13 +40,15 @@ const LEVELS: Check = Check::Test("multigrid::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const TRANSFERS: Check = Check::Test("transfer::");
+const FLOWS: Check = Check::Test("flow::");
+const MEMORY: Check = Check::Study("memory");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, SOLVER, SOLIDS,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, TRANSFERS, FLOWS, MEMORY, SOLVER, SOLIDS,
 ];
 
 /// What is to become of a patch.
@@ -113,7 +115,15 @@ const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
 const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
 const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
+const LAW: &str = "src/material/law.rs";
 const PIOLA: &str = "src/material/piola.rs";
+const SPECTRAL: &str = "src/material/spectral.rs";
+const HENCKY: &str = "src/material/hencky.rs";
+const HARDENING: &str = "src/material/hardening.rs";
+const PLASTIC: &str = "src/material/plastic.rs";
+const VON_MISES: &str = "src/material/von_mises.rs";
+const DRUCKER_PRAGER: &str = "src/material/drucker_prager.rs";
+const VISCOELASTIC: &str = "src/material/viscoelastic.rs";
 const TENSOR: &str = "src/tensor.rs";
 const GMRES: &str = "src/solver/gmres.rs";
 const CONJUGATE: &str = "src/solver/conjugate_gradient.rs";
@@ -276,24 +286,24 @@ pub(super) const PATCHES: &[Patch] = &[
         "law.stress(&at, start)",
         Killed(&[TANGENT], &[POINTS])),
     patch("no geometric part without a closed form", PARTICLE,
-        "v.dot(&(stress * b))",
-        "0.0 * v.dot(&b)",
+        "scaled(&identity(), geometric[(k, l)])",
+        "scaled(&identity(), 0.0 * geometric[(k, l)])",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
-    patch("misprint (34): F for its transpose", PARTICLE,
-        "at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose()",
-        "at.f * law.tangent_density(&at, start, &v, &b) * at.f",
+    patch("misprint (34): F for its transpose", LAW,
+        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
-    patch("misprint (34): both gradients J", PARTICLE,
-        "at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose()",
-        "at.f * law.tangent_density(&at, start, &b, &b) * at.f.transpose()",
+    patch("misprint (34): both gradients J", LAW,
+        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, start, &unit(l), &unit(l)) * at.f.transpose()",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
-    patch("misprint after (37): v and b swapped", PARTICLE,
-        "at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose()",
-        "at.f * law.tangent_density(&at, start, &b, &v) * at.f.transpose()",
+    patch("misprint after (37): v and b swapped", LAW,
+        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, start, &unit(l), &unit(k)) * at.f.transpose()",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
-    patch("misprint after (37), both", PARTICLE,
-        "at.f * law.tangent_density(&at, start, &v, &b) * at.f.transpose()",
-        "at.f * law.tangent_density(&at, start, &b, &v) * at.f",
+    patch("misprint after (37), both", LAW,
+        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, start, &unit(l), &unit(k)) * at.f",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("reactions left in Newton's residual", PRODUCT,
         "self.clear_prescribed(residual);",
@@ -543,6 +553,86 @@ pub(super) const PATCHES: &[Patch] = &[
         "f_left * law.stress(at, start)",
         "law.stress(at, start) * f_left",
         Killed(&[TANGENT, POINTS, DYNAMICS], &[DIGITS])),
+    patch("no divided differences off the diagonal", SPECTRAL,
+        "f.difference(d(i), d(j)) * a[(i, j)]",
+        "T::zero()",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("isotropic functions to first order alone", SPECTRAL,
+        "second(f, d(i), d(k), d(j)) * a[(i, k)] * a[(k, j)]",
+        "T::zero()",
+        Killed(&[MEMORY], &[POINTS, FLOWS])),
+    patch("b from the transposed F", HENCKY,
+        "at.f * flowed * at.f.transpose()",
+        "at.f.transpose() * flowed * at.f",
+        Killed(&[MEMORY], &[POINTS])),
+    patch("Delta for Delta coth Delta in the moduli", HENCKY,
+        "secant(i, j) * artanh_over(self.x[i], self.x[j]) - tau[i] - tau[j]",
+        "secant(i, j) - tau[i] - tau[j]",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("sign of a stress in the moduli", HENCKY,
+        "secant(i, j) * artanh_over(self.x[i], self.x[j]) - tau[i] - tau[j]",
+        "secant(i, j) * artanh_over(self.x[i], self.x[j]) - tau[i] + tau[j]",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("half of the stress on the moduli's diagonal", HENCKY,
+        "normal[(i, i)] -= tau[i] + tau[i];",
+        "normal[(i, i)] -= tau[i];",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("the secant not taken from the radial slope", HENCKY,
+        "t_v + (t_d - g) * n[j]",
+        "t_v + t_d * n[j]",
+        Killed(&[MEMORY, TANGENT], &[])),
+    patch("blocks with e_j for e_l", HENCKY,
+        "symmetric(&outer(&e_j, &a.column(l).into_owned()))",
+        "symmetric(&outer(&e_j, &a.column(j).into_owned()))",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("flow of half the size", HENCKY,
+        "(-2.0 * flow[i]).exp_m1()",
+        "(-flow[i]).exp_m1()",
+        Killed(&[MEMORY, FLOWS], &[POINTS, TANGENT])),
+    patch("flow without the exponential", HENCKY,
+        "(-2.0 * flow[i]).exp_m1()",
+        "(-2.0 * flow[i])",
+        Killed(&[MEMORY, FLOWS], &[POINTS, TANGENT])),
+    patch("2G for 3G in von Mises' return", VON_MISES,
+        "self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n)",
+        "self.yield_stress.solve(trial, 2.0 * shear, 1.0, p_n)",
+        Killed(&[MEMORY, FLOWS, TANGENT], &[POINTS])),
+    patch("the elastic slope where von Mises' solid flows", VON_MISES,
+        "T::one() - compliance * T::lit(3.0 * shear)",
+        "T::one()",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("friction for dilatancy in the flow", DRUCKER_PRAGER,
+        "elastic.p - gamma * lit(bulk * eta_bar)",
+        "elastic.p - gamma * lit(bulk * eta)",
+        Killed(&[MEMORY, FLOWS], &[POINTS])),
+    patch("the cone's bulk slope without flow", DRUCKER_PRAGER,
+        "lit(bulk) * (T::one() - w * lit(eta_bar * eta * bulk))",
+        "lit(bulk)",
+        Killed(&[MEMORY], &[POINTS])),
+    patch("the apex without what shear dilates", DRUCKER_PRAGER,
+        "(v - sheared * lit(*eta_bar)) * lit(eta * bulk)",
+        "v * lit(eta * bulk)",
+        Killed(&[MEMORY], &[POINTS])),
+    patch("no apex", DRUCKER_PRAGER,
+        "left.value() >= 0.0",
+        "left.value() >= f64::NEG_INFINITY",
+        Killed(&[FLOWS], &[POINTS])),
+    patch("no slope of Voce's hardening", HARDENING,
+        "T::lit(self.linear) + (p * T::lit(-self.rate)).exp() * T::lit(self.saturation * self.rate)",
+        "T::lit(self.linear)",
+        Killed(&[MEMORY, TANGENT], &[POINTS])),
+    patch("plastic change of volume forgotten", PLASTIC,
+        "share * x + volume",
+        "share * x",
+        Killed(&[MEMORY, FLOWS], &[POINTS, TANGENT])),
+    patch("Euler's step for the relaxation", VISCOELASTIC,
+        "(-dt / branch.relaxation_time).exp()",
+        "(1.0 / (1.0 + dt / branch.relaxation_time))",
+        Killed(&[FLOWS], &[MEMORY, POINTS, TANGENT])),
+    patch("the springs' stress not pulled off by what has relaxed", VISCOELASTIC,
+        "principal.deviator().map(|x| x * (1.0 - decay))",
+        "principal.deviator().map(|x| x * decay)",
+        Killed(&[MEMORY, FLOWS], &[POINTS, TANGENT])),
     patch("a coefficient of the energy's series", TENSOR,
         "T::lit(1.0 / (2 * k + 1) as f64)",
         "T::lit(1.0 / (2 * k + 3) as f64)",

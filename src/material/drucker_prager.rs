@@ -1,0 +1,154 @@
+//! Drucker and Prager's criterion: soils, with cohesion, friction, and a dilatancy of their own.
+
+use super::hencky::Radial;
+use super::{Criterion, Hardening, Lame, LameParameters, Returned};
+use crate::problems::{Number, Problems};
+use crate::scalar::Real;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::SQRT_2;
+
+/// Flow where √J₂ + η p reaches ξ c(ε̄), with p = tr τ/3 positive in tension, η = 6 sin φ/(√3 (3 − sin φ)) and ξ = 6 cos φ/(√3 (3 − sin φ)): the cone
+/// through the compressive edges of Mohr and Coulomb's pyramid. The flow dilates by η̄, the η of ψ; at the apex it is any that
+/// leads there (de Souza Neto, Perić, Owen, 2008, sec. 8.3).
+///
+/// τ is Kirchhoff's stress J σ. ε̄ grows by ξ Δγ on the cone; at the apex by that of the shear, and ξ/η of what dilates beyond: associated
+/// there, so that ψ = 0 has a return too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DruckerPrager {
+    /// η
+    friction: f64,
+    /// η̄
+    dilatancy: f64,
+    /// ξ
+    cohesive: f64,
+    /// c(ε̄)
+    cohesion: Hardening,
+}
+
+/// The constants of [`DruckerPrager`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "DruckerPrager")]
+#[serde(deny_unknown_fields)]
+pub struct DruckerPragerParameters {
+    /// The elastic constants.
+    pub elastic: LameParameters,
+    /// The angle of friction φ in degrees, 0 ≤ φ < 90. The cone goes through the compressive edges of Mohr and Coulomb's pyramid.
+    #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 90))]
+    pub friction: f64,
+    /// The angle of dilatancy ψ in degrees, 0 ≤ ψ ≤ φ. Default 0.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 90))]
+    pub dilatancy: f64,
+    /// The cohesion c, as a function of the accumulated plastic strain.
+    pub cohesion: Hardening,
+}
+
+/// 6 sin φ/(√3 (3 − sin φ)) of φ in radians.
+fn slope(angle: f64) -> f64 {
+    6.0 * angle.sin() / (3.0_f64.sqrt() * (3.0 - angle.sin()))
+}
+
+impl DruckerPrager {
+    /// From φ and ψ in degrees, 0 ≤ ψ ≤ φ < 90, and the cohesion.
+    ///
+    /// ```
+    /// use bfree::material::{DruckerPrager, Hardening, Lame, Law, Plastic, Start};
+    /// use bfree::tensor::{Deformation, Tensor, Vector};
+    ///
+    /// // Pulled apart on all sides it bears tr τ/3 = c cot φ.
+    /// let (c, phi) = (0.1, 30.0_f64);
+    /// let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c));
+    /// let law = Plastic { solid: Lame::from_young_poisson(1000.0, 0.3)?, criterion };
+    /// let at = Deformation::<f64, 3>::new(Tensor::from_diagonal(&Vector::from([0.1; 3])));
+    /// let stress = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+    /// assert!((stress[(0, 0)] / (c / phi.to_radians().tan()) - 1.0).abs() < 1e-12);
+    /// # Ok::<(), bfree::material::LameError>(())
+    /// ```
+    pub fn new(friction: f64, dilatancy: f64, cohesion: Hardening) -> Self {
+        let [phi, psi] = [friction, dilatancy].map(f64::to_radians);
+        let cohesive = 6.0 * phi.cos() / (3.0_f64.sqrt() * (3.0 - phi.sin()));
+        Self { friction: slope(phi), dilatancy: slope(psi), cohesive, cohesion }
+    }
+}
+
+impl Criterion for DruckerPrager {
+    type Parameters = DruckerPragerParameters;
+    const NAME: &'static str = "Drucker-Prager";
+    const ASSOCIATED: bool = false;
+
+    fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
+        let DruckerPragerParameters { elastic, friction, dilatancy, cohesion } = given;
+        let solid = elastic.lame(problems, &format!("{path}.elastic"));
+        let rough = (0.0..90.0).contains(friction);
+        problems.require(rough, &format!("{path}.friction"), Number(*friction), "must be ≥ 0 and < 90");
+        let dilates = (0.0..=friction.max(0.0)).contains(dilatancy);
+        let allowed = format_args!("must lie between 0 and the friction, {}", Number(*friction));
+        problems.require(dilates || !rough, &format!("{path}.dilatancy"), Number(*dilatancy), allowed);
+        let criterion = Self::new(*friction, *dilatancy, *cohesion);
+        // G + K η η̄ on the cone and K η² at the apex, over ξ², must exceed what softening takes.
+        let stiffness = solid.filter(|_| rough && dilates).map_or(f64::INFINITY, |solid| {
+            let (bulk, eta) = (solid.bulk_modulus(), criterion.friction);
+            let cone = solid.shear + bulk * eta * criterion.dilatancy;
+            let apex = if eta > 0.0 { bulk * eta * eta } else { f64::INFINITY };
+            cone.min(apex) / criterion.cohesive.powi(2)
+        });
+        let good = cohesion.check(stiffness, problems, &format!("{path}.cohesion"));
+        solid.filter(|_| good && rough && dilates).map(|solid| (solid, criterion))
+    }
+
+    fn example(solid: &Lame) -> Self {
+        let g = solid.shear;
+        Self::new(30.0, 10.0, Hardening { initial: 0.05 * g, linear: 0.02 * g, saturation: -0.02 * g, rate: 5.0 })
+    }
+
+    /// The cone, √J₂ − G Δγ + η (p − K η̄ Δγ) = ξ c(ε̄ + ξ Δγ), unless √J₂ < G Δγ: then the apex, η p = ξ c.
+    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
+        let Self { friction: eta, dilatancy: eta_bar, cohesive: xi, cohesion } = self;
+        let (shear, bulk, lit) = (solid.shear, solid.bulk_modulus(), T::lit);
+        let (before, elastic) = (lit(before), Radial::elastic(solid, v));
+        // √J₂ = ‖dev τ‖/√2
+        let root_j2 = d * lit(SQRT_2 * shear);
+        let excess = root_j2 + elastic.p * lit(*eta);
+        if excess.value() <= xi * cohesion.strength(before.value()) {
+            return Returned::elastic(solid, v, before.value());
+        }
+        let (gamma, w) = cohesion.solve(excess, shear + bulk * eta * eta_bar, *xi, before);
+        let left = root_j2 - gamma * lit(shear);
+        if left.value() >= 0.0 {
+            let p = elastic.p - gamma * lit(bulk * eta_bar);
+            let g = elastic.g * left / root_j2;
+            let radial = Radial {
+                p,
+                g,
+                p_v: lit(bulk) * (T::one() - w * lit(eta_bar * eta * bulk)),
+                p_d: -w * lit(bulk * eta_bar * SQRT_2 * shear),
+                t_v: -w * lit(SQRT_2 * shear * eta * bulk),
+                t_d: elastic.g * (T::one() - w * lit(shear)),
+            };
+            // p Δε_v + √J₂ 2Δd/√2, both of the end: Δε_v = η̄ Δγ and Δd = Δγ/√2
+            let dissipated = gamma * (p * lit(*eta_bar) + left);
+            return Returned { radial, plastic_strain: before + gamma * lit(*xi), dissipated };
+        }
+        // All of the shear goes, and dilates by η̄; then η δ more until η K (v − η̄ √J₂/G − η δ) = ξ c(ε̄ + ξ √J₂/G + ξ δ).
+        let sheared = root_j2 * lit(1.0 / shear);
+        let after = before + sheared * lit(*xi);
+        let excess = (v - sheared * lit(*eta_bar)) * lit(eta * bulk);
+        let (delta, w) = cohesion.solve(excess, bulk * eta * eta, *xi, after);
+        let flowed = sheared * lit(*eta_bar) + delta * lit(*eta);
+        let (p, plastic_strain) = ((v - flowed) * lit(bulk), after + delta * lit(*xi));
+        let hardens = cohesion.slope(plastic_strain) * lit(xi * xi);
+        // √J₂/G and δ by d; δ by v
+        let (s_d, d_v) = (lit(SQRT_2), w * lit(eta * bulk));
+        let d_d = -w * (lit(eta * bulk * eta_bar) + hardens) * s_d;
+        let radial = Radial {
+            p,
+            g: T::zero(),
+            p_v: lit(bulk) * (T::one() - d_v * lit(*eta)),
+            p_d: -(s_d * lit(*eta_bar) + d_d * lit(*eta)) * lit(bulk),
+            t_v: T::zero(),
+            t_d: T::zero(),
+        };
+        Returned { radial, plastic_strain, dissipated: p * flowed }
+    }
+}

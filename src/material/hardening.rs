@@ -1,0 +1,134 @@
+//! Strength as a function of the accumulated plastic strain.
+
+use crate::problems::{Number, Problems};
+use crate::scalar::Real;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A strength that changes as plastic strain p accumulates: k(p) = `initial` + `linear` p + `saturation` (1 − e^{−`rate` p}). None,
+/// linear, Voce's, and their sum.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hardening {
+    /// Strength of what has not flowed (stress), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub initial: f64,
+    /// Growth with the plastic strain (stress), ≥ 0. Default 0.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub linear: f64,
+    /// Growth (stress) that plastic strain approaches; softening if negative, ≥ -`initial`. Default 0.
+    #[serde(default)]
+    pub saturation: f64,
+    /// How fast it approaches it (no unit), ≥ 0. Default 0.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub rate: f64,
+}
+
+/// Steps of Newton's method at most: it converges from one side.
+const ITERATIONS: usize = 60;
+
+impl Hardening {
+    /// k = `initial` for ever.
+    ///
+    /// ```
+    /// use bfree::material::Hardening;
+    ///
+    /// let perfect = Hardening::perfect(2.0);
+    /// assert_eq!((perfect.strength(0.0), perfect.strength(7.0), perfect.work(3.0)), (2.0, 2.0, 6.0));
+    /// ```
+    pub fn perfect(initial: f64) -> Self {
+        Self { initial, linear: 0.0, saturation: 0.0, rate: 0.0 }
+    }
+
+    /// k(p)
+    ///
+    /// ```
+    /// use bfree::material::Hardening;
+    ///
+    /// // Between its initial and its final strength, to which e^{−1} is left where p = 1/rate.
+    /// let voce = Hardening { initial: 1.0, linear: 0.0, saturation: 2.0, rate: 4.0 };
+    /// assert!((voce.strength(0.25) - (3.0 - 2.0 * (-1.0_f64).exp())).abs() < 1e-15);
+    /// ```
+    pub fn strength<T: Real>(&self, p: T) -> T {
+        let Self { initial, linear, saturation, rate } = *self;
+        T::lit(initial) + p * T::lit(linear) - (p * T::lit(-rate)).exp_m1() * T::lit(saturation)
+    }
+
+    /// k'(p)
+    pub fn slope<T: Real>(&self, p: T) -> T {
+        T::lit(self.linear) + (p * T::lit(-self.rate)).exp() * T::lit(self.saturation * self.rate)
+    }
+
+    /// ∫₀ᵖ k, what it takes to flow so far.
+    pub fn work<T: Real>(&self, p: T) -> T {
+        let Self { initial, linear, saturation, rate } = *self;
+        let even = p * T::lit(initial) + p * p * T::lit(0.5 * linear);
+        if rate == 0.0 {
+            return even;
+        }
+        even + (p + (p * T::lit(-rate)).exp_m1() * T::lit(1.0 / rate)) * T::lit(saturation)
+    }
+
+    /// The Δ > 0 with a − b Δ − c k(p + c Δ) = 0, and 1/(b + c² k') there; a must exceed c k(p), and b + c² k' must be positive.
+    ///
+    /// Newton's method from Δ = 0 stays on one side of the root where k is concave, and after its first step where k is convex; then as many
+    /// more steps as the number type carries derivatives.
+    pub(super) fn solve<T: Real>(&self, a: T, b: f64, c: f64, p: T) -> (T, T) {
+        let (a_0, p_0) = (a.value(), p.value());
+        let mut root = 0.0_f64;
+        for _ in 0..ITERATIONS {
+            let at = p_0 + c * root;
+            let step = (a_0 - b * root - c * self.strength(at)) / (b + c * c * self.slope(at));
+            root = (root + step).max(0.0);
+            if step.abs() <= 2.0 * f64::EPSILON * root {
+                break;
+            }
+        }
+        let (mut delta, c_t) = (T::lit(root), T::lit(c));
+        let inverse_slope = |delta: T| (T::lit(b) + self.slope(p + c_t * delta) * T::lit(c * c)).recip();
+        for _ in 0..=T::NDERIV {
+            let left = a - delta * T::lit(b) - c_t * self.strength(p + c_t * delta);
+            delta += left * inverse_slope(delta);
+        }
+        (delta, inverse_slope(delta))
+    }
+
+    /// Whether its numbers are good, and no step can lose its solution: c² k' > −b.
+    pub(super) fn check(&self, stiffness: f64, problems: &mut Problems, path: &str) -> bool {
+        let Self { initial, linear, saturation, rate } = *self;
+        let at = |key: &str| format!("{path}.{key}");
+        let mut good = problems.positive(&at("initial"), initial);
+        for (key, value) in [("linear", linear), ("rate", rate)] {
+            good &= problems.number(&at(key), value);
+            problems.require(value >= 0.0, &at(key), Number(value), "must be ≥ 0");
+            good &= value >= 0.0;
+        }
+        good &= problems.number(&at("saturation"), saturation);
+        if !good {
+            return false;
+        }
+        let least = -initial;
+        let strong = saturation >= least;
+        problems.require(
+            strong,
+            &at("saturation"),
+            Number(saturation),
+            format_args!("must be at least -initial = {}", Number(least)),
+        );
+        let softens = linear + saturation * rate;
+        let stable = softens > -stiffness;
+        problems.require(
+            stable || !strong,
+            &at("rate"),
+            Number(rate),
+            format_args!(
+                "softens faster than the solid unloads: linear + saturation rate = {} must be greater than {}",
+                Number(softens),
+                Number(-stiffness)
+            ),
+        );
+        strong && stable
+    }
+}

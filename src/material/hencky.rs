@@ -1,0 +1,247 @@
+//! Hencky's elasticity: the logarithmic strain ε = ½ ln b of b = F G Fᵀ, and what isotropic laws in it make of S and ℂ.
+//!
+//! G is the inverse of the plastic (or viscous) right Cauchy–Green tensor, I where nothing has flowed. It belongs to the reference configuration, so
+//! that no rotation of the body touches it. A step that flows by Δε multiplies b by e^{−2Δε}, both in the same axes: the exponential map
+//! (Weber and Anand, 1990; Simo, 1992). Everything is in three dimensions, with the missing stretches of F one.
+
+use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
+use super::{Lame, embed};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
+use num_dual::Dual;
+
+/// Rows and columns of the six numbers of a symmetric tensor.
+const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
+/// A symmetric tensor from six numbers; zero of what is not there.
+fn six(numbers: &[f64]) -> Tensor<f64, 3> {
+    let mut a = Tensor::zeros();
+    for (&(i, k), &x) in SIX.iter().zip(numbers) {
+        (a[(i, k)], a[(k, i)]) = (x, x);
+    }
+    a
+}
+
+/// The upper left D×D part.
+fn cut<T: Real, const D: usize>(a: &Tensor<T, 3>) -> Tensor<T, D> {
+    Tensor::from_fn(|i, k| a[(i, k)])
+}
+
+/// ½ (b − I) = ½ (H + Hᵀ + H Hᵀ + F (G − I) Fᵀ), with no digit lost at small strain, from the six numbers of G − I.
+fn half_b_less_one<T: Real>(at: &Deformation<T, 3>, flowed: &[f64]) -> Tensor<T, 3> {
+    let flowed = six(flowed).map(T::lit);
+    let elastic = at.h + at.h.transpose() + at.h * at.h.transpose();
+    scaled(&(elastic + at.f * flowed * at.f.transpose()), T::lit(0.5))
+}
+
+/// The strain ε of a state, in parts.
+pub(super) struct Strained<T: Real> {
+    at: Deformation<T, 3>,
+    /// tr ε, the logarithm of the elastic change of volume.
+    pub volume: T,
+    /// dev ε
+    pub deviator: Tensor<T, 3>,
+}
+
+impl<T: Real> Strained<T> {
+    /// From F, and the six numbers of G − I; none of them is G = I.
+    pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
+        let at = Deformation::new(embed(&at.h));
+        let strain = function(&Hencky, &half_b_less_one(&at, flowed));
+        let volume = trace(&strain);
+        Self { at, volume, deviator: strain - scaled(&identity(), volume * T::lit(1.0 / 3.0)) }
+    }
+
+    /// dev ε : dev ε
+    pub fn square(&self) -> T {
+        contract(&self.deviator, &self.deviator)
+    }
+
+    /// ‖dev ε‖; where it is zero, so are its derivatives.
+    pub fn norm(&self) -> T {
+        let square = self.square();
+        if square.value() > 0.0 { square.sqrt() } else { T::zero() }
+    }
+
+    /// S = F⁻¹ τ F⁻ᵀ of τ = p I + g dev ε
+    pub fn stress<const D: usize>(&self, p: T, g: T) -> Tensor<T, D> {
+        self.pulled_back(&(scaled(&identity(), p) + scaled(&self.deviator, g)))
+    }
+
+    /// F⁻¹ τ F⁻ᵀ
+    pub fn pulled_back<const D: usize>(&self, tau: &Tensor<T, 3>) -> Tensor<T, D> {
+        let f_inv_t = self.at.inverse_transpose();
+        cut(&(f_inv_t.transpose() * tau * f_inv_t))
+    }
+
+    /// ε
+    pub fn strain(&self) -> Tensor<T, 3> {
+        self.deviator + scaled(&identity(), self.volume * T::lit(1.0 / 3.0))
+    }
+
+    /// f(ε)
+    pub fn function(&self, f: &impl Function) -> Tensor<T, 3> {
+        function(f, &self.strain())
+    }
+}
+
+/// A state in the principal axes of b.
+pub(super) struct Principal<T: Real> {
+    at: Deformation<T, 3>,
+    /// Eigenvectors of b, in columns.
+    axes: Tensor<T, 3>,
+    /// Eigenvalues of ½ (b − I).
+    x: [T; 3],
+    /// The principal strains εᵢ.
+    pub strains: [T; 3],
+}
+
+impl<T: Real> Principal<T> {
+    /// As [`Strained::new`].
+    pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
+        let at = Deformation::new(embed(&at.h));
+        let half = half_b_less_one(&at, flowed);
+        let axes = principal_axes(&half.map(T::value)).map(T::lit);
+        let turned = axes.transpose() * half * axes;
+        let x: [T; 3] = std::array::from_fn(|i| turned[(i, i)]);
+        Self { at, axes, x, strains: x.map(|x| Hencky.value(x)) }
+    }
+
+    /// tr ε
+    pub fn volume(&self) -> T {
+        self.strains[0] + self.strains[1] + self.strains[2]
+    }
+
+    /// The principal values of dev ε.
+    pub fn deviator(&self) -> [T; 3] {
+        let mean = self.volume() * T::lit(1.0 / 3.0);
+        self.strains.map(|strain| strain - mean)
+    }
+
+    /// ‖dev ε‖
+    pub fn norm(&self) -> T {
+        let [a, b, c] = self.deviator();
+        let square = a * a + b * b + c * c;
+        if square.value() > 0.0 { square.sqrt() } else { T::zero() }
+    }
+
+    /// ℂ in these axes, of principal Kirchhoff stresses `tau`, their derivatives ∂τᵢ/∂εⱼ, and the secants (τᵢ − τⱼ)/(εᵢ − εⱼ).
+    ///
+    /// With L = sym(F⁻ᵀ X F⁻¹), δb = L b + b L makes δεᵢⱼ = (Δ coth Δ) Lᵢⱼ with Δ = εᵢ − εⱼ, so that
+    /// F (ℂ:X) Fᵀ = δτ − L τ − τ L is Σⱼ ∂τᵢ/∂εⱼ Lⱼⱼ − 2τᵢ Lᵢᵢ on the diagonal, and [(τᵢ − τⱼ) coth Δ − τᵢ − τⱼ] Lᵢⱼ off it.
+    pub fn moduli(&self, tau: [T; 3], slopes: Tensor<T, 3>, secant: impl Fn(usize, usize) -> T) -> Moduli<T> {
+        let mut normal = slopes;
+        let mut shear = Tensor::zeros();
+        for i in 0..3 {
+            normal[(i, i)] -= tau[i] + tau[i];
+            for j in (0..3).filter(|&j| j != i) {
+                shear[(i, j)] = secant(i, j) * artanh_over(self.x[i], self.x[j]) - tau[i] - tau[j];
+            }
+        }
+        Moduli { f_inv_t: self.at.inverse_transpose(), axes: self.axes, normal, shear }
+    }
+
+    /// As [`Self::moduli`], of τ = p I + g dev ε with p and t = g d functions of v = tr ε and d = ‖dev ε‖ alone.
+    pub fn radial_moduli(&self, radial: &Radial<T>) -> Moduli<T> {
+        let Radial { p, g, p_v, p_d, t_v, t_d } = *radial;
+        let (deviator, d) = (self.deviator(), self.norm());
+        let n = deviator.map(|x| if d.value() > 0.0 { x / d } else { T::zero() });
+        let slopes = Tensor::from_fn(|i, j| {
+            let turned = if i == j { g } else { T::zero() } - g * T::lit(1.0 / 3.0);
+            p_v + p_d * n[j] + n[i] * (t_v + (t_d - g) * n[j]) + turned
+        });
+        self.moduli(deviator.map(|x| p + g * x), slopes, |_, _| g)
+    }
+}
+
+impl Principal<f64> {
+    /// The six numbers of G − I after a flow by `flow`, principal strains: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
+    pub fn flow(&self, flow: [f64; 3], flowed: &[f64], next: &mut [f64]) {
+        let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
+        let back = self.at.inverse_transpose().transpose() * self.axes;
+        let after = six(flowed) + back * lost * back.transpose();
+        next.iter_mut().zip(SIX).for_each(|(next, (i, k))| *next = 0.5 * (after[(i, k)] + after[(k, i)]));
+    }
+}
+
+/// A Kirchhoff stress τ = p I + g dev ε, and how p and t = g d change with v = tr ε and d = ‖dev ε‖.
+#[derive(Clone, Copy, Debug)]
+pub struct Radial<T> {
+    /// p, positive in tension.
+    pub p: T,
+    /// g, 2G where nothing flows.
+    pub g: T,
+    /// ∂p/∂v
+    pub p_v: T,
+    /// ∂p/∂d
+    pub p_d: T,
+    /// ∂t/∂v
+    pub t_v: T,
+    /// ∂t/∂d
+    pub t_d: T,
+}
+
+impl<T: Real> Radial<T> {
+    /// Hooke's law in ε: p = K v, g = 2G.
+    pub fn elastic(solid: &Lame, v: T) -> Self {
+        let (bulk, twice_shear) = (T::lit(solid.bulk_modulus()), T::lit(2.0 * solid.shear));
+        Self { p: bulk * v, g: twice_shear, p_v: bulk, p_d: T::zero(), t_v: T::zero(), t_d: twice_shear }
+    }
+}
+
+/// ℂ in the principal axes of b.
+pub(super) struct Moduli<T: Real> {
+    f_inv_t: Tensor<T, 3>,
+    axes: Tensor<T, 3>,
+    normal: Tensor<T, 3>,
+    shear: Tensor<T, 3>,
+}
+
+impl<T: Real> Moduli<T> {
+    /// δτ − L τ − τ L, both in the axes.
+    fn response(&self, l: &Tensor<T, 3>) -> Tensor<T, 3> {
+        let mut z = l.component_mul(&self.shear);
+        for i in 0..3 {
+            for j in 0..3 {
+                z[(i, i)] += self.normal[(i, j)] * l[(j, j)];
+            }
+        }
+        z
+    }
+
+    /// ℂ:X
+    pub fn elasticity<const D: usize>(&self, x: &Tensor<T, D>) -> Tensor<T, D> {
+        let back = self.axes.transpose() * self.f_inv_t;
+        let l = back * embed(&symmetric(x)) * back.transpose();
+        cut(&(back.transpose() * self.response(&l) * back))
+    }
+}
+
+impl Moduli<f64> {
+    /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs: its column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
+    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut [[Tensor<f64, D>; D]; D]) {
+        let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
+        let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();
+        for j in 0..D {
+            let e_j: Vector<f64, 3> = self.axes.row(j).transpose();
+            for l in 0..D {
+                let stress = self.response(&symmetric(&outer(&e_j, &a.column(l).into_owned())));
+                let stress = self.axes * stress;
+                for (k, blocks) in blocks.iter_mut().enumerate() {
+                    let column = stress * a.column(k);
+                    (0..D).for_each(|i| blocks[l][(i, j)] += column[i]);
+                }
+            }
+        }
+    }
+}
+
+/// ∂S/∂E : sym X by dual numbers through `stress`: the derivative of a derivative, which [`Principal`] does not have, for its axes carry none.
+pub(super) fn derivative<T: Real, const D: usize>(
+    at: &Deformation<T, D>,
+    x: &Tensor<T, D>,
+    stress: impl Fn(&Deformation<Dual<T>, D>) -> Tensor<Dual<T>, D>,
+) -> Tensor<T, D> {
+    let delta_f = at.inverse_transpose() * symmetric(x);
+    stress(&Deformation::new(at.h.zip_map(&delta_f, Dual::new))).map(|s| s.eps)
+}

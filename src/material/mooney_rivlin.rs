@@ -1,0 +1,106 @@
+//! A compressible Mooney–Rivlin solid.
+
+use super::{Ciarlet, Elastic, Lame, Listed, Volumetric};
+use crate::problems::{Number, Problems};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, contract, identity, scaled, second_invariant, symmetric, trace};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// W = c₁ (I₁ − 3) + c₂ (I₂ − 3) − 2 (c₁ + 2c₂) ln J + U(J), with Ciarlet's U: rubber. G = 2 (c₁ + c₂), and the Λ of U is that of the solid less
+/// the 4 c₂ that I₂ has (Ciarlet and Geymonat, 1982).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MooneyRivlin {
+    /// c₁ (stress)
+    pub c1: f64,
+    /// c₂ (stress)
+    pub c2: f64,
+    /// Λ − 4c₂, the Λ of U.
+    pub volumetric: f64,
+}
+
+/// The constants of [`MooneyRivlin`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "MooneyRivlin")]
+#[serde(deny_unknown_fields)]
+pub struct MooneyRivlinParameters {
+    /// c₁ (stress), > 0: half of what the shear modulus is without c₂.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub c1: f64,
+    /// c₂ (stress), ≥ 0. The shear modulus is 2 (c₁ + c₂).
+    #[schemars(range(min = 0))]
+    pub c2: f64,
+    /// The bulk modulus K (stress), > 4/3 `c1` + 16/3 `c2`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bulk: f64,
+}
+
+/// 4 I₂(E): j² − 2 (tr E − j) where det E = 0, from J² = det(I + 2E), with the digits that minors lose in turned bodies; by minors in 3D.
+fn four_minors<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
+    if D < 3 {
+        at.j * at.j - at.trace_e_minus_j() * T::lit(2.0)
+    } else {
+        second_invariant(&at.green_lagrange()) * T::lit(4.0)
+    }
+}
+
+impl MooneyRivlin {
+    /// 2 (c₁ + 2c₂), the factor of tr E − ln J.
+    fn shear(&self) -> f64 {
+        2.0 * (self.c1 + 2.0 * self.c2)
+    }
+}
+
+impl Elastic for MooneyRivlin {
+    /// 2 (c₁ + 2c₂) (tr E − ln J) + 4c₂ I₂(E) + U, for I₁ − 3 = 2 tr E and I₂ − 3 = 4 tr E + 4 I₂(E)
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+        at.trace_e_minus_log_jacobian() * T::lit(self.shear())
+            + four_minors(at) * T::lit(self.c2)
+            + Ciarlet::energy(at) * T::lit(0.5 * self.volumetric)
+    }
+
+    /// S = 2 (c₁ + 2c₂) (I − C⁻¹) + 4c₂ (tr E I − E) + J U' C⁻¹, with I − C⁻¹ = F⁻¹ (H + F⁻ᵀ Hᵀ) as of the neo-Hookean solids
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+        let (f_inv_t, e) = (at.inverse_transpose(), at.green_lagrange());
+        let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.shear()));
+        let first = f_inv_t.transpose() * (scaled(&f_inv_t, Ciarlet::stress(self.volumetric, at)) + shear);
+        first + scaled(&(scaled(&identity(), trace(&e)) - e), T::lit(4.0 * self.c2))
+    }
+
+    /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹ + 4c₂ (tr X I − sym X), with q = J U' − 2 (c₁ + 2c₂)
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        let f_inv_t = at.inverse_transpose();
+        let c_inv = f_inv_t.transpose() * f_inv_t;
+        let x = symmetric(x);
+        let q = Ciarlet::stress(self.volumetric, at) - T::lit(self.shear());
+        scaled(&c_inv, Ciarlet::stiffness(self.volumetric, at) * contract(&c_inv, &x))
+            - scaled(&(c_inv * x * c_inv), q + q)
+            + scaled(&(scaled(&identity(), trace(&x)) - x), T::lit(4.0 * self.c2))
+    }
+}
+
+impl Listed for MooneyRivlin {
+    type Parameters = MooneyRivlinParameters;
+    const NAME: &'static str = "Mooney-Rivlin";
+
+    fn build(given: &MooneyRivlinParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        let MooneyRivlinParameters { c1, c2, bulk } = *given;
+        let at = |key: &str| format!("{path}.{key}");
+        let mut good = problems.positive(&at("c1"), c1);
+        good &= problems.number(&at("c2"), c2) && problems.positive(&at("bulk"), bulk);
+        problems.require(c2 >= 0.0, &at("c2"), Number(c2), "must be ≥ 0");
+        if !(good && c2 >= 0.0) {
+            return None;
+        }
+        let least = (4.0 * c1 + 16.0 * c2) / 3.0;
+        let allowed = format_args!("must be greater than 4/3 c1 + 16/3 c2 = {}", Number(least));
+        problems.require(bulk > least, &at("bulk"), Number(bulk), allowed);
+        (bulk > least).then_some(Self { c1, c2, volumetric: bulk - least })
+    }
+
+    /// c₂ as large as leaves three quarters of Λ to U, where that is less than an eighth of G.
+    fn example(lame: Lame) -> Self {
+        let c2 = (0.125 * lame.shear).min(lame.lambda / 16.0).max(0.0);
+        Self { c1: 0.5 * lame.shear - c2, c2, volumetric: lame.lambda - 4.0 * c2 }
+    }
+}

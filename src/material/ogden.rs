@@ -1,0 +1,163 @@
+//! Ogden's solid: powers of the principal stretches.
+
+use super::hencky::{Principal, Strained, derivative};
+use super::spectral::{Function, Power, primitive_trace};
+use super::{Ciarlet, Lame, Law, Listed, Start, Volumetric};
+use crate::problems::{Number, Problems};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, identity, scaled};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J)
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "OgdenTerm")]
+#[serde(deny_unknown_fields)]
+pub struct OgdenTerm {
+    /// μ (stress), of the sign of α.
+    pub modulus: f64,
+    /// α (no unit), not 0 and at most 100 in size.
+    #[schemars(range(min = -100, max = 100))]
+    pub exponent: f64,
+}
+
+/// The constants of [`Ogden`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "Ogden")]
+#[serde(deny_unknown_fields)]
+pub struct OgdenParameters {
+    /// The terms, 1 to 8. The shear modulus is half of the sum of `modulus` times `exponent`.
+    #[schemars(length(min = 1, max = 8))]
+    pub terms: Vec<OgdenTerm>,
+    /// The bulk modulus K (stress), > 2/3 of the shear modulus.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bulk: f64,
+}
+
+/// Terms at most.
+const MOST: usize = 8;
+
+/// W = Σ μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J) + U(J), with Ciarlet's U: rubber (Ogden, Proc. R. Soc. Lond. A 328, 1972). 2G = Σ μ α.
+///
+/// In Hencky's strain ε the Kirchhoff stress is τ = Σ μ (e^{αε} − I) + J U' I.
+///
+/// ```
+/// use bfree::material::{Elastic, Lame, Law, NeoHookean, Ogden, OgdenTerm, Start};
+/// use bfree::tensor::{Deformation, Tensor};
+///
+/// // One term with α = 2 is the neo-Hookean solid of μ = G.
+/// let ogden = Ogden { terms: vec![OgdenTerm { modulus: 2.0, exponent: 2.0 }], lambda: 3.0 };
+/// let neo_hookean = NeoHookean::ciarlet(Lame::new(3.0, 2.0)?);
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.5, -0.2, 0.1));
+/// let apart = ogden.stress(&at, &Start::NONE) - Elastic::stress(&neo_hookean, &at);
+/// assert!(apart.norm() < 1e-14);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ogden {
+    /// The terms.
+    pub terms: Vec<OgdenTerm>,
+    /// Λ
+    pub lambda: f64,
+}
+
+impl Law for Ogden {
+    /// Σ μα tr R(ε) + U, with R(x) = (e^{αx} − 1 − αx)/α² and tr ε = ln J
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> T {
+        let strain = Strained::new(at, &[]).strain();
+        let terms = self
+            .terms
+            .iter()
+            .map(|term| primitive_trace(&Power(term.exponent), &strain) * T::lit(term.modulus * term.exponent));
+        terms.fold(Ciarlet::energy(at) * T::lit(0.5 * self.lambda), |sum, term| sum + term)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> Tensor<T, D> {
+        let strained = Strained::new(at, &[]);
+        let terms = self
+            .terms
+            .iter()
+            .map(|term| scaled(&strained.function(&Power(term.exponent)), T::lit(term.modulus * term.exponent)));
+        let pressure = scaled(&identity(), Ciarlet::stress(self.lambda, at));
+        strained.pulled_back(&terms.fold(pressure, |sum: Tensor<T, 3>, term| sum + term))
+    }
+
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        if T::NDERIV > 0 {
+            return derivative(at, x, |at| self.stress(at, start));
+        }
+        self.moduli(at).elasticity(x)
+    }
+
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        _: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        let mut blocks = [[Tensor::zeros(); D]; D];
+        self.moduli(at).add_blocks(f_n, &mut blocks);
+        blocks
+    }
+}
+
+impl Ogden {
+    /// τᵢ = Σ μ (e^{αεᵢ} − 1) + J U' and its derivatives.
+    fn moduli<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> super::hencky::Moduli<T> {
+        let principal = Principal::new(at, &[]);
+        let (strains, pressure) = (principal.strains, Ciarlet::stress(self.lambda, at));
+        let sum = |of: &dyn Fn(&Power) -> T| {
+            let terms = self.terms.iter();
+            let terms = terms.map(|term| of(&Power(term.exponent)) * T::lit(term.modulus * term.exponent));
+            terms.fold(T::zero(), |sum, term| sum + term)
+        };
+        let secant = |i: usize, j: usize| sum(&|f| f.difference(strains[i], strains[j]));
+        let bulk = Ciarlet::stiffness(self.lambda, at);
+        let slopes = Tensor::from_fn(|i, j| if i == j { bulk + secant(i, i) } else { bulk });
+        principal.moduli(std::array::from_fn(|i| pressure + sum(&|f| f.value(strains[i]))), slopes, secant)
+    }
+}
+
+impl Listed for Ogden {
+    type Parameters = OgdenParameters;
+    const NAME: &'static str = "Ogden";
+
+    fn build(given: &OgdenParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        let (terms, count) = (format!("{path}.terms"), given.terms.len());
+        let few = (1..=MOST).contains(&count);
+        problems.require(few, &terms, format_args!("a list of {count}"), format_args!("must have 1 to {MOST} entries"));
+        let mut good = few;
+        for (i, OgdenTerm { modulus, exponent }) in given.terms.iter().enumerate().take(MOST) {
+            let (of_modulus, of_exponent) = (format!("{terms}[{i}].modulus"), format!("{terms}[{i}].exponent"));
+            good &= problems.number(&of_modulus, *modulus) && problems.between(&of_exponent, *exponent, -100.0, 100.0);
+            let stiff = modulus * exponent > 0.0;
+            problems.require(
+                stiff,
+                &of_modulus,
+                Number(*modulus),
+                "must have the sign of the exponent, and neither may be 0",
+            );
+            good &= stiff;
+        }
+        good &= problems.positive(&format!("{path}.bulk"), given.bulk);
+        if !good {
+            return None;
+        }
+        let shear = 0.5 * given.terms.iter().map(|term| term.modulus * term.exponent).sum::<f64>();
+        let least = 2.0 * shear / 3.0;
+        let allowed = format_args!("must be greater than 2/3 of the shear modulus = {}", Number(least));
+        problems.require(given.bulk > least, &format!("{path}.bulk"), Number(given.bulk), allowed);
+        (given.bulk > least).then(|| Self { terms: given.terms.clone(), lambda: given.bulk - least })
+    }
+
+    /// Ogden's rubber, roughly: stretches to the powers 1.5 and −2.
+    fn example(lame: Lame) -> Self {
+        let (shear, term) = (lame.shear, |modulus, exponent| OgdenTerm { modulus, exponent });
+        Self { terms: vec![term(shear, 1.5), term(-0.25 * shear, -2.0)], lambda: lame.lambda }
+    }
+}

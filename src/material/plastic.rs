@@ -1,0 +1,198 @@
+//! Finite plasticity: Hencky's elasticity, and a return map in logarithmic strains to a yield criterion.
+
+use super::hencky::{Principal, Radial, Strained, derivative};
+use super::{DISSIPATED, Lame, Law, Listed, PLASTIC_STRAIN, Remembered, Start};
+use crate::problems::Problems;
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor};
+
+/// Where an isotropic solid flows, and how: a type, so that a loop over particles has one of them.
+///
+/// It sees the trial strain by v = tr ε and d = ‖dev ε‖, and brings back the Kirchhoff stress; the direction of its deviator stays.
+pub trait Criterion: Clone + Send + Sync + Sized + 'static {
+    /// What a scene writes of it.
+    type Parameters;
+
+    /// The name of the solid in reports.
+    const NAME: &'static str;
+
+    /// Whether the flow is normal to the surface: the tangent is then symmetric, and a step has a potential.
+    const ASSOCIATED: bool;
+
+    /// The solid and its criterion; or `None`, and `problems` of the keys below `path`.
+    fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)>;
+
+    /// One that a solid of these constants meets at strains of some percent.
+    fn example(solid: &Lame) -> Self;
+
+    /// What a step with the trial strain (v, d) ends with, after the plastic strain `before`.
+    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T>;
+}
+
+/// Where a return map ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Returned<T> {
+    /// The stress, and its derivatives by the trial strain.
+    pub radial: Radial<T>,
+    /// The accumulated plastic strain.
+    pub plastic_strain: T,
+    /// What flow takes of the energy in this step, per reference volume.
+    pub dissipated: T,
+}
+
+impl<T: Real> Returned<T> {
+    /// No flow.
+    pub fn elastic(solid: &Lame, v: T, before: f64) -> Self {
+        Self { radial: Radial::elastic(solid, v), plastic_strain: T::lit(before), dissipated: T::zero() }
+    }
+}
+
+/// An elastoplastic solid, isotropic, with the elastic energy W = K/2 (tr ε)² + G dev ε : dev ε in the logarithmic elastic strain ε = ½ ln(F C_p⁻¹ Fᵀ).
+///
+/// A step freezes C_p⁻¹, takes the trial strain, and flows by the exponential map (Simo, Comput. Methods Appl. Mech. Eng. 99, 1992;
+/// de Souza Neto, Perić, Owen, Computational Methods for Plasticity, 2008, ch. 14).
+///
+/// ```
+/// use bfree::material::{Hardening, Lame, Law, Plastic, Start, VonMises};
+/// use bfree::tensor::{Deformation, Tensor};
+///
+/// // Sheared far beyond its yield stress, it bears √3 τ_xy = σ_y, but for a rotation of the stress of the order of the elastic strain.
+/// let solid = Lame::from_young_poisson(1000.0, 0.3)?;
+/// let law = Plastic { solid, criterion: VonMises { yield_stress: Hardening::perfect(0.1) } };
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.0, 0.0));
+/// let stress = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+/// assert!((3.0_f64.sqrt() * stress[(0, 1)] / 0.1 - 1.0).abs() < 1e-3);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plastic<Y> {
+    /// Λ and G.
+    pub solid: Lame,
+    /// Where it flows.
+    pub criterion: Y,
+}
+
+/// A number that a body at rest remembers as 0.
+pub(super) const fn zero(name: &'static str) -> Remembered {
+    Remembered { name, at_rest: 0.0 }
+}
+
+/// The accumulated plastic strain, the energy lost, and C_p⁻¹ − I.
+const MEMORY: [Remembered; 8] = [
+    zero(PLASTIC_STRAIN),
+    zero(DISSIPATED),
+    zero("inverse_plastic_xx"),
+    zero("inverse_plastic_yy"),
+    zero("inverse_plastic_zz"),
+    zero("inverse_plastic_xy"),
+    zero("inverse_plastic_yz"),
+    zero("inverse_plastic_xz"),
+];
+
+/// The plastic strain, and C_p⁻¹ − I; those of a body at rest where nothing is remembered.
+fn remembered<'a>(start: &Start<'a>) -> (f64, &'a [f64]) {
+    (start.memory.first().copied().unwrap_or(0.0), start.memory.get(2..).unwrap_or(&[]))
+}
+
+impl<Y: Criterion> Plastic<Y> {
+    fn returned<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+    ) -> (Strained<T>, Returned<T>) {
+        let (before, flowed) = remembered(start);
+        let strained = Strained::new(at, flowed);
+        let returned = self.criterion.returned(&self.solid, strained.volume, strained.norm(), before);
+        (strained, returned)
+    }
+
+    fn principal<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+    ) -> (Principal<T>, Returned<T>) {
+        let (before, flowed) = remembered(start);
+        let principal = Principal::new(at, flowed);
+        let returned = self.criterion.returned(&self.solid, principal.volume(), principal.norm(), before);
+        (principal, returned)
+    }
+}
+
+impl<Y: Criterion> Law for Plastic<Y> {
+    fn memory(&self) -> &[Remembered] {
+        &MEMORY
+    }
+
+    fn is_symmetric(&self) -> bool {
+        Y::ASSOCIATED
+    }
+
+    fn has_potential(&self) -> bool {
+        Y::ASSOCIATED
+    }
+
+    /// W of the elastic strain, and what flow takes in the step; their sum is stationary in the flow where that is associated.
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        let (strained, Returned { radial: Radial { p, g, .. }, dissipated, .. }) = self.returned(at, start);
+        let (bulk, shear) = (self.solid.bulk_modulus(), self.solid.shear);
+        p * p * T::lit(0.5 / bulk) + g * g * strained.square() * T::lit(0.25 / shear) + dissipated
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        let (strained, Returned { radial, .. }) = self.returned(at, start);
+        strained.stress(radial.p, radial.g)
+    }
+
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        if T::NDERIV > 0 {
+            return derivative(at, x, |at| self.stress(at, start));
+        }
+        let (principal, Returned { radial, .. }) = self.principal(at, start);
+        principal.radial_moduli(&radial).elasticity(x)
+    }
+
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        start: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        let (principal, Returned { radial, .. }) = self.principal(at, start);
+        let mut blocks = [[Tensor::zeros(); D]; D];
+        principal.radial_moduli(&radial).add_blocks(f_n, &mut blocks);
+        blocks
+    }
+
+    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+        let (principal, Returned { radial, plastic_strain, dissipated }) = self.principal(at, start);
+        let (before, flowed) = remembered(start);
+        if plastic_strain == before {
+            return;
+        }
+        if let [strain, lost, next @ ..] = next {
+            (*strain, *lost) = (plastic_strain, *lost + dissipated);
+            // Δε = ε_trial − ε
+            let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
+            let share = 1.0 - radial.g / (2.0 * self.solid.shear);
+            principal.flow(principal.deviator().map(|x| share * x + volume), flowed, next);
+        }
+    }
+}
+
+impl<Y: Criterion> Listed for Plastic<Y> {
+    type Parameters = Y::Parameters;
+    const NAME: &'static str = Y::NAME;
+
+    fn build(given: &Y::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        Y::build(given, problems, path).map(|(solid, criterion)| Self { solid, criterion })
+    }
+
+    fn example(solid: Lame) -> Self {
+        Self { solid, criterion: Y::example(&solid) }
+    }
+}

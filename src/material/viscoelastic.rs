@@ -1,0 +1,203 @@
+//! Finite viscoelasticity: Maxwell branches beside an elastic law.
+
+use super::hencky::{Principal, Radial, Strained, derivative};
+use super::plastic::zero;
+use super::{DISSIPATED, Lame, Law, Listed, Material, NeoHookean, Parameters, Remembered, Start};
+use crate::problems::Problems;
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A spring and a dashpot in a row, both for shapes alone.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "MaxwellBranch")]
+#[serde(deny_unknown_fields)]
+pub struct Branch {
+    /// The shear modulus of the spring (stress), > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub shear: f64,
+    /// The relaxation time: viscosity over shear modulus, > 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub relaxation_time: f64,
+}
+
+/// The constants of [`Viscoelastic`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "Viscoelastic")]
+#[serde(deny_unknown_fields)]
+pub struct ViscoelasticParameters {
+    /// The law that is left when all branches have relaxed; one that remembers nothing.
+    pub base: Box<Parameters>,
+    /// What relaxes beside it, 1 to 8 branches.
+    #[schemars(length(min = 1, max = 8))]
+    pub branches: Vec<Branch>,
+}
+
+/// An elastic law, and branches with strains of their own: F C_v⁻¹ Fᵀ = b_e, τ = 2G dev ε with ε = ½ ln b_e, which flow by ε̇_v = dev ε/τ_r
+/// (Reese and Govindjee, Int. J. Solids Struct. 35, 1998, with Hencky's springs and dashpots that have no viscosity in volume).
+///
+/// A step freezes C_v⁻¹, takes the trial strain, and lets it relax for Δt by the exponential map: dev ε = e^{−Δt/τ_r} dev ε_trial, which is
+/// exact where F rests, and of first order in Δt where it moves. A step has the potential W + Σ G e^{−Δt/τ_r} dev ε_trial : dev ε_trial.
+///
+/// ```
+/// use bfree::material::{Branch, Lame, Law, NeoHookean, Start, Viscoelastic};
+/// use bfree::tensor::{Deformation, Tensor};
+///
+/// // Sheared a little, and held: G∞ + G₁ e^{−t/τ} is left, in however many steps.
+/// let base = NeoHookean::ciarlet(Lame::new(10.0, 1.0)?);
+/// let law = Viscoelastic::new(base, vec![Branch { shear: 3.0, relaxation_time: 2.0 }]).ok_or("an elastic base")?;
+/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 1e-6, 0.0, 0.0));
+/// let mut memory = vec![0.0; law.memory().len()];
+/// for dt in [0.5, 1.5] {
+///     let mut next = memory.clone();
+///     law.remember(&at, &Start { dt, memory: &memory }, &mut next);
+///     memory = next;
+/// }
+/// let modulus = law.stress(&at, &Start { dt: 0.0, memory: &memory })[(0, 1)] / 1e-6;
+/// assert!((modulus - (1.0 + 3.0 * (-1.0_f64).exp())).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Viscoelastic {
+    base: Box<Material>,
+    branches: Vec<Branch>,
+}
+
+/// Branches at most.
+const MOST: usize = 8;
+
+/// Numbers of C_v⁻¹ − I.
+const SIX: usize = 6;
+
+macro_rules! names {
+    ($($branch:literal)*) => {
+        [zero(DISSIPATED), $(
+            zero(concat!("inverse_viscous_", $branch, "_xx")),
+            zero(concat!("inverse_viscous_", $branch, "_yy")),
+            zero(concat!("inverse_viscous_", $branch, "_zz")),
+            zero(concat!("inverse_viscous_", $branch, "_xy")),
+            zero(concat!("inverse_viscous_", $branch, "_yz")),
+            zero(concat!("inverse_viscous_", $branch, "_xz"))
+        ),*]
+    };
+}
+
+/// The energy lost, and C_v⁻¹ − I of every branch.
+const MEMORY: [Remembered; 1 + SIX * MOST] = names!(1 2 3 4 5 6 7 8);
+
+impl Viscoelastic {
+    /// Branches beside a law; `None` if that remembers something, or of more than eight branches.
+    pub fn new(base: impl Into<Material>, branches: Vec<Branch>) -> Option<Self> {
+        let base = base.into();
+        (base.memory().is_empty() && branches.len() <= MOST).then(|| Self { base: Box::new(base), branches })
+    }
+
+    /// Every branch with what it remembers of C_v⁻¹ − I, nothing at rest, and e^{−Δt/τ_r}.
+    fn branches<'a>(&'a self, start: &Start<'a>) -> impl Iterator<Item = (&'a Branch, &'a [f64], f64)> {
+        let (dt, memory) = (start.dt, start.memory);
+        self.branches.iter().enumerate().map(move |(i, branch)| {
+            let first = 1 + SIX * i;
+            (branch, memory.get(first..first + SIX).unwrap_or(&[]), (-dt / branch.relaxation_time).exp())
+        })
+    }
+}
+
+/// τ = 2G e^{−Δt/τ_r} dev ε
+fn relaxed<T: Real>(branch: &Branch, decay: f64) -> Radial<T> {
+    let (zero, g) = (T::zero(), T::lit(2.0 * branch.shear * decay));
+    Radial { p: zero, g, p_v: zero, p_d: zero, t_v: zero, t_d: g }
+}
+
+impl Law for Viscoelastic {
+    fn memory(&self) -> &[Remembered] {
+        MEMORY.get(..1 + SIX * self.branches.len()).unwrap_or(&MEMORY)
+    }
+
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        let springs = self
+            .branches(start)
+            .map(|(branch, flowed, decay)| Strained::new(at, flowed).square() * T::lit(branch.shear * decay));
+        springs.fold(self.base.energy(at, &Start::NONE), |sum, energy| sum + energy)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        let springs = self.branches(start).map(|(branch, flowed, decay)| {
+            let radial = relaxed(branch, decay);
+            Strained::new(at, flowed).stress(radial.p, radial.g)
+        });
+        springs.fold(self.base.stress(at, &Start::NONE), |sum, stress: Tensor<T, D>| sum + stress)
+    }
+
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        if T::NDERIV > 0 {
+            return derivative(at, x, |at| self.stress(at, start));
+        }
+        let springs = self.branches(start).map(|(branch, flowed, decay)| {
+            Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).elasticity(x)
+        });
+        springs.fold(self.base.elasticity(at, &Start::NONE, x), |sum, stress: Tensor<T, D>| sum + stress)
+    }
+
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        start: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        let mut blocks = self.base.tangent_blocks(f_n, at, &Start::NONE);
+        for (branch, flowed, decay) in self.branches(start) {
+            Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).add_blocks(f_n, &mut blocks);
+        }
+        blocks
+    }
+
+    /// The springs lose G (1 − e^{−2Δt/τ_r}) dev ε_trial : dev ε_trial.
+    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
+        let Some((lost, next)) = next.split_first_mut() else { return };
+        for ((branch, flowed, decay), next) in self.branches(start).zip(next.chunks_mut(SIX)) {
+            let principal = Principal::new(at, flowed);
+            *lost += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
+            principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), flowed, next);
+        }
+    }
+}
+
+impl Listed for Viscoelastic {
+    type Parameters = ViscoelasticParameters;
+    const NAME: &'static str = "viscoelastic";
+
+    fn build(given: &ViscoelasticParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        let (base, branches) = (format!("{path}.base"), format!("{path}.branches"));
+        let law = given.base.law(problems, &base);
+        let elastic = law.as_ref().is_none_or(|law| law.memory().is_empty());
+        problems.require(elastic, &base, "a law with memory", "must be an elastic law");
+        let count = given.branches.len();
+        let few = (1..=MOST).contains(&count);
+        problems.require(
+            few,
+            &branches,
+            format_args!("a list of {count}"),
+            format_args!("must have 1 to {MOST} entries"),
+        );
+        let mut good = true;
+        for (i, branch) in given.branches.iter().enumerate().take(MOST) {
+            good &= problems.positive(&format!("{branches}[{i}].shear"), branch.shear);
+            good &= problems.positive(&format!("{branches}[{i}].relaxation_time"), branch.relaxation_time);
+        }
+        law.filter(|_| good && few).and_then(|law| Self::new(law, given.branches.clone()))
+    }
+
+    /// Half of G relaxes.
+    fn example(lame: Lame) -> Self {
+        let Lame { lambda, shear } = lame;
+        let base = NeoHookean::ciarlet(Lame { lambda: lambda + shear / 3.0, shear: 0.5 * shear });
+        let branch = |relaxation_time| Branch { shear: 0.25 * shear, relaxation_time };
+        Self { base: Box::new(base.into()), branches: vec![branch(0.5), branch(5.0)] }
+    }
+}

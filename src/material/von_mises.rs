@@ -1,0 +1,65 @@
+//! Von Mises' criterion with isotropic hardening, associated: metals.
+
+use super::hencky::Radial;
+use super::{Criterion, Hardening, Lame, LameParameters, Returned};
+use crate::problems::Problems;
+use crate::scalar::Real;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Flow where q = √(3/2) ‖dev τ‖ reaches σ_y(p), along dev τ, p accumulating √(2/3) of the plastic strain; τ is Kirchhoff's stress J σ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VonMises {
+    /// σ_y(p)
+    pub yield_stress: Hardening,
+}
+
+/// The constants of [`VonMises`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "VonMises")]
+#[serde(deny_unknown_fields)]
+pub struct VonMisesParameters {
+    /// The elastic constants.
+    pub elastic: LameParameters,
+    /// The yield stress in tension, as a function of the accumulated plastic strain; of the Kirchhoff stress J σ, which metals have nearly
+    /// in common with the Cauchy stress.
+    pub yield_stress: Hardening,
+}
+
+impl Criterion for VonMises {
+    type Parameters = VonMisesParameters;
+    const NAME: &'static str = "von Mises";
+    const ASSOCIATED: bool = true;
+
+    fn build(given: &VonMisesParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
+        let solid = given.elastic.lame(problems, &format!("{path}.elastic"));
+        let stiffness = 3.0 * solid.map_or(f64::INFINITY, |solid| solid.shear);
+        let good = given.yield_stress.check(stiffness, problems, &format!("{path}.yield_stress"));
+        solid.filter(|_| good).map(|solid| (solid, Self { yield_stress: given.yield_stress }))
+    }
+
+    fn example(solid: &Lame) -> Self {
+        let g = solid.shear;
+        let yield_stress = Hardening { initial: 0.1 * g, linear: 0.05 * g, saturation: 0.05 * g, rate: 5.0 };
+        Self { yield_stress }
+    }
+
+    /// q_trial − 3G Δp = σ_y(p_n + Δp); dev τ is scaled by 1 − 3G Δp/q_trial, and t = √(2/3) q.
+    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
+        let (shear, p_n) = (solid.shear, T::lit(before));
+        let trial = d * T::lit(6.0_f64.sqrt() * shear);
+        if trial.value() <= self.yield_stress.strength(before) {
+            return Returned::elastic(solid, v, before);
+        }
+        let (delta, compliance) = self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n);
+        let elastic = Radial::elastic(solid, v);
+        let radial = Radial {
+            g: elastic.g * (T::one() - delta * T::lit(3.0 * shear) / trial),
+            t_d: elastic.g * (T::one() - compliance * T::lit(3.0 * shear)),
+            ..elastic
+        };
+        let plastic_strain = p_n + delta;
+        let dissipated = self.yield_stress.work(plastic_strain) - self.yield_stress.work(p_n);
+        Returned { radial, plastic_strain, dissipated }
+    }
+}

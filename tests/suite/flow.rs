@@ -1,0 +1,376 @@
+//! Laws that flow: closed forms at a point, and whole bodies that yield.
+
+use crate::support::{Failure, Random, scene};
+use bfree::checkpoint::{Checkpoints, Identity, restore};
+use bfree::field::Field;
+use bfree::material::{
+    Branch, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters, Plastic,
+    Start, Viscoelastic, VonMises,
+};
+use bfree::output::history::Energies;
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::scene::Problems;
+use bfree::simulation::Simulation;
+use bfree::solver::Krylov;
+use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity};
+use serde_json::Value;
+use std::num::NonZeroU64;
+
+/// A point that is deformed step by step, and remembers.
+struct Point<L> {
+    law: L,
+    memory: Vec<f64>,
+}
+
+impl<L: Law> Point<L> {
+    fn new(law: L) -> Self {
+        let memory = law.memory().iter().map(|one| one.at_rest).collect();
+        Self { law, memory }
+    }
+
+    /// The Kirchhoff stress at the end of a step to F.
+    fn step<const D: usize>(&mut self, f: Tensor<f64, D>, dt: f64) -> Tensor<f64, D> {
+        let at = Deformation::new(f - identity());
+        let start = Start { dt, memory: &self.memory };
+        let stress = f * self.law.stress(&at, &start) * f.transpose();
+        let mut next = self.memory.clone();
+        self.law.remember(&at, &start, &mut next);
+        self.memory = next;
+        stress
+    }
+
+    fn recall(&self, name: &str) -> Option<f64> {
+        Start { dt: 0.0, memory: &self.memory }.recall(&self.law, name)
+    }
+}
+
+fn solid() -> Result<Lame, Failure> {
+    Ok(Lame::from_young_poisson(1000.0, 0.3)?)
+}
+
+fn von_mises(yield_stress: Hardening) -> Result<Plastic<VonMises>, Failure> {
+    Ok(Plastic { solid: solid()?, criterion: VonMises { yield_stress } })
+}
+
+/// Uniaxial strain ε = ln λ: q = 2G ε until σ₀; then Δp = (2G ε − σ₀)/(3G + H), q = σ₀ + H p, and τ = K ε + ⅔ q. Back, q falls by 2G for a strain
+/// of 1 until it is −σ_y.
+#[test]
+fn uniaxial_yield_and_reversal_have_a_closed_form() -> Result<(), Failure> {
+    let (initial, linear) = (20.0, 50.0);
+    let law = von_mises(Hardening { initial, linear, saturation: 0.0, rate: 0.0 })?;
+    let (bulk, shear) = (law.solid.bulk_modulus(), law.solid.shear);
+    let mut point = Point::new(law);
+    let (mut p, mut q, mut before): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let path = [0.01, 0.02, 0.05, 0.1, 0.09, 0.05, 0.0, -0.1, -0.2, -0.1, 0.3];
+    for strain in path {
+        let trial: f64 = q + 2.0 * shear * (strain - before);
+        let flow = ((trial.abs() - initial - linear * p) / (3.0 * shear + linear)).max(0.0);
+        (p, q, before) = (p + flow, trial - 3.0 * shear * flow * trial.signum(), strain);
+        let tau = point.step(Tensor::<f64, 1>::from_element(strain.exp()), 1.0)[0];
+        let exact = bulk * strain + q / 1.5;
+        assert!((tau - exact).abs() < 1e-12 * bulk, "{tau} instead of {exact} at {strain}");
+        assert!((point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN) - p).abs() < 1e-13);
+    }
+    assert!(p > 0.4, "the path is meant to flow: {p}");
+    Ok(())
+}
+
+/// Proportional stretching at constant volume, by one step or by many: radial return is exact, and Voce's strength is met at its own p.
+#[test]
+fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
+    let hardening = Hardening { initial: 20.0, linear: 10.0, saturation: 30.0, rate: 8.0 };
+    let stretch =
+        |x: f64| Tensor::<f64, 3>::from_diagonal(&Vector::from([x.exp(), (-0.5 * x).exp(), (-0.5 * x).exp()]));
+    let mut results = Vec::new();
+    for steps in [1, 40] {
+        let mut point = Point::new(von_mises(hardening)?);
+        let mut tau = Tensor::zeros();
+        for step in 1..=steps {
+            tau = point.step(stretch(0.5 * f64::from(step) / f64::from(steps)), 1.0);
+        }
+        let p = point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN);
+        let q = tau[(0, 0)] - tau[(1, 1)];
+        assert!((q / hardening.strength(p) - 1.0).abs() < 1e-12, "{q} at {p}");
+        // ε = p + q/(3G)
+        assert!((p + q / (3.0 * solid()?.shear) - 0.5).abs() < 1e-12);
+        let flowed = &point.memory[2..];
+        let volume = (1.0 + flowed[0]) * (1.0 + flowed[1]) * (1.0 + flowed[2]);
+        assert!((volume - 1.0).abs() < 1e-13, "det C_p = 1: {volume}");
+        // All that was spent: ∫ σ_y dp.
+        let lost = point.recall("dissipated").unwrap_or(f64::NAN);
+        assert!((lost / hardening.work(p) - 1.0).abs() < 1e-12);
+        results.push(q);
+    }
+    assert!((results[0] / results[1] - 1.0).abs() < 1e-12);
+    Ok(())
+}
+
+/// On the cone √J₂ + η p = ξ c, and the flow dilates by η̄/√… of its shear: tr Δε_p = η̄ Δγ with ε̄ = ξ Δγ. Beyond, the apex p = c ξ/η.
+#[test]
+fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure> {
+    let (phi, psi, c) = (35.0_f64, 12.0_f64, 5.0);
+    let slope = |angle: f64| 6.0 * angle.to_radians().sin() / (3.0_f64.sqrt() * (3.0 - angle.to_radians().sin()));
+    let (eta, eta_bar) = (slope(phi), slope(psi));
+    let xi = eta / phi.to_radians().tan();
+    let law = Plastic { solid: solid()?, criterion: DruckerPrager::new(phi, psi, Hardening::perfect(c)) };
+    let mut random = Random(5);
+    let mut number = || random.below(2_000_001) as f64 * 1e-6 - 1.0;
+    let (mut on_cone, mut at_apex) = (0, 0);
+    for _ in 0..200 {
+        let f = identity::<f64, 3>() * (1.0 + 0.05 * number()) + Tensor::from_fn(|_, _| 0.05 * number());
+        let mut point = Point::new(law);
+        let tau = point.step(f, 1.0);
+        let p = tau.trace() / 3.0;
+        let deviator = tau - identity::<f64, 3>() * p;
+        let root_j2 = deviator.norm() / 2.0_f64.sqrt();
+        let flow = point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN);
+        if flow == 0.0 {
+            assert!(root_j2 + eta * p <= xi * c + 1e-12);
+            continue;
+        }
+        assert!((root_j2 + eta * p - xi * c).abs() < 1e-11, "not on the surface: {}", root_j2 + eta * p - xi * c);
+        // −½ ln det C_p⁻¹ is the plastic change of volume.
+        let [xx, yy, zz, xy, yz, xz] = point.memory[2..8].try_into()?;
+        let inverse_plastic = identity::<f64, 3>() + Tensor::<f64, 3>::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let dilated = -0.5 * determinant(&inverse_plastic).ln();
+        if root_j2 > 1e-9 {
+            assert!((dilated - eta_bar * flow / xi).abs() < 1e-12, "{dilated} for {flow}");
+            on_cone += 1;
+        } else {
+            assert!((p - c * xi / eta).abs() < 1e-11 && dilated > 0.0);
+            at_apex += 1;
+        }
+    }
+    assert!(on_cone > 20 && at_apex > 20, "{on_cone} {at_apex}");
+    Ok(())
+}
+
+/// G∞ + Σ G e^{−t/τ_r} of what is held, however long the steps.
+#[test]
+fn relaxation_is_exact() -> Result<(), Failure> {
+    let branches = vec![Branch { shear: 3.0, relaxation_time: 0.5 }, Branch { shear: 2.0, relaxation_time: 20.0 }];
+    let law = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?), branches.clone()).ok_or("elastic")?;
+    let strain = 1e-7;
+    let f = identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0);
+    let mut point = Point::new(law);
+    let mut time = 0.0;
+    for dt in [0.0, 1e-3, 0.1, 1.0, 7.0, 30.0] {
+        time += dt;
+        let modulus = point.step(f, dt)[(0, 1)] / strain;
+        let exact = branches.iter().fold(1.0, |sum, one| sum + one.shear * (-time / one.relaxation_time).exp());
+        assert!((modulus / exact - 1.0).abs() < 1e-8, "{modulus} instead of {exact} at {time}");
+    }
+    // At large strain, in the axes of the strain: the difference of two principal stresses of a branch falls by e^{−t/τ_r}.
+    let only = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?), vec![branches[0]]).ok_or("elastic")?;
+    let base = Point::new(Material::from(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?)));
+    let f = Tensor::<f64, 3>::new(1.5, 0.3, 0.0, -0.2, 0.8, 0.1, 0.0, 0.0, 1.1);
+    let (mut point, mut base) = (Point::new(only), base);
+    let elastic = base.step(f, 0.0);
+    let [at_once, later] = [0.0, 0.8].map(|dt| point.step(f, dt) - elastic);
+    assert!((later - at_once * (-0.8_f64 / 0.5).exp()).norm() < 1e-13 * at_once.norm());
+    Ok(())
+}
+
+/// Under a constant shear stress γ(t) = (τ/G∞) (1 − G₁/(G∞ + G₁) e^{−t/τ_c}), τ_c = τ_r (G∞ + G₁)/G∞: of first order in Δt, and its limit exact.
+#[test]
+fn creep_converges_to_its_closed_form() -> Result<(), Failure> {
+    let (base, shear, relaxation_time, time, stress) = (1.0, 3.0, 0.5, 1.5, 1e-8);
+    let crept = |steps: u32| -> Result<f64, Failure> {
+        let branch = Branch { shear, relaxation_time };
+        let law = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, base)?), vec![branch]).ok_or("elastic")?;
+        let (mut point, mut strain) = (Point::new(law), 0.0);
+        // The load comes at once.
+        for dt in std::iter::once(0.0).chain(std::iter::repeat_n(time / f64::from(steps), steps as usize)) {
+            for _ in 0..4 {
+                let f = identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0);
+                let (at, start) = (Deformation::new(f - identity()), Start { dt, memory: &point.memory });
+                let tau = (f * point.law.stress(&at, &start) * f.transpose())[(0, 1)];
+                strain += (stress - tau) / (base + shear * (-dt / relaxation_time).exp());
+            }
+            point.step(identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0), dt);
+        }
+        Ok(strain * base / stress)
+    };
+    let exact = 1.0 - shear / (base + shear) * (-time * base / (relaxation_time * (base + shear))).exp();
+    let coarse = (0..7).map(|k| crept(16 << k)).collect::<Result<Vec<_>, _>>()?;
+    let ratio = (coarse[5] - exact) / (coarse[6] - exact);
+    assert!((1.9..2.1).contains(&ratio), "of first order: {ratio}");
+    // Romberg's extrapolation to Δt = 0.
+    let mut row = coarse;
+    for order in 1..7 {
+        let factor = f64::from(1 << order);
+        row = row.windows(2).map(|pair| (factor * pair[1] - pair[0]) / (factor - 1.0)).collect();
+    }
+    assert!((row[0] / exact - 1.0).abs() < 1e-8, "{} instead of {exact}", row[0]);
+    Ok(())
+}
+
+const METAL: &str = r#"bodies.0.material={"von_mises":{"elastic":{"young":1.0985,"poisson":0.3},"yield_stress":{"initial":0.12,"linear":0.1,"saturation":0.05,"rate":10}}}"#;
+const SOIL: &str = r#"bodies.0.material={"drucker_prager":{"elastic":{"young":1.0985,"poisson":0.3},"friction":25,"dilatancy":5,"cohesion":{"initial":0.07,"linear":0.1}}}"#;
+const POLYMER: &str = r#"bodies.0.material={"viscoelastic":{"base":{"neo_hookean":{"young":0.6,"poisson":0.3}},"branches":[{"shear":0.2,"relaxation_time":0.3},{"shear":0.1,"relaxation_time":3}]}}"#;
+
+/// Cook's membrane, coarse, in load steps.
+fn membrane(material: &str, steps: u32, more: &[&str]) -> Result<Simulation<2>, Failure> {
+    let step = format!("time.step={}", 1.0 / f64::from(steps));
+    scene("cook.json", &[&["grid.spacing=8", material, &step, "output={}"], more].concat())
+}
+
+fn run(simulation: &mut Simulation<2>) -> Result<(Vec<usize>, f64), Failure> {
+    let (mut iterations, mut yielding) = (Vec::new(), 0.0_f64);
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        let report = simulation.advance()?;
+        assert!(report.failed.is_empty(), "{:?}", report.failed);
+        iterations.push(report.newton.history.iterations.len());
+        yielding = yielding.max(report.yielding);
+    }
+    Ok((iterations, yielding))
+}
+
+#[test]
+fn bodies_that_flow_have_exact_tangents_and_converge() -> Result<(), Failure> {
+    for material in [METAL, SOIL, POLYMER] {
+        for precision in ["double", "mixed"] {
+            let mut simulation = membrane(material, 4, &[&format!("solver.krylov.precision=\"{precision}\"")])?;
+            simulation.settings.check_tangent = NonZeroU64::new(1);
+            let (iterations, yielding) = run(&mut simulation)?;
+            assert!(iterations.iter().all(|&count| count <= 12), "{material}: {iterations:?}");
+            assert_eq!(yielding > 0.02, material != POLYMER, "{yielding}");
+            let method = if material == SOIL { Krylov::Gmres { restart: 30 } } else { Krylov::ConjugateGradient };
+            assert_eq!(simulation.krylov().0, method);
+        }
+    }
+    Ok(())
+}
+
+/// stored + lost − work: the trapezoidal rule of the work, and Δt of relaxation, go with the steps.
+#[test]
+fn energy_is_stored_or_lost() -> Result<(), Failure> {
+    for (material, order) in [(METAL, 1.5), (SOIL, 0.7), (POLYMER, 0.7)] {
+        let defect = |steps| -> Result<f64, Failure> {
+            let mut simulation = membrane(material, steps, &["ghost_stiffness=0"])?;
+            let reference = Reference::of(&simulation);
+            run(&mut simulation)?;
+            let energies = Energies::of(&simulation, &reference);
+            assert!(energies.dissipated > 0.01 * energies.external, "{energies:?}");
+            Ok(energies.balance.abs() / energies.external)
+        };
+        let (coarse, fine) = (defect(10)?, defect(20)?);
+        assert!(fine < 0.02 && coarse / fine > f64::powf(2.0, order), "{material}: {coarse} {fine}");
+    }
+    Ok(())
+}
+
+#[test]
+fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Failure> {
+    for material in [METAL, SOIL, POLYMER] {
+        let mut bits: Vec<Vec<u64>> = Vec::new();
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+            let memory = pool.install(|| -> Result<_, String> {
+                let mut simulation = membrane(material, 4, &[]).map_err(|error| error.to_string())?;
+                run(&mut simulation).map_err(|error| error.to_string())?;
+                Ok(simulation.particles.by_id().memory)
+            })?;
+            bits.push(memory.iter().map(|x| x.to_bits()).collect());
+        }
+        assert_eq!(bits[0], bits[1]);
+        let (folder, start) = (tempfile::tempdir()?, membrane(material, 4, &[])?);
+        let identity = Identity::new(Value::Null, &start.particles);
+        let settings = OutputSettings {
+            directory: folder.path().to_owned(),
+            fields: vec![Field::PlasticStrain, Field::DissipatedDensity],
+            snapshot_every: None,
+            probes: vec![],
+            end_time: 1.0,
+            audience: Audience::Nobody,
+        };
+        let mut simulation = start.clone();
+        let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+        for _ in 0..2 {
+            simulation.advance()?;
+        }
+        let mut checkpoints = Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None);
+        checkpoints.write(&simulation, &mut recorder)?;
+        let mut continued = start.clone();
+        restore(folder.path(), &identity, &mut continued)?;
+        run(&mut continued)?;
+        let memory: Vec<u64> = continued.particles.by_id().memory.iter().map(|x| x.to_bits()).collect();
+        assert_eq!(memory, bits[0]);
+        let (particles, width) = (&continued.particles, continued.particles.remembered);
+        for (field, name) in [(Field::PlasticStrain, PLASTIC_STRAIN), (Field::DissipatedDensity, DISSIPATED)] {
+            let shown = field.values(&continued, &Reference::of(&continued))?;
+            let place = continued.bodies[0].law.memory().iter().position(|one| one.name == name);
+            let solid = particles.solid_places();
+            let kept = |&p: &u32| place.map_or(0.0, |place| particles.memory[p as usize * width + place]);
+            assert_eq!(shown, solid.iter().map(kept).collect::<Vec<_>>());
+            assert_eq!(shown.iter().any(|x| *x > 0.0), place.is_some());
+        }
+        let header = std::fs::read_to_string(folder.path().join("history.csv"))?;
+        let header = header.lines().next().unwrap_or_default().to_owned();
+        assert!(header.contains("dissipated"), "{header}");
+        assert_eq!(header.contains("yielding"), material != POLYMER, "{header}");
+    }
+    Ok(())
+}
+
+#[test]
+fn conjugate_gradients_are_refused_where_a_law_makes_the_tangent_unsymmetric() -> Result<(), Failure> {
+    let method = r#"solver.krylov.method="conjugate_gradient""#;
+    let refused = membrane(SOIL, 4, &[method]).err().ok_or("friction")?.to_string();
+    assert!(refused.contains("friction") && refused.contains("gmres"), "{refused}");
+    assert!(membrane(METAL, 4, &[method]).is_ok());
+    Ok(())
+}
+
+#[test]
+fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
+    let wrong = [
+        (
+            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":0}}}"#,
+            "yield_stress.initial",
+            "> 0",
+        ),
+        (
+            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-2}}}"#,
+            "yield_stress.saturation",
+            "-initial = -1",
+        ),
+        (
+            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-0.5,"rate":10}}}"#,
+            "yield_stress.rate",
+            "softens faster",
+        ),
+        (
+            r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}}"#,
+            "friction",
+            "< 90",
+        ),
+        (
+            r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":20,"dilatancy":30,"cohesion":{"initial":1}}}"#,
+            "dilatancy",
+            "between 0 and the friction, 20",
+        ),
+        (r#"{"viscoelastic":{"base":{"neo_hookean":{"young":1,"poisson":0.3}},"branches":[]}}"#, "branches", "1 to 8"),
+        (
+            r#"{"viscoelastic":{"base":{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1}}},"branches":[{"shear":1,"relaxation_time":1}]}}"#,
+            "base",
+            "elastic",
+        ),
+        (r#"{"mooney_rivlin":{"c1":1,"c2":1,"bulk":6}}"#, "bulk", "greater than"),
+        (r#"{"ogden":{"terms":[{"modulus":1,"exponent":-2}],"bulk":6}}"#, "terms[0].modulus", "sign"),
+        (r#"{"ogden":{"terms":[{"modulus":1,"exponent":2}],"bulk":0.5}}"#, "bulk", "greater than"),
+    ];
+    for (text, key, words) in wrong {
+        let (mut problems, given) = (Problems::default(), serde_json::from_str::<Parameters>(text)?);
+        assert!(given.law(&mut problems, "material").is_none(), "{text}");
+        let message = problems.to_string();
+        assert!(message.contains(key) && message.contains(words), "{text}: {message}");
+        assert_eq!(problems.list.len(), 1, "{message}");
+    }
+    // A criterion as a scene writes it is the one in code.
+    let given: Parameters =
+        serde_json::from_str(r#"{"von_mises":{"elastic":{"young":1000,"poisson":0.3},"yield_stress":{"initial":2}}}"#)?;
+    let law = given.law(&mut Problems::default(), "material").ok_or("good constants")?;
+    assert_eq!(law, von_mises(Hardening::perfect(2.0))?.into());
+    Ok(())
+}

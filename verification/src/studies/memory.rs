@@ -1,0 +1,200 @@
+//! Laws with memory at a point: each regime of the return maps, in which derivatives must hold as they do in elastic ones.
+//!
+//! Tangents are compared with dual numbers through the local solve. What is remembered is judged by what it must give back: at the end of a
+//! step the new memory and no time give the stress of the step again.
+
+use super::{Effort, Outcome, StudyError};
+use crate::random::Random;
+use crate::report::{Bound, Report};
+use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, Start, admissible};
+use bfree::tensor::{Deformation, Tensor, contract, identity, inverse};
+use num_dual::{Dual2_64, Dual64};
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "return maps and relaxation: tangents, potentials and memory in every regime";
+
+/// What every derivative must meet, as `--check-tangent` asks at most.
+const EXACT: f64 = 1e-10;
+
+/// States tried in each regime.
+const TRIES: u32 = 20;
+
+/// Which laws flow in the steps of a regime.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Flows {
+    /// Plastic ones, in every step.
+    Always,
+    /// As above, but for those that pressure strengthens.
+    Metals,
+    /// None.
+    Never,
+    /// Some, in some steps.
+    Sometimes,
+}
+
+/// How a step reaches its end: what happened before, over which Δt it goes, and where it ends.
+struct Regime {
+    name: &'static str,
+    /// Whether a step before it has left the body flowed.
+    flowed: bool,
+    dt: f64,
+    /// What deforms the body then: all stretches, how much longer the first and the third are, and anything.
+    stretch: f64,
+    first: f64,
+    third: f64,
+    size: f64,
+    flows: Flows,
+}
+
+const fn regime(name: &'static str, flowed: bool, [stretch, first, size]: [f64; 3], flows: Flows) -> Regime {
+    Regime { name, flowed, dt: 1.0, stretch, first, third: 0.0, size, flows }
+}
+
+const REGIMES: &[Regime] = &[
+    regime("elastic", false, [1.0, 0.0, 1e-3], Flows::Never),
+    regime("yielding", false, [0.9, 0.4, 0.02], Flows::Always),
+    regime("at yield", true, [1.0, 0.0, 1e-6], Flows::Sometimes),
+    regime("reversal", true, [1.15, -0.4, 0.02], Flows::Metals),
+    regime("apex", false, [1.2, 0.0, 0.02], Flows::Sometimes),
+    Regime { third: 0.3, ..regime("double stretches", false, [0.9, 1e-9, 0.0], Flows::Sometimes) },
+    Regime { third: 0.3, ..regime("double, flowed", true, [0.9, 1e-5, 0.0], Flows::Sometimes) },
+    regime("triple stretches", false, [0.9, 0.0, 1e-10], Flows::Sometimes),
+    regime("triple, flowed", true, [0.9, 0.0, 1e-10], Flows::Sometimes),
+    Regime { dt: 1e-3, ..regime("dt=1e-3", true, [0.9, 0.3, 0.02], Flows::Sometimes) },
+    Regime { dt: 1e3, ..regime("dt=1e3", true, [0.9, 0.3, 0.02], Flows::Sometimes) },
+];
+
+/// Runs the study.
+pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
+    let title = "laws with memory: worst relative error of a regime";
+    let mut report = Report::new(title, &["quantity", "law", "D", "regime"]);
+    for (name, law) in Material::examples(Lame::from_young_poisson(1000.0, 0.3)?) {
+        if !law.memory().is_empty() {
+            dimension::<1>(name, &law, &mut report)?;
+            dimension::<2>(name, &law, &mut report)?;
+            dimension::<3>(name, &law, &mut report)?;
+        }
+    }
+    Ok(Outcome { reports: vec![report], ..Outcome::default() })
+}
+
+/// F of a regime: its stretches, then anything small.
+fn end<const D: usize>(regime: &Regime, random: &mut Random) -> Tensor<f64, D> {
+    let longer = [regime.first, 0.0, regime.third];
+    let stretch = |i: usize| regime.stretch * (1.0 + longer[i]);
+    let stretches = Tensor::from_fn(|i, k| if i == k { stretch(i) } else { 0.0 });
+    (identity::<f64, D>() + random.tensor() * regime.size) * stretches
+}
+
+fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) -> Result<(), StudyError> {
+    let rest: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
+    let plastic = Start { dt: 0.0, memory: &rest }.recall(law, PLASTIC_STRAIN).is_some();
+    for regime in REGIMES {
+        let mut random = Random::new(17);
+        let (mut memory, mut f_0) = (rest.clone(), identity::<f64, D>());
+        if regime.flowed {
+            f_0 = end(&regime_of_flow(), &mut random);
+            law.remember(&Deformation::new(f_0 - identity()), &Start { dt: 1.0, memory: &rest }, &mut memory);
+        }
+        let start = Start { dt: regime.dt, memory: &memory };
+        let mut worst = [0.0; QUANTITIES.len()];
+        let mut flowed = 0;
+        for _ in 0..TRIES {
+            let f = end(regime, &mut random) * f_0;
+            let (errors, flows) = errors(law, &start, f - identity(), &mut random)?;
+            flowed += u32::from(flows);
+            worst.iter_mut().zip(errors).for_each(|(worst, error)| *worst = worse(*worst, error));
+        }
+        let dimension = D.to_string();
+        for ((quantity, bound), worst) in QUANTITIES.iter().zip(worst) {
+            report.push(&[quantity, name, &dimension, regime.name], worst, Bound::AtMost(*bound));
+        }
+        let bound = match regime.flows {
+            Flows::Always => Some(Bound::AtLeast(1.0)),
+            Flows::Metals => law.is_symmetric().then_some(Bound::AtLeast(1.0)),
+            Flows::Never => Some(Bound::AtMost(0.0)),
+            Flows::Sometimes => None,
+        };
+        if let Some(bound) = bound.filter(|_| plastic) {
+            let share = f64::from(flowed) / f64::from(TRIES);
+            report.push(&["share of steps that flow", name, &dimension, regime.name], share, bound);
+        }
+    }
+    Ok(())
+}
+
+/// The step before, in the regimes that have one.
+fn regime_of_flow() -> Regime {
+    regime("before", false, [0.95, 0.3, 0.1], Flows::Always)
+}
+
+/// What is measured, and what is allowed.
+const QUANTITIES: [(&str, f64); 7] = [
+    ("C:X against dual(S)", EXACT),
+    ("blocks against C:X", EXACT),
+    ("S against dual(W)", EXACT),
+    // Where eigenvalues are within 1e-5 a second divided difference has 11 digits.
+    ("dual2(W) against dual(P)", 1e-9),
+    ("S of the new memory", EXACT),
+    ("energy gained by flow", 1e-14),
+    ("symmetry of the tangent", EXACT),
+];
+
+/// NaN if either is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// Errors of all [`QUANTITIES`], 0 of those that the law does not have, and whether it flowed.
+fn errors<const D: usize>(
+    law: &Material,
+    start: &Start<'_>,
+    h: Tensor<f64, D>,
+    random: &mut Random,
+) -> Result<([f64; QUANTITIES.len()], bool), StudyError> {
+    let at = admissible(h)?;
+    let (f, delta_f) = (at.f, random.tensor::<D>());
+    let delta_f = delta_f * f;
+    let (stress, dual) = (law.stress(&at, start), Deformation::new(h.zip_map(&delta_f, Dual64::new)));
+    let dual_stress = law.stress(&dual, start);
+    let piola = (dual.f * dual_stress).map(|x| x.eps);
+    let dual_stress = dual_stress.map(|x| x.eps);
+    let strain = f.transpose() * delta_f;
+    let elasticity = law.elasticity(&at, start, &strain);
+    let stiffness = law.elasticity(&at, start, &(f.transpose() * f)).norm();
+
+    let f_n = inverse(&(identity::<f64, D>() + random.tensor() * (0.3 / D as f64))) * f;
+    let blocks = law.tangent_blocks(&f_n, &at, start);
+    let mut block: f64 = 0.0;
+    for k in 0..D {
+        for l in 0..D {
+            let unit = |k: usize| f_n.row(k).transpose();
+            let expected = f * law.tangent_density(&at, start, &unit(k), &unit(l)) * f.transpose();
+            block = worse(block, (blocks[k][l] - expected).norm() / stiffness);
+        }
+    }
+
+    let work = (f * stress).norm() * delta_f.norm() + piola.norm() * delta_f.norm();
+    let (mut potential, mut curvature, mut asymmetry) = (0.0, 0.0, 0.0);
+    if law.has_potential() {
+        potential = (law.energy(&dual, start).eps - contract(&(f * stress), &delta_f)).abs() / work;
+        let second = Deformation::new(h.zip_map(&delta_f, |h, d| Dual2_64::new(h, d, 0.0)));
+        curvature = (law.energy(&second, start).v2 - contract(&piola, &delta_f)).abs() / work;
+    }
+    if law.is_symmetric() {
+        let other = f.transpose() * random.tensor::<D>() * f;
+        let (one, two) = (contract(&elasticity, &other), contract(&law.elasticity(&at, start, &other), &strain));
+        asymmetry = (one - two).abs() / (elasticity.norm() * other.norm());
+    }
+
+    let mut next = start.memory.to_vec();
+    law.remember(&at, start, &mut next);
+    let after = Start { dt: 0.0, memory: &next };
+    let kept = (law.stress(&at, &after) - stress).norm() / (stress.norm() + 1e-3 * stiffness);
+    let lost = |start: &Start<'_>| start.recall(law, DISSIPATED).unwrap_or(0.0);
+    let gained = (lost(start) - lost(&after)).max(0.0) / stiffness;
+    let strain = |start: &Start<'_>| start.recall(law, PLASTIC_STRAIN).unwrap_or(0.0);
+    let flows = strain(&after) > strain(start);
+    let tangent = (elasticity - dual_stress).norm() / dual_stress.norm();
+    Ok(([tangent, block, potential, curvature, kept, gained, asymmetry], flows))
+}
