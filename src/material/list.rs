@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// What a law of the list has beside its formulas.
 pub trait Listed: Law + Sized {
-    /// What a scene writes of it: the doc comments of the fields are the manual. Isotropic laws share [`LameParameters`].
+    /// What a scene writes of it: the doc comments of the fields are the manual. Isotropic laws share [`LameParameters`](super::LameParameters).
     type Parameters;
 
     /// Its name in reports.

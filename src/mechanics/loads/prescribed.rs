@@ -120,7 +120,7 @@ pub struct PrescribedDof {
     pub node: usize,
     /// Component.
     pub component: usize,
-    /// Which of [`Loads::prescribed`] holds it.
+    /// Which of [`Loads::prescribed`](super::Loads::prescribed) holds it.
     pub owner: usize,
     /// Whether the owner moves (a curve) or rests.
     pub moving: bool,
