@@ -193,6 +193,14 @@ class Particles:
         """W, per reference volume, (n,)."""
 
     @property
+    def plastic_strain(self) -> NDArray[np.float64]:
+        """(n,), accumulated plastic strain; 0 of laws that have none."""
+
+    @property
+    def dissipated_density(self) -> NDArray[np.float64]:
+        """(n,), energy per reference volume that flow and relaxation have taken; 0 of elastic laws."""
+
+    @property
     def mass(self) -> NDArray[np.float64]:
         """(n,)"""
 
