@@ -37,6 +37,25 @@ impl<T: DualNumCopy> Real for T {
     }
 }
 
+/// The root x of r(x) = 0 with all derivatives that `T` carries, from its value, found by whatever means, and dr/dx there: what a law that
+/// solves something needs to be differentiated (implicit function theorem). r sees with `T` what it depends on.
+///
+/// Each step of Newton's method, with the slope fixed, makes one more order of the derivatives right; the first polishes the value.
+///
+/// ```
+/// use bfree::scalar::{Real, implicit};
+/// use num_dual::Dual64;
+///
+/// // x³ = a at a = 8: dx/da = 1/(3x²)
+/// let a = Dual64::lit(8.0).derivative();
+/// let x = implicit(2.0, 12.0, |x| x * x * x - a);
+/// assert_eq!((x.value(), x.eps), (2.0, 1.0 / 12.0));
+/// ```
+pub fn implicit<T: Real>(root: f64, slope: f64, residual: impl Fn(T) -> T) -> T {
+    let inverse_slope = T::lit(slope.recip());
+    (0..=T::NDERIV).fold(T::lit(root), |x, _| x - residual(x) * inverse_slope)
+}
+
 /// Sums and products of one kind of number, so that a formula written once serves single numbers and vector lanes.
 ///
 /// ```

@@ -1,9 +1,7 @@
 //! The law of a body: one of the shipped ones, or that of an energy in Python.
 
 use crate::energy::Recorded;
-use bfree::material::{ClosedTangent, FromEnergy, Material, Remembered, Start};
-use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector};
+use bfree::material::{FromEnergy, Law as _, Material};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use verification::check_material;
@@ -60,62 +58,14 @@ pub enum BodyLaw {
     Energy(FromEnergy<Recorded>),
 }
 
-/// The call with whichever law it is.
-macro_rules! either {
-    ($law:expr, $one:ident => $call:expr) => {
-        match $law {
-            BodyLaw::Shipped($one) => $call,
-            BodyLaw::Energy($one) => $call,
-        }
-    };
-}
-
 /// All of it is the law's own; as one of the shipped ones it has their fast loops.
 impl bfree::material::Law for BodyLaw {
-    fn memory(&self) -> &[Remembered] {
-        either!(self, law => law.memory())
-    }
-    fn is_symmetric(&self) -> bool {
-        either!(self, law => law.is_symmetric())
-    }
-    fn has_potential(&self) -> bool {
-        either!(self, law => law.has_potential())
-    }
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        either!(self, law => bfree::material::Law::energy(law, at, start))
-    }
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        either!(self, law => bfree::material::Law::stress(law, at, start))
-    }
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        either!(self, law => bfree::material::Law::elasticity(law, at, start, x))
-    }
-    fn tangent_density<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
-        either!(self, law => bfree::material::Law::tangent_density(law, at, start, v, b))
-    }
-    fn closed<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        volume: f64,
-    ) -> Option<ClosedTangent<f64, D>> {
-        either!(self, law => bfree::material::Law::closed(law, f_n, at, volume))
-    }
-    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-        either!(self, law => law.remember(at, start, next));
-    }
+    bfree::law_of_variants!(Self: Shipped, Energy);
+
     fn shipped(&self) -> Option<&Material> {
-        either!(self, law => law.shipped())
+        match self {
+            Self::Shipped(law) => law.shipped(),
+            Self::Energy(_) => None,
+        }
     }
 }

@@ -75,7 +75,6 @@ impl DruckerPrager {
 impl Criterion for DruckerPrager {
     type Parameters = DruckerPragerParameters;
     const NAME: &'static str = "Drucker-Prager";
-    const ASSOCIATED: bool = false;
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
         let DruckerPragerParameters { elastic, friction, dilatancy, cohesion } = given;
@@ -95,6 +94,14 @@ impl Criterion for DruckerPrager {
         });
         let good = cohesion.check(stiffness, problems, &format!("{path}.cohesion"));
         solid.filter(|_| good && rough && dilates).map(|solid| (solid, criterion))
+    }
+
+    fn is_associated(&self) -> bool {
+        self.friction == self.dilatancy
+    }
+
+    fn has_potential(&self) -> bool {
+        false
     }
 
     fn example(solid: &Lame) -> Self {

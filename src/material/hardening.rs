@@ -1,7 +1,7 @@
 //! Strength as a function of the accumulated plastic strain.
 
 use crate::problems::{Number, Problems};
-use crate::scalar::Real;
+use crate::scalar::{Real, implicit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -73,8 +73,7 @@ impl Hardening {
 
     /// The Δ > 0 with a − b Δ − c k(p + c Δ) = 0, and 1/(b + c² k') there; a must exceed c k(p), and b + c² k' must be positive.
     ///
-    /// Newton's method from Δ = 0 stays on one side of the root where k is concave, and after its first step where k is convex; then as many
-    /// more steps as the number type carries derivatives.
+    /// Newton's method from Δ = 0 stays on one side of the root where k is concave, and after its first step where k is convex.
     pub(super) fn solve<T: Real>(&self, a: T, b: f64, c: f64, p: T) -> (T, T) {
         let (a_0, p_0) = (a.value(), p.value());
         let mut root = 0.0_f64;
@@ -86,13 +85,11 @@ impl Hardening {
                 break;
             }
         }
-        let (mut delta, c_t) = (T::lit(root), T::lit(c));
-        let inverse_slope = |delta: T| (T::lit(b) + self.slope(p + c_t * delta) * T::lit(c * c)).recip();
-        for _ in 0..=T::NDERIV {
-            let left = a - delta * T::lit(b) - c_t * self.strength(p + c_t * delta);
-            delta += left * inverse_slope(delta);
-        }
-        (delta, inverse_slope(delta))
+        let c_t = T::lit(c);
+        let slope = |delta: T| T::lit(b) + self.slope(p + c_t * delta) * T::lit(c * c);
+        let left = |delta: T| delta * T::lit(b) + c_t * self.strength(p + c_t * delta) - a;
+        let delta = implicit(root, slope(T::lit(root)).value(), left);
+        (delta, slope(delta).recip())
     }
 
     /// Whether its numbers are good, and no step can lose its solution: c² k' > −b.

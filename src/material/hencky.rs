@@ -8,7 +8,6 @@ use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
 use super::{Lame, embed};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
-use num_dual::Dual;
 
 /// Rows and columns of the six numbers of a symmetric tensor.
 const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
@@ -234,14 +233,4 @@ impl Moduli<f64> {
             }
         }
     }
-}
-
-/// ∂S/∂E : sym X by dual numbers through `stress`: the derivative of a derivative, which [`Principal`] does not have, for its axes carry none.
-pub(super) fn derivative<T: Real, const D: usize>(
-    at: &Deformation<T, D>,
-    x: &Tensor<T, D>,
-    stress: impl Fn(&Deformation<Dual<T>, D>) -> Tensor<Dual<T>, D>,
-) -> Tensor<T, D> {
-    let delta_f = at.inverse_transpose() * symmetric(x);
-    stress(&Deformation::new(at.h.zip_map(&delta_f, Dual::new))).map(|s| s.eps)
 }

@@ -2,7 +2,8 @@
 
 use super::{ClosedTangent, Material, embed};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, outer};
+use crate::tensor::{Deformation, Tensor, Vector, outer, symmetric};
+use num_dual::Dual;
 
 /// What a particle remembers of a law from step to step: one number, by name.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,13 +105,15 @@ pub trait Law: Send + Sync {
     /// Second Piola–Kirchhoff stress `S`, symmetric.
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D>;
 
-    /// `ℂ:X = ∂S/∂E : sym X`.
+    /// `ℂ:X = ∂S/∂E : sym X`. By dual numbers through [`Self::stress`], if nothing better is given: a law is then values alone.
     fn elasticity<T: Real, const D: usize>(
         &self,
         at: &Deformation<T, D>,
         start: &Start<'_>,
         x: &Tensor<T, D>,
-    ) -> Tensor<T, D>;
+    ) -> Tensor<T, D> {
+        derivative(at, x, |at| self.stress(at, start))
+    }
 
     /// The B-free tangent density, `ℂmat{v,b} a = [ℂ:(a ⊗ b)] v` (eq. 37).
     fn tangent_density<T: Real, const D: usize>(
@@ -186,6 +189,16 @@ pub trait Law: Send + Sync {
     }
 }
 
+/// ∂S/∂E : sym X by dual numbers through `stress`: δF = F⁻ᵀ sym X has δE = sym X.
+pub(super) fn derivative<T: Real, const D: usize>(
+    at: &Deformation<T, D>,
+    x: &Tensor<T, D>,
+    stress: impl Fn(&Deformation<Dual<T>, D>) -> Tensor<Dual<T>, D>,
+) -> Tensor<T, D> {
+    let delta_f = at.inverse_transpose() * symmetric(x);
+    stress(&Deformation::new(at.h.zip_map(&delta_f, Dual::new))).map(|s| s.eps)
+}
+
 /// ℂmat{v, b}, column by column from what ℂ makes of a ⊗ b.
 fn density<T: Real, const D: usize>(
     v: &Vector<T, D>,
@@ -233,8 +246,10 @@ pub trait Elastic: Send + Sync {
     /// Second Piola–Kirchhoff stress `S = ∂W/∂E`, symmetric.
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D>;
 
-    /// `ℂ:X = ∂S/∂E : sym X`.
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D>;
+    /// `ℂ:X = ∂S/∂E : sym X`. By dual numbers through [`Self::stress`], if nothing better is given: a law is then values alone.
+    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+        derivative(at, x, |at| self.stress(at))
+    }
 
     /// The B-free tangent density, `ℂmat{v,b} a = [ℂ:(a ⊗ b)] v` (eq. 37).
     fn tangent_density<T: Real, const D: usize>(

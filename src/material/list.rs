@@ -1,12 +1,10 @@
 //! The list of shipped laws, from which [`Material`] and [`Parameters`] are made.
 
 use super::{
-    Ciarlet, ClosedTangent, DruckerPrager, Lame, Law, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
-    Remembered, StVenantKirchhoff, Start, Viscoelastic, VonMises,
+    Ciarlet, DruckerPrager, FibreReinforced, Lame, Law, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
+    StVenantKirchhoff, Viscoelastic, VonMises,
 };
 use crate::problems::Problems;
-use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +19,8 @@ pub trait Listed: Law + Sized {
     /// The law; or `None`, and `problems` of the keys below `path`.
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self>;
 
-    /// A member that is Hooke's law of Λ and G at small strain, with other constants as it likes: what tests and studies take.
+    /// A member that is Hooke's law of Λ and G at small strain, but for fibres, with other constants as it likes: what tests and studies
+    /// take.
     fn example(lame: Lame) -> Self;
 }
 
@@ -71,51 +70,16 @@ macro_rules! materials {
         }
 
         impl Law for Material {
-            fn memory(&self) -> &[Remembered] {
-                match self { $(Self::$law(law) => law.memory()),* }
-            }
-            fn is_symmetric(&self) -> bool {
-                match self { $(Self::$law(law) => law.is_symmetric()),* }
-            }
-            fn has_potential(&self) -> bool {
-                match self { $(Self::$law(law) => law.has_potential()),* }
-            }
-            fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-                match self { $(Self::$law(law) => Law::energy(law, at, start)),* }
-            }
-            fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => Law::stress(law, at, start)),* }
-            }
-            fn elasticity<T: Real, const D: usize>(
-                &self, at: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
-            ) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => Law::elasticity(law, at, start, x)),* }
-            }
-            fn tangent_density<T: Real, const D: usize>(
-                &self, at: &Deformation<T, D>, start: &Start<'_>, v: &Vector<T, D>, b: &Vector<T, D>,
-            ) -> Tensor<T, D> {
-                match self { $(Self::$law(law) => Law::tangent_density(law, at, start, v, b)),* }
-            }
-            fn closed<const D: usize>(
-                &self, f_n: &Tensor<f64, D>, at: &Deformation<f64, D>, volume: f64,
-            ) -> Option<ClosedTangent<f64, D>> {
-                match self { $(Self::$law(law) => Law::closed(law, f_n, at, volume)),* }
-            }
-            fn tangent_blocks<const D: usize>(
-                &self, f_n: &Tensor<f64, D>, at: &Deformation<f64, D>, start: &Start<'_>,
-            ) -> [[Tensor<f64, D>; D]; D] {
-                match self { $(Self::$law(law) => law.tangent_blocks(f_n, at, start)),* }
-            }
-            fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-                match self { $(Self::$law(law) => law.remember(at, start, next)),* }
-            }
+            $crate::law_of_variants!(Self: $($law),*);
+
             fn shipped(&self) -> Option<&Material> {
                 Some(self)
             }
         }
 
         impl Material {
-            /// Every law with its name: what tests and studies run over. At small strain all are Hooke's law of Λ and G.
+            /// Every law with its name: what tests and studies run over. At small strain all are Hooke's law of Λ and G,
+            /// and fibres beside it.
             pub fn examples(lame: Lame) -> Vec<(&'static str, Self)> {
                 vec![$((<$formula>::NAME, Self::$law(Listed::example(lame)))),*]
             }
@@ -146,6 +110,8 @@ materials! {
     "mooney_rivlin" => MooneyRivlin(MooneyRivlin);
     /// Rubber: Ogden's solid, with powers of the principal stretches, compressible.
     "ogden" => Ogden(Ogden);
+    /// Tissue, reinforced rubber: one family of fibres in an elastic matrix; they bear tension alone.
+    "fibre_reinforced" => FibreReinforced(FibreReinforced);
     /// Maxwell branches beside an elastic law, at finite strain.
     "viscoelastic" => Viscoelastic(Viscoelastic);
     /// Metal: linear elasticity in logarithmic strains, and flow at a von Mises stress that may harden.

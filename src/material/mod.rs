@@ -8,6 +8,7 @@
 
 mod closed_tangent;
 mod drucker_prager;
+mod fibres;
 mod from_energy;
 mod hardening;
 mod hencky;
@@ -21,11 +22,13 @@ mod piola;
 mod plastic;
 mod spectral;
 mod st_venant_kirchhoff;
+mod variants;
 mod viscoelastic;
 mod von_mises;
 
 pub use closed_tangent::ClosedTangent;
 pub use drucker_prager::{DruckerPrager, DruckerPragerParameters};
+pub use fibres::{FibreReinforced, FibreReinforcedParameters};
 pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;

@@ -1,6 +1,7 @@
 //! Ogden's solid: powers of the principal stretches.
 
-use super::hencky::{Principal, Strained, derivative};
+use super::hencky::{Principal, Strained};
+use super::law::derivative;
 use super::spectral::{Function, Power, primitive_trace};
 use super::{Ciarlet, Lame, Law, Listed, Start, Volumetric};
 use crate::problems::{Number, Problems};
@@ -88,6 +89,7 @@ impl Law for Ogden {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
+        // Axes carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }

@@ -1,6 +1,7 @@
 //! Finite plasticity: Hencky's elasticity, and a return map in logarithmic strains to a yield criterion.
 
-use super::hencky::{Principal, Radial, Strained, derivative};
+use super::hencky::{Principal, Radial, Strained};
+use super::law::derivative;
 use super::{DISSIPATED, Lame, Law, Listed, PLASTIC_STRAIN, Remembered, Start};
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -16,8 +17,11 @@ pub trait Criterion: Clone + Send + Sync + Sized + 'static {
     /// The name of the solid in reports.
     const NAME: &'static str;
 
-    /// Whether the flow is normal to the surface: the tangent is then symmetric, and a step has a potential.
-    const ASSOCIATED: bool;
+    /// Whether the flow is normal to the surface: the tangent is then symmetric.
+    fn is_associated(&self) -> bool;
+
+    /// Whether what flow takes in a step is a potential of it: associated flow, and the work of hardening along the way and not at its end.
+    fn has_potential(&self) -> bool;
 
     /// The solid and its criterion; or `None`, and `problems` of the keys below `path`.
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)>;
@@ -124,11 +128,11 @@ impl<Y: Criterion> Law for Plastic<Y> {
     }
 
     fn is_symmetric(&self) -> bool {
-        Y::ASSOCIATED
+        self.criterion.is_associated()
     }
 
     fn has_potential(&self) -> bool {
-        Y::ASSOCIATED
+        self.criterion.has_potential()
     }
 
     /// W of the elastic strain, and what flow takes in the step; their sum is stationary in the flow where that is associated.
@@ -149,6 +153,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
+        // Axes carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }

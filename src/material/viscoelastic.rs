@@ -1,6 +1,7 @@
 //! Finite viscoelasticity: Maxwell branches beside an elastic law.
 
-use super::hencky::{Principal, Radial, Strained, derivative};
+use super::hencky::{Principal, Radial, Strained};
+use super::law::derivative;
 use super::plastic::zero;
 use super::{DISSIPATED, Lame, Law, Listed, Material, NeoHookean, Parameters, Remembered, Start};
 use crate::problems::Problems;
@@ -135,6 +136,7 @@ impl Law for Viscoelastic {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
+        // Axes carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }

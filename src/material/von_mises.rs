@@ -29,13 +29,20 @@ pub struct VonMisesParameters {
 impl Criterion for VonMises {
     type Parameters = VonMisesParameters;
     const NAME: &'static str = "von Mises";
-    const ASSOCIATED: bool = true;
 
     fn build(given: &VonMisesParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
         let solid = given.elastic.lame(problems, &format!("{path}.elastic"));
         let stiffness = 3.0 * solid.map_or(f64::INFINITY, |solid| solid.shear);
         let good = given.yield_stress.check(stiffness, problems, &format!("{path}.yield_stress"));
         solid.filter(|_| good).map(|solid| (solid, Self { yield_stress: given.yield_stress }))
+    }
+
+    fn is_associated(&self) -> bool {
+        true
+    }
+
+    fn has_potential(&self) -> bool {
+        true
     }
 
     fn example(solid: &Lame) -> Self {
@@ -53,12 +60,13 @@ impl Criterion for VonMises {
         }
         let (delta, compliance) = self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n);
         let elastic = Radial::elastic(solid, v);
+        let plastic_strain = p_n + delta;
+        // σ_y/q_trial and k'/(3G + k'): far beyond yield, 1 − 3G Δp/q_trial and 1 − 3G/(3G + k') would leave few digits.
         let radial = Radial {
-            g: elastic.g * (T::one() - delta * T::lit(3.0 * shear) / trial),
-            t_d: elastic.g * (T::one() - compliance * T::lit(3.0 * shear)),
+            g: elastic.g * self.yield_stress.strength(plastic_strain) / trial,
+            t_d: elastic.g * self.yield_stress.slope(plastic_strain) * compliance,
             ..elastic
         };
-        let plastic_strain = p_n + delta;
         let dissipated = self.yield_stress.work(plastic_strain) - self.yield_stress.work(p_n);
         Returned { radial, plastic_strain, dissipated }
     }

@@ -14,6 +14,7 @@
 //! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have as many digits as it takes to read the same bits back.
 
 mod csv;
+mod earlier;
 mod error;
 mod fields;
 pub(crate) mod files;
@@ -31,10 +32,11 @@ mod summary;
 pub mod vtu;
 pub mod warnings;
 
+pub use earlier::foreign;
 pub use error::OutputError;
 pub use probes::{Place, Probe, nearest};
 pub use progress::Audience;
-pub use recorder::{Mark, OutputSettings, Recorder, foreign};
+pub use recorder::{Mark, OutputSettings, Recorder};
 pub use reference::Reference;
 pub use report::Outcome;
 pub use summary::Summary;

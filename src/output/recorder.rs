@@ -1,13 +1,13 @@
 //! Everything that is written about a run, in one place.
 
-use super::files::{Stream, TEMPORARY, Written};
+use super::earlier::remove_later_files;
+use super::files::{Stream, Written};
 use super::history::{Cost, Energies, History};
-use super::plot::is_picture;
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
 use super::reactions::Reactions;
 use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
-use super::snapshots::{SERIES, SnapshotMark, Snapshots};
+use super::snapshots::{SnapshotMark, Snapshots};
 use super::warnings::{Watch, Watched};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
@@ -17,8 +17,6 @@ use crate::simulation::{Simulation, StepReport};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -110,8 +108,8 @@ pub struct Recorder<const D: usize> {
 #[serde(deny_unknown_fields)]
 pub struct Mark {
     /// What each file held that grows.
-    files: BTreeMap<String, Written>,
-    snapshots: Option<SnapshotMark>,
+    pub(super) files: BTreeMap<String, Written>,
+    pub(super) snapshots: Option<SnapshotMark>,
     watch: Watch,
     counts: Counts,
     seconds: Seconds,
@@ -329,65 +327,4 @@ impl<const D: usize> Recorder<D> {
         let probes = self.probes.as_mut().map(|probes| &mut probes.table.0);
         [&mut self.history.table.0, &mut self.newton.0].into_iter().chain(reactions).chain(probes)
     }
-}
-
-/// The files of a run, beside its snapshots and its pictures.
-const FILES: [&str; 6] = ["history.csv", "reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
-
-/// Whether a run may write a file of this name.
-fn is_output(name: &str) -> bool {
-    FILES.contains(&name) || SnapshotMark::default().precedes(name) || is_picture(name)
-}
-
-/// A file that a run would replace, in a directory where no run of this program has been: none has left its history or its report.
-///
-/// ```
-/// use bfree::output::foreign;
-///
-/// let folder = tempfile::tempdir()?;
-/// let (history, picture) = (folder.path().join("history.csv"), folder.path().join("energies.png"));
-/// std::fs::write(folder.path().join("notes.txt"), "mine")?;
-/// assert_eq!(foreign(folder.path()), None);
-/// std::fs::write(&picture, "mine")?;
-/// assert_eq!(foreign(folder.path()), Some(picture));
-/// // What a run has left beside its history may go with it.
-/// std::fs::write(&history, "step,time,dt,kinetic\n")?;
-/// assert_eq!(foreign(folder.path()), None);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn foreign(directory: &Path) -> Option<PathBuf> {
-    let mut start = Vec::new();
-    let begin = File::open(directory.join("history.csv")).and_then(|file| file.take(10).read_to_end(&mut start));
-    // Of a run that died at once, the history has no line.
-    let report = std::fs::read(directory.join("report.json")).unwrap_or_default();
-    let report: Value = serde_json::from_slice(&report).unwrap_or_default();
-    let of_ours = report["program"].as_str().is_some_and(|program| program.starts_with("bfree "));
-    if of_ours || (begin.is_ok() && b"step,time,".starts_with(&start)) {
-        return None;
-    }
-    let mut names: Vec<_> =
-        std::fs::read_dir(directory).ok()?.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
-    names.sort();
-    names.iter().find(|name| name.to_str().is_some_and(is_output)).map(|name| directory.join(name))
-}
-
-/// Removes what an earlier run left under the names this one may use and will not continue from `mark`, so that no file of it is
-/// taken for a new one.
-fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
-    let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
-    let continued = |name: &str| match name {
-        SERIES => mark.is_some(),
-        _ => mark.is_some_and(|mark| mark.files.contains_key(name)),
-    };
-    let entries = std::fs::read_dir(directory).map_err(OutputError::io("read", directory))?;
-    for entry in entries {
-        let entry = entry.map_err(OutputError::io("read", directory))?;
-        let name = entry.file_name();
-        let Some(name) = name.to_str() else { continue };
-        let file = FILES.contains(&name) && !continued(name);
-        if file || is_picture(name) || snapshots.precedes(name) || name.starts_with(TEMPORARY) {
-            std::fs::remove_file(entry.path()).map_err(OutputError::io("remove", &entry.path()))?;
-        }
-    }
-    Ok(())
 }

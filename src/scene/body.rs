@@ -20,7 +20,7 @@ pub struct Body {
     pub shape: Option<Shape>,
     /// A file with the particles. Either this or `shape` is given.
     pub particles: Option<ParticleFile>,
-    /// The hyperelastic law.
+    /// The law.
     pub material: material::Parameters,
     /// Mass per reference volume, > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -1,9 +1,13 @@
 //! A simulation: the state at the last converged step, and how it goes on (`step.rs`).
 
+mod balance;
 mod coming;
+mod keep;
 mod report;
 mod settings;
+mod start;
 mod step;
+mod work;
 
 pub use coming::Coming;
 pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};

@@ -4,6 +4,8 @@
 //! action ℂ:X of the tangent. The first test below is all that is needed to know, by term and by name, that they belong together; the
 //! second pulls a bar: `cargo test --release --package own_law`.
 
+pub mod creep;
+
 use bfree::material::Elastic;
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, symmetric, trace};

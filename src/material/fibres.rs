@@ -1,0 +1,158 @@
+//! One family of fibres in an elastic matrix.
+
+use super::{Lame, Law, Listed, Material, NeoHookean, Parameters, Start};
+use crate::problems::{Number, Problems};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The constants of [`FibreReinforced`].
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename = "FibreReinforced")]
+#[serde(deny_unknown_fields)]
+pub struct FibreReinforcedParameters {
+    /// The law of the matrix; one that remembers nothing.
+    pub base: Box<Parameters>,
+    /// Where fibres run in the undeformed body, of any length but 0; three numbers in every dimension.
+    pub direction: [f64; 3],
+    /// k₁ (stress), > 0: a quarter of what fibres add to Young's modulus along them at rest.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub modulus: f64,
+    /// k₂ (no unit), ≥ 0: how soon fibres stiffen. With 0 their energy is k₁/2 (I₄ − 1)².
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub exponent: f64,
+}
+
+/// W = W_base + k₁/(2k₂) (e^{k₂ (I₄ − 1)²} − 1) with I₄ = a·C a along the fibres a, where they are stretched; they bear no compression
+/// (Holzapfel, Gasser, Ogden, J. Elasticity 61, 2000).
+///
+/// ```
+/// use bfree::material::{Elastic, FibreReinforced, Lame, Law, NeoHookean, Start};
+/// use bfree::tensor::{Deformation, Tensor, Vector};
+///
+/// let base = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
+/// let law = FibreReinforced::new(base, Vector::from([2.0, 0.0, 0.0]), 10.0, 0.0).ok_or("an elastic base, and a direction")?;
+/// let fibres = |h: f64| {
+///     let at = Deformation::<f64, 1>::new(Tensor::from_element(h));
+///     (law.stress(&at, &Start::NONE) - Elastic::stress(&base, &at))[(0, 0)]
+/// };
+/// // S = 2k₁ (I₄ − 1) with I₄ = 1.21; nothing in compression.
+/// assert!((fibres(0.1) - 2.0 * 10.0 * 0.21).abs() < 1e-13);
+/// assert_eq!(fibres(-0.1), 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct FibreReinforced {
+    base: Box<Material>,
+    /// a
+    direction: Vector<f64, 3>,
+    /// k₁
+    modulus: f64,
+    /// k₂
+    exponent: f64,
+}
+
+impl FibreReinforced {
+    /// Fibres in a matrix; `None` if that remembers something, or of a direction or constants that are none.
+    pub fn new(base: impl Into<Material>, direction: Vector<f64, 3>, modulus: f64, exponent: f64) -> Option<Self> {
+        let base = base.into();
+        let unit = direction.try_normalize(0.0).filter(|unit| (unit.norm() - 1.0).abs() < 1e-9);
+        let good = base.memory().is_empty() && modulus > 0.0 && exponent >= 0.0;
+        unit.filter(|_| good).map(|direction| Self { base: Box::new(base), direction, modulus, exponent })
+    }
+
+    /// a ⊗ a, and I₄ − 1 = 2 a·E a where that is positive: with `D` components, for nothing is stretched along the others.
+    fn stretched<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> (Tensor<T, D>, Option<T>) {
+        let along = Tensor::from_fn(|i, k| T::lit(self.direction[i] * self.direction[k]));
+        let stretch = contract(&along, &at.green_lagrange()) * T::lit(2.0);
+        (along, (stretch.value() > 0.0).then_some(stretch))
+    }
+
+    /// k₁ e^{k₂ x²}, of x = I₄ − 1.
+    fn stiffness<T: Real>(&self, x: T) -> T {
+        (x * x * T::lit(self.exponent)).exp() * T::lit(self.modulus)
+    }
+
+    /// 4 W″ = 4k₁ (1 + 2k₂ x²) e^{k₂ x²}, the factor of a ⊗ a ⊗ a ⊗ a in ℂ.
+    fn slope<T: Real>(&self, x: T) -> T {
+        self.stiffness(x) * (T::lit(4.0) + x * x * T::lit(8.0 * self.exponent))
+    }
+}
+
+impl Law for FibreReinforced {
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        let base = self.base.energy(at, start);
+        self.stretched(at).1.map_or(base, |x| {
+            let squared = x * x;
+            let (k_1, k_2) = (T::lit(0.5 * self.modulus), T::lit(self.exponent));
+            base + if self.exponent > 0.0 { (squared * k_2).exp_m1() * k_1 / k_2 } else { squared * k_1 }
+        })
+    }
+
+    /// S = S_base + 2 W′ a ⊗ a
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        let (base, (along, stretch)) = (self.base.stress(at, start), self.stretched(at));
+        stretch.map_or(base, |x| base + scaled(&along, self.stiffness(x) * x * T::lit(2.0)))
+    }
+
+    /// ℂ:X = ℂ_base:X + 4 W″ (a·X a) a ⊗ a
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        let (base, (along, stretch)) = (self.base.elasticity(at, start, x), self.stretched(at));
+        stretch.map_or(base, |i| base + scaled(&along, self.slope(i) * contract(&along, x)))
+    }
+
+    /// Of the base, and 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        start: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        let mut blocks = self.base.tangent_blocks(f_n, at, start);
+        if let (_, Some(x)) = self.stretched(at) {
+            let a = Vector::<f64, D>::from_fn(|i, _| self.direction[i]);
+            let (now, before) = (at.f * a, f_n * a);
+            let block = outer(&now, &now) * self.slope(x);
+            for (blocks, k) in blocks.iter_mut().zip(before.iter()) {
+                blocks.iter_mut().zip(before.iter()).for_each(|(sum, l)| *sum += block * (k * l));
+            }
+        }
+        blocks
+    }
+}
+
+impl Listed for FibreReinforced {
+    type Parameters = FibreReinforcedParameters;
+    const NAME: &'static str = "fibre-reinforced";
+
+    fn build(given: &FibreReinforcedParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+        let at = |key: &str| format!("{path}.{key}");
+        let base = given.base.law(problems, &at("base"));
+        let elastic = base.as_ref().is_none_or(|law| law.memory().is_empty());
+        problems.require(elastic, &at("base"), "a law with memory", "must be an elastic law");
+        let direction = Vector::<f64, 3>::from(given.direction);
+        for (k, &x) in given.direction.iter().enumerate() {
+            problems.number(&format!("{}[{k}]", at("direction")), x);
+        }
+        problems.require(direction.amax() > 0.0, &at("direction"), "0", "must have a length");
+        problems.positive(&at("modulus"), given.modulus);
+        problems.number(&at("exponent"), given.exponent);
+        problems.require(given.exponent >= 0.0, &at("exponent"), Number(given.exponent), "must be ≥ 0");
+        // Of any length, without overflow.
+        let direction = direction / direction.amax();
+        base.and_then(|base| Self::new(base, direction, given.modulus, given.exponent))
+    }
+
+    /// Fibres that are as stiff as the matrix, in no plane of the axes; Hooke's law in compression along them alone.
+    fn example(lame: Lame) -> Self {
+        let base = Box::new(NeoHookean::ciarlet(lame).into());
+        Self { base, direction: Vector::from([0.6, 0.64, 0.48]), modulus: 0.5 * lame.shear, exponent: 1e-3 }
+    }
+}

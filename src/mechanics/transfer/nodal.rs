@@ -1,0 +1,197 @@
+//! Particles → nodes (eqs. 40–42).
+
+use crate::mechanics::affine::affine;
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::mass::{Mass, is_light, lumped};
+use crate::mechanics::schemes::Alphas;
+use crate::mechanics::sweep::Supports;
+use crate::particles::Particles;
+use crate::pooled::Pooled;
+use crate::solver::LinearError;
+use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Lumped mass, velocity and acceleration at the active nodes: each array as long as there are nodes, or empty where nothing
+/// needs it.
+///
+/// ```
+/// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+/// use bfree::tensor::Vector;
+///
+/// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+/// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+/// let particles = &mut simulation.particles;
+/// particles.velocity = direction(particles.len(), 1);
+/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// let momentum = |nodal: &Nodal<2>| nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum::<Vector<f64, 2>>();
+/// // Mass and momentum are those of the particles, with the lumped mass as with the consistent one.
+/// let rest = Nodal::at_rest(particles, &supports);
+/// assert!((rest.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+/// let lumped = Nodal::project(particles, &supports, 1.0)?;
+/// let consistent = Nodal::project(particles, &supports, 0.1)?;
+/// assert!((momentum(&lumped) - particles.momentum()).norm() < 1e-13);
+/// assert!((momentum(&consistent) - particles.momentum()).norm() < 1e-10);
+/// assert!(lumped.iterations == 0 && consistent.iterations > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Nodal<const D: usize> {
+    /// Σ_p m N_I; empty without inertia and gravity.
+    pub mass: Pooled<f64>,
+    /// v_n; empty without inertia.
+    pub velocity: Pooled<Vector<f64, D>>,
+    /// a_n; empty without inertia.
+    pub acceleration: Pooled<Vector<f64, D>>,
+    /// φ_n, the motion since the grid was new; empty where it is.
+    pub motion: Pooled<Vector<f64, D>>,
+    /// Iterations the projection took (0 for a lumped mass).
+    pub iterations: usize,
+}
+
+impl<const D: usize> Nodal<D> {
+    /// Projects the particles' velocity and acceleration with M̃ = (1−ε) M + ε lumped(M) onto `count` active nodes:
+    /// M̃ v = Σ_p N m v_p and M̃ a = Σ_p N m a_p (eq. 42).
+    ///
+    /// # Errors
+    /// Particle velocities so large that the projection overflows.
+    pub fn project(particles: &Particles<D>, supports: &Supports<D>, lumping: f64) -> Result<Self, LinearError> {
+        let lumped = lumped(particles, supports);
+        let mass = Mass { particles, supports, lumped: &lumped, lumping };
+        let ([velocity, acceleration], iterations) = mass.project([&particles.velocity, &particles.acceleration])?;
+        Ok(Self { mass: lumped, velocity, acceleration, iterations, ..Self::default() })
+    }
+
+    /// The lumped mass, and velocity and acceleration by [`Projection::Affine`].
+    ///
+    /// ```
+    /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let linear = r#"approximation="linear""#.parse()?;
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[linear])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &mut simulation.particles;
+    /// particles.velocity = direction(particles.len(), 1);
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// // The momentum is that of the particles.
+    /// let nodal = Nodal::fit(particles, &supports);
+    /// let momentum: Vector<f64, 2> = nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum();
+    /// assert!((momentum - particles.momentum()).norm() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn fit(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+        let mass = lumped(particles, supports);
+        let [velocity, acceleration] =
+            affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
+        Self { mass, velocity, acceleration, ..Self::default() }
+    }
+
+    /// The lumped mass, and no motion.
+    pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+        let still: Pooled<Vector<f64, D>> = supports.field();
+        Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports) }
+    }
+
+    /// The lumped mass, which gravity acts on, and no inertia.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// // The mass is there, and no motion that it could resist.
+    /// let nodal = Nodal::mass_alone(particles, &supports);
+    /// assert!((nodal.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+    /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports).is_static());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn mass_alone(particles: &Particles<D>, supports: &Supports<D>) -> Self {
+        Self { mass: lumped(particles, supports), ..Self::default() }
+    }
+
+    /// Whether there is no inertia.
+    ///
+    /// Example: [`Self::mass_alone`].
+    pub fn is_static(&self) -> bool {
+        self.velocity.is_empty()
+    }
+
+    /// φ_n of every node, zero where the grid is new.
+    pub fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
+        let motion = self.motion.iter().copied().chain(std::iter::repeat(Vector::zeros()));
+        motion.take(count)
+    }
+
+    /// φ_n + Δφ̂ of every node: the motion that ends without acceleration. None without inertia.
+    pub fn predicted(&self, alphas: &Alphas) -> impl Iterator<Item = Vector<f64, D>> {
+        let state = self.velocity.iter().zip(&self.acceleration).zip(self.moved(self.velocity.len()));
+        state.map(|((v, a), motion)| motion + alphas.predicted(v, a))
+    }
+
+    /// a_I = −R_I / m_I, from the residual of the same state at rest.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let mut nodal = Nodal::at_rest(particles, &supports);
+    /// // An undeformed body under gravity: R_I = −m_I g, and all of it begins to fall.
+    /// let g = Vector::from([0.0, -10.0]);
+    /// let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| g * -m).collect();
+    /// nodal.accelerate(particles, &unbalanced);
+    /// assert!(nodal.acceleration.iter().all(|a| (a - g).norm() < 1e-14));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn accelerate(&mut self, particles: &Particles<D>, unbalanced: &[Vector<f64, D>]) {
+        let is_light = is_light(particles);
+        for ((a, r), &m) in self.acceleration.iter_mut().zip(unbalanced).zip(&self.mass) {
+            *a = if is_light(m) { Vector::zeros() } else { -r / m };
+        }
+    }
+
+    /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
+    ///
+    /// ```
+    /// use bfree::mechanics::{loads::{MotionStep, PrescribedDof}, sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let particles = &simulation.particles;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+    /// let projected = Nodal::project(particles, &supports, 1.0)?;
+    /// // A wall holds the x component of node 3.
+    /// let wall = PrescribedDof { node: 3, component: 0, owner: 0, moving: false, step: MotionStep::default() };
+    /// let nodal = projected.with_prescribed(&[wall]);
+    /// assert_eq!((nodal.velocity[3][0], nodal.velocity[3][1]), (0.0, projected.velocity[3][1]));
+    /// assert_eq!(nodal.velocity[4], projected.velocity[4]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn with_prescribed(&self, prescribed: &[PrescribedDof]) -> Self {
+        let mut overwritten = self.clone();
+        for dof in prescribed.iter().filter(|_| !self.is_static()) {
+            overwritten.velocity[dof.node][dof.component] = dof.step.velocity_start;
+            overwritten.acceleration[dof.node][dof.component] = dof.step.acceleration_start;
+        }
+        overwritten
+    }
+}
+
+/// How nodes get velocity and acceleration from the particles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Projection {
+    /// M̃ v = Σ N m v_p, as in the paper (42). With a lumped mass a body that spins freely loses some percent of its angular momentum in a
+    /// radian.
+    #[default]
+    Mass,
+    /// Lumped, and each particle stands for an affine field, with the gradient that fits its surroundings: of the angular momentum about a
+    /// tenth as much is lost, for some passes over the particles more in a step. `time.lumping` then counts in the inertia alone.
+    Affine,
+}

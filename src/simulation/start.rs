@@ -1,0 +1,150 @@
+//! What a step starts from: shape functions, prescribed motion, the state of the nodes, and the equilibrium that is to be found.
+
+use super::{Simulation, StepError, Workspace};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::kept::Kept;
+use crate::mechanics::loads::{PrescribedDof, prescribed_dofs};
+use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::schemes::Alphas;
+use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::terms;
+use crate::mechanics::transfer::{Nodal, Projection};
+use crate::nodes::Nodes;
+use crate::particles::Particles;
+use crate::solver::LinearError;
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// The shape functions of a step, those of the last one if the grid is kept.
+    pub(super) fn supports(&mut self, kept: bool) -> Result<Supports<D>, SupportError> {
+        let (Workspace { supports, serves, pool }, Particles { position, id, .. }) =
+            (&mut self.workspace, &self.particles);
+        let spare = supports.take();
+        match spare {
+            Some(supports) if kept && *serves => Ok(supports.again()),
+            spare => {
+                let precision = self.settings.newton.precision;
+                Ok(Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, pool)?.0)
+            }
+        }
+    }
+
+    /// The degrees of freedom prescribed in the coming step.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let held = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+    ///     let (_, nodes) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+    ///     Ok(of.prescribed(&nodes))
+    /// };
+    /// // Only active nodes count: near the right wall, the disc sees nodes of it, and they may slide but not leave.
+    /// let before = held(&simulation)?.len();
+    /// simulation.particles.position.iter_mut().for_each(|x| x[0] += 11.0);
+    /// let at_wall = held(&simulation)?;
+    /// assert!(at_wall.len() > before);
+    /// assert!(at_wall.iter().any(|dof| dof.component == 0 && dof.step.increment == 0.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn prescribed(&self, nodes: &Nodes) -> Vec<PrescribedDof> {
+        self.prescribed_from(nodes, self.kept.as_ref())
+    }
+
+    pub(super) fn prescribed_from(&self, nodes: &Nodes, kept: Option<&Kept<D>>) -> Vec<PrescribedDof> {
+        let moved = kept.map_or(&[][..], |kept| &kept.motion);
+        prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, moved, self.clock.time(), self.clock.step())
+    }
+
+    /// The state of the nodes at t_n: projected from the particles, or what the nodes of a grid that is kept have had since.
+    pub(super) fn nodal(&self, supports: &Supports<D>, kept: Option<&Kept<D>>) -> Result<Nodal<D>, StepError> {
+        let nodes = supports.nodes();
+        match kept {
+            None => Ok(self.project(supports)?),
+            Some(kept) if kept.motion.len() == nodes => Ok(kept.state(self.masses(supports), supports.pool())),
+            Some(kept) => Err(StepError::OtherGrid { kept: kept.motion.len(), nodes }),
+        }
+    }
+
+    /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    /// use bfree::tensor::Vector;
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    /// let nodal = simulation.project(&supports)?;
+    /// let momentum: Vector<f64, 2> = nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum();
+    /// assert!((momentum - simulation.particles.momentum()).norm() < 1e-13);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Particle velocities so large that the projection overflows.
+    pub fn project(&self, supports: &Supports<D>) -> Result<Nodal<D>, LinearError> {
+        if self.settings.scheme.has_inertia() {
+            return match self.settings.projection {
+                Projection::Mass => Nodal::project(&self.particles, supports, self.settings.lumping),
+                Projection::Affine => Ok(Nodal::fit(&self.particles, supports)),
+            };
+        }
+        Ok(self.masses(supports))
+    }
+
+    /// The mass of the nodes, where something asks for it.
+    pub(super) fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
+        let weighs = self.settings.scheme.has_inertia() || self.loads.gravity.is_some();
+        if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
+    }
+
+    /// The equilibrium at time `t` on given supports.
+    ///
+    /// ```
+    /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
+    ///
+    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
+    /// let simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
+    /// let (supports, _) = Supports::new(&simulation.approximation, grid, &particles.position)?;
+    /// let nodal = Nodal::project(particles, &supports, simulation.settings.lumping)?;
+    /// let alphas = simulation.settings.scheme.end(dt);
+    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], alphas, dt);
+    /// // A body in free flight is in equilibrium at Δφ = Δt v.
+    /// let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
+    /// let residual = equilibrium.residual(&dphi)?;
+    /// assert!(residual.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt() < 1e-13 * equilibrium.magnitude(&dphi)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn equilibrium<'a>(
+        &'a self,
+        supports: &'a Supports<D>,
+        nodal: &'a Nodal<D>,
+        prescribed: &'a [PrescribedDof],
+        alphas: Alphas,
+        t: f64,
+    ) -> Equilibrium<'a, D, L> {
+        let Self { particles, bodies, loads, settings, .. } = self;
+        // Without inertia nothing is consistent.
+        let lumping = if nodal.is_static() { 1.0 } else { settings.lumping };
+        // At t_n, too, laws are asked about a step.
+        let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
+        Equilibrium::new(
+            terms::Step {
+                particles,
+                bodies,
+                loads,
+                supports,
+                nodal,
+                alphas,
+                lumping,
+                time: t,
+                dt,
+                ghost: settings.ghost,
+            },
+            prescribed,
+        )
+    }
+}

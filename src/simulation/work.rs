@@ -1,0 +1,72 @@
+//! What a step costs the outside: reactions, and the work of all external forces.
+
+use super::{Reaction, Simulation, StepError};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::schemes::Alphas;
+use crate::mechanics::terms::{self, Role};
+use crate::mechanics::transfer::Update;
+use crate::pooled::Pooled;
+use crate::tensor::Vector;
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Reactions at t_{n+1} and impulses J over Δt, summed over each prescribed condition, and the work of the step,
+    /// Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ over all external forces, the reactions of moving walls among them.
+    pub(super) fn reactions_and_work(
+        &self,
+        balanced: &Equilibrium<'_, D, L>,
+        t: f64,
+        dt: f64,
+        dphi: &[Vector<f64, D>],
+        update: &Update<'_, D>,
+    ) -> Result<(Vec<Reaction<D>>, f64, f64), StepError> {
+        let (terms::Step { supports, nodal, .. }, phi) = (balanced.step, update.motion());
+        let mut end = balanced;
+        let after;
+        if self.settings.scheme.instant() < 1.0 {
+            after = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
+            // Nothing has asked yet whether this end is possible.
+            after.forces(Role::Stores, phi)?;
+            end = &after;
+        }
+        let conditions = &self.loads.prescribed;
+        let mut reactions = vec![Reaction { force: Vector::zeros(), torque: 0.0 }; conditions.len()];
+        let mut work = 0.0;
+        if !end.prescribed.is_empty() {
+            let mut residual: Pooled<Vector<f64, D>> = supports.field();
+            end.residual_into::<f64>(phi, &mut residual)?;
+            for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
+                let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
+                reactions[dof.owner].force[dof.component] += reaction + blow;
+                if let Some(rotation) = conditions[dof.owner].rotation() {
+                    let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];
+                    reactions[dof.owner].torque += rotation.moment(&x, dof.component, reaction + blow);
+                }
+                work += (0.5 * reaction + blow) * dof.step.increment;
+            }
+        }
+        // At t_n: a = a_n and Δφ = 0.
+        let before = supports.pool().collect(nodal.moved(supports.nodes()));
+        let start = self.equilibrium(supports, nodal, end.prescribed, Alphas::START, t);
+        if end.prescribed.iter().any(|dof| dof.moving) {
+            let mut residual: Pooled<Vector<f64, D>> = supports.field();
+            start.residual_into::<f64>(&before, &mut residual)?;
+            for dof in end.prescribed {
+                work += 0.5 * residual[dof.node][dof.component] * dof.step.increment;
+            }
+        }
+        work += mean_work(&end.external_force(phi)?, &start.external_force(&before)?, dphi);
+        let mut dissipated = 0.0;
+        if self.damps() {
+            let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
+            dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
+        }
+        Ok((reactions, work, dissipated))
+    }
+}
+
+/// The work of a force along Δφ, by the mean of its values at the ends of the step.
+fn mean_work<const D: usize>(end: &[Vector<f64, D>], start: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
+    end.iter().zip(start).zip(dphi).map(|((end, start), dphi)| 0.5 * (end + start).dot(dphi)).sum()
+}

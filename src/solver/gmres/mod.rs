@@ -1,0 +1,260 @@
+//! Restarted GMRES, preconditioned from the right (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.5).
+
+#[cfg(test)]
+mod tests;
+
+use super::vector::{Entry, axpy, dot, norm, scaled};
+use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
+use crate::pooled::{Pool, Pooled};
+
+/// A second orthogonalisation is made when the first one leaves less than this part of the vector: 1/√2 (Daniel, Gragg,
+/// Kaufman, Stewart 1976).
+const REORTHOGONALISE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// A new direction below this part of the vector it was made from, in units of round-off: the Krylov space is exhausted.
+const EXHAUSTED: f64 = 8.0;
+
+/// A whole cycle that leaves more than this part of the residual is stagnation: a thousand such cycles gain a factor e.
+const STAGNATION: f64 = 0.999;
+
+/// A cycle whose Krylov space holds no better than this part of the residual was too short: the next is twice as long.
+const TOO_SHORT: f64 = 0.9;
+
+/// Settings of [`gmres`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GmresSettings {
+    /// Wanted ‖b − A x‖ / ‖b‖, in [0, 1).
+    pub relative_tolerance: f64,
+    /// Iterations allowed, over all restarts.
+    pub max_iterations: usize,
+    /// Iterations between restarts, at least 1. One vector is kept for each, and one more. Where a cycle gains next to
+    /// nothing, the following ones are twice as long.
+    pub restart: usize,
+}
+
+impl Default for GmresSettings {
+    fn default() -> Self {
+        Self { relative_tolerance: 1e-8, max_iterations: 1000, restart: 30 }
+    }
+}
+
+/// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹, whose residual is the true one.
+///
+/// 1. r = b − A x, v₁ = r/‖r‖.
+/// 2. w = A M⁻¹ vⱼ, made orthogonal to v₁ … vⱼ (modified Gram–Schmidt, again if much cancels): column j of H, vⱼ₊₁.
+/// 3. Givens rotations keep H triangular and give the residual norm without x.
+/// 4. After m iterations, or at the tolerance, or when the space is exhausted: x ← x + M⁻¹ V y with H y = ‖r‖ e₁.
+/// 5. The residual is computed anew from x. If it does not meet the tolerance, back to 1.
+/// 6. Where the best of a cycle's whole space is hardly better than x, m is doubled: null modes and clustered small
+///    eigenvalues need a longer memory, and a failed solve costs more than a few vectors.
+/// 7. Otherwise a cycle that hardly lowers the true residual is round-off, or an exhausted space, and ends the iteration as
+///    [`LinearOutcome::Stagnated`]; one that raises it is undone.
+///
+/// `solution` is overwritten; its former contents do not matter. b = 0 gives x = 0 without iterating.
+///
+/// ```
+/// use bfree::pooled::Pool;
+/// use bfree::solver::{GmresSettings, Identity, LinearOperator, gmres};
+///
+/// /// A quarter turn and a stretch: not symmetric, so conjugate gradients would not do.
+/// struct Turn;
+///
+/// impl LinearOperator for Turn {
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         (y[0], y[1]) = (-2.0 * x[1], 2.0 * x[0]);
+///     }
+/// }
+///
+/// let mut x = [0.0; 2];
+/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default(), &Pool::default())?;
+/// // Without rounding, a matrix of order n takes n iterations.
+/// assert!(report.converged() && report.iterations == 2);
+/// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
+/// # Ok::<(), bfree::solver::LinearError>(())
+/// ```
+///
+/// # Errors
+/// A setting out of range, lengths that differ, NaN or infinity.
+pub fn gmres<S: Entry>(
+    operator: &dyn LinearOperator<S>,
+    preconditioner: &dyn LinearOperator<S>,
+    rhs: &[S],
+    solution: &mut [S],
+    settings: &GmresSettings,
+    workspace: &Pool,
+) -> Result<LinearReport, LinearError> {
+    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
+    InvalidSetting::check_restart(settings.restart)?;
+    let (mut report, b_norm) = begin(rhs, solution)?;
+    if b_norm == 0.0 {
+        return Ok(report);
+    }
+    let target = settings.relative_tolerance * b_norm;
+    // More than n directions are never independent.
+    let mut restart = settings.restart.min(rhs.len());
+    let mut r = workspace.collect(rhs.iter().copied());
+    let mut r_norm = b_norm;
+    let mut trial = workspace.filled(rhs.len(), S::zero());
+    let mut correction = workspace.filled(rhs.len(), S::zero());
+    loop {
+        report.relative_residual = r_norm / b_norm;
+        if report.iterations >= settings.max_iterations {
+            report.outcome = LinearOutcome::IterationLimit;
+            return Ok(report);
+        }
+        let length = restart.min(settings.max_iterations - report.iterations);
+        let (taken, promised) = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
+            .map_err(|error| error.after(report.iterations))?;
+        report.iterations += taken;
+        report.products += taken + 1;
+        trial.copy_from_slice(solution);
+        axpy(1.0, &correction, &mut trial);
+        finite(norm(&trial), "the norm of the solution", report.iterations)?;
+        let trial_norm =
+            finite(true_residual(operator, rhs, &trial, &mut r), "the norm of the residual", report.iterations)?;
+        let (before, fell) = (r_norm, trial_norm / r_norm);
+        if fell < 1.0 {
+            solution.copy_from_slice(&trial);
+            r_norm = trial_norm;
+            report.relative_residual = r_norm / b_norm;
+        }
+        if r_norm <= target {
+            return Ok(report);
+        }
+        let too_short = taken == length && promised > TOO_SHORT * before && length < rhs.len();
+        if too_short {
+            restart = (2 * restart).min(rhs.len());
+        } else if fell > STAGNATION {
+            report.outcome = LinearOutcome::Stagnated;
+            return Ok(report);
+        }
+    }
+}
+
+/// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the
+/// correction of x and returns the iterations taken and the norm the residual should have then.
+fn cycle<S: Entry>(
+    operator: &dyn LinearOperator<S>,
+    preconditioner: &dyn LinearOperator<S>,
+    r: &Pooled<S>,
+    r_norm: f64,
+    target: f64,
+    length: usize,
+    correction: &mut [S],
+) -> Result<(usize, f64), LinearError> {
+    let fresh = || r.pool().filled(r.len(), S::zero());
+    let mut v = fresh();
+    scaled(1.0 / r_norm, r, &mut v);
+    // Grows by one vector an iteration: what is not needed is not allocated.
+    let mut basis: Vec<Pooled<S>> = Vec::new();
+    let exhausted_below = EXHAUSTED * S::EPSILON;
+    let mut triangle = Triangle {
+        columns: Vec::new(),
+        rotations: Vec::new(),
+        g: Vec::new(),
+        last: r_norm,
+        negligible: exhausted_below,
+    };
+    for iteration in 0..length {
+        let mut w = fresh();
+        // `correction` holds M⁻¹ v meanwhile.
+        preconditioner.apply(&v, correction);
+        operator.apply(correction, &mut w);
+        basis.push(v);
+        let w_norm = finite(norm(&w), "the norm of a Krylov vector", iteration)?;
+        let (column, left) = orthogonalise(&mut w, w_norm, &basis);
+        let exhausted = left <= exhausted_below * w_norm;
+        triangle.push(column, if exhausted { 0.0 } else { left });
+        if exhausted || triangle.residual() <= target {
+            break;
+        }
+        v = fresh();
+        scaled(1.0 / left, &w, &mut v);
+    }
+    let mut sum = fresh();
+    for (y, v) in triangle.solve().iter().zip(&basis) {
+        axpy(*y, v, &mut sum);
+    }
+    preconditioner.apply(&sum, correction);
+    Ok((basis.len(), triangle.residual()))
+}
+
+/// Takes out of `w` its parts along the orthonormal `basis`. Returns these parts and the norm of what is left.
+fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Pooled<S>]) -> (Vec<f64>, f64) {
+    let mut column = vec![0.0; basis.len()];
+    let mut before = w_norm;
+    for _ in 0..2 {
+        // hᵢ = w·vᵢ,  w ← w − hᵢ vᵢ
+        for (h, v) in column.iter_mut().zip(basis) {
+            let part = dot(w, v);
+            *h += part;
+            axpy(-part, v, w);
+        }
+        let left = norm(w);
+        if left > REORTHOGONALISE * before {
+            return (column, left);
+        }
+        before = left;
+    }
+    (column, before)
+}
+
+/// The Hessenberg matrix of a cycle, turned into a triangle by Givens rotations as its columns come.
+struct Triangle {
+    /// Column j has j + 1 entries, the diagonal last.
+    columns: Vec<Vec<f64>>,
+    /// (cos, sin) of each rotation.
+    rotations: Vec<(f64, f64)>,
+    /// The rotated right-hand side ‖r‖ e₁, one entry a column.
+    g: Vec<f64>,
+    /// Its entry below the triangle, the residual up to sign.
+    last: f64,
+    /// A pivot below this part of the largest one is round-off.
+    negligible: f64,
+}
+
+impl Triangle {
+    /// Adds h₁ⱼ … hⱼⱼ and hⱼ₊₁,ⱼ.
+    fn push(&mut self, mut column: Vec<f64>, below: f64) {
+        let mut diagonal = column.first().copied().unwrap_or(0.0);
+        for (i, (c, s)) in self.rotations.iter().enumerate() {
+            let next = column[i + 1];
+            column[i] = c * diagonal + s * next;
+            diagonal = c * next - s * diagonal;
+        }
+        let length = (diagonal * diagonal + below * below).sqrt();
+        // A zero column (A M⁻¹ v is in the span of the images before it) leaves the residual as it is.
+        let (c, s) = if length > 0.0 { (diagonal / length, below / length) } else { (0.0, 1.0) };
+        if let Some(entry) = column.last_mut() {
+            *entry = length;
+        }
+        self.columns.push(column);
+        self.rotations.push((c, s));
+        self.g.push(c * self.last);
+        self.last *= -s;
+    }
+
+    /// Norm of the least-squares residual.
+    fn residual(&self) -> f64 {
+        self.last.abs()
+    }
+
+    /// The y that minimises ‖ ‖r‖ e₁ − H y ‖, by back substitution; shorter than the triangle if its last columns are zero.
+    fn solve(&self) -> Vec<f64> {
+        let diagonal = |j: usize| self.columns[j][j];
+        let largest = (0..self.columns.len()).map(diagonal).fold(0.0, f64::max);
+        // Only an exhausted space of a singular operator ends in a zero pivot.
+        let mut n = self.columns.len();
+        while n > 0 && diagonal(n - 1) <= self.negligible * largest {
+            n -= 1;
+        }
+        let mut y = self.g[..n].to_vec();
+        for j in (0..n).rev() {
+            y[j] /= diagonal(j);
+            for i in 0..j {
+                y[i] -= self.columns[j][i] * y[j];
+            }
+        }
+        y
+    }
+}

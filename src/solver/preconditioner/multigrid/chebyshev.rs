@@ -1,0 +1,85 @@
+//! Smoothing: Chebyshev polynomials over the diagonal blocks, and the eigenvalue that they need.
+
+use crate::solver::LinearOperator;
+use crate::solver::vector::dot;
+use nalgebra::DMatrix;
+
+/// Degree of the smoothing polynomials, and the part of the spectrum they see: [λ/PART, λ].
+const DEGREE: usize = 5;
+const PART: f64 = 30.0;
+
+/// Products that estimate the largest eigenvalue λ of D⁻¹K, and what is added to the estimate, which is from below.
+const ESTIMATE: usize = 10;
+const MARGIN: f64 = 1.15;
+
+/// The largest eigenvalue of D⁻¹K, by the method of Lanczos in the inner product of D.
+pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n: usize) -> f64 {
+    let mut r: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
+    let (mut before, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut matrix = DMatrix::<f64>::zeros(ESTIMATE, ESTIMATE);
+    // Nothing of prescribed unknowns.
+    jacobi(&r, &mut z);
+    operator.apply(&z, &mut w);
+    jacobi(&w, &mut z);
+    operator.apply(&z, &mut r);
+    jacobi(&r, &mut z);
+    let mut beta = dot(&r, &z).max(0.0).sqrt();
+    for step in 0..ESTIMATE {
+        if beta.is_nan() || beta <= 0.0 {
+            break;
+        }
+        // r = D v, z = v
+        r.iter_mut().for_each(|x| *x /= beta);
+        z.iter_mut().for_each(|x| *x /= beta);
+        operator.apply(&z, &mut w);
+        let alpha = dot(&w, &z);
+        matrix[(step, step)] = alpha;
+        for i in 0..n {
+            let next = w[i] - alpha * r[i] - if step > 0 { beta * before[i] } else { 0.0 };
+            (before[i], r[i]) = (r[i], next);
+        }
+        jacobi(&r, &mut z);
+        beta = dot(&r, &z).max(0.0).sqrt();
+        if step + 1 < ESTIMATE {
+            (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta, beta);
+        }
+    }
+    let finite = matrix.iter().all(|x| x.is_finite());
+    let largest = if finite { MARGIN * matrix.symmetric_eigenvalues().max() } else { 0.0 };
+    if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// x ← x + p(D⁻¹K) D⁻¹ (b − K x), p a Chebyshev polynomial; from x = 0 if `zero`.
+pub(super) fn chebyshev(
+    operator: &dyn LinearOperator,
+    jacobi: &dyn Fn(&[f64], &mut [f64]),
+    largest: f64,
+    b: &[f64],
+    x: &mut [f64],
+    zero: bool,
+) {
+    let n = b.len();
+    let (upper, lower) = (largest, largest / PART);
+    let (theta, delta) = (0.5 * (upper + lower), 0.5 * (upper - lower));
+    let sigma = theta / delta;
+    let (mut r, mut z, mut p) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
+    if !zero {
+        operator.apply(x, &mut z);
+        r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
+    }
+    jacobi(&r, &mut z);
+    p.iter_mut().zip(&z).for_each(|(p, z)| *p = z / theta);
+    let mut rho = 1.0 / sigma;
+    for step in 0..DEGREE {
+        x.iter_mut().zip(&p).for_each(|(x, p)| *x += p);
+        if step + 1 == DEGREE {
+            break;
+        }
+        operator.apply(&p, &mut z);
+        r.iter_mut().zip(&z).for_each(|(r, z)| *r -= z);
+        jacobi(&r, &mut z);
+        let next = 1.0 / (2.0 * sigma - rho);
+        p.iter_mut().zip(&z).for_each(|(p, z)| *p = next * rho * *p + 2.0 * next / delta * z);
+        rho = next;
+    }
+}

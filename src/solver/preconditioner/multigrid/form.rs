@@ -1,0 +1,82 @@
+//! What multigrid has to know of an operator, beyond its product.
+
+use std::collections::HashMap;
+
+/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, Σ_nodes w·B u, and bends. Lengths are in cells.
+#[derive(Clone, Debug, Default)]
+pub struct LocalForm {
+    /// Cells along each axis; 0 along axes that do not exist.
+    pub grid: [u32; 3],
+    /// Index of each node.
+    pub nodes: Vec<[u32; 3]>,
+    /// Which unknowns are prescribed, node after node.
+    pub prescribed: Vec<bool>,
+    /// B of each node, D×D, column by column.
+    pub blocks: Vec<f64>,
+    /// Index of each cell with something in it.
+    pub cells: Vec<[u32; 3]>,
+    /// Where in the grid its centroid is.
+    pub centres: Vec<[f64; 3]>,
+    /// Its share that is filled.
+    pub filled: Vec<f64>,
+    /// m
+    pub masses: Vec<f64>,
+    /// Second differences that are held.
+    pub bends: Vec<Bend>,
+    /// `A[i][k][j][l]` of ∂w_i/∂x_k and ∂u_j/∂x_l.
+    pub tangents: Vec<f64>,
+}
+
+/// The energy ½ k |u_a − 2 u_b + u_c|² of three neighbours along an axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Bend {
+    /// a, b, c
+    pub nodes: [u32; 3],
+    /// k
+    pub stiffness: f64,
+}
+
+impl Bend {
+    /// The weights of a, b and c.
+    pub const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
+}
+
+impl LocalForm {
+    /// Room for one more cell.
+    pub(crate) fn push_cell(&mut self, index: [u32; 3], tiles: usize) {
+        self.cells.push(index);
+        self.centres.push([0.0; 3]);
+        self.filled.push(0.0);
+        self.masses.push(0.0);
+        self.tangents.extend(std::iter::repeat_n(0.0, tiles));
+    }
+
+    /// Divides the sums of places by what they were weighted with.
+    pub(crate) fn finish_centres(&mut self) {
+        for (centre, &filled) in self.centres.iter_mut().zip(&self.filled) {
+            centre.iter_mut().for_each(|x| *x /= filled);
+        }
+    }
+
+    /// The cells of the next grid; of each of these, which it lies in.
+    pub(super) fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<usize> {
+        let (tiles, mut places) = (D.pow(4), HashMap::new());
+        let mut of_coarse = Vec::with_capacity(self.cells.len());
+        for (cell, index) in self.cells.iter().enumerate() {
+            let coarse = index.map(|i| i / 2);
+            let at = *places.entry(coarse).or_insert_with(|| {
+                next.push_cell(coarse, tiles);
+                next.cells.len() - 1
+            });
+            of_coarse.push(at);
+            // Lengths are in cells: volumes are smaller numbers by 2^D, gradients larger ones by 2.
+            let share = self.filled[cell] / f64::from(1 << D);
+            next.filled[at] += share;
+            next.masses[at] += self.masses[cell];
+            (0..D).for_each(|k| next.centres[at][k] += share * 0.5 * self.centres[cell][k]);
+            (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
+        }
+        next.finish_centres();
+        of_coarse
+    }
+}

@@ -1,0 +1,145 @@
+//! Multigrid on the background grid: one V-cycle as preconditioner.
+//!
+//! The finest level is the tangent itself, known by its product. Coarser ones are hat functions on grids of twice the spacing each, with the
+//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils; second
+//! differences that something holds are held on each of them. Motions go down by linear interpolation of nodal values, forces go up by its
+//! transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the same before and after, so that the whole is symmetric where the
+//! tangent is.
+
+mod chebyshev;
+mod form;
+mod level;
+
+pub use form::{Bend, LocalForm};
+
+use super::{BlockJacobi, Preconditioner};
+use crate::solver::vector::Entry;
+use crate::solver::{LinearOperator, Linearization};
+use chebyshev::{chebyshev, largest};
+use level::Level;
+use nalgebra::{DVector, Dyn, LU};
+
+/// Unknowns that are solved for directly, and the most that ever are.
+const BOTTOM: usize = 400;
+const MOST: usize = 2000;
+
+/// One V-cycle, of levels made from the first tangent that is shown; smoothed by the present one.
+#[derive(Clone, Debug, Default)]
+pub struct Multigrid<const D: usize> {
+    blocks: BlockJacobi<D>,
+    /// What the tangent was divided by that the levels are made from.
+    scale: f64,
+    largest: f64,
+    levels: Vec<Level<D>>,
+    bottom: Option<LU<f64, Dyn, Dyn>>,
+}
+
+/// Bytes of the levels below so many nodes in `dimension` dimensions, and of the form that they are made from.
+pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
+    let (block, tangent) = (dimension.pow(2) * size_of::<f64>(), dimension.pow(4) * size_of::<f64>());
+    let transfer = 1.5_f64.powi(dimension as i32).ceil() as usize * size_of::<(u32, f64)>();
+    // Coarse grids have a half more nodes than their share, along surfaces.
+    let coarse = 2 * nodes.div_ceil(1 << dimension);
+    nodes * (tangent + transfer + size_of::<Vec<u32>>()) + coarse * (28 * block + 27 * size_of::<u32>())
+}
+
+impl<const D: usize> Multigrid<D> {
+    /// The levels of a tangent.
+    fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
+        self.largest = largest(fine, &|r, z| self.blocks.apply(r, z), self.blocks.len());
+        let Some(mut form) = form else { return };
+        loop {
+            let (level, next) = Level::<D>::of(&form);
+            let size = D * next.nodes.len();
+            let last = size <= BOTTOM || next.grid.iter().all(|&cells| cells <= 1);
+            if last && size <= MOST {
+                self.bottom = Some(level.assembled().lu());
+            }
+            self.levels.push(level);
+            form = next;
+            if last {
+                return;
+            }
+        }
+    }
+
+    /// x = M⁻¹ b below level `from`.
+    fn coarse(&self, from: usize, b: &[f64]) -> Vec<f64> {
+        let level = &self.levels[from];
+        let mut x = vec![0.0; b.len()];
+        if from + 1 == self.levels.len() {
+            match self.bottom.as_ref().and_then(|lu| lu.solve(&DVector::from_column_slice(b))) {
+                Some(solved) => x.copy_from_slice(solved.as_slice()),
+                None => level.precondition(b, &mut x),
+            }
+            return x;
+        }
+        let jacobi = |r: &[f64], z: &mut [f64]| level.precondition(r, z);
+        chebyshev(level, &jacobi, level.largest, b, &mut x, true);
+        self.correct(from + 1, level, b, &mut x);
+        chebyshev(level, &jacobi, level.largest, b, &mut x, false);
+        x
+    }
+
+    /// Adds to x what level `to` makes of the residual.
+    fn correct(&self, to: usize, operator: &dyn LinearOperator, b: &[f64], x: &mut [f64]) {
+        let Some(level) = self.levels.get(to) else { return };
+        let mut r = vec![0.0; b.len()];
+        operator.apply(x, &mut r);
+        r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
+        level.down(&self.coarse(to, &level.up(&r)), x);
+    }
+}
+
+/// A V-cycle with the present tangent.
+struct Cycle<'a, const D: usize, S> {
+    levels: &'a Multigrid<D>,
+    tangent: Doubled<'a, S>,
+}
+
+/// The tangent in double precision, whatever its own, and times what brings it to the levels' scale.
+struct Doubled<'a, S>(&'a dyn Linearization<S>, f64);
+
+impl<S: Entry> LinearOperator for Doubled<'_, S> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        let (x, mut out) = (x.iter().map(|&x| S::lit(x)).collect::<Vec<_>>(), vec![S::zero(); y.len()]);
+        self.0.apply(&x, &mut out);
+        y.iter_mut().zip(&out).for_each(|(y, out)| *y = self.1 * out.value());
+    }
+}
+
+impl<S: Entry, const D: usize> LinearOperator<S> for Cycle<'_, D, S> {
+    fn apply(&self, r: &[S], z: &mut [S]) {
+        let b: Vec<f64> = r.iter().map(|r| r.value()).collect();
+        let mut x = vec![0.0; b.len()];
+        let (fine, levels) = (&self.tangent, self.levels);
+        let jacobi = |r: &[f64], z: &mut [f64]| levels.blocks.apply(r, z);
+        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, true);
+        levels.correct(0, fine, &b, &mut x);
+        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);
+        z.iter_mut().zip(&x).for_each(|(z, x)| *z = S::lit(*x));
+    }
+}
+
+impl<const D: usize> Multigrid<D> {
+    fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
+        if self.levels.is_empty() {
+            self.blocks.take(tangent);
+            self.scale = tangent.scale();
+            self.build(tangent.local_form(), &Doubled(tangent, 1.0));
+        }
+        // Systems that single precision could not solve come again in double.
+        let tangent = Doubled(tangent, tangent.scale() / self.scale);
+        Box::new(Cycle { levels: self, tangent })
+    }
+}
+
+impl<const D: usize> Preconditioner for Multigrid<D> {
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
+        self.prepared(tangent)
+    }
+
+    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
+        self.prepared(tangent)
+    }
+}
