@@ -112,6 +112,14 @@ impl bfree::material::Law for BodyLaw {
     ) -> Option<ClosedTangent<f64, D>> {
         either!(self, law => bfree::material::Law::closed(law, f_n, at, volume))
     }
+    fn tangent_blocks<const D: usize>(
+        &self,
+        f_n: &Tensor<f64, D>,
+        at: &Deformation<f64, D>,
+        start: &Start<'_>,
+    ) -> [[Tensor<f64, D>; D]; D] {
+        either!(self, law => bfree::material::Law::tangent_blocks(law, f_n, at, start))
+    }
     fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
         either!(self, law => law.remember(at, start, next));
     }
