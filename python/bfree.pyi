@@ -79,7 +79,7 @@ class Simulation(Iterator[Step]):
 
     @property
     def end(self) -> float:
-        """When the last step ends: `time.end`, or the whole step after it."""
+        """When the last step ends: `time.end`; between whole steps it is shortened."""
 
     @property
     def particles(self) -> Particles:

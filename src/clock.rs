@@ -8,6 +8,9 @@ pub const MAX_HALVINGS: u32 = 20;
 /// Ticks per nominal step.
 const TICKS: u64 = 1 << MAX_HALVINGS;
 
+/// Round-off in an end, in steps.
+const HAIR: f64 = 1e-6;
+
 /// What a clock inherits from step to step.
 ///
 /// ```
@@ -59,6 +62,8 @@ impl Reached {
 pub struct Clock {
     nominal: f64,
     max_halvings: u32,
+    /// Of a clock whose only step ends there: see [`Clock::to`].
+    end: Option<f64>,
     /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
     ticks: u64,
     /// The current step is Δt / 2^level.
@@ -70,12 +75,13 @@ pub struct Clock {
 impl Clock {
     /// At time zero, with nominal step `dt`, which may be halved `max_halvings` times (at most [`MAX_HALVINGS`]).
     pub fn new(dt: f64, max_halvings: u32) -> Self {
-        Self { nominal: dt, max_halvings: max_halvings.min(MAX_HALVINGS), ticks: 0, level: 0, steps: 0 }
+        let max_halvings = max_halvings.min(MAX_HALVINGS);
+        Self { nominal: dt, max_halvings, end: None, ticks: 0, level: 0, steps: 0 }
     }
 
     /// How far it has come.
     pub fn reached(&self) -> Reached {
-        let Self { nominal: _, max_halvings: _, ticks, level, steps } = *self;
+        let Self { nominal: _, max_halvings: _, end: _, ticks, level, steps } = *self;
         Reached { ticks, level, steps }
     }
 
@@ -104,7 +110,11 @@ impl Clock {
     /// t_n
     pub fn time(&self) -> f64 {
         // Exact while the number of steps is: whole steps and the fraction are multiplied once.
-        (self.ticks / TICKS) as f64 * self.nominal + (self.ticks % TICKS) as f64 / TICKS as f64 * self.nominal
+        let (whole, part) = ((self.ticks / TICKS) as f64, (self.ticks % TICKS) as f64 / TICKS as f64);
+        match self.end {
+            Some(end) => end + (whole - 1.0) * self.nominal + part * self.nominal,
+            None => whole * self.nominal + part * self.nominal,
+        }
     }
 
     /// Δt of the coming step.
@@ -117,16 +127,64 @@ impl Clock {
         self.nominal
     }
 
-    /// Whole steps that reach `end`, to within a billionth of a step; a last step may lead beyond it.
+    /// Whole steps until `end`; one that misses it by less than a millionth of a step has reached it.
     ///
     /// ```
     /// use bfree::clock::Clock;
     ///
     /// // 0.3 / 0.1 is 2.9999999999999996.
-    /// assert_eq!((Clock::new(0.1, 0).whole_steps(0.3), Clock::new(0.1, 0).whole_steps(0.31)), (3, 4));
+    /// assert_eq!((Clock::new(0.1, 0).whole_steps(0.3), Clock::new(0.1, 0).whole_steps(0.39)), (3, 3));
     /// ```
     pub fn whole_steps(&self, end: f64) -> u64 {
-        (end / self.nominal - 1e-9).ceil().max(0.0) as u64
+        (end / self.nominal + HAIR).floor().max(0.0) as u64
+    }
+
+    /// What is left to `end` after [`Self::whole_steps`], if it lies between steps.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// assert_eq!((Clock::new(0.25, 0).rest(0.625), Clock::new(0.1, 0).rest(0.3)), (Some(0.125), None));
+    /// ```
+    pub fn rest(&self, end: f64) -> Option<f64> {
+        let rest = end - self.whole_steps(end) as f64 * self.nominal;
+        (rest > HAIR * self.nominal).then_some(rest)
+    }
+
+    /// Whether `end` is reached, to within a millionth of a step.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// let mut clock = Clock::new(0.1, 0);
+    /// (0..3).for_each(|_| clock.advance());
+    /// assert!(clock.has_reached(0.3) && !clock.has_reached(0.31));
+    /// ```
+    pub fn has_reached(&self, end: f64) -> bool {
+        end - self.time() <= HAIR * self.nominal
+    }
+
+    /// The clock of what is left to `end`, as one nominal step, not longer than the coming one; `None` if `end` is reached, as
+    /// [`Self::whole_steps`] sees it, or more than a step away.
+    ///
+    /// ```
+    /// use bfree::clock::Clock;
+    ///
+    /// let mut clock = Clock::new(0.1, 5);
+    /// clock.advance();
+    /// let mut last = clock.to(0.13).ok_or("between steps")?;
+    /// assert_eq!((last.time(), last.nominal_steps(), last.steps()), (0.1, 0, 1));
+    /// last.advance();
+    /// assert_eq!((last.time(), last.nominal_steps(), last.steps()), (0.13, 1, 2));
+    /// assert!(clock.to(0.1).is_none() && clock.to(0.25).is_none());
+    /// # Ok::<(), &str>(())
+    /// ```
+    pub fn to(&self, end: f64) -> Option<Self> {
+        let rest = end - self.time();
+        let between = rest > HAIR * self.nominal && rest < self.nominal;
+        let level = (0..self.max_halvings).find(|&level| rest <= self.step() * (1_u64 << level) as f64);
+        let level = level.unwrap_or(self.max_halvings);
+        between.then_some(Self { nominal: rest, end: Some(end), ticks: 0, level, ..*self })
     }
 
     /// Steps taken so far.

@@ -13,6 +13,7 @@ use std::sync::Arc;
 pub trait Model: Send + Sync {
     fn dimension(&self) -> usize;
     fn clock(&self) -> &Clock;
+    fn set_clock(&mut self, clock: Clock);
     fn advance(&mut self) -> Result<Step, AdvanceError>;
     /// By the ids of the particles; as many numbers as there are particles and components.
     fn values(&self, field: Field) -> Result<Vec<f64>, OutputError>;
@@ -37,6 +38,10 @@ impl<const D: usize> Model for Sized<D> {
 
     fn clock(&self) -> &Clock {
         &self.simulation.clock
+    }
+
+    fn set_clock(&mut self, clock: Clock) {
+        self.simulation.clock = clock;
     }
 
     fn advance(&mut self) -> Result<Step, AdvanceError> {

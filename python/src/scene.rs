@@ -101,10 +101,9 @@ impl Scene {
         });
         let plan = Plan::of(&simulation).map_err(|error| scene_error(&error))?;
         plan.check_fits(available()).map_err(|error| scene_error(&error))?;
-        let last = simulation.clock.whole_steps(self.scene.time.end);
         let start = Reference::of(&simulation);
         let bodies = simulation.bodies.iter().map(|body| body.name.clone()).collect();
         let model: Box<dyn Model> = Box::new(Sized { simulation, start });
-        Ok(Simulation::new(model, last, bodies, plan.to_string()))
+        Ok(Simulation::new(model, self.scene.time.end, bodies, plan.to_string()))
     }
 }

@@ -16,8 +16,8 @@ use std::sync::Arc;
 #[pyclass(module = "bfree")]
 pub struct Simulation {
     model: Box<dyn Model>,
-    /// Nominal steps until `time.end`.
-    last: u64,
+    /// `time.end`
+    end: f64,
     /// Names of the bodies.
     #[pyo3(get)]
     bodies: Vec<String>,
@@ -30,8 +30,8 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    pub fn new(model: Box<dyn Model>, last: u64, bodies: Vec<String>, plan: String) -> Self {
-        Self { model, last, bodies, plan, arrays: HashMap::new(), coming: None }
+    pub fn new(model: Box<dyn Model>, end: f64, bodies: Vec<String>, plan: String) -> Self {
+        Self { model, end, bodies, plan, arrays: HashMap::new(), coming: None }
     }
 
     fn coming(&mut self, py: Python<'_>) -> PyResult<Arc<dyn System>> {
@@ -84,10 +84,17 @@ impl Simulation {
         this
     }
 
-    /// Loops in C, too, can be interrupted between steps.
+    /// Loops in C, too, can be interrupted between steps. A last step that would lead beyond the end is shortened.
     fn __next__(&mut self, py: Python<'_>) -> PyResult<Option<Step>> {
         py.check_signals()?;
-        if self.model.clock().nominal_steps() >= self.last { Ok(None) } else { self.advance(py).map(Some) }
+        let clock = *self.model.clock();
+        if clock.has_reached(self.end) {
+            return Ok(None);
+        }
+        if let Some(rest) = clock.to(self.end).filter(|_| clock.on_nominal()) {
+            self.model.set_clock(rest);
+        }
+        self.advance(py).map(Some)
     }
 
     #[getter]
@@ -109,7 +116,7 @@ impl Simulation {
     /// When the last step ends.
     #[getter]
     fn end(&self) -> f64 {
-        self.last as f64 * self.model.clock().nominal()
+        self.end
     }
 
     #[getter]

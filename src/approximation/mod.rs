@@ -311,6 +311,25 @@ impl Parameters {
     pub(crate) fn has_kinks_in_middles(&self) -> bool {
         matches!(self, Self::Bspline(given) if given.degree == 2)
     }
+
+    /// How far apart, in grid spacings, the surfaces of two bodies are when they begin to feel each other, at least and at most: measured
+    /// by the test `contact`. `None` of functions that were not measured.
+    ///
+    /// ```
+    /// let cubic = bfree::approximation::Parameters::default();
+    /// assert_eq!(cubic.contact_distance(), Some([1.7, 2.4]));
+    /// ```
+    pub fn contact_distance(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Linear => Some([0.4, 1.4]),
+            Self::Gimp => Some([0.8, 1.7]),
+            Self::Bspline(given) if given.degree == 2 => Some([1.2, 2.0]),
+            Self::Bspline(_) => Some([1.7, 2.4]),
+            Self::Lme(given) if given.gamma == 3.0 => Some([0.7, 1.6]),
+            Self::Lme(given) if given.gamma == 1.4 => Some([1.9, 2.4]),
+            Self::Lme(_) => None,
+        }
+    }
 }
 
 /// Cells the shape functions measured, those that nothing beats in error and work at once (study `tradeoff`).

@@ -44,7 +44,7 @@ pub struct TangentMismatch {
     pub dual: f64,
     /// The relative difference allowed.
     pub bound: f64,
-    /// What it is relative to.
+    /// The size that the error is relative to.
     pub scale: f64,
 }
 

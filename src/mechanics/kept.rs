@@ -36,7 +36,7 @@ pub enum Renewal {
 }
 
 impl Renewal {
-    /// Whether the grid stays after a step that ends with such a strain.
+    /// Whether the grid is kept after a step that ends with this strain.
     pub fn keeps(self, strain: f64) -> bool {
         match self {
             Self::EveryStep => false,

@@ -89,7 +89,7 @@ impl<const D: usize> Mass<'_, D> {
         Ok((nodal, iterations))
     }
 
-    /// 1/M̃_II, zero where there is none.
+    /// 1/M̃_II; zero at nodes without mass.
     fn inverse_diagonal(&self) -> Pooled<f64> {
         let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
         self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {

@@ -54,7 +54,7 @@ pub enum OutputError {
         /// Number of particles.
         particles: usize,
     },
-    /// A probe at a point that is none, or without any particle to look at.
+    /// A probe at a point that is not a number, or with no particle near.
     #[error(
         "probe {name:?} at {point:?} has no nearest particle; its coordinates must be finite, and its body must have particles"
     )]

@@ -93,6 +93,8 @@ pub struct Cost {
 #[derive(Debug)]
 pub struct History {
     pub(crate) table: Table,
+    /// Without inertia loads are there at once, and a balance says nothing of their work.
+    moves: bool,
     dissipates: bool,
     follows_path: bool,
     yields: bool,
@@ -108,17 +110,19 @@ impl History {
         simulation: &Simulation<D, L, A>,
         kept: Option<Written>,
     ) -> Result<Self, OutputError> {
+        let moves = simulation.settings.scheme.has_inertia();
         let dissipates = simulation.damps() || simulation.remembers(DISSIPATED);
         let (follows_path, yields) = (simulation.settings.scheme.follows_path(), simulation.remembers(PLASTIC_STRAIN));
         let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
         columns.extend(follows_path.then(|| "load".into()));
         columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));
         columns.extend(dissipates.then(|| "dissipated".into()));
-        columns.extend(["total", "balance"].map(str::to_owned));
+        columns.push("total".into());
+        columns.extend(moves.then(|| "balance".into()));
         columns.extend(AXES.iter().take(D).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
         columns.extend(yields.then(|| "yielding".into()));
-        Ok(Self { table: Table::open(path, &columns, kept)?, dissipates, follows_path, yields })
+        Ok(Self { table: Table::open(path, &columns, kept)?, moves, dissipates, follows_path, yields })
     }
 
     /// Appends the present state; returns its energies.
@@ -139,7 +143,8 @@ impl History {
         row.push(cost.dt);
         row.extend([energies.kinetic, energies.strain, energies.external]);
         row.extend(self.dissipates.then_some(energies.dissipated));
-        row.extend([energies.total, energies.balance]);
+        row.push(energies.total);
+        row.extend(self.moves.then_some(energies.balance));
         row.extend(simulation.particles.momentum().iter().copied());
         row.push(cost.newton);
         row.push(cost.krylov);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// The pace is that of the last so many seconds.
 const WINDOW: f64 = 30.0;
 
-/// Between two lines where there is no terminal.
+/// Time between two lines of progress where standard error is not a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Between two lines of JSON.
@@ -128,7 +128,7 @@ pub struct Progress {
     end: f64,
 }
 
-/// Nobody may be listening; the run goes on.
+/// A closed standard error does not stop the run.
 fn line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

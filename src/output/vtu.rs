@@ -89,7 +89,7 @@ pub struct Snapshot {
     pub arrays: Vec<Array>,
 }
 
-/// A file is no snapshot of ours.
+/// A file is not a snapshot that bfree wrote.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The system refused.

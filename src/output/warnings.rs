@@ -9,7 +9,7 @@ const CREATED: f64 = 0.01;
 /// Energy lost, likewise: an impact of the paper's bodies, a few cells wide, takes a fifth.
 const LOST: f64 = 0.3;
 
-/// Steps whose mean is what iterations usually are.
+/// Steps over which the usual number of iterations is averaged.
 const MEMORY: u64 = 50;
 
 /// Steps before iterations are compared with their mean.
@@ -22,7 +22,7 @@ const CLIMB: (f64, f64) = (5.0, 100.0);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The balance of energy is positive.
+    /// With inertia, the balance of energy is positive.
     EnergyCreated,
     /// With inertia, the balance of energy is far below zero.
     EnergyLost,
@@ -104,7 +104,7 @@ impl Watch {
         if energy.is_finite() {
             self.most_energy = self.most_energy.max(energy);
         }
-        if balance > CREATED * self.most_energy {
+        if step.moves && balance > CREATED * self.most_energy {
             let part = 100.0 * balance / self.most_energy;
             self.warn(step, Kind::EnergyCreated, || {
                 format!("energy was created: the balance is {balance:+.3e}, {part:.1} % of the most energy so far")

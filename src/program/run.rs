@@ -1,7 +1,7 @@
 //! `bfree run`.
 
 use super::probes::{Bound, bound_probes};
-use super::scene_arguments::{SceneArguments, beyond, what_accuracy_sets};
+use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
 use bfree::output::plot::plot_run;
@@ -29,7 +29,8 @@ pub struct Run {
     /// Directory of the results [default: out/ and the scene's name].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// End at this time instead of the scene's time.end, or at the first whole step that reaches it; the same values are allowed.
+    /// End at this time instead of the scene's time.end; the same values are allowed. Between whole steps the last one is shortened, after
+    /// the checkpoint: a restart goes on as if it had not been taken.
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = number)]
     until: Option<f64>,
     /// Take at most this many whole time steps; 0 writes the initial state only.
@@ -139,19 +140,20 @@ impl Run {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.scene.plan(&simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
-        let until = simulation.clock.whole_steps(scene.time.end);
-        let last = self.steps.map_or(until, |steps| steps.min(until));
+        let end = scene.time.end;
+        let until = simulation.clock.whole_steps(end);
+        let mut last = self.steps.map_or(until, |steps| steps.min(until));
+        // A shortened step is one more.
+        let mut shortens = self.steps.is_none_or(|steps| steps > until);
         let directory = self.out.clone().unwrap_or_else(|| {
             Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))
         });
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
             self.say("accuracy", &format!("accuracy {set}"));
         }
-        if let Some(end) = beyond(scene, until).filter(|_| last == until) {
-            self.say("warning", &format!("{until} steps of {} go {end}", scene.time.step));
-        }
         let probes = bound_probes(scene, &simulation);
         probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
+        scene.warnings(&simulation).iter().for_each(|text| self.say("warning", text));
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let identity = Identity::new(settings.clone(), &simulation.particles);
         let mut asked = Map::new();
@@ -172,7 +174,7 @@ impl Run {
             fields: scene.output.fields(scene.time.inertia),
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
-            end_time: last as f64 * simulation.clock.nominal(),
+            end_time: if shortens { end } else { last as f64 * simulation.clock.nominal() },
             audience: self.audience(),
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
@@ -193,42 +195,40 @@ impl Run {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
         let mut failure = None;
-        let unwritten = |simulation: &Simulation<D>| {
-            let (time, place) = (simulation.clock.time(), directory.display());
-            self.say(
-                "stopped",
-                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
-            );
+        let unwritten = |time: f64| {
+            let place = directory.display();
+            let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
+            self.say("stopped", &text);
         };
         loop {
+            let time = simulation.clock.time();
             if let Some(checkpoints) = &mut checkpoints {
-                checkpoints.write_if_due(&simulation, &mut recorder).map_err(|error| {
-                    unwritten(&simulation);
-                    Failure::run(error)
-                })?;
+                let due = checkpoints.write_if_due(&simulation, &mut recorder);
+                due.inspect_err(|_| unwritten(time)).map_err(Failure::run)?;
             }
-            if simulation.clock.nominal_steps() >= last || interrupted.load(Ordering::Relaxed) {
-                break;
+            let interrupted = interrupted.load(Ordering::Relaxed);
+            if simulation.clock.nominal_steps() >= last || interrupted {
+                // Before the last snapshot, which an undisturbed run would not write here, and before a step that is shortened.
+                if let Some(mut checkpoints) = checkpoints.take() {
+                    let written = checkpoints.write(&simulation, &mut recorder);
+                    written.inspect_err(|_| unwritten(time)).map_err(Failure::run)?;
+                }
+                let rest = simulation.clock.to(end).filter(|_| shortens && !interrupted);
+                let Some(rest) = rest else { break };
+                (simulation.clock, last, shortens) = (rest, 1, false);
             }
             match simulation.advance() {
-                Ok(step) => recorder.record(&simulation, &step).map_err(|error| {
-                    unwritten(&simulation);
-                    Failure::run(error)
-                })?,
+                Ok(step) => {
+                    let recorded = recorder.record(&simulation, &step);
+                    recorded.inspect_err(|_| unwritten(simulation.clock.time())).map_err(Failure::run)?;
+                }
                 Err(error) => {
                     failure = Some(error);
                     break;
                 }
             }
         }
-        if let (Some(checkpoints), None) = (&mut checkpoints, &failure) {
-            // Before the last snapshot, which an undisturbed run would not write here.
-            checkpoints.write(&simulation, &mut recorder).map_err(|error| {
-                unwritten(&simulation);
-                Failure::run(error)
-            })?;
-        }
-        let stopped = simulation.clock.nominal_steps() < last;
+        let stopped = simulation.clock.nominal_steps() < last || shortens && simulation.clock.to(end).is_some();
         let outcome = match &failure {
             Some(error) => Outcome::Failed(error),
             None if stopped => Outcome::Interrupted,

@@ -85,15 +85,23 @@ impl SceneArguments {
         if let Some(set) = what_accuracy_sets(scene) {
             let _ = writeln!(text, "accuracy      {set}");
         }
-        let end = beyond(scene, steps).unwrap_or_else(|| format!("to t = {}", scene.time.end));
-        let _ = writeln!(text, "steps         {steps} of {} {end}", scene.time.step);
+        let (step, end) = (scene.time.step, scene.time.end);
+        let rest = simulation.clock.rest(end).map_or_else(String::new, |rest| format!(" and one of {rest:.6}"));
+        let _ = writeln!(text, "steps         {steps} of {step}{rest} to t = {end}");
         for body in scene.filled(&simulation) {
             let _ = writeln!(text, "body          {body}");
         }
         if simulation.bodies.len() > 1 {
+            let h = scene.grid.spacing;
+            let felt = scene.approximation.contact_distance().map_or_else(
+                || "how far was not measured for these functions".to_owned(),
+                |cells| {
+                    format!("{:.4} to {:.4} apart ({} to {} spacings)", cells[0] * h, cells[1] * h, cells[0], cells[1])
+                },
+            );
             let _ = writeln!(
                 text,
-                "contact       where bodies share nodes, before their surfaces meet: docs/src/limits.md says how far"
+                "contact       bodies feel each other before their surfaces meet: {felt}, see docs/src/limits.md"
             );
         }
         let _ = write!(text, "{}", self.plan(&simulation)?);
@@ -102,6 +110,7 @@ impl SceneArguments {
             let _ = write!(text, "\nprobe         {bound}");
             bound.warning().into_iter().for_each(|text| tell(format_args!("warning: {text}")));
         }
+        scene.warnings(&simulation).iter().for_each(|text| tell(format_args!("warning: {text}")));
         print(text)
     }
 }
@@ -121,10 +130,4 @@ pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
     let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();
     let set = if set.is_empty() { "nothing: the scene gives every key".to_owned() } else { set.join(", ") };
     Some(format!("{accuracy} sets {set}"))
-}
-
-/// Where whole steps end that do not end at the time asked for, beyond the 1e-9 of a step that [`Clock::whole_steps`](bfree::clock::Clock::whole_steps) overlooks.
-pub fn beyond(scene: &Scene, steps: u64) -> Option<String> {
-    let (end, last) = (scene.time.end, steps as f64 * scene.time.step);
-    (last > end + 1e-6 * scene.time.step).then(|| format!("to t = {last}, the first of them to reach {end}"))
 }

@@ -62,7 +62,7 @@ impl Scene {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
         let means = Means { folder, memory };
-        let mut problems = self.read_surfaces(folder)?;
+        let mut problems = self.read_shapes(folder)?;
         if !problems.is_empty() {
             return Err(BuildError::Values(problems));
         }

@@ -2,7 +2,7 @@
 
 use super::Problems;
 use super::particle_file::ParticleFileError;
-use super::surface_file::SurfaceFileError;
+use super::shape_file::ShapeFileError;
 use crate::mechanics::loads::CurveError;
 use crate::shape::FillError;
 use crate::simulation::StepError;
@@ -63,15 +63,15 @@ pub enum BuildError {
         /// What is wrong.
         source: Box<ParticleFileError>,
     },
-    /// A surface file.
+    /// The file of a shape.
     #[error("{path}: {file} {source}")]
-    SurfaceFile {
+    ShapeFile {
         /// The key.
         path: String,
         /// The file.
         file: String,
         /// What is wrong.
-        source: Box<SurfaceFileError>,
+        source: Box<ShapeFileError>,
     },
     /// A particle of a file that lies outside the grid.
     #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]

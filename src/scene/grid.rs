@@ -65,7 +65,7 @@ impl GridBox {
     /// assert!(section.holds(&[2.0, 0.5]) && !section.holds(&[2.1, 0.5]));
     /// let grid = section.build::<2>().ok_or("a plane grid")?;
     /// assert_eq!(grid.position([8, 4]).as_slice(), section.size);
-    /// // Three quarters of a cell are none.
+    /// // Three quarters of a cell are not a whole number of cells.
     /// let section: GridBox = serde_json::from_str(r#"{"size": [2, 1], "spacing": 0.8}"#)?;
     /// assert_eq!((section.cells(), section.build::<2>()), (None, None));
     /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -1,5 +1,7 @@
 //! Regions of space in a scene.
 
+use super::image_file::ImageFile;
+use super::shape_file::ShapeFile;
 use super::surface_file::SurfaceFile;
 use crate::problems::{LARGEST, MOST, Number, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
@@ -90,6 +92,9 @@ pub enum Shape {
     /// The inside of a closed surface of triangles, from a file (3D only). A file in other units is brought to those of the scene by
     /// `scaled`.
     Surface(SurfaceFile),
+    /// The pixels of a picture (2D) or the voxels of a scan (3D) whose value lies in a range; each is a box, and is cut exactly. Their surface
+    /// is a staircase: pressures on it have the right resultant, tractions act on an area that is larger than the smooth one's.
+    Image(ImageFile),
 }
 
 impl Shape {
@@ -129,6 +134,7 @@ impl Shape {
             }
             Self::Scaled { of, about, factor } => similar(of.build()?, vector(about)?, identity(), *factor),
             Self::Surface(file) => file.surface.get()?.in_dimension()?.into(),
+            Self::Image(file) => file.solid()?.into(),
         })
     }
 
@@ -214,14 +220,25 @@ impl Shape {
                 "must end in .stl or .ply",
             ),
             Self::Surface(_) => true,
+            Self::Image(file) => file.check(problems, &format!("{path}.image"), dimension),
         }
+    }
+
+    /// Whether pixels are part of it.
+    pub(super) fn has_pixels(&self) -> bool {
+        let mut any = false;
+        let _ = self.each_file("", &mut |_, file| {
+            any |= matches!(file, ShapeFile::Image(_));
+            Ok::<(), ()>(())
+        });
+        any
     }
 
     /// Visits the files in it, each with its path.
     pub(super) fn each_file<E>(
         &self,
         path: &str,
-        visit: &mut impl FnMut(&str, &SurfaceFile) -> Result<(), E>,
+        visit: &mut impl FnMut(&str, ShapeFile<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut all = |parts: &[Self], key: &str| {
             let mut parts = parts.iter().enumerate();
@@ -236,7 +253,8 @@ impl Shape {
             }
             Self::Rotated { of, .. } => of.each_file(&format!("{path}.rotated.of"), visit),
             Self::Scaled { of, .. } => of.each_file(&format!("{path}.scaled.of"), visit),
-            Self::Surface(file) => visit(&format!("{path}.surface.file"), file),
+            Self::Surface(file) => visit(&format!("{path}.surface.file"), ShapeFile::Surface(file)),
+            Self::Image(file) => visit(&format!("{path}.image.file"), ShapeFile::Image(file)),
             Self::Box { .. } | Self::Ball { .. } | Self::HalfSpace { .. } => Ok(()),
             Self::Polygon(_) | Self::Cylinder { .. } | Self::Cone { .. } => Ok(()),
         }

@@ -1,4 +1,4 @@
-//! The word a misspelt one was meant to be.
+//! The allowed word nearest to a misspelt one.
 
 /// The most letters to change, insert or drop.
 const NEAR: usize = 2;

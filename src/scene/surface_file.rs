@@ -1,8 +1,5 @@
 //! Surfaces of triangles from files of STL and PLY.
 
-use super::BuildError;
-use super::shape::Shape;
-use super::{Problems, Scene};
 use crate::shape::{Surface, SurfaceError};
 use crate::tensor::Vector;
 use ply_rs_bw::parser::Parser;
@@ -57,7 +54,7 @@ pub enum SurfaceFileError {
         /// Its corners.
         corners: usize,
     },
-    /// What it holds bounds no solid.
+    /// Its triangles do not bound a solid.
     #[error("holds {0}")]
     Surface(#[from] SurfaceError),
 }
@@ -97,41 +94,6 @@ impl SurfaceFile {
             let _ = self.surface.set(read_file(&folder.join(&self.file))?);
         }
         Ok(())
-    }
-}
-
-impl Scene {
-    /// Reads the surfaces of shapes from their files; and what is wrong with the scene now that they are known.
-    pub(super) fn read_surfaces(&self, folder: &Path) -> Result<Problems, BuildError> {
-        let mut any = false;
-        let mut read = |path: &str, file: &SurfaceFile| {
-            any = true;
-            let named = |source| BuildError::SurfaceFile {
-                path: path.to_owned(),
-                file: folder.join(&file.file).display().to_string(),
-                source: Box::new(source),
-            };
-            file.read(folder).map_err(named)
-        };
-        for (path, shape) in self.shapes() {
-            shape.each_file(&path, &mut read)?;
-        }
-        Ok(if any { self.check() } else { Problems::default() })
-    }
-
-    /// All shapes, with their paths.
-    fn shapes(&self) -> Vec<(String, &Shape)> {
-        let bodies = self.bodies.iter().enumerate();
-        let bodies = bodies.filter_map(|(i, body)| Some((format!("bodies[{i}].shape"), body.shape.as_ref()?)));
-        let prescribed = self.prescribed.iter().enumerate();
-        let prescribed = prescribed.map(|(i, one)| (format!("prescribed[{i}].region"), &one.region));
-        let tractions = self.tractions.iter().map(|one| one.region.as_ref()).enumerate();
-        let tractions = tractions.filter_map(|(i, region)| Some((format!("tractions[{i}].region"), region?)));
-        let pressures = self.pressures.iter().map(|one| one.region.as_ref()).enumerate();
-        let pressures = pressures.filter_map(|(i, region)| Some((format!("pressures[{i}].region"), region?)));
-        let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes).enumerate();
-        let initial = initial.map(|(i, one)| (format!("initial_velocity.nodes[{i}].region"), &one.region));
-        bodies.chain(prescribed).chain(tractions).chain(pressures).chain(initial).collect()
     }
 }
 

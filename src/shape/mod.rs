@@ -8,6 +8,7 @@ mod cut;
 mod fill;
 mod half_space;
 mod layout;
+mod pixels;
 mod polygon;
 mod similar;
 mod surface;
@@ -24,6 +25,7 @@ pub(crate) use fill::around;
 pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, Seed, fill};
 pub use half_space::HalfSpace;
 pub use layout::Layout;
+pub use pixels::{Mask, Pixels};
 pub use polygon::{Polygon, PolygonError};
 pub use similar::{Similar, rotation};
 pub use surface::{Surface, SurfaceError};
@@ -121,6 +123,8 @@ shapes! {
     Similar;
     /// The inside of a closed surface of triangles.
     Surface;
+    /// Pixels of a picture, voxels of a scan.
+    Pixels;
 }
 
 impl<const D: usize> Shape<D> {

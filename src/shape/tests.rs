@@ -45,7 +45,14 @@ fn solids() -> Vec<Shape<3>> {
         )
         .unwrap()
         .into(),
+        Pixels::new(vector([-0.9, -0.8, -0.7]), vector([0.9, 0.7, 0.8]), mask()).unwrap().into(),
     ]
+}
+
+/// Voxels with a hole and a notch, of which a layer at each end of the first axis is empty.
+fn mask() -> Mask {
+    let inside = |i: usize| ![0, 5].contains(&(i % 6)) && i % 11 != 3;
+    Mask::new([6, 4, 3], (0..72).map(inside)).unwrap()
 }
 
 /// Points without any symmetry, in [−1.5, 1.5]³.

@@ -71,8 +71,8 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub dissipated: f64,
     /// Where on its path it is, for a scheme that follows one.
     pub path: Path,
-    /// The grid that is kept, if it is: a step then goes on from there, and not from the places and deformations that are written into the
-    /// particles by hand. Put `None` here first.
+    /// The grid that is kept over steps, if there is one. The next step starts from it: whoever writes positions or deformations into the
+    /// particles by hand must put `None` here, or they are ignored.
     pub kept: Option<Kept<D>>,
     /// Prescribed conditions that bodies felt in the first step, by number, without those that one has come to since: the others are contacts.
     pub held: BTreeSet<usize>,

@@ -19,7 +19,7 @@ pub enum InitialGuess {
     Zero,
     /// Δφ = Δt v.
     Velocity,
-    /// Δφ goes on as in the last step, where the grid is kept; Δφ = 0 where it is new.
+    /// The Δφ of the last step on a grid that is kept; Δφ = 0 on a new one.
     LastStep,
 }
 

@@ -93,7 +93,7 @@ impl<S, T: LinearOperator<S> + ?Sized> LinearOperator<S> for &T {
 /// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7);
 /// ```
 pub trait Linearization<S = f64>: LinearOperator<S> + DiagonalBlocks {
-    /// What it is divided by: in single precision a power of two that keeps entries near 1, whatever the units.
+    /// The factor that entries are divided by: in single precision a power of two that keeps entries near 1, whatever the units.
     fn scale(&self) -> f64;
 }
 

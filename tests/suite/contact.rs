@@ -42,6 +42,9 @@ fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
         for (found, said) in [(range.0, least), (range.1, most)] {
             assert!((found - said.parse::<f64>()?).abs() < 0.06, "{row}: {found}");
         }
+        // And as `bfree check` says it.
+        let functions: bfree::approximation::Parameters = serde_json::from_str(approximation)?;
+        assert_eq!(functions.contact_distance(), Some([least.parse()?, most.parse()?]), "{row}");
         rows += 1;
     }
     assert_eq!(rows, 6);

@@ -263,22 +263,55 @@ fn options_are_judged_like_the_scene() -> Result<(), Failure> {
 }
 
 #[test]
-fn an_end_between_two_steps_is_said_to_be_one() -> Result<(), Failure> {
+fn a_run_ends_at_its_end_between_steps_too() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    // 4 / 0.05 is 80 up to rounding; 0.22 / 0.05 is not whole.
-    for (until, words) in
-        [("0.3", None), ("0.22", Some("5 steps of 0.05 go to t = 0.25, the first of them to reach 0.22"))]
-    {
+    // 0.3 / 0.05 is 6 up to rounding; 0.22 / 0.05 is not whole.
+    for (until, steps) in [("0.3", 6), ("0.22", 5)] {
         let output = rebound(directory.path(), &["--until", until, "--discard"])?;
-        let text = String::from_utf8(output.stderr)?;
-        assert_eq!(text.contains("warning"), words.is_some(), "{text}");
-        assert!(words.is_none_or(|words| text.contains(words)), "{text}");
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8(output.stderr)?);
+        let report = report(directory.path())?;
+        let time = report["time"].as_f64().ok_or("no time")?;
+        assert!((time - until.parse::<f64>()?).abs() < 1e-15, "{time}");
+        assert_eq!(report["counts"]["steps"].as_u64(), Some(steps));
     }
+    // Steps that are counted are whole ones.
+    rebound(directory.path(), &["--until", "0.22", "--steps", "4", "--discard"])?;
+    assert_eq!(report(directory.path())?["time"].as_f64(), Some(0.2));
     let check = |set: &str| -> Result<String, Failure> {
         Ok(String::from_utf8(program().arg("check").arg(scene("rebound.json")).args(["--set", set]).output()?.stdout)?)
     };
     assert!(check("time.end=4")?.contains("80 of 0.05 to t = 4\n"));
-    assert!(check("time.end=0.22")?.contains("5 of 0.05 to t = 0.25, the first of them to reach 0.22"));
+    assert!(check("time.end=0.22")?.contains("4 of 0.05 and one of 0.020000 to t = 0.22\n"));
+    Ok(())
+}
+
+#[test]
+fn check_says_how_far_apart_bodies_feel_each_other() -> Result<(), Failure> {
+    let check = |set: &str| -> Result<String, Failure> {
+        let output = program().arg("check").arg(scene("collision.json")).args(["--set", set]).output()?;
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8(output.stderr)?);
+        Ok(String::from_utf8(output.stdout)?)
+    };
+    assert!(check("approximation=\"linear\"")?.contains("0.1000 to 0.3500 apart (0.4 to 1.4 spacings)"));
+    assert!(check("approximation={\"lme\": {\"gamma\": 2}}")?.contains("how far was not measured"));
+    Ok(())
+}
+
+#[test]
+fn load_steps_have_no_balance() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let out = directory.path().join("run");
+    let status = program()
+        .arg("run")
+        .arg(scene("column_static.json"))
+        .args(["--steps", "1", "--quiet", "--out"])
+        .arg(&out)
+        .status()?;
+    assert!(status.success());
+    let history = std::fs::read_to_string(out.join("history.csv"))?;
+    let columns: Vec<&str> = history.lines().next().unwrap_or_default().split(',').collect();
+    assert!(columns.contains(&"strain") && !columns.contains(&"balance"), "{columns:?}");
+    assert_eq!(history.lines().last().map(|row| row.split(',').count()), Some(columns.len()));
     Ok(())
 }
 

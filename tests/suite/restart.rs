@@ -74,6 +74,19 @@ fn checkpoints(directory: &Path) -> Vec<std::path::PathBuf> {
 }
 
 #[test]
+fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
+    let common = ["--quiet", "--set", "output.every=0.1", "--set", "output.checkpoint=1"];
+    assert!(run("rebound.json", &whole, &[&common, &["--until", "0.73"]])?.status.success());
+    assert!(run("rebound.json", &parts, &[&common, &["--until", "0.32"]])?.status.success());
+    let history = std::fs::read_to_string(parts.join("history.csv"))?;
+    assert!(history.lines().last().is_some_and(|row| row.starts_with("7,0.32,0.0")), "{history}");
+    assert!(run("rebound.json", &parts, &[&common, &["--until", "0.73", "--restart"]])?.status.success());
+    assert_same(&whole, &parts)
+}
+
+#[test]
 fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     // Walls and smoothing; a prescribed motion with work and a load; halved steps in the middle of whole ones.

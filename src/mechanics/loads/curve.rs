@@ -19,7 +19,7 @@ pub struct Curve {
     points: Vec<[f64; 2]>,
 }
 
-/// Why a list of points is no curve.
+/// Why a list of points does not define a curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CurveError {
     /// No points.

@@ -19,7 +19,7 @@ use crate::mechanics::sweep::{Laned, Number};
 use crate::solver::Bend;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
-/// A node that has less of the body than this part of what it has of the layer under the load gives way to the load.
+/// A node whose volume is less than this share of that of the loaded layer at it is tied to its neighbours: it cannot carry the load alone.
 const LOOSE: f64 = 0.1;
 
 /// s without inertia.

@@ -28,7 +28,7 @@ pub(super) struct System<'a> {
     pub r: &'a Pooled<f64>,
     pub method: Krylov,
     pub relative_tolerance: f64,
-    /// Whether there is a potential that a truncated step may lower.
+    /// Whether the problem has a potential: a step of a truncated linear solve may then lower it.
     pub has_potential: &'a dyn Fn() -> bool,
 }
 

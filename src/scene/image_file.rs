@@ -1,0 +1,192 @@
+//! Pictures (PNG, in 2D) and scans (raw voxels, in 3D) as shapes.
+
+use crate::problems::{Number, Problems};
+use crate::shape::{Mask, Pixels};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// Pixels of a file, at most.
+pub const MAX_PIXELS: u64 = 1 << 27;
+
+/// What deflate packs into a byte, at most: a PNG file that says it holds more is broken.
+const DENSEST: u64 = 1032;
+
+/// Pixels of a picture, or voxels of a scan, whose value lies in a range.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageFile {
+    /// Path of the file, relative to the scene's folder: in 2D a grey PNG of at most 8 bits (with fewer bits, white is still 255), in 3D
+    /// a file `.raw` of one unsigned byte a voxel, x fastest, then y, then z.
+    #[schemars(length(min = 1))]
+    pub file: PathBuf,
+    /// The lower corner of the box that the picture covers (length). The last row of a PNG lies there, as one sees it.
+    pub min: Vec<f64>,
+    /// The upper corner (length), above `min` in every component.
+    pub max: Vec<f64>,
+    /// The least and the greatest value, 0 to 255, of pixels that belong to the shape: one label twice, or a threshold and 255.
+    pub values: [u8; 2],
+    /// Voxels along x, y and z of a raw file; a PNG file knows its size.
+    #[schemars(inner(range(min = 1)))]
+    pub size: Option<[u32; 3]>,
+    /// What was read.
+    #[serde(skip)]
+    read: OnceLock<Mask>,
+}
+
+/// A file that gives no shape.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageFileError {
+    /// It cannot be read.
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    /// It is no PNG file, or a broken one.
+    #[error("cannot be read: {0}")]
+    Png(#[from] png::DecodingError),
+    /// It is a folder, a device or a pipe.
+    #[error("is no regular file")]
+    NoFile,
+    /// Its colours are no values of one byte.
+    #[error("is a PNG of {0}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency")]
+    NotGrey(String),
+    /// It has too many pixels, or none.
+    #[error("has {} × {} pixels; 1 to {MAX_PIXELS} in all are allowed", .0[0], .0[1])]
+    Size([u32; 2]),
+    /// It is shorter or longer than it should be.
+    #[error("has {found} bytes, and {asked} pixels")]
+    Length {
+        /// Its bytes.
+        found: u64,
+        /// The pixels that it should hold.
+        asked: u64,
+    },
+    /// No pixel belongs to the shape.
+    #[error("has no pixel of a value from {} to {}: its values are from {} to {}", .asked[0], .asked[1], .found[0], .found[1])]
+    NoPixel {
+        /// The values asked for.
+        asked: [u8; 2],
+        /// The least and the greatest there is.
+        found: [u8; 2],
+    },
+}
+
+impl ImageFile {
+    /// The solid; `None` before the file was read, and unless `min` and `max` have `D` components.
+    pub(super) fn solid<const D: usize>(&self) -> Option<Pixels<D>> {
+        let [min, max] = [&self.min, &self.max].map(|x| super::shape::vector(x));
+        Pixels::new(min?, max?, self.read.get()?.clone())
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+        let before = problems.list.len();
+        let ending = match dimension {
+            2 => "png",
+            3 => "raw",
+            _ => {
+                problems.refuse(path, "an image", "needs a grid of 2 or 3 dimensions");
+                return false;
+            }
+        };
+        let found = self.file.extension().and_then(|ending| ending.to_str());
+        let named = found.is_some_and(|found| found.eq_ignore_ascii_case(ending));
+        let allowed = format!("must end in .{ending} in {dimension} dimensions");
+        problems.require(named, &format!("{path}.file"), format_args!("{:?}", self.file), allowed);
+        let ok = problems.vector(&format!("{path}.min"), &self.min, dimension)
+            && problems.vector(&format!("{path}.max"), &self.max, dimension);
+        for (k, (&min, &max)) in self.min.iter().zip(&self.max).enumerate().filter(|_| ok) {
+            let allowed = format!("must be greater than min[{k}] = {}", Number(min));
+            problems.require(max > min, &format!("{path}.max[{k}]"), Number(max), allowed);
+        }
+        let [least, most] = self.values;
+        let values = format_args!("[{least}, {most}]");
+        problems.require(
+            least <= most,
+            &format!("{path}.values"),
+            values,
+            "must be the least value, then the greatest",
+        );
+        let path = format!("{path}.size");
+        match self.size {
+            None => problems.require(dimension == 2, &path, "nothing", "must give the voxels along x, y and z"),
+            Some(size) if dimension == 2 => {
+                problems.refuse(&path, format_args!("{size:?}"), "must not be given: the picture knows its size");
+            }
+            Some(size) => {
+                let allowed = format!("must be three numbers of at least 1 whose product is at most {MAX_PIXELS}");
+                let all = product(&size).filter(|all| (1..=MAX_PIXELS).contains(all));
+                problems.require(all.is_some(), &path, format_args!("{size:?}"), allowed);
+            }
+        }
+        problems.list.len() == before
+    }
+
+    /// Reads the file, unless that was done.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is of another kind or size, or has no pixel of the values.
+    pub(super) fn read(&self, folder: &Path) -> Result<(), ImageFileError> {
+        if self.read.get().is_some() {
+            return Ok(());
+        }
+        let path = folder.join(&self.file);
+        let about = fs::metadata(&path)?;
+        // A pipe may wait for ever.
+        if !about.is_file() {
+            return Err(ImageFileError::NoFile);
+        }
+        let file = BufReader::new(File::open(&path)?);
+        let (count, bytes) = match self.size {
+            Some(size) => (size, raw(file, &size, about.len())?),
+            None => grey(file, about.len())?,
+        };
+        let [least, most] = self.values;
+        let inside = bytes.iter().map(|value| (least..=most).contains(value));
+        let mask = Mask::new(count.map(|n| n as usize), inside).ok_or_else(|| {
+            let (low, high) = bytes.iter().fold((u8::MAX, 0), |(low, high), &value| (low.min(value), high.max(value)));
+            ImageFileError::NoPixel { asked: self.values, found: [low, high] }
+        })?;
+        let _ = self.read.set(mask);
+        Ok(())
+    }
+}
+
+fn product(size: &[u32]) -> Option<u64> {
+    size.iter().try_fold(1_u64, |all, &n| all.checked_mul(n.into()))
+}
+
+/// The voxels of a raw file.
+fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>, ImageFileError> {
+    let asked = product(size).unwrap_or(u64::MAX);
+    if found != asked || asked > MAX_PIXELS {
+        return Err(ImageFileError::Length { found, asked });
+    }
+    let mut bytes = vec![0; asked as usize];
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The pixels of a PNG file, the last row first, so that y grows.
+fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ImageFileError> {
+    let mut decoder = png::Decoder::new(file);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info()?;
+    let info = reader.info();
+    let (width, height) = info.size();
+    let kind = (info.color_type, info.bit_depth, info.trns.is_some());
+    if kind.0 != png::ColorType::Grayscale || kind.1 == png::BitDepth::Sixteen || kind.2 {
+        let transparent = if kind.2 { ", transparent" } else { "" };
+        return Err(ImageFileError::NotGrey(format!("{:?} and {} bits{transparent}", kind.0, kind.1 as u8)));
+    }
+    let pixels = product(&[width, height]).filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
+    let asked = pixels.ok_or(ImageFileError::Size([width, height]))?;
+    if asked * kind.1 as u64 / 8 > DENSEST * found {
+        return Err(ImageFileError::Length { found, asked });
+    }
+    let mut bytes = vec![0; asked as usize];
+    reader.next_frame(&mut bytes)?;
+    let rows = bytes.chunks_exact(width as usize).rev();
+    Ok(([width, height, 1], rows.flatten().copied().collect()))
+}

@@ -1,0 +1,241 @@
+//! What a scene may have wrong and still runs: said with numbers by `bfree check` and at the start of a run.
+
+use super::body::Body;
+use super::shape::Shape as Drawn;
+use super::{BodyUse, Scene};
+use crate::grid::indices;
+use crate::mechanics::loads::SurfaceLoad;
+use crate::mechanics::loads::{Pressing, Selection};
+use crate::shape::{EDGE, Fill, Intersection, Shape, around};
+use crate::simulation::Simulation;
+use crate::tensor::Vector;
+use std::collections::BTreeSet;
+
+/// Particles nearer to each other, relative to the spacing, lie at one place.
+const COINCIDENT: f64 = 1e-6;
+
+/// Coincident places that are named.
+const NAMED: usize = 3;
+
+/// Share of its shape's volume by which a body may miss it. Weight, momentum and energies are wrong by as much, and that is twice what
+/// the accuracy `"standard"` errs by. With `fill: "cut"` it is 1e-4.
+const MISSED: f64 = 0.01;
+
+/// Volume in a cell that curved surfaces leave unsure, relative to the cell.
+const UNSURE: f64 = 1e-3;
+
+/// Cells across a body, at least, to bend and to press.
+const CELLS: f64 = 2.0;
+
+/// Bodies of a scene, as they were built.
+struct Bodies<'a, const D: usize> {
+    simulation: &'a Simulation<D>,
+    scene: &'a [Body],
+    shapes: Vec<Option<Shape<D>>>,
+    /// Particles with a volume, body by body.
+    particles: Vec<Vec<usize>>,
+}
+
+impl Scene {
+    /// What may be wrong with a simulation of this scene: bodies that overlap, particles at one place, bodies too thin for the grid or of
+    /// another volume than their shape, prescribed regions without nodes, tractions on surfaces of pixels. Of bodies that are unions
+    /// the thickness is that of one part.
+    ///
+    /// ```
+    /// // Two discs of radius 1, apart; and moved by 3, so that one lies partly in the other.
+    /// for (x, overlap) in [(3, false), (6, true)] {
+    ///     let moved = format!("bodies[0].shape.ball.center=[{x}, 2.25]").parse()?;
+    ///     let scene = bfree::scene::read_file("scenes/collision.json".as_ref(), &[moved])?;
+    ///     let warnings = scene.warnings(&scene.build::<2>("scenes".as_ref())?);
+    ///     assert_eq!(warnings.iter().any(|text| text.contains("overlap")), overlap);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn warnings<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<String> {
+        let mut particles = vec![Vec::new(); self.bodies.len()];
+        for p in (0..simulation.particles.len()).filter(|&p| simulation.particles.is_solid(p)) {
+            particles.get_mut(simulation.particles.body[p] as usize).into_iter().for_each(|own| own.push(p));
+        }
+        let shapes = self.bodies.iter().map(|body| body.shape.as_ref().and_then(Drawn::build)).collect();
+        let bodies = Bodies { simulation, scene: &self.bodies, shapes, particles };
+        let mut all: Vec<String> = (1..self.bodies.len())
+            .flat_map(|a| (0..a).map(move |b| (b, a)))
+            .filter_map(|(a, b)| bodies.overlap(a, b))
+            .collect();
+        all.extend(bodies.coincident());
+        all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
+        let filled = self.filled_otherwise(simulation);
+        all.extend(filled.into_iter().filter_map(|(number, body)| missed(number, &body)));
+        all.extend(without_nodes(simulation));
+        let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
+        all.extend(loaded.filter_map(|(i, (traction, load))| {
+            let body = self.bodies.iter().find(|body| body.name == traction.body)?;
+            let pixels = traction.surface.is_none() && body.shape.as_ref()?.has_pixels();
+            staircase(i, load).filter(|_| pixels)
+        }));
+        all
+    }
+
+    /// Bodies whose volume need not be that of their shape, with their numbers.
+    fn filled_otherwise<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<(usize, BodyUse)> {
+        if self.bodies.iter().all(|body| body.fill == Fill::Cut) {
+            return Vec::new();
+        }
+        let whole = |(i, _): &(usize, BodyUse)| self.bodies[*i].fill != Fill::Cut;
+        self.filled(simulation).into_iter().enumerate().filter(whole).collect()
+    }
+}
+
+impl<const D: usize> Bodies<'_, D> {
+    fn spacing(&self) -> f64 {
+        self.simulation.grid.spacing
+    }
+
+    /// Particles of a body that lie in the shape of another.
+    fn inside(&self, body: usize, other: usize) -> Vec<usize> {
+        let Some(shape) = &self.shapes[other] else { return Vec::new() };
+        let ((min, max), hair) = (shape.bounding_box(), EDGE * self.spacing());
+        let own = self.shapes[body].as_ref().map(Shape::bounding_box);
+        if own.is_some_and(|(own_min, own_max)| (0..D).any(|k| own_max[k] <= min[k] || own_min[k] >= max[k])) {
+            return Vec::new();
+        }
+        let position = &self.simulation.particles.position;
+        let near = |p: &&usize| (0..D).all(|k| position[**p][k] > min[k] && position[**p][k] < max[k]);
+        let inside = |p: &&usize| shape.signed_distance(&position[**p]) < -hair;
+        self.particles[body].iter().filter(near).filter(inside).copied().collect()
+    }
+
+    /// Two bodies in one place. Of two shapes the volume is what they have in common in the cells of such particles, for the centroid of
+    /// a part of a box may lie beside that part.
+    fn overlap(&self, a: usize, b: usize) -> Option<String> {
+        let (grid, particles) = (&self.simulation.grid, &self.simulation.particles);
+        let found = [self.inside(a, b), self.inside(b, a)].concat();
+        let cells: BTreeSet<_> = found.iter().filter_map(|&p| grid.cell(&particles.position[p])).collect();
+        let volume: f64 = match (&self.shapes[a], &self.shapes[b]) {
+            (Some(one), Some(other)) => {
+                let common = Shape::from(Intersection(vec![one.clone(), other.clone()]));
+                let edges = Vector::repeat(grid.spacing);
+                cells.iter().map(|&cell| common.part(&grid.position(cell), &edges, grid.spacing).0).sum()
+            }
+            _ => found.iter().map(|&p| particles.volume[p]).sum(),
+        };
+        let [a, b] = [a, b].map(|body| &self.scene[body].name);
+        (volume > UNSURE * cells.len() as f64 * grid.spacing.powi(D as i32)).then(|| {
+            format!(
+                "bodies {a:?} and {b:?} overlap: {} particles of one lie in the other, in a volume of {volume:.4e}; there they move as \
+                 one, with the mass and the stiffness of both",
+                found.len()
+            )
+        })
+    }
+
+    /// Particles at one place.
+    fn coincident(&self) -> Option<String> {
+        let position = &self.simulation.particles.position;
+        let key = |p: usize| -> [i64; D] {
+            std::array::from_fn(|k| {
+                let from = position[p][k] - self.simulation.grid.origin[k];
+                (from / (COINCIDENT * self.spacing())).round() as i64
+            })
+        };
+        let mut keys: Vec<([i64; D], usize)> = self.particles.iter().flatten().map(|&p| (key(p), p)).collect();
+        keys.sort_unstable();
+        let same: Vec<usize> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
+        let places = same.iter().take(NAMED).map(|&p| {
+            let place: Vec<String> = position[p].iter().map(ToString::to_string).collect();
+            format!("({})", place.join(", "))
+        });
+        (!same.is_empty()).then(|| {
+            let places = places.collect::<Vec<_>>().join(", ");
+            let more = if same.len() > NAMED { ", …" } else { "" };
+            format!("{} particles lie at the place of another one: at {places}{more}; they move as one", same.len())
+        })
+    }
+
+    /// A body that has no room for two cells: twice the greatest depth of a particle and its own width are less. Of a body without a
+    /// shape, its least extent.
+    fn thin(&self, body: usize) -> Option<String> {
+        let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.spacing());
+        let width = |p: usize| particles.volume[p].powf(1.0 / D as f64);
+        let enough = CELLS * h * (1.0 - EDGE);
+        let across = match &self.shapes[body] {
+            Some(shape) => {
+                let mut most: f64 = 0.0;
+                // From the middle on: the first ones lie at the surface.
+                let (first, last) = own.split_at(own.len() / 2);
+                for &p in last.iter().chain(first) {
+                    most = most.max(width(p) - 2.0 * shape.signed_distance(&particles.position[p]));
+                    if most >= enough {
+                        return None;
+                    }
+                }
+                most
+            }
+            None => {
+                (0..D).map(|k| self.extent(own, k)).fold(f64::INFINITY, f64::min) + own.first().map(|&p| width(p))?
+            }
+        };
+        (across < enough).then(|| {
+            let name = &self.scene[body].name;
+            format!(
+                "body {name:?} is at most {across:.4e} thick, {:.2} cells; from {CELLS} on it bends and presses as it should: lower \
+                 grid.spacing",
+                across / h
+            )
+        })
+    }
+
+    fn extent(&self, own: &[usize], k: usize) -> f64 {
+        let along = || own.iter().map(|&p| self.simulation.particles.position[p][k]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A body whose volume, and so its mass, is not that of its shape.
+fn missed(number: usize, body: &BodyUse) -> Option<String> {
+    let BodyUse { name, volume, drawn, .. } = body;
+    let drawn = drawn.filter(|drawn| (volume / drawn - 1.0).abs() > MISSED)?;
+    Some(format!(
+        "body {name:?} has the volume {volume:.6}, and its shape {drawn:.6}: its mass is {:+.1} % off; bodies[{number}].fill \"cut\" \
+         makes them equal",
+        100.0 * (volume / drawn - 1.0)
+    ))
+}
+
+/// Prescribed regions in which no node lies.
+fn without_nodes<const D: usize>(simulation: &Simulation<D>) -> Vec<String> {
+    let grid = &simulation.grid;
+    let regions = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
+        Selection::Region(region) => Some(region),
+        Selection::Face { .. } => None,
+    });
+    let has_none = |region: &Shape<D>| {
+        let (first, count) = around(grid, region);
+        let empty = count.contains(&0);
+        let mut nodes = indices(count.map(|cells| cells + 1));
+        empty
+            || !nodes
+                .any(|i| region.holds(&grid.position(std::array::from_fn(|k| (first[k] + i[k]) as u32)), grid.spacing))
+    };
+    let all = regions.enumerate().filter(|(_, region)| has_none(region));
+    all.map(|(i, _)| {
+        format!(
+            "prescribed[{i}].region holds no node of the grid, and so nothing: make it larger, by up to grid.spacing"
+        )
+    })
+    .collect()
+}
+
+/// A traction on more than one side of pixels.
+fn staircase<const D: usize>(i: usize, load: &SurfaceLoad<D>) -> Option<String> {
+    let area: f64 = load.points.iter().map(|point| point.area).sum();
+    let flat = load.points.iter().map(|point| point.normal * point.area).sum::<Vector<f64, D>>().amax();
+    let traction = matches!(load.pressing, Pressing::Traction(_));
+    (traction && flat < (1.0 - EDGE) * area).then(|| {
+        format!(
+            "tractions[{i}] acts on a staircase of pixels: its area of {area:.4e} is up to {:.2} times that of the smooth surface, and so \
+             is the force; a pressure has the right resultant",
+            (D as f64).sqrt()
+        )
+    })
+}

@@ -1,0 +1,137 @@
+//! What `bfree check` and the start of a run warn of, with numbers.
+
+use crate::support::Failure;
+use bfree::scene;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// The warnings about a scene in the plane of these bodies; its functions are linear, and a grid has 8 × 8 cells of 1.
+fn warnings(bodies: Value, more: Value, folder: &Path) -> Result<Vec<String>, Failure> {
+    let mut text = json!({
+        "grid": {"size": [8, 8], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "approximation": "linear", "bodies": bodies
+    });
+    if let (Some(scene), Value::Object(more)) = (text.as_object_mut(), more) {
+        scene.extend(more);
+    }
+    let scene = scene::read(&text.to_string(), &[])?;
+    Ok(scene.warnings(&scene.build::<2>(folder)?))
+}
+
+fn block(name: &str, min: [f64; 2], max: [f64; 2]) -> Value {
+    json!({"name": name, "shape": {"box": {"min": min, "max": max}}, "density": 1,
+           "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+}
+
+fn file(name: &str, file: &str) -> Value {
+    json!({"name": name, "particles": {"file": file}, "density": 1, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+}
+
+/// One warning that has all the words.
+fn assert_one(warnings: &[String], words: &[&str]) {
+    let all = |text: &&String| words.iter().all(|word| text.contains(word));
+    assert_eq!(warnings.iter().filter(all).count(), 1, "{words:?}: {warnings:?}");
+}
+
+#[test]
+fn bodies_that_overlap_are_named_with_particles_and_volume() -> Result<(), Failure> {
+    let nowhere = Path::new(".");
+    let bodies = |x: f64| json!([block("a", [1.0, 1.0], [4.0, 4.0]), block("b", [x, 2.0], [x + 3.0, 5.0])]);
+    let found = warnings(bodies(3.0), json!({}), nowhere)?;
+    // One cell wide, two high: 8 particles of each, in the same places.
+    assert_one(&found, &["\"a\" and \"b\" overlap: 16 particles", "volume of 2.0000e0"]);
+    assert_one(&found, &["8 particles lie at the place of another one: at (3.25, 2.25)", "…"]);
+    assert_eq!(found.len(), 2, "{found:?}");
+    // Side by side.
+    assert_eq!(warnings(bodies(4.0), json!({}), nowhere)?, Vec::<String>::new());
+    // Round ones that touch in a point.
+    let ball = |name: &str, x: f64| {
+        json!({"name": name, "shape": {"ball": {"center": [x, 4.1], "radius": 1.3}}, "density": 1,
+               "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+    };
+    assert_eq!(warnings(json!([ball("a", 2.0), ball("b", 4.6)]), json!({}), nowhere)?, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn particles_of_a_file_at_one_place_or_in_another_body_are_named() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let rows: String = (0..36)
+        .map(|i| format!("{},{},0.25\n", 1.25 + 0.5 * f64::from(i % 6), 1.25 + 0.5 * f64::from(i / 6)))
+        .collect();
+    std::fs::write(folder.path().join("p.csv"), format!("x,y,volume\n{rows}2.25,1.75,0.25\n"))?;
+    let found = warnings(json!([file("a", "p.csv")]), json!({}), folder.path())?;
+    assert_one(&found, &["1 particles lie at the place of another one: at (2.25, 1.75); they move as one"]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let found = warnings(json!([file("a", "p.csv"), block("b", [3.0, 1.0], [6.0, 4.0])]), json!({}), folder.path())?;
+    assert_one(&found, &["\"a\" and \"b\" overlap: 12 particles", "volume of 3.0000e0"]);
+    Ok(())
+}
+
+#[test]
+fn a_body_of_less_than_two_cells_is_named_with_its_thickness() -> Result<(), Failure> {
+    let nowhere = Path::new(".");
+    let thick =
+        |thickness: f64| warnings(json!([block("plate", [1.0, 2.0], [7.0, 2.0 + thickness])]), json!({}), nowhere);
+    assert_one(&thick(1.0)?, &["\"plate\" is at most 1.0000e0 thick, 1.00 cells"]);
+    assert_eq!(thick(2.0)?, Vec::<String>::new());
+    // Of the wall of a ring, not of the ring.
+    let disc = |radius: f64| json!({"ball": {"center": [4, 4], "radius": radius}});
+    let ring = json!([{"name": "ring", "shape": {"difference": {"of": disc(3.5), "minus": disc(2.7)}}, "density": 1,
+                       "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}]);
+    assert_one(&warnings(ring, json!({}), nowhere)?, &["\"ring\" is at most", "cells"]);
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("p.csv"), "x,y,volume\n1.25,1.25,0.25\n1.75,1.25,0.25\n2.25,1.25,0.25\n")?;
+    assert_one(
+        &warnings(json!([file("bar", "p.csv")]), json!({}), folder.path())?,
+        &["\"bar\" is at most 5.0000e-1 thick, 0.50 cells"],
+    );
+    Ok(())
+}
+
+#[test]
+fn a_mass_that_misses_the_shape_by_a_percent_is_said() -> Result<(), Failure> {
+    let nowhere = Path::new(".");
+    let mut disc = json!({"name": "disc", "shape": {"ball": {"center": [4, 4], "radius": 2.2}}, "density": 1, "fill": "cells",
+                          "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}});
+    // 16 cells whose middles lie in a circle of 15.2.
+    assert_one(
+        &warnings(json!([disc]), json!({}), nowhere)?,
+        &["\"disc\" has the volume 16.000000", "+5.2 % off", "bodies[0].fill \"cut\""],
+    );
+    disc["fill"] = "cut".into();
+    assert_eq!(warnings(json!([disc]), json!({}), nowhere)?, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn a_prescribed_region_between_nodes_is_named() -> Result<(), Failure> {
+    let region = |x: f64| {
+        json!({"prescribed": [{"region": {"box": {"min": [0, 0], "max": [8, 8]}}, "velocity": [[0, [0, null]]]},
+                              {"region": {"box": {"min": [x, 0.1], "max": [x + 0.5, 8]}}, "velocity": [[0, [0, 0]]]}]})
+    };
+    let bodies = json!([block("a", [1.0, 1.0], [4.0, 4.0])]);
+    let found = warnings(bodies.clone(), region(3.2), Path::new("."))?;
+    assert_one(&found, &["prescribed[1].region holds no node of the grid"]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(warnings(bodies, region(2.7), Path::new("."))?, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn shipped_scenes_have_nothing_to_warn_of() -> Result<(), Failure> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for entry in std::fs::read_dir(&folder)? {
+        let path = entry?.path();
+        if path.extension().is_none_or(|ending| ending != "json") {
+            continue;
+        }
+        let scene = scene::read_file(&path, &[])?;
+        let found = match scene.dimension() {
+            1 => scene.warnings(&scene.build::<1>(&folder)?),
+            2 => scene.warnings(&scene.build::<2>(&folder)?),
+            _ => scene.warnings(&scene.build::<3>(&folder)?),
+        };
+        assert_eq!(found, Vec::<String>::new(), "{}", path.display());
+    }
+    Ok(())
+}
