@@ -9,6 +9,7 @@ mod fill;
 mod half_space;
 mod layout;
 mod polygon;
+mod quadrature;
 mod similar;
 mod surface;
 
