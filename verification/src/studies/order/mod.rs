@@ -6,6 +6,7 @@ mod block;
 mod hole;
 mod rebound;
 mod ring;
+mod transfers;
 mod vortex;
 
 use super::{Effort, Outcome, StudyError};
@@ -265,6 +266,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     ring::run(&mut outcome);
     beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
+    transfers::run(*effort, &mut outcome);
     rebound::run(*effort, &mut outcome)?;
     outcome.remarks.push(
         "On a grid that is kept, functions of degree p on Gauss points of their own pieces have order p + 1 in the displacement and p in the \
