@@ -299,17 +299,21 @@ approximations! {
     /// Products of one-dimensional uGIMP functions; the half width of a particle follows from the bodies'
     /// `particles_per_cell`, which must all agree.
     "gimp" => Gimp;
-    /// Products of B-splines centred on the nodes. At walls they curve in load steps with Gauss's points on a kept grid; with inertia, or
-    /// with regular particles, their second derivative is zero there.
+    /// Products of B-splines centred on the nodes. At walls they curve with Gauss's points on a kept grid, in load steps and with
+    /// `time.lumping` = 0; with a lumped mass, or with regular particles, their second derivative is zero there.
     "bspline" => Bspline(given: BsplineParameters) or NotAKnotBspline;
     /// Local maximum entropy functions.
     "lme" => Lme(given: LmeParameters) or LmeCircle;
 }
 
 impl Parameters {
-    /// Whether they are polynomials between the middles of cells.
-    pub(crate) fn has_kinks_in_middles(&self) -> bool {
-        matches!(self, Self::Bspline(given) if given.degree == 2)
+    /// The degree of the polynomials that they are along an axis; of one that comes near, for local maximum entropy functions.
+    pub(crate) fn degree(&self) -> u32 {
+        match self {
+            Self::Linear | Self::Gimp => 1,
+            Self::Bspline(given) => given.degree,
+            Self::Lme(_) => 3,
+        }
     }
 
     /// How far apart, in grid spacings, the surfaces of two bodies are when they begin to feel each other, at least and at most: measured

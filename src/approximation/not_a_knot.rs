@@ -11,8 +11,8 @@ use crate::grid::Axis;
 ///
 /// Linear consistency holds with the nodes where they are. But N of the third node is negative near the wall (down to −1/16 of quadratic,
 /// −0.19 of cubic ones): of a body that ends there a lumped mass would be, too. And sums over particles must be integrals: with regular
-/// ones those of [`Bspline`], which are mirrored at walls, err less. So it is for Gauss's points without inertia. Axes of fewer than four
-/// cells have no room for two ends, and the functions of [`Bspline`].
+/// ones those of [`Bspline`], which are mirrored at walls, err less. So it is for Gauss's points without a lumped mass. Axes of fewer than
+/// four cells have no room for two ends, and the functions of [`Bspline`].
 ///
 /// ```
 /// use bfree::approximation::{ApproximationError, AxisWeights, Bspline, NotAKnotBspline, Separable};

@@ -149,7 +149,7 @@ impl Scene {
             per_axis: body.particles_per_cell,
             layout: body.layout.unwrap_or(by_itself),
             rule: body.fill,
-            kinks_in_middles: self.approximation.has_kinks_in_middles(),
+            degree: self.approximation.degree(),
         }
     }
 
@@ -157,10 +157,11 @@ impl Scene {
         self.grid.renewed(self.time.inertia) != Renewal::EveryStep
     }
 
-    /// Whether sums over particles are integrals, of Gauss's points on a grid that is kept, and no mass is lumped.
+    /// Whether sums over particles are integrals, of Gauss's points on a grid that is kept, and no mass is lumped, not even in part.
     pub(super) fn is_integrated(&self) -> bool {
         let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
-        !self.time.inertia.has_inertia() && self.is_kept() && self.bodies.iter().all(gauss)
+        let lumped = self.time.inertia.has_inertia() && self.time.lumping() > 0.0;
+        !lumped && self.is_kept() && self.bodies.iter().all(gauss)
     }
 
     /// What its bodies were filled with, beside what is drawn.
@@ -204,7 +205,8 @@ impl Scene {
         region: Option<&Shape<D>>,
         grid: &Grid<D>,
     ) -> Vec<Facet<D>> {
-        let (h, n) = (grid.spacing, u64::from(self.filling(body).boxes()));
+        let filling = self.filling(body);
+        let (h, n) = (grid.spacing, u64::from(filling.boxes_at_surface()));
         let edges = Vector::repeat(h / n as f64);
         let (first, count) = around(grid, shape);
         let goes_on = |facet: &Facet<D>| {
@@ -224,7 +226,10 @@ impl Scene {
             }
             for i in indices([n; D]) {
                 let lower = corner + Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
-                facets.extend(shape.facets(region, &lower, &edges, h));
+                facets.extend(match filling.layout {
+                    Layout::Regular => shape.facets(region, &lower, &edges, h),
+                    Layout::Gauss => shape.surface_points(region, &lower, &edges, h),
+                });
             }
         }
         facets.retain(|facet| !goes_on(facet));

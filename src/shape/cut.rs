@@ -23,21 +23,59 @@ pub struct Facet<const D: usize> {
     pub normal: Vector<f64, D>,
     /// Its area (a length in 2D, 1 in 1D).
     pub area: f64,
+    /// The mean of (x − position) ⊗ (x − position) over it.
+    pub spread: Tensor<f64, D>,
+    /// The mean of (x − position) ⊗ n: not zero where it is curved.
+    pub turn: Tensor<f64, D>,
+}
+
+impl<const D: usize> Facet<D> {
+    /// The simplex with these D corners.
+    pub(super) fn flat(corners: &[Vector<f64, D>], normal: Vector<f64, D>, area: f64) -> Self {
+        let position = corners.iter().sum::<Vector<f64, D>>() / D as f64;
+        let squares = corners.iter().map(|x| (x - position) * (x - position).transpose()).sum::<Tensor<f64, D>>();
+        Self { position, normal, area, spread: squares / (D * (D + 1)) as f64, turn: Tensor::zeros() }
+    }
+
+    /// Both together.
+    fn and(&self, other: &Self) -> Self {
+        let area = self.area + other.area;
+        let share = other.area / area;
+        let (by, turned) = (other.position - self.position, other.normal - self.normal);
+        let mean = |a: Tensor<f64, D>, b: Tensor<f64, D>, apart: Vector<f64, D>| {
+            a * (1.0 - share) + b * share + by * apart.transpose() * (share * (1.0 - share))
+        };
+        Self {
+            position: self.position + by * share,
+            normal: self.normal + turned * share,
+            area,
+            spread: mean(self.spread, other.spread, by),
+            turn: mean(self.turn, other.turn, turned),
+        }
+    }
 }
 
 /// A convex piece of a box that lies in the solid.
-struct Piece<'a, const D: usize> {
-    volume: f64,
-    centroid: Vector<f64, D>,
-    /// Of a piece that the surface may bound.
-    cut: Option<(&'a Simplex<D>, &'a Cut<D>)>,
+pub(super) struct Piece<'a, const D: usize> {
+    pub volume: f64,
+    pub centroid: Vector<f64, D>,
+    pub extent: Extent<'a, D>,
+}
+
+/// What a piece is.
+#[derive(Clone, Copy)]
+pub(super) enum Extent<'a, const D: usize> {
+    /// A box, by its edges.
+    Box(&'a Vector<f64, D>),
+    /// A simplex that the surface may bound.
+    Simplex(&'a Simplex<D>, &'a Cut<D>),
 }
 
 /// Corners 0 … D.
 type Simplex<const D: usize> = [Vector<f64, D>; 4];
 
 /// The planes that cut a box, as seen from its centre, and how far the surface may be from them.
-struct Cut<const D: usize> {
+pub(super) struct Cut<const D: usize> {
     center: Vector<f64, D>,
     planes: Vec<Face<D>>,
     departure: f64,
@@ -77,7 +115,7 @@ impl<const D: usize> Shape<D> {
             return (rest.max(0.0), if rest > 0.0 { center + (center - centroid) * (volume / rest) } else { center });
         }
         let (mut volume, mut moment) = (0.0, Vector::zeros());
-        self.pieces(None, lower, edges, FLAT * spacing, &mut |piece| {
+        self.pieces(None, lower, edges, spacing, FLAT, &mut |piece| {
             volume += piece.volume;
             moment += piece.centroid * piece.volume;
         });
@@ -116,10 +154,24 @@ impl<const D: usize> Shape<D> {
         edges: &Vector<f64, D>,
         spacing: f64,
     ) -> Vec<Facet<D>> {
+        self.sides(region, lower, edges, spacing, FLAT)
+    }
+
+    /// As [`Self::facets`], `flat` in place of 1e-3.
+    pub(super) fn sides(
+        &self,
+        region: Option<&Self>,
+        lower: &Vector<f64, D>,
+        edges: &Vector<f64, D>,
+        spacing: f64,
+        flat: f64,
+    ) -> Vec<Facet<D>> {
         let (center, radius) = around(lower, edges);
         if let Some((part, outside)) = self.solid().alone(&center, radius) {
-            let mut facets = part.facets(region, lower, edges, spacing);
-            facets.iter_mut().filter(|_| outside).for_each(|facet| facet.normal = -facet.normal);
+            let mut facets = part.sides(region, lower, edges, spacing, flat);
+            for facet in facets.iter_mut().filter(|_| outside) {
+                (facet.normal, facet.turn) = (-facet.normal, -facet.turn);
+            }
             return facets;
         }
         let mut sides: Vec<Facet<D>> = Vec::new();
@@ -133,10 +185,7 @@ impl<const D: usize> Shape<D> {
                 sides.push(facet);
                 return;
             };
-            let area = side.area + facet.area;
-            let mean = |a: Vector<f64, D>, b: Vector<f64, D>| (a * side.area + b * facet.area) / area;
-            let (position, normal) = (mean(side.position, facet.position), mean(side.normal, facet.normal));
-            *side = Facet { position, normal, area };
+            *side = side.and(&facet);
         };
         let mut planes = Vec::new();
         region.iter().for_each(|region| _ = region.solid().add_planes(&center, radius, &mut planes));
@@ -144,8 +193,8 @@ impl<const D: usize> Shape<D> {
             facets.into_iter().for_each(|facet| add(facet, 0.0));
             return sides;
         }
-        self.pieces(region, lower, edges, FLAT * spacing, &mut |piece| {
-            let Some((simplex, cut)) = piece.cut else { return };
+        self.pieces(region, lower, edges, spacing, flat, &mut |piece| {
+            let Extent::Simplex(simplex, cut) = piece.extent else { return };
             for apex in 0..=D {
                 if let Some(facet) = self.facet(simplex, apex, piece.volume, cut, spacing) {
                     add(facet, cut.departure);
@@ -158,17 +207,18 @@ impl<const D: usize> Shape<D> {
     /// The side of a simplex across from a corner, if it lies in a plane where the solid ends.
     fn facet(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<Facet<D>> {
         let hair = EDGE * spacing;
-        let side = || (0..=D).filter(|&i| i != apex).map(|i| &simplex[i]);
+        let mut side = simplex[..=D].to_vec();
+        side.swap_remove(apex);
         let height = |plane: &Face<D>| cut.distance(plane, &simplex[apex]);
         let lies_in =
-            |plane: &&Face<D>| height(plane).abs() > hair && side().all(|x| cut.distance(plane, x).abs() <= hair);
+            |plane: &&Face<D>| height(plane).abs() > hair && side.iter().all(|x| cut.distance(plane, x).abs() <= hair);
         let plane = cut.planes.iter().find(lies_in)?;
         let outward = plane.1 * -height(plane).signum();
-        let position = side().sum::<Vector<f64, D>>() / D as f64;
-        let beyond = position + outward * (2.0 * cut.departure + 1e3 * hair);
         // V = A height / D
         let area = D as f64 * volume / height(plane).abs();
-        (!self.contains(&beyond)).then_some(Facet { position, normal: outward, area })
+        let facet = Facet::flat(&side, outward, area);
+        let beyond = facet.position + outward * (2.0 * cut.departure + 1e3 * hair);
+        (!self.contains(&beyond)).then_some(facet)
     }
 
     /// Whether a piece with this centroid lies in the solid: near a curved surface, by the plane that stands for it.
@@ -183,11 +233,12 @@ impl<const D: usize> Shape<D> {
     }
 
     /// Hands over the convex pieces that a box and the solid have in common; `region` cuts them once more.
-    fn pieces(
+    pub(super) fn pieces(
         &self,
         region: Option<&Self>,
         lower: &Vector<f64, D>,
         edges: &Vector<f64, D>,
+        spacing: f64,
         flat: f64,
         visit: &mut dyn FnMut(Piece<'_, D>),
     ) {
@@ -197,14 +248,14 @@ impl<const D: usize> Shape<D> {
             return;
         }
         if distance <= -radius {
-            visit(Piece { volume: edges.product(), centroid: center, cut: None });
+            visit(Piece { volume: edges.product(), centroid: center, extent: Extent::Box(edges) });
             return;
         }
         let (mut planes, mut departure) = (Vec::new(), 0.0_f64);
         for shape in std::iter::once(self).chain(region) {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
-        let hair = EDGE / FLAT * flat;
+        let hair = EDGE * spacing;
         let same = |a: &Face<D>, b: &Face<D>| {
             let along = a.1.dot(&b.1).signum();
             (a.1 - b.1 * along).norm() <= 1e-6 && (a.0 - b.0 * along).abs() <= hair
@@ -215,14 +266,14 @@ impl<const D: usize> Shape<D> {
                 distinct.push(plane);
             }
         }
-        if (departure > flat || distinct.len() > MANY) && radius > flat {
+        if (departure > flat * spacing || distinct.len() > MANY) && radius > flat * spacing {
             let k = edges.imax();
             let mut half = *edges;
             half[k] *= 0.5;
             let mut upper = *lower;
             upper[k] += half[k];
-            self.pieces(region, lower, &half, flat, visit);
-            self.pieces(region, &upper, &half, flat, visit);
+            self.pieces(region, lower, &half, spacing, flat, visit);
+            self.pieces(region, &upper, &half, spacing, flat, visit);
             return;
         }
         let cut = Cut { center, planes: distinct, departure: departure.min(2.0 * radius) };
@@ -238,14 +289,14 @@ impl<const D: usize> Shape<D> {
             let volume = volume(simplex);
             let centroid = simplex[..=D].iter().sum::<Vector<f64, D>>() / (D + 1) as f64;
             if volume > 0.0 && self.holds_by(&cut, &centroid) {
-                visit(Piece { volume, centroid, cut: Some((simplex, &cut)) });
+                visit(Piece { volume, centroid, extent: Extent::Simplex(simplex, &cut) });
             }
         }
     }
 }
 
 /// The centre of a box, and how far its corners are; a hair more, for faces that it touches.
-fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
+pub(super) fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
     (lower + edges * 0.5, (0.5 + EDGE) * edges.norm())
 }
 

@@ -15,7 +15,11 @@ pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
 #[serde(rename_all = "snake_case")]
 pub enum Fill {
     /// Every particle has the volume and the centroid of that part of its box that lies in the shape: volume, mass and first moments
-    /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour.
+    /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout boxes have half the
+    /// size; in 1D and 2D, but for shapes of triangles, the particles of a cut cell are instead points that integrate products of
+    /// polynomials of the shape functions' degree over what of it lies in the shape: up to 4 of linear functions, 16 of cubic ones and of
+    /// LME, and 9 in each quarter of a cell of quadratic ones. A surface that is loaded then has two points for each side in half a cell,
+    /// and three in 3D.
     #[default]
     Cut,
     /// Those that lie in the shape, each for its whole box.
@@ -25,7 +29,7 @@ pub enum Fill {
 }
 
 /// How a solid is filled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Filling {
     /// Particles along each axis of a cell, > 0.
     pub per_axis: u32,
@@ -33,17 +37,37 @@ pub struct Filling {
     pub layout: Layout,
     /// What becomes of those at the surface.
     pub rule: Fill,
-    /// Whether shape functions have their kinks in the middle of cells, as quadratic B-splines have: Gauss's points are then those of the
-    /// pieces between middles.
-    pub kinks_in_middles: bool,
+    /// The degree of the shape functions, of their pieces along an axis: in cells that are cut, Gauss layout integrates products of
+    /// polynomials of that degree. Those of even degree, as quadratic B-splines, have their kinks in the middle of cells: Gauss's points
+    /// are then those of the pieces between middles.
+    pub degree: u32,
+}
+
+impl Default for Filling {
+    fn default() -> Self {
+        Self { per_axis: 0, layout: Layout::default(), rule: Fill::default(), degree: 1 }
+    }
 }
 
 impl Filling {
-    /// Boxes along an axis of a cell that is cut.
-    pub(crate) fn boxes(self) -> u32 {
+    /// Boxes along an axis of a cell that is cut, each of which has a particle.
+    fn boxes(self) -> u32 {
         match self.layout {
             Layout::Regular => self.per_axis,
             Layout::Gauss => 2 * self.per_axis,
+        }
+    }
+
+    /// Pieces along an axis of a cell that have a rule of Gauss's of their own.
+    fn pieces(self) -> u32 {
+        if self.layout == Layout::Gauss && self.degree.is_multiple_of(2) { 2 } else { 1 }
+    }
+
+    /// Boxes along an axis of a cell, in each of which a surface has points of its own.
+    pub(crate) fn boxes_at_surface(self) -> u32 {
+        match self.layout {
+            Layout::Regular => self.per_axis,
+            Layout::Gauss => 2,
         }
     }
 }
@@ -59,6 +83,9 @@ pub struct Seed<const D: usize> {
 
 /// Parts of a box smaller than this share of it are joined to their neighbour.
 const SLIVER: f64 = 0.1;
+
+/// As much of a piece that is integrated: what joins a neighbour changes its second moments.
+const THIN: f64 = 1e-3;
 
 /// Parts as small as that are round-off, and so is what is missing in a box that is as full.
 const NOTHING: f64 = 1e-9;
@@ -118,9 +145,8 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     if candidates > MAX_CANDIDATES {
         return Err(FillError::TooMany { candidates });
     }
-    let pieces = how.boxes();
     // By whether the cell below is full, and the one above.
-    let between = how.kinks_in_middles && how.layout == Layout::Gauss;
+    let between = how.pieces() > 1;
     let points = [[false, false], [true, false], [false, true], [true, true]]
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
     let is_full = |cell: [u64; D]| {
@@ -128,32 +154,36 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         shape.part(&lower, &Vector::repeat(h), h).0 > (1.0 - NOTHING) * h.powi(D as i32)
     };
     let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
-    let edges: Vector<f64, D> = Vector::repeat(h / f64::from(pieces));
+    // Of a box in a cell that is cut, which has one particle, or those of Gauss's rule.
+    let (middle, gauss) = (Layout::Regular.points(1), how.layout.points(how.per_axis));
+    let edges: Vector<f64, D> = Vector::repeat(h / f64::from(how.boxes()));
     let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
     let mut rows = None;
     for (id, cell) in (0..).zip(indices(count)) {
         let corner: [f64; D] = std::array::from_fn(|k| (first[k] + cell[k]) as f64);
         let position = |within: Vector<f64, D>| Vector::from_fn(|k, _| grid.origin[k] + (corner[k] + within[k]) * h);
-        let boxes = || {
-            indices([u64::from(pieces); D]).map(|i| position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(pieces))))
+        let lowers = |n: u32| {
+            indices([u64::from(n); D]).map(move |i| position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(n))))
         };
+        let one = |(volume, centroid): (f64, Vector<f64, D>)| vec![Seed { position: centroid, volume }];
         if how.rule == Fill::Cut && cell[0] == 0 {
             // The boxes of a row of cells, if the shape knows them all at once.
-            let along = count[0] as usize * pieces as usize;
-            rows = boxes()
-                .step_by(pieces as usize)
+            let along = count[0] as usize * how.boxes() as usize;
+            rows = lowers(how.boxes())
+                .step_by(how.boxes() as usize)
                 .map(|lower| shape.row(&lower, &edges, along))
                 .collect::<Option<Vec<_>>>();
         }
-        let mut parts = None;
+        // What lies in the boxes of a cell that may be cut, how many there are along an axis, what is in one that is full, and what is little.
+        let mut parts: Option<(Vec<Vec<Seed<D>>>, u32, &[(f64, f64)], f64)> = None;
         if let Some(rows) = &rows {
-            let from = cell[0] as usize * pieces as usize;
-            let of_cell = rows.iter().flat_map(|row| row.iter().skip(from).take(pieces as usize).copied());
-            parts = Some(of_cell.collect())
-                .filter(|parts: &Vec<(f64, Vector<f64, D>)>| parts.iter().any(|part| part.0 > 0.0));
-            if parts.is_none() {
+            let from = cell[0] as usize * how.boxes() as usize;
+            let of_cell = rows.iter().flat_map(|row| row.iter().skip(from).take(how.boxes() as usize).copied());
+            let of_cell: Vec<_> = of_cell.collect();
+            if of_cell.iter().all(|part| part.0 <= 0.0) {
                 continue;
             }
+            parts = Some((of_cell.into_iter().map(one).collect(), how.boxes(), &middle, SLIVER));
         } else {
             let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
             let across = 0.5 * h * (D as f64).sqrt();
@@ -166,28 +196,40 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 continue;
             }
             if how.rule == Fill::Cut && distance > -across {
-                parts = Some(boxes().map(|lower| shape.part(&lower, &edges, h)).collect());
+                let size = Vector::repeat(h / f64::from(how.pieces()));
+                let integrated = |lower| shape.quadrature(&lower, &size, h, how.degree);
+                let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(integrated).collect());
+                parts = Some(match all.flatten() {
+                    Some(points) => (points, how.pieces(), &gauss, THIN),
+                    None => {
+                        let boxes = lowers(how.boxes()).map(|lower| one(shape.part(&lower, &edges, h)));
+                        (boxes.collect(), how.boxes(), &middle, SLIVER)
+                    }
+                });
             }
         }
         if how.rule == Fill::Cut {
             filling.cells.push((id, filling.seeds.len()));
         }
-        if let Some(parts) = parts
-            && parts.iter().any(|part| part.0 < (1.0 - NOTHING) * edges.product())
-        {
-            for (i, (volume, centroid)) in indices([u64::from(pieces); D]).zip(parts) {
-                let share = volume / edges.product();
-                if share > 1.0 - NOTHING {
-                    let middle = Vector::from_fn(|k, _| (i[k] as f64 + 0.5) / f64::from(pieces));
-                    filling.seeds.push(Seed { position: position(middle), volume: edges.product() });
-                } else if share > NOTHING {
-                    if share < SLIVER {
-                        filling.slivers.push((id, filling.seeds.len()));
+        if let Some((parts, n, in_full, little)) = parts {
+            let size = h / f64::from(n);
+            let share = |part: &[Seed<D>]| part.iter().map(|seed| seed.volume).sum::<f64>() / size.powi(D as i32);
+            if parts.iter().any(|part| share(part) < 1.0 - NOTHING) {
+                for (i, part) in indices([u64::from(n); D]).zip(parts) {
+                    let share = share(&part);
+                    if share > 1.0 - NOTHING {
+                        for j in indices([in_full.len() as u64; D]) {
+                            let along: [(f64, f64); D] = std::array::from_fn(|k| in_full[j[k] as usize]);
+                            let within = Vector::from_fn(|k, _| (i[k] as f64 + along[k].0) / f64::from(n));
+                            let volume = along.iter().map(|(_, weight)| weight * size).product();
+                            filling.seeds.push(Seed { position: position(within), volume });
+                        }
+                    } else if share > NOTHING {
+                        filling.add_part(id, part, share < little);
                     }
-                    filling.seeds.push(Seed { position: centroid, volume });
                 }
+                continue;
             }
-            continue;
         }
         let goes_on = |beside: Option<u64>| beside.and_then(|id| full.get(id as usize)).is_some_and(|&full| full);
         let mut stride = 1;
@@ -236,6 +278,18 @@ struct Seeds<const D: usize> {
 }
 
 impl<const D: usize> Seeds<D> {
+    /// Adds the seeds of a part of a cell, or one for all of a sliver.
+    fn add_part(&mut self, cell: u64, part: Vec<Seed<D>>, sliver: bool) {
+        if !sliver {
+            self.seeds.extend(part);
+            return;
+        }
+        let volume = part.iter().map(|seed| seed.volume).sum();
+        let moment: Vector<f64, D> = part.iter().map(|seed| seed.position * seed.volume).sum();
+        self.slivers.push((cell, self.seeds.len()));
+        self.seeds.push(Seed { position: moment / volume, volume });
+    }
+
     /// The seeds with each sliver joined to the nearest other one of its cell or of the cells beside it, volume and first moments kept.
     fn joined(mut self) -> Vec<Seed<D>> {
         let mut gone = vec![false; if self.slivers.is_empty() { 0 } else { self.seeds.len() }];

@@ -12,8 +12,8 @@ pub enum Layout {
     Regular,
     /// At the points of Gauss's rule, with its weights: smooth stresses are integrated to a higher order. The rule is that of the pieces of
     /// the shape functions: of cells, and for quadratic B-splines, which are polynomials between the middles of cells, of those pieces,
-    /// and of half cells where the body ends. Cells that the surface cuts have boxes of half the size. For grids that are kept: particles
-    /// that move to other cells are no Gauss points there.
+    /// and of half cells where the body ends. Of cells that the surface cuts `fill` tells. For grids that are kept: particles that move to
+    /// other cells are no Gauss points there.
     Gauss,
 }
 

@@ -10,6 +10,7 @@ mod half_space;
 mod layout;
 mod pixels;
 mod polygon;
+mod quadrature;
 mod similar;
 mod surface;
 

@@ -18,7 +18,7 @@ use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{DISSIPATED, Law, Material, p_wave_modulus};
 use crate::mechanics::kept::Kept;
-use crate::mechanics::loads::Loads;
+use crate::mechanics::loads::{Loads, SurfacePoint};
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
 use crate::mechanics::schemes::{Alphas, LONG_STEPS};
@@ -174,9 +174,12 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
-    /// Whether a term of the residual takes energy on purpose: damping, or ghost stiffness.
+    /// Whether a term of the residual takes energy on purpose: damping, ghost stiffness, or ties of nodes that a load reaches beyond its
+    /// body.
     pub(crate) fn damps(&self) -> bool {
-        self.loads.damping.is_some() || self.settings.ghost > 0.0
+        let on_surface = |point: &SurfacePoint<D>| !self.particles.is_solid(point.particle);
+        let ties = || self.loads.surface.iter().flat_map(|load| &load.points).any(on_surface);
+        self.loads.damping.is_some() || self.settings.ghost > 0.0 || ties()
     }
 
     /// Whether a law remembers a number by this name.

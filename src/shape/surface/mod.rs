@@ -299,11 +299,8 @@ impl<const D: usize> Solid<D> for Surface<D> {
                 for [a, b, c] in fan {
                     let area = 0.5 * (b - a).cross(&(c - a)).norm();
                     if area > 0.0 {
-                        facets.push(Facet {
-                            position: plane(center + (a + b + c) / 3.0),
-                            normal: plane(mesh.normals[i]),
-                            area,
-                        });
+                        let corners = [a, b, c].map(|corner| plane(center + corner));
+                        facets.push(Facet::flat(&corners, plane(mesh.normals[i]), area));
                     }
                 }
             }

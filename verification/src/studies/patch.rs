@@ -306,7 +306,7 @@ fn rotation<const D: usize>(random: &mut Random) -> Tensor<f64, D> {
 }
 
 /// A square that spins and vibrates in the middle of a large box, with jittered particles.
-fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2>, StudyError> {
+pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2>, StudyError> {
     let mut random = Random::new(31);
     let centre = Vector::from([6.0, 6.0]);
     let mut particles = Particles::default();
@@ -335,7 +335,7 @@ fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2
 }
 
 /// Σ m x × v about the centre of mass.
-fn angular_momentum(particles: &Particles<2>) -> f64 {
+pub(super) fn angular_momentum(particles: &Particles<2>) -> f64 {
     let mass: f64 = particles.mass.iter().sum();
     let centre = particles.position.iter().zip(&particles.mass).map(|(x, &m)| x * m).sum::<Vector<f64, 2>>() / mass;
     (0..particles.len())

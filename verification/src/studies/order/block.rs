@@ -149,6 +149,35 @@ fn kept(effort: Effort, outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
+/// The same in 2D with inertia and a consistent mass: the motion is in proportion to time.
+fn with_inertia(outcome: &mut Outcome) {
+    let title = "that block in 2D with inertia, eps = 0, the grid kept, dt = h / 2";
+    let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout"]);
+    let header = ["shape", "layout", "cells", "displacement", "order", "velocity", "order", "stress", "order", "products x particles"];
+    let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
+    let (quadratic, cubic) = (Bspline::Quadratic, Bspline::Cubic);
+    let cases: [(_, Approximation, _, _); 4] = [
+        ("quadratic", quadratic.into(), &GAUSS_OF_MIDDLES, [2.0, 1.5]),
+        ("cubic", cubic.into(), &GAUSS, [2.5, 1.5]),
+        ("not-a-knot quadratic", NotAKnotBspline(quadratic).into(), &GAUSS_OF_MIDDLES, [3.0, 2.0]),
+        ("not-a-knot cubic", NotAKnotBspline(cubic).into(), &GAUSS, [3.5, 2.5]),
+    ];
+    for (name, shape, layout, [displacement, stress]) in cases {
+        let least = [("displacement", displacement), ("velocity", displacement), ("stress", stress)];
+        let least = least.map(|(what, order)| (what, Bound::AtLeast(order - NEAR)));
+        let refined = Refined { report: &mut report, table: &mut table, least };
+        refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
+            let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
+            let settings = Settings { lumping: 0.0, renewal: Renewal::Never, ..Settings::default() };
+            let block = Block::curved_at_walls::<2>(CHANGE);
+            let held = Held::new(block, grid, (&shape, layout), None, 0.5 / f64::from(cells), settings)?.after(2 * cells)?;
+            Ok(([held.displacement(), held.velocity(), held.stress()], held.work))
+        });
+    }
+    outcome.reports.push(report);
+    outcome.tables.push(table);
+}
+
 /// The same in 2D with the grid made anew after half of the load, and after every eighth of it.
 fn renewed(effort: Effort, outcome: &mut Outcome) {
     let title = "that block in 2D, the grid renewed";
@@ -190,5 +219,6 @@ fn renewed(effort: Effort, outcome: &mut Outcome) {
 
 pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     kept(effort, outcome);
+    with_inertia(outcome);
     renewed(effort, outcome);
 }

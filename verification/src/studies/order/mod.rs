@@ -6,6 +6,7 @@ mod block;
 mod hole;
 mod rebound;
 mod ring;
+mod transfers;
 mod vortex;
 
 use super::{Effort, Outcome, StudyError};
@@ -38,20 +39,20 @@ struct Layout {
 }
 
 impl Layout {
-    const fn new(name: &'static str, per_axis: u32, layout: shape::Layout, kinks_in_middles: bool) -> Self {
-        Self { name, filling: Filling { per_axis, layout, rule: Fill::Cut, kinks_in_middles } }
+    const fn new(name: &'static str, per_axis: u32, layout: shape::Layout, degree: u32) -> Self {
+        Self { name, filling: Filling { per_axis, layout, rule: Fill::Cut, degree } }
     }
 }
 
-const REGULAR: Layout = Layout::new("regular", 2, shape::Layout::Regular, false);
+const REGULAR: Layout = Layout::new("regular", 2, shape::Layout::Regular, 1);
 
 /// Those of functions that are polynomials between nodes.
-const GAUSS: Layout = Layout::new("Gauss", 2, shape::Layout::Gauss, false);
+const GAUSS: Layout = Layout::new("Gauss", 2, shape::Layout::Gauss, 3);
 
 /// Those of quadratic B-splines, which are polynomials from the middle of a cell to that of the next.
-const GAUSS_OF_MIDDLES: Layout = Layout::new("Gauss, of middles", 2, shape::Layout::Gauss, true);
+const GAUSS_OF_MIDDLES: Layout = Layout::new("Gauss, of middles", 2, shape::Layout::Gauss, 2);
 
-const GAUSS_3: Layout = Layout::new("Gauss 3", 3, shape::Layout::Gauss, false);
+const GAUSS_3: Layout = Layout::new("Gauss 3", 3, shape::Layout::Gauss, 3);
 
 /// A body that fills the box of its grid and is held at its faces, moved by the body force of a known motion.
 struct Held<M, const D: usize> {
@@ -162,8 +163,8 @@ fn tractions<M: Motion<D>, const D: usize>(
     (body, hole): (&Shape<D>, &Ball<D>),
     particles: &mut Particles<D>,
 ) -> Result<Vec<SurfaceLoad<D>>, StudyError> {
-    // As many boxes as cut cells have with Gauss points.
-    const BOXES: usize = 4;
+    // As in scenes with Gauss's points.
+    const BOXES: usize = 2;
     let edges = Vector::repeat(grid.spacing / BOXES as f64);
     let around = Ball { radius: hole.radius + grid.spacing, ..hole.clone() }.into();
     let mut loads = Vec::new();
@@ -175,7 +176,7 @@ fn tractions<M: Motion<D>, const D: usize>(
             rest /= across;
             grid.origin[k] + at as f64 * edges[k]
         });
-        for facet in body.facets(Some(&around), &lower, &edges, grid.spacing) {
+        for facet in body.surface_points(Some(&around), &lower, &edges, grid.spacing) {
             let at = Deformation::new(state(motion, &facet.position, 1.0).displacement_gradient);
             let traction = at.f * law.stress(&at, &Start::NONE) * facet.normal;
             let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
@@ -265,6 +266,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     ring::run(&mut outcome);
     beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
+    transfers::run(*effort, &mut outcome);
     rebound::run(*effort, &mut outcome)?;
     outcome.remarks.push(
         "On a grid that is kept, functions of degree p on Gauss points of their own pieces have order p + 1 in the displacement and p in the \

@@ -21,15 +21,13 @@ const HALF: f64 = 1.25;
 const END: f64 = 0.8;
 
 /// A run to the end.
-fn spun(
+pub(super) fn spun(
     (shape, layout): (&Approximation, &Layout),
-    lumping: f64,
+    settings: Settings,
     cells: u32,
     steps: u32,
-    scheme: Arc<dyn Scheme>,
 ) -> Result<Held<Vortex, 2>, StudyError> {
     let grid = Grid { origin: Vector::repeat(-HALF), spacing: 2.0 * HALF / f64::from(cells), cells: [cells; 2] };
-    let settings = Settings { scheme, lumping, renewal: Renewal::Never, ..Settings::default() };
     Held::new(Vortex::default(), grid, (shape, layout), None, END / f64::from(steps), settings)?.after(steps)
 }
 
@@ -57,7 +55,8 @@ fn in_space(effort: Effort, outcome: &mut Outcome) {
         let least = [("displacement", displacement), ("velocity", velocity), ("stress", stress)];
         let refined = Refined { report: &mut report, table: &mut table, least };
         let found = refined.run(&[name, layout.name, &lumping.to_string()], sizes, |cells| {
-            let run = spun((&shape, layout), lumping, cells, cells * cells / 20, Arc::new(Newmark::default()))?;
+            let settings = Settings { lumping, renewal: Renewal::Never, ..Settings::default() };
+            let run = spun((&shape, layout), settings, cells, cells * cells / 20)?;
             Ok(([run.displacement(), run.velocity(), run.stress()], run.work))
         });
         let name = format!("{name}, eps = {lumping}");
@@ -95,7 +94,8 @@ fn in_time(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
     }
     for (scheme, order) in schemes {
         for (name, shape) in &shapes {
-            let run = |steps| spun((shape, &GAUSS), 1.0, 10, steps, scheme.clone());
+            let settings = || Settings { scheme: scheme.clone(), renewal: Renewal::Never, ..Settings::default() };
+            let run = |steps| spun((shape, &GAUSS), settings(), 10, steps);
             let [coarse, middle, fine] = [run(80)?, run(160)?, run(320)?].map(|run| run.simulation.particles.by_id());
             let (before, after) = (apart(&coarse, &middle), apart(&middle, &fine));
             for (k, what) in ["displacement", "velocity"].into_iter().enumerate() {
