@@ -181,6 +181,10 @@ class Particles:
         """Cauchy's, with the out-of-plane normal stress, (n, 3, 3)."""
 
     @property
+    def principal_stress(self) -> NDArray[np.float64]:
+        """Of Cauchy's stress, the largest first, (n, 3)."""
+
+    @property
     def pressure(self) -> NDArray[np.float64]:
         """Positive in compression, (n,)."""
 

@@ -66,6 +66,8 @@ fields! {
     "strain" => Strain: Symmetric;
     /// Cauchy stress, with the out-of-plane normal stress.
     "stress" => Stress: Symmetric;
+    /// Principal values of the Cauchy stress, the largest first; tension is positive.
+    "principal_stress" => PrincipalStress: Principal;
     /// Pressure, minus a third of the trace of the Cauchy stress; positive in compression.
     "pressure" => Pressure: Scalar;
     /// Von Mises equivalent of the Cauchy stress.
@@ -93,6 +95,8 @@ pub enum Kind {
     Index,
     /// x, y, z
     Vector,
+    /// The three principal values of a tensor, the largest first.
+    Principal,
     /// xx, yy, zz, xy, yz, xz
     Symmetric,
     /// xx, xy, xz, yx, yy, yz, zx, zy, zz
@@ -113,6 +117,7 @@ impl Kind {
         match self {
             Self::Scalar | Self::Index => &[""],
             Self::Vector => &["x", "y", "z"],
+            Self::Principal => &["1", "2", "3"],
             Self::Symmetric => &["xx", "yy", "zz", "xy", "yz", "xz"],
             Self::Tensor => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
         }
@@ -134,7 +139,8 @@ impl Field {
     }
 
     /// The columns of a table in `dimension` dimensions that hold the field under the name `name`: `name` itself for a scalar,
-    /// `name_x`, … for as many components of a vector as there are dimensions, `name_xx`, … for all components of a tensor.
+    /// `name_x`, … for as many components of a vector as there are dimensions, `name_1`, … for principal values, `name_xx`, … for all components
+    /// of a tensor.
     ///
     /// ```
     /// use bfree::field::Field;

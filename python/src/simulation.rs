@@ -65,6 +65,7 @@ fn shaped<'py>(py: Python<'py>, kind: Kind, dimension: usize, values: &[f64]) ->
         Kind::Scalar => frozen(py, values.to_vec(), &[count]),
         Kind::Index => frozen(py, values.iter().map(|&x| x as i64).collect(), &[count]),
         Kind::Vector => frozen(py, each(&[0, 1, 2][..dimension]), &[count, dimension]),
+        Kind::Principal => frozen(py, values.to_vec(), &[count, 3]),
         // xx, yy, zz, xy, yz, xz
         Kind::Symmetric => frozen(py, each(&[0, 3, 5, 3, 1, 4, 5, 4, 2]), &[count, 3, 3]),
         Kind::Tensor => frozen(py, values.to_vec(), &[count, 3, 3]),
@@ -214,7 +215,7 @@ impl Simulation {
                 Kind::Symmetric | Kind::Tensor => {
                     self.array(py, field)?.bind(py).call_method1("reshape", (count, 9))?
                 }
-                Kind::Scalar | Kind::Index => self.array(py, field)?.into_bound(py),
+                Kind::Scalar | Kind::Index | Kind::Principal => self.array(py, field)?.into_bound(py),
             };
             data.set_item(name, array.call_method0("copy")?)?;
         }

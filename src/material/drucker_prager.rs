@@ -8,9 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::SQRT_2;
 
-/// Flow where √J₂ + η p reaches ξ c(ε̄), with p = tr τ/3 positive in tension, η = 6 sin φ/(√3 (3 − sin φ)) and ξ = 6 cos φ/(√3 (3 − sin φ)): the cone
-/// through the compressive edges of Mohr and Coulomb's pyramid. The flow dilates by η̄, the η of ψ; at the apex it is any that
-/// leads there (de Souza Neto, Perić, Owen, 2008, sec. 8.3).
+/// Flow where √J₂ + η p reaches ξ c(ε̄), with p = tr τ/3 positive in tension, and η and ξ those of a [`Cone`]. The flow dilates by η̄, the η of ψ;
+/// at the apex it is any that leads there (de Souza Neto, Perić, Owen, 2008, sec. 8.3).
 ///
 /// τ is Kirchhoff's stress J σ. ε̄ grows by ξ Δγ on the cone; at the apex by that of the shear, and ξ/η of what dilates beyond: associated
 /// there, so that ψ = 0 has a return too.
@@ -26,6 +25,39 @@ pub struct DruckerPrager {
     cohesion: Hardening,
 }
 
+/// Which cone stands for Mohr and Coulomb's pyramid |τ| + σ tan φ = c.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "StrengthCone")]
+pub enum Cone {
+    /// The one through its compressive edges: as strong as the pyramid in triaxial compression, stronger elsewhere.
+    #[default]
+    Compression,
+    /// The one that is as strong as the pyramid where soil flows in plane strain: for slopes and footings in 2D.
+    PlaneStrain,
+}
+
+impl Cone {
+    /// η, η̄ and ξ of φ and ψ in radians.
+    ///
+    /// Compression: η = 6 sin φ/(√3 (3 − sin φ)), ξ = η/tan φ, and η̄ the η of ψ. Plane strain: flow without an out-of-plane part has
+    /// s_zz = −⅔ η̄ √J₂; put into Mohr and Coulomb's criterion, η = sin φ/d, ξ = cos φ/d, d = √(1 − η̄²/3) + η̄ sin φ/3. With ψ = φ that is
+    /// η = 3 tan φ/√(9 + 12 tan² φ).
+    fn slopes(self, phi: f64, psi: f64) -> [f64; 3] {
+        match self {
+            Self::Compression => {
+                let edge = |angle: f64| 6.0 / (3.0_f64.sqrt() * (3.0 - angle.sin()));
+                [edge(phi) * phi.sin(), edge(psi) * psi.sin(), edge(phi) * phi.cos()]
+            }
+            Self::PlaneStrain => {
+                let dilatancy = psi.sin() / (1.0 + psi.sin().powi(2) / 3.0).sqrt();
+                let d = (1.0 - dilatancy * dilatancy / 3.0).sqrt() + dilatancy * phi.sin() / 3.0;
+                [phi.sin() / d, dilatancy, phi.cos() / d]
+            }
+        }
+    }
+}
+
 /// The constants of [`DruckerPrager`].
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "DruckerPrager")]
@@ -33,7 +65,7 @@ pub struct DruckerPrager {
 pub struct DruckerPragerParameters {
     /// The elastic constants.
     pub elastic: LameParameters,
-    /// The angle of friction φ in degrees, 0 ≤ φ < 90. The cone goes through the compressive edges of Mohr and Coulomb's pyramid.
+    /// The angle of friction φ in degrees, 0 ≤ φ < 90.
     #[schemars(extend("minimum" = 0, "exclusiveMaximum" = 90))]
     pub friction: f64,
     /// The angle of dilatancy ψ in degrees, 0 ≤ ψ ≤ φ. Default 0.
@@ -42,33 +74,30 @@ pub struct DruckerPragerParameters {
     pub dilatancy: f64,
     /// The cohesion c, as a function of the accumulated plastic strain.
     pub cohesion: Hardening,
-}
-
-/// 6 sin φ/(√3 (3 − sin φ)) of φ in radians.
-fn slope(angle: f64) -> f64 {
-    6.0 * angle.sin() / (3.0_f64.sqrt() * (3.0 - angle.sin()))
+    /// Which cone stands for Mohr and Coulomb's pyramid of φ and c. Default: `"compression"`.
+    #[serde(default)]
+    pub cone: Cone,
 }
 
 impl DruckerPrager {
-    /// From φ and ψ in degrees, 0 ≤ ψ ≤ φ < 90, and the cohesion.
+    /// From φ and ψ in degrees, 0 ≤ ψ ≤ φ < 90, the cohesion and the cone.
     ///
     /// ```
-    /// use bfree::material::{DruckerPrager, Hardening, Lame, Law, Plastic, Start};
+    /// use bfree::material::{Cone, DruckerPrager, Hardening, Lame, Law, Plastic, Start};
     /// use bfree::tensor::{Deformation, Tensor, Vector};
     ///
     /// // Pulled apart on all sides it bears tr τ/3 = c cot φ.
     /// let (c, phi) = (0.1, 30.0_f64);
-    /// let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c));
+    /// let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c), Cone::Compression);
     /// let law = Plastic { solid: Lame::from_young_poisson(1000.0, 0.3)?, criterion };
     /// let at = Deformation::<f64, 3>::new(Tensor::from_diagonal(&Vector::from([0.1; 3])));
     /// let stress = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
     /// assert!((stress[(0, 0)] / (c / phi.to_radians().tan()) - 1.0).abs() < 1e-12);
     /// # Ok::<(), bfree::material::LameError>(())
     /// ```
-    pub fn new(friction: f64, dilatancy: f64, cohesion: Hardening) -> Self {
-        let [phi, psi] = [friction, dilatancy].map(f64::to_radians);
-        let cohesive = 6.0 * phi.cos() / (3.0_f64.sqrt() * (3.0 - phi.sin()));
-        Self { friction: slope(phi), dilatancy: slope(psi), cohesive, cohesion }
+    pub fn new(friction: f64, dilatancy: f64, cohesion: Hardening, cone: Cone) -> Self {
+        let [friction, dilatancy, cohesive] = cone.slopes(friction.to_radians(), dilatancy.to_radians());
+        Self { friction, dilatancy, cohesive, cohesion }
     }
 }
 
@@ -77,14 +106,14 @@ impl Criterion for DruckerPrager {
     const NAME: &'static str = "Drucker-Prager";
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
-        let DruckerPragerParameters { elastic, friction, dilatancy, cohesion } = given;
+        let DruckerPragerParameters { elastic, friction, dilatancy, cohesion, cone } = given;
         let solid = elastic.lame(problems, &format!("{path}.elastic"));
         let rough = (0.0..90.0).contains(friction);
         problems.require(rough, &format!("{path}.friction"), Number(*friction), "must be ≥ 0 and < 90");
         let dilates = (0.0..=friction.max(0.0)).contains(dilatancy);
         let allowed = format_args!("must lie between 0 and the friction, {}", Number(*friction));
         problems.require(dilates || !rough, &format!("{path}.dilatancy"), Number(*dilatancy), allowed);
-        let criterion = Self::new(*friction, *dilatancy, *cohesion);
+        let criterion = Self::new(*friction, *dilatancy, *cohesion, *cone);
         // G + K η η̄ on the cone and K η² at the apex, over ξ², must exceed what softening takes.
         let stiffness = solid.filter(|_| rough && dilates).map_or(f64::INFINITY, |solid| {
             let (bulk, eta) = (solid.bulk_modulus(), criterion.friction);
@@ -106,7 +135,8 @@ impl Criterion for DruckerPrager {
 
     fn example(solid: &Lame) -> Self {
         let g = solid.shear;
-        Self::new(30.0, 10.0, Hardening { initial: 0.05 * g, linear: 0.02 * g, saturation: -0.02 * g, rate: 5.0 })
+        let cohesion = Hardening { initial: 0.05 * g, linear: 0.02 * g, saturation: -0.02 * g, rate: 5.0 };
+        Self::new(30.0, 10.0, cohesion, Cone::Compression)
     }
 
     /// The cone, √J₂ − G Δγ + η (p − K η̄ Δγ) = ξ c(ε̄ + ξ Δγ), unless √J₂ < G Δγ: then the apex, η p = ξ c.
@@ -157,5 +187,22 @@ impl Criterion for DruckerPrager {
             t_d: T::zero(),
         };
         Returned { radial, plastic_strain, dissipated: p * flowed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// De Souza Neto, Perić, Owen (2008), eqs. 6.123 and 6.124, for associated flow: η = 3 tan φ/√(9 + 12 tan² φ), ξ = 3/√(9 + 12 tan² φ).
+    #[test]
+    fn the_cone_of_plane_strain_is_the_known_one_for_associated_flow() {
+        for phi in [0.0, 10.0, 30.0, 50.0_f64].map(f64::to_radians) {
+            let root = (9.0 + 12.0 * phi.tan().powi(2)).sqrt();
+            let known = [3.0 * phi.tan() / root, 3.0 * phi.tan() / root, 3.0 / root];
+            for (found, known) in Cone::PlaneStrain.slopes(phi, phi).into_iter().zip(known) {
+                assert!((found - known).abs() < 1e-15, "{found} instead of {known} at {phi}");
+            }
+        }
     }
 }

@@ -27,7 +27,7 @@ mod viscoelastic;
 mod von_mises;
 
 pub use closed_tangent::ClosedTangent;
-pub use drucker_prager::{DruckerPrager, DruckerPragerParameters};
+pub use drucker_prager::{Cone, DruckerPrager, DruckerPragerParameters};
 pub use fibres::{FibreReinforced, FibreReinforcedParameters};
 pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
@@ -42,6 +42,7 @@ pub use ogden::{Ogden, OgdenParameters, OgdenTerm};
 pub use piola::{NonPositiveJacobian, admissible, first_piola};
 pub(crate) use piola::{admissible_or_rest, embed, piola};
 pub use plastic::{Criterion, Plastic, Returned};
+pub(crate) use spectral::principal_values;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use viscoelastic::{Branch, Viscoelastic, ViscoelasticParameters};
 pub use von_mises::{VonMises, VonMisesParameters};

@@ -151,6 +151,14 @@ pub(super) fn function<T: Real>(f: &impl Function, a: &Tensor<T, 3>) -> Tensor<T
     axes * y * axes.transpose()
 }
 
+/// The eigenvalues of a symmetric tensor, the largest first.
+pub(crate) fn principal_values(a: &Tensor<f64, 3>) -> [f64; 3] {
+    let axes = principal_axes(a);
+    let mut values: [f64; 3] = (axes.transpose() * a * axes).diagonal().into();
+    values.sort_by(|x, y| y.total_cmp(x));
+    values
+}
+
 /// Sweeps of Jacobi's method: it converges quadratically, four or five are enough.
 const SWEEPS: usize = 10;
 

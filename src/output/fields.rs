@@ -2,7 +2,7 @@
 
 use super::{OutputError, Reference};
 use crate::field::Field;
-use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN, Start, admissible, piola};
+use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN, Start, admissible, piola, principal_values};
 use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 
@@ -82,6 +82,7 @@ impl Field {
                 let stress = stress()?;
                 out.extend(SYMMETRIC.map(|at| stress[at]));
             }
+            Self::PrincipalStress => out.extend(principal_values(&stress()?)),
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
             Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0))),

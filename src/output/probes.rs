@@ -15,6 +15,14 @@ use std::path::PathBuf;
 pub enum Place<const D: usize> {
     /// At a particle, which it follows.
     Particle(usize),
+    /// At the point of the body that lies `offset` from a particle in the reference configuration, wherever it goes: at x_p + F d, to first
+    /// order in d. Fields other than position and displacement are those of the particle.
+    Carried {
+        /// The particle.
+        particle: usize,
+        /// d
+        offset: Vector<f64, D>,
+    },
     /// At the particle nearest to a fixed point, found anew each time; of equally near ones, the first. No field is interpolated.
     Nearest {
         /// The point.
@@ -42,14 +50,27 @@ impl<const D: usize> Probe<D> {
     fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
         let name = || self.name.clone();
         match self.place {
-            Place::Particle(particle) if particle < particles.len() => Ok(Some(particle)),
-            Place::Particle(particle) => {
+            Place::Particle(particle) | Place::Carried { particle, .. } if particle < particles.len() => {
+                Ok(Some(particle))
+            }
+            Place::Particle(particle) | Place::Carried { particle, .. } => {
                 Err(OutputError::ProbeParticle { name: name(), particle, particles: particles.len() })
             }
             Place::Nearest { point, body, within } => match nearest(particles, &point, body) {
                 Some((particle, distance)) => Ok((distance <= within).then_some(particle)),
                 None => Err(OutputError::ProbePoint { name: name(), point: point.iter().copied().collect() }),
             },
+        }
+    }
+
+    /// What a point beside the particle adds to its field: F d to the position, H d to the displacement.
+    fn beside(&self, particles: &Particles<D>) -> Option<Vector<f64, D>> {
+        let Place::Carried { particle, offset } = self.place else { return None };
+        let moved = particles.displacement_gradient[particles.place(particle)?] * offset;
+        match self.field {
+            Field::Position => Some(offset + moved),
+            Field::Displacement => Some(moved),
+            _ => None,
         }
     }
 }
@@ -118,6 +139,8 @@ impl<const D: usize> Probes<D> {
                 Some(particle) => probe.field.append(simulation, reference, particle, &mut values)?,
                 None => values.resize(columns, f64::NAN),
             }
+            let beside = probe.beside(&simulation.particles);
+            beside.iter().flatten().zip(&mut values).for_each(|(add, value)| *value += add);
             row.extend(values.iter().copied().take(columns));
         }
         self.table.row(&row)

@@ -13,7 +13,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The problems, and the scene of each.
-const PROBLEMS: [(&str, &str); 10] = [
+const PROBLEMS: [(&str, &str); 15] = [
     ("rebound", include_str!("../../scenes/rebound.json")),
     ("collision", include_str!("../../scenes/collision.json")),
     ("cantilever", include_str!("../../scenes/cantilever.json")),
@@ -24,6 +24,11 @@ const PROBLEMS: [(&str, &str); 10] = [
     ("elastica", include_str!("../../scenes/elastica.json")),
     ("cook", include_str!("../../scenes/cook.json")),
     ("ring", include_str!("../../scenes/ring.json")),
+    ("tube", include_str!("../../scenes/tube.json")),
+    ("cook_plastic", include_str!("../../scenes/cook_plastic.json")),
+    ("taylor", include_str!("../../scenes/taylor.json")),
+    ("slope", include_str!("../../scenes/slope.json")),
+    ("collapse", include_str!("../../scenes/collapse.json")),
 ];
 
 /// The schema's file beside the scene.

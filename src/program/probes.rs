@@ -22,7 +22,7 @@ impl<const D: usize> Bound<D> {
     pub fn warning(&self) -> Option<String> {
         (self.distance > self.spacing).then(|| {
             let consequence = match self.probe.place {
-                Place::Particle(_) => "it is followed all the same",
+                Place::Particle(_) | Place::Carried { .. } => "it is followed all the same",
                 Place::Nearest { .. } => "values are NaN while none is within one grid spacing",
             };
             format!(
@@ -43,6 +43,7 @@ impl<const D: usize> Display for Bound<D> {
         let Self { probe: Probe { name, field, place }, particle, distance, .. } = self;
         let (field, kept) = match place {
             Place::Particle(_) => (field.name(), "follows"),
+            Place::Carried { .. } => (field.name(), "carried by"),
             Place::Nearest { .. } => (field.name(), "fixed in space, first sees"),
         };
         write!(f, "{name}: {field}, {kept} particle {particle}, {distance:.3e} from the place given")
@@ -55,11 +56,14 @@ pub fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
     let bind = |probe: &scene::output::Probe| {
         let body = |name: &String| simulation.bodies.iter().position(|body| body.name == *name).map(|body| body as u32);
         let body = probe.body.as_ref().and_then(body);
-        let (At::Particle(x) | At::Point(x)) = &probe.at;
+        let (At::Particle(x) | At::BodyPoint(x) | At::Point(x)) = &probe.at;
         let point = Vector::<f64, D>::from_iterator(x.iter().copied());
         let (particle, distance) = nearest(particles, &point, body)?;
         let place = match &probe.at {
             At::Particle(_) => Place::Particle(particle),
+            At::BodyPoint(_) => {
+                Place::Carried { particle, offset: point - particles.position[particles.place(particle)?] }
+            }
             At::Point(_) => Place::Nearest { point, body, within: simulation.grid.spacing },
         };
         let per_cell = scene.bodies.get(particles.body[particles.place(particle)?] as usize)?.particles_per_cell;

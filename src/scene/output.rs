@@ -49,6 +49,9 @@ pub struct Probe {
 pub enum At {
     /// The particle that is nearest to this point at t = 0, wherever it goes.
     Particle(Vec<f64>),
+    /// The point of the body that is here at t = 0, wherever it goes, such as a corner: the nearest particle's motion, continued by its
+    /// deformation gradient. Fields other than position and displacement are the particle's.
+    BodyPoint(Vec<f64>),
     /// This point, fixed in space: at each time the particle nearest to it then, of equally near ones the first. No field is
     /// interpolated; while no particle is within one grid spacing, the value is NaN.
     Point(Vec<f64>),
@@ -128,6 +131,7 @@ impl Probe {
         }
         let (key, x) = match &self.at {
             At::Particle(x) => ("particle", x),
+            At::BodyPoint(x) => ("body_point", x),
             At::Point(x) => ("point", x),
         };
         let path = format!("{path}.at.{key}");

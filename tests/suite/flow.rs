@@ -4,8 +4,8 @@ use crate::support::{Failure, Random, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
 use bfree::field::Field;
 use bfree::material::{
-    Branch, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters, Plastic,
-    Start, Viscoelastic, VonMises,
+    Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters,
+    Plastic, Start, Viscoelastic, VonMises,
 };
 use bfree::output::history::Energies;
 use bfree::output::{Audience, OutputSettings, Recorder, Reference};
@@ -112,7 +112,8 @@ fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure>
     let slope = |angle: f64| 6.0 * angle.to_radians().sin() / (3.0_f64.sqrt() * (3.0 - angle.to_radians().sin()));
     let (eta, eta_bar) = (slope(phi), slope(psi));
     let xi = eta / phi.to_radians().tan();
-    let law = Plastic { solid: solid()?, criterion: DruckerPrager::new(phi, psi, Hardening::perfect(c)) };
+    let criterion = DruckerPrager::new(phi, psi, Hardening::perfect(c), Cone::Compression);
+    let law = Plastic { solid: solid()?, criterion };
     let mut random = Random(5);
     let mut number = || random.below(2_000_001) as f64 * 1e-6 - 1.0;
     let (mut on_cone, mut at_apex) = (0, 0);
@@ -142,6 +143,30 @@ fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure>
         }
     }
     assert!(on_cone > 20 && at_apex > 20, "{on_cone} {at_apex}");
+    Ok(())
+}
+
+/// Sheared in plane strain until nothing but flow is left, soil is as strong as Mohr and Coulomb say: (τ₁ − τ₂)/2 + (τ₁ + τ₂)/2 sin φ = c cos φ in the
+/// plane. The cone through the compressive edges is stronger, by 6/(√3 (3 − sin φ)).
+#[test]
+fn the_cone_of_plane_strain_has_mohr_and_coulomb_s_strength_there() -> Result<(), Failure> {
+    let (phi, c) = (25.0_f64, 5.0);
+    let (sin, cos) = phi.to_radians().sin_cos();
+    for (cone, strength) in [(Cone::PlaneStrain, 1.0), (Cone::Compression, 6.0 / (3.0_f64.sqrt() * (3.0 - sin)))] {
+        let mut point = Point::new(Plastic {
+            solid: solid()?,
+            criterion: DruckerPrager::new(phi, 0.0, Hardening::perfect(c), cone),
+        });
+        let mut tau = Tensor::zeros();
+        for step in 0..=200 {
+            let sheared = Tensor::<f64, 2>::new(1.0, 0.005 * f64::from(step), 0.0, 1.0);
+            tau = point.step(sheared * 0.99, 1.0);
+        }
+        let [mean, radius] = [0.5 * tau.trace(), (0.5 * (tau[(0, 0)] - tau[(1, 1)])).hypot(tau[(0, 1)])];
+        let found = radius / (c * cos - mean * sin);
+        assert!(mean < -2.0 * c, "under pressure: {mean}");
+        assert!((found / strength - 1.0).abs() < 1e-9, "{cone:?}: {found} instead of {strength}");
+    }
     Ok(())
 }
 

@@ -23,6 +23,7 @@ mod memory;
 mod multigrid;
 mod output;
 mod path;
+mod plasticity;
 mod points;
 mod program;
 mod rebound;

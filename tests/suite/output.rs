@@ -56,6 +56,9 @@ fn settings<const D: usize>(directory: &Path) -> OutputSettings<D> {
     }
 }
 
+/// From a particle to a point beside it.
+const ASIDE: Vector<f64, 2> = Vector::<f64, 2>::new(0.03, 0.06);
+
 fn at_particle<const D: usize>(simulation: &Simulation<D>, field: Field) -> Result<Vec<f64>, OutputError> {
     field.values(simulation, &Reference::of(simulation))
 }
@@ -76,6 +79,7 @@ fn uniaxial<const D: usize>() -> Result<(), Failure> {
     let across = LAMBDA / 2.0 * (stretch * stretch - 1.0) / stretch;
     let along = across + SHEAR * (stretch * stretch - 1.0) / stretch;
     assert_close(&at_particle(&simulation, Field::Stress)?, &[along, across, across, 0.0, 0.0, 0.0]);
+    assert_close(&at_particle(&simulation, Field::PrincipalStress)?, &[along, across, across]);
     assert_close(&at_particle(&simulation, Field::Pressure)?, &[-(along + 2.0 * across) / 3.0]);
     assert_close(&at_particle(&simulation, Field::VonMises)?, &[along - across]);
     assert_close(&at_particle(&simulation, Field::Jacobian)?, &[stretch]);
@@ -99,6 +103,9 @@ fn stresses_in_simple_shear_are_those_by_hand() -> Result<(), Failure> {
     h[(0, 1)] = k;
     let simulation = single(h)?;
     assert_close(&at_particle(&simulation, Field::Stress)?, &[SHEAR * k * k, 0.0, 0.0, SHEAR * k, 0.0, 0.0]);
+    // σ² − G k² σ − G² k² = 0 in the plane, and 0 across.
+    let [mean, radius] = [0.5 * k * k, k * (1.0 + 0.25 * k * k).sqrt()].map(|x| SHEAR * x);
+    assert_close(&at_particle(&simulation, Field::PrincipalStress)?, &[mean + radius, 0.0, mean - radius]);
     let gradient = [1.0, k, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     assert_close(&at_particle(&simulation, Field::DeformationGradient)?, &gradient);
     // E = ½ (FᵀF − I), not ½ (FFᵀ − I)
@@ -128,11 +135,18 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
     let probes = vec![
         Probe { name: "top".into(), field: Field::Displacement, place: Place::Particle(63) },
         Probe { name: "near".into(), field: Field::Jacobian, place: at_point(2.0) },
+        Probe {
+            name: "beside".into(),
+            field: Field::Displacement,
+            place: Place::Carried { particle: 63, offset: ASIDE },
+        },
+        Probe { name: "there".into(), field: Field::Position, place: Place::Carried { particle: 63, offset: ASIDE } },
         Probe { name: "far".into(), field: Field::Velocity, place: at_point(0.4) },
     ];
     let mut recorder =
         Recorder::start(OutputSettings { probes, ..settings(directory.path()) }, &simulation, reference.clone())?;
     let (mut energies, mut newton, mut floor, mut tops) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut carried = Vec::new();
     for _ in 0..20 {
         let step = simulation.advance()?;
         recorder.record(&simulation, &step)?;
@@ -141,6 +155,7 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
         floor.push(step.reactions[0].force[1]);
         let top = simulation.particles.place(63).ok_or("the particle is lost")?;
         tops.push(simulation.particles.position[top][1] - initial.particles.position[63][1]);
+        carried.push((simulation.particles.displacement_gradient[top] * ASIDE)[1]);
     }
     let summary = recorder.finish(
         &simulation,
@@ -163,6 +178,13 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
     assert_eq!(newton_column[1..], newton);
     assert_eq!(column(&file("reactions.csv"), "floor_y")?, floor);
     assert_eq!(column(&file("probes.csv"), "top_y")?[1..], tops);
+    let [beside, there] = ["beside_y", "there_y"].map(|name| column(&file("probes.csv"), name));
+    let (beside, there, start) = (beside?, there?, initial.particles.position[63][1]);
+    assert!(carried.iter().any(|add| add.abs() > 1e-6), "a body that deforms");
+    for (k, (top, add)) in tops.iter().zip(carried).enumerate() {
+        assert_eq!(beside[k + 1], top + add);
+        assert!((there[k + 1] - (start + ASIDE[1] + top + add)).abs() < 1e-14);
+    }
     let near = column(&file("probes.csv"), "near")?;
     assert!(near.len() == 21 && near.iter().all(|x| x.is_finite()), "{near:?}");
     assert!(column(&file("probes.csv"), "far_y")?.iter().all(|x| x.is_nan()), "no particle is that near");

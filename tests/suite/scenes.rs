@@ -67,17 +67,22 @@ fn shipped_scenes_are_sound() {
             "ball_drop",
             "block_static",
             "cantilever",
+            "collapse",
             "collision",
             "column_static",
             "compaction",
             "compaction_confined",
             "cook",
+            "cook_plastic",
             "elastica",
             "rebound",
             "rebound_fast",
             "riemann",
             "riemann_jump",
-            "ring"
+            "ring",
+            "slope",
+            "taylor",
+            "tube"
         ]
     );
 }

@@ -111,6 +111,15 @@ fn a_cylinder_rebounds() -> Result<(), Failure> {
     tutorial::<4>("rebound").map(drop)
 }
 
+#[test]
+fn metals_flow_as_known() -> Result<(), Failure> {
+    let [_, _, coarse, fine, ..] = tutorial::<7>("plasticity")?;
+    // Of first order, as the text says.
+    let extrapolated = 2.0 * fine - coarse;
+    assert!((extrapolated / 7.01 - 1.0).abs() < 0.005, "{extrapolated}");
+    Ok(())
+}
+
 /// The example is a member of the workspace, so that `cargo test --workspace` runs its tests.
 #[test]
 fn the_code_of_the_own_law_is_that_of_the_example() -> Result<(), Failure> {

@@ -1,0 +1,51 @@
+//! Soil at its limit and beyond, beside published results. Metals: `tutorial.rs`.
+
+use crate::support::{Failure, scene};
+use bfree::simulation::Simulation;
+
+/// How far the crest of the slope sinks with its strength divided by `factor`: c/F, tan φ/F (m).
+fn sinking(factor: f64) -> Result<f64, Failure> {
+    let friction = (20.0_f64.to_radians().tan() / factor).atan().to_degrees();
+    let law = "bodies.0.material.drucker_prager";
+    let overrides = [format!("{law}.friction={friction}"), format!("{law}.cohesion.initial={}", 10.0 / factor)];
+    let mut simulation: Simulation<2> = scene("slope.json", &overrides.each_ref().map(String::as_str))?;
+    let start = simulation.particles.by_id().position;
+    let distance = |x: &bfree::tensor::Vector<f64, 2>| (x[0] - 12.0).hypot(x[1] - 10.0);
+    let crest = (0..start.len()).min_by(|&a, &b| distance(&start[a]).total_cmp(&distance(&start[b])));
+    let crest = crest.ok_or("no particles")?;
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        simulation.advance()?;
+    }
+    Ok(start[crest][1] - simulation.particles.by_id().position[crest][1])
+}
+
+/// Griffiths and Lane (Géotechnique 49, 1999), example 1: finite elements with Mohr and Coulomb's criterion fail at a factor of 1.4,
+/// Bishop and Morgenstern's charts say 1.380. Here every strength has an equilibrium at finite strain, and the motion turns up.
+#[test]
+fn a_slope_fails_at_the_factor_of_griffiths_and_lane() -> Result<(), Failure> {
+    let [safe, before, after] = [1.0, 1.35, 1.45].map(sinking);
+    let (safe, before, after) = (safe?, before?, after?);
+    assert!(before < 2.0 * safe && after > 5.0 * safe, "{safe} m, {before} m, {after} m");
+    Ok(())
+}
+
+/// The experiments of Nguyen and others with aluminium rods (arXiv:1512.05180): columns of less than 0.65 times their width in height keep
+/// the height of what does not move. The front is between that of sand (Lube and others, Phys. Rev. E 72, 2005: width (1 + 1.2 a), of a = 0.5) and
+/// that of rods with 0.65 < a < 1.5 (width (1 + 3.25 a^0.96)).
+#[test]
+fn a_column_collapses_and_comes_to_rest() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = scene("collapse.json", &[])?;
+    let (width, height, mut fastest) = (0.2, 0.1, 0.0_f64);
+    while simulation.clock.time() < 0.6 - 1e-9 {
+        let step = simulation.advance()?;
+        assert!(step.failed.is_empty(), "{:?}", step.failed);
+        fastest = fastest.max(simulation.particles.kinetic_energy());
+    }
+    let particles = &simulation.particles;
+    let largest = |axis: usize| particles.position.iter().map(|x| x[axis]).fold(0.0, f64::max);
+    assert!(largest(1) > 0.96 * height, "the top stays: {}", largest(1));
+    let front = largest(0) / width;
+    assert!(front > 1.0 + 1.2 * 0.5 && front < 1.0 + 3.25 * 0.5_f64.powf(0.96), "{front}");
+    assert!(particles.kinetic_energy() < 0.03 * fastest, "{} J of {fastest} J are left", particles.kinetic_energy());
+    Ok(())
+}
