@@ -270,6 +270,38 @@ fn mutated_particle_files_are_refused_by_line() -> Result<(), Failure> {
     Ok(())
 }
 
+#[test]
+fn moduli_and_densities_near_the_least_number_run_or_are_refused_by_key() -> Result<(), Failure> {
+    let base = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a", "velocity": [1, 0],
+        "shape": {"box": {"min": [1, 1], "max": [3, 3]}}, "density": 1, "material": {"neo_hookean": {"young": 1, "poisson": 0.3}}}]}"#;
+    let set = |density: &str, young: &str| -> Result<Vec<_>, Failure> {
+        let set = [format!("bodies[0].density={density}"), format!("bodies[0].material.neo_hookean.young={young}")];
+        Ok(set.iter().map(|set| set.parse()).collect::<Result<Vec<_>, _>>()?)
+    };
+    for least in ["5e-324", "1e-308", "1e-300", "1e-160", "1e160", "1e308"] {
+        for (given, key) in
+            [((least, "1"), "bodies[0].density"), (("1", least), "bodies[0].material.neo_hookean.young")]
+        {
+            let message = scene::read(base, &set(given.0, given.1)?).expect_err(least).to_string();
+            assert!(message.contains(&format!("{key}: {least} is not allowed; must lie between")), "{message}");
+        }
+    }
+    // In free flight, soft or not so stiff that a step is nothing but round-off beside it.
+    let values = ["1e-99", "1e-60", "1", "1e60", "1e99"];
+    for (i, density) in values.iter().enumerate() {
+        for young in &values[..=i] {
+            let mut simulation = scene::read(base, &set(density, young)?)?.build::<2>(Path::new("."))?;
+            for _ in 0..3 {
+                simulation.step().map_err(|error| format!("{density} {young}: {error}"))?;
+            }
+            let off = simulation.particles.velocity.iter().map(|v| (v[0] - 1.0).abs()).fold(0.0, f64::max);
+            // Newton's method stops at 1e-9 of what it began with.
+            assert!(off < 1e-8, "{density} {young}: {off}");
+        }
+    }
+    Ok(())
+}
+
 /// Whether the particles of a scene are so few that building it is a matter of milliseconds.
 fn small(scene: &Scene) -> bool {
     let cells: f64 = scene.grid.cells().into_iter().flatten().map(f64::from).product();
