@@ -174,8 +174,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 .map(|lower| shape.row(&lower, &edges, along))
                 .collect::<Option<Vec<_>>>();
         }
-        // What lies in the boxes of a cell that may be cut, how many there are along an axis, what is in one that is full, and what is little.
-        let mut parts: Option<(Vec<Vec<Seed<D>>>, u32, &[(f64, f64)], f64)> = None;
+        let mut parts = None;
         if let Some(rows) = &rows {
             let from = cell[0] as usize * how.boxes() as usize;
             let of_cell = rows.iter().flat_map(|row| row.iter().skip(from).take(how.boxes() as usize).copied());
@@ -183,7 +182,8 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
             if of_cell.iter().all(|part| part.0 <= 0.0) {
                 continue;
             }
-            parts = Some((of_cell.into_iter().map(one).collect(), how.boxes(), &middle, SLIVER));
+            let boxes = of_cell.into_iter().map(one).collect();
+            parts = Some(Parts { boxes, along: how.boxes(), full: &middle, sliver: SLIVER });
         } else {
             let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
             let across = 0.5 * h * (D as f64).sqrt();
@@ -200,10 +200,10 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 let integrated = |lower| shape.quadrature(&lower, &size, h, how.degree);
                 let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(integrated).collect());
                 parts = Some(match all.flatten() {
-                    Some(points) => (points, how.pieces(), &gauss, THIN),
+                    Some(boxes) => Parts { boxes, along: how.pieces(), full: &gauss, sliver: THIN },
                     None => {
                         let boxes = lowers(how.boxes()).map(|lower| one(shape.part(&lower, &edges, h)));
-                        (boxes.collect(), how.boxes(), &middle, SLIVER)
+                        Parts { boxes: boxes.collect(), along: how.boxes(), full: &middle, sliver: SLIVER }
                     }
                 });
             }
@@ -211,7 +211,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         if how.rule == Fill::Cut {
             filling.cells.push((id, filling.seeds.len()));
         }
-        if let Some((parts, n, in_full, little)) = parts {
+        if let Some(Parts { boxes: parts, along: n, full: in_full, sliver: little }) = parts {
             let size = h / f64::from(n);
             let share = |part: &[Seed<D>]| part.iter().map(|seed| seed.volume).sum::<f64>() / size.powi(D as i32);
             if parts.iter().any(|part| share(part) < 1.0 - NOTHING) {
@@ -264,6 +264,18 @@ pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64;
         count[k] = (upper.min(f64::from(grid.cells[k])) as u64).saturating_sub(first[k]);
     }
     (first, count)
+}
+
+/// A cell that may be cut.
+struct Parts<'a, const D: usize> {
+    /// What lies in each of its boxes.
+    boxes: Vec<Vec<Seed<D>>>,
+    /// How many boxes there are along an axis.
+    along: u32,
+    /// Places and weights along an axis of a box that is full.
+    full: &'a [(f64, f64)],
+    /// The share of a box below which a part is a sliver.
+    sliver: f64,
 }
 
 /// Seeds cell by cell.

@@ -16,7 +16,7 @@ pub use settings::{InitialGuess, Settings};
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{DISSIPATED, Law, Material, p_wave_modulus};
+use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, p_wave_modulus};
 use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::{Loads, SurfacePoint};
 use crate::mechanics::path::Path;
@@ -26,7 +26,7 @@ use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
-use crate::solver::{Krylov, Preconditioning};
+use crate::solver::{Krylov, Preconditioned, Preconditioning};
 use crate::tensor::{Deformation, Vector};
 use std::collections::BTreeSet;
 
@@ -240,8 +240,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
         let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
         let splines = self.approximation.separable().is_some_and(|functions| functions.is_spline());
-        let on_path = self.settings.scheme.follows_path();
-        self.settings.preconditioner.chosen::<D>(self.particles.len(), splines, long, on_path)
+        self.settings.preconditioner.chosen::<D>(Preconditioned {
+            particles: self.particles.len(),
+            splines,
+            long,
+            on_path: self.settings.scheme.follows_path(),
+            flows: self.remembers(PLASTIC_STRAIN),
+        })
     }
 
     /// The same simulation with other laws, one for each body; particles remember what these do at rest.

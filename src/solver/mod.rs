@@ -20,7 +20,8 @@ pub use newton::{
 #[cfg(feature = "direct")]
 pub use preconditioner::Direct;
 pub use preconditioner::{
-    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioner, Preconditioning,
+    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner,
+    Preconditioning,
 };
 pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
 

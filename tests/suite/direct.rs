@@ -4,12 +4,17 @@
 #[test]
 fn a_program_without_it_says_so() {
     use bfree::scene;
-    use bfree::solver::Preconditioning;
+    use bfree::solver::{Preconditioned, Preconditioning};
 
     let direct = r#"solver.krylov.preconditioner="direct""#.parse().unwrap();
     let refused = scene::read_file("scenes/elastica.json".as_ref(), &[direct]).unwrap_err().to_string();
     assert!(refused.contains("solver.krylov.preconditioner") && refused.contains("--features direct"), "{refused}");
-    let (chosen, why) = Preconditioning::Direct.chosen::<2>(1000, true, true, false);
+    let (chosen, why) = Preconditioning::Direct.chosen::<2>(Preconditioned {
+        particles: 1000,
+        splines: true,
+        long: true,
+        ..Default::default()
+    });
     assert!(chosen == Preconditioning::BlockJacobi && why.contains("`direct`"), "{why}");
 }
 

@@ -86,8 +86,8 @@ pub trait Preconditioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// Multigrid for large bodies without inertia or in steps of Courant numbers above 10, else the diagonal blocks; for small ones of those
-    /// in 1D and 2D the direct solve, where the program has it.
+    /// Multigrid for large bodies, and for those that may flow, without inertia or in steps of Courant numbers above 10, else the diagonal
+    /// blocks; for small elastic ones of those in 1D and 2D the direct solve, where the program has it.
     #[default]
     Automatic,
     /// The inverses of the diagonal blocks: cheap, and enough where inertia dominates.
@@ -98,6 +98,22 @@ pub enum Preconditioning {
     Direct,
     /// Nothing.
     None,
+}
+
+/// What the choice of a preconditioner looks at.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Preconditioned {
+    /// How many there are.
+    pub particles: usize,
+    /// Whether the functions are B-splines.
+    pub splines: bool,
+    /// Whether inertia does not dominate the steps.
+    pub long: bool,
+    /// Whether steps follow a path of equilibria, by GMRES.
+    pub on_path: bool,
+    /// Whether a law has plastic strain: near a limit load, multigrid takes a fourth to a sixtieth of the iterations of diagonal blocks
+    /// (`docs/src/tutorial/plasticity.md`).
+    pub flows: bool,
 }
 
 /// Particles in 1D, 2D and 3D from which on multigrid was the faster one; and with splines, which diagonal blocks serve better: in 3D it is
@@ -114,26 +130,25 @@ impl Preconditioning {
     /// Whether this program can factorise.
     pub const HAS_DIRECT: bool = cfg!(feature = "direct");
 
-    /// What is used for so many particles in `D` dimensions, with B-splines or other functions, in steps that are `long` or not, along a
-    /// path of equilibria (by GMRES) or not; and why.
+    /// What is used for a body in `D` dimensions; and why.
     ///
     /// ```
     /// use bfree::solver::Preconditioning::{Automatic, BlockJacobi, Multigrid};
+    /// use bfree::solver::Preconditioned;
     ///
-    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, true, false).0, Multigrid);
-    /// assert_eq!(Automatic.chosen::<3>(1_000_000, false, false, false), (BlockJacobi, "inertia dominates"));
-    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true, false).1, "faster for so many particles and these functions");
-    /// assert_eq!(Automatic.chosen::<3>(1_000, false, true, true), (Multigrid, "restarts lose what few iterations keep"));
+    /// let (small, large) = (Preconditioned { particles: 1_000, ..Default::default() }, 1_000_000);
+    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { particles: large, long: true, ..small }).0, Multigrid);
+    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { particles: large, ..small }), (BlockJacobi, "inertia dominates"));
+    /// let long = Preconditioned { long: true, ..small };
+    /// assert_eq!(Automatic.chosen::<3>(long).1, "faster for so many particles and these functions");
+    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { flows: true, ..long }), (Multigrid, "the body may flow"));
+    /// let on_path = Preconditioned { on_path: true, ..long };
+    /// assert_eq!(Automatic.chosen::<3>(on_path), (Multigrid, "restarts lose what few iterations keep"));
     /// // What is asked for is used.
-    /// assert_eq!(Multigrid.chosen::<3>(1_000, false, false, false), (Multigrid, "it was asked for"));
+    /// assert_eq!(Multigrid.chosen::<3>(small), (Multigrid, "it was asked for"));
     /// ```
-    pub fn chosen<const D: usize>(
-        self,
-        particles: usize,
-        splines: bool,
-        long: bool,
-        on_path: bool,
-    ) -> (Self, &'static str) {
+    pub fn chosen<const D: usize>(self, of: Preconditioned) -> (Self, &'static str) {
+        let Preconditioned { particles, splines, long, on_path, flows } = of;
         let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
         let axes = (D - 1).min(2);
         match self {
@@ -141,6 +156,7 @@ impl Preconditioning {
                 (Self::BlockJacobi, "this program was built without the feature `direct`")
             }
             Self::Automatic if on_path => (Self::Multigrid, "restarts lose what few iterations keep"),
+            Self::Automatic if long && flows => (Self::Multigrid, "the body may flow"),
             Self::Automatic if long && Self::HAS_DIRECT && particles <= few[axes] => {
                 (Self::Direct, "few particles, and inertia does not dominate")
             }
