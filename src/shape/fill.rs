@@ -149,9 +149,18 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     let between = how.pieces() > 1;
     let points = [[false, false], [true, false], [false, true], [true, true]]
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
+    // As its pieces are below: cells beside each other must agree on which of them is whole.
+    let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
     let is_full = |cell: [u64; D]| {
-        let lower = Vector::from_fn(|k, _| grid.origin[k] + (first[k] + cell[k]) as f64 * h);
-        shape.part(&lower, &Vector::repeat(h), h).0 > (1.0 - NOTHING) * h.powi(D as i32)
+        let lowers = indices([u64::from(how.pieces()); D]).map(|i| {
+            let within = |k: usize| i[k] as f64 / f64::from(how.pieces());
+            Vector::from_fn(|k, _| grid.origin[k] + ((first[k] + cell[k]) as f64 + within(k)) * h)
+        });
+        let volume = |lower: Vector<f64, D>| match shape.quadrature(&lower, &size, h, how.degree) {
+            Some(points) => points.iter().map(|point| point.volume).sum(),
+            None => shape.part(&lower, &size, h).0,
+        };
+        lowers.map(volume).all(|volume| volume >= (1.0 - NOTHING) * size.product())
     };
     let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
     // Of a box in a cell that is cut, which has one particle, or those of Gauss's rule.
@@ -196,7 +205,6 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 continue;
             }
             if how.rule == Fill::Cut && distance > -across {
-                let size = Vector::repeat(h / f64::from(how.pieces()));
                 let integrated = |lower| shape.quadrature(&lower, &size, h, how.degree);
                 let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(integrated).collect());
                 parts = Some(match all.flatten() {
