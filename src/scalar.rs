@@ -48,7 +48,7 @@ impl<T: DualNumCopy> Real for T {
 ///
 /// // x³ = a at a = 8: dx/da = 1/(3x²)
 /// let a = Dual64::lit(8.0).derivative();
-/// let x = implicit(2.0, 12.0, |x| x * x * x - a);
+/// let x = implicit(2.0, 12.0, |x: Dual64| x * x * x - a);
 /// assert_eq!((x.value(), x.eps), (2.0, 1.0 / 12.0));
 /// ```
 pub fn implicit<T: Real>(root: f64, slope: f64, residual: impl Fn(T) -> T) -> T {
