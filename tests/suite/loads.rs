@@ -196,9 +196,11 @@ fn inflation(cells: u32, functions: &str) -> Result<f64, Failure> {
     let (a, b, shear, poisson) = (1.0_f64, 1.5_f64, 1000.0, 0.25);
     let exact = pressure * a * a / (2.0 * shear * (b * b - a * a)) * ((1.0 - 2.0 * poisson) * a + b * b / a);
     let now = simulation.particles.by_id();
-    let outward = (0..now.len()).filter(|&p| !now.is_solid(p)).map(|p| now.position[p].norm() - start[p].norm());
-    let (count, sum) = outward.fold((0.0, 0.0), |(count, sum), u| (count + 1.0, sum + u));
-    Ok(sum / count / exact - 1.0)
+    let outward = |point: &SurfacePoint<2>| {
+        let id = simulation.particles.id[point.particle] as usize;
+        (now.position[id].norm() - start[id].norm()) * point.area
+    };
+    Ok(simulation.loads.surface[0].points.iter().map(outward).sum::<f64>() / area / exact - 1.0)
 }
 
 #[test]
@@ -211,7 +213,8 @@ fn follower_pressure_inflates_a_ring_by_lame_s_solution() -> Result<(), Failure>
         r#"{"lme": {"gamma": 1.4}}"#,
     ] {
         let errors = [inflation(4, functions)?, inflation(8, functions)?, inflation(16, functions)?].map(f64::abs);
-        assert!(errors[0] < 0.011, "{functions}: {errors:?}");
+        // Two cells across the wall: linear functions, whose forces are now integrated, measure 1.28 %.
+        assert!(errors[0] < 0.013, "{functions}: {errors:?}");
         // Of order 3/2 at least, down to what the area of a curved surface is known to.
         for pair in errors.windows(2) {
             assert!(pair[1] < 4e-4 || pair[1] < pair[0] * 0.5_f64.powf(1.5), "{functions}: {errors:?}");
