@@ -151,12 +151,13 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
     // As its pieces are below: cells beside each other must agree on which of them is whole.
     let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
+    let integrated = |lower: Vector<f64, D>| shape.quadrature(&lower, &size, h, how.degree);
     let is_full = |cell: [u64; D]| {
         let lowers = indices([u64::from(how.pieces()); D]).map(|i| {
             let within = |k: usize| i[k] as f64 / f64::from(how.pieces());
             Vector::from_fn(|k, _| grid.origin[k] + ((first[k] + cell[k]) as f64 + within(k)) * h)
         });
-        let volume = |lower: Vector<f64, D>| match shape.quadrature(&lower, &size, h, how.degree) {
+        let volume = |lower: Vector<f64, D>| match integrated(lower) {
             Some(points) => points.iter().map(|point| point.volume).sum(),
             None => shape.part(&lower, &size, h).0,
         };
@@ -205,8 +206,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 continue;
             }
             if how.rule == Fill::Cut && distance > -across {
-                let integrated = |lower| shape.quadrature(&lower, &size, h, how.degree);
-                let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(integrated).collect());
+                let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(&integrated).collect());
                 parts = Some(match all.flatten() {
                     Some(boxes) => Parts { boxes, along: how.pieces(), full: &gauss, sliver: THIN },
                     None => {
