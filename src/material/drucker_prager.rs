@@ -76,6 +76,7 @@ impl Criterion for DruckerPrager {
     type Parameters = DruckerPragerParameters;
     const NAME: &'static str = "Drucker-Prager";
     const ASSOCIATED: bool = false;
+    const ISOCHORIC: bool = false;
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
         let DruckerPragerParameters { elastic, friction, dilatancy, cohesion } = given;

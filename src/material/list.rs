@@ -2,7 +2,7 @@
 
 use super::{
     Ciarlet, ClosedTangent, DruckerPrager, Lame, Law, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
-    Remembered, StVenantKirchhoff, Start, Viscoelastic, VonMises,
+    Remembered, StVenantKirchhoff, Start, Viscoelastic, VolumeResponse, VonMises,
 };
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -95,6 +95,9 @@ macro_rules! materials {
                 &self, at: &Deformation<T, D>, start: &Start<'_>, v: &Vector<T, D>, b: &Vector<T, D>,
             ) -> Tensor<T, D> {
                 match self { $(Self::$law(law) => Law::tangent_density(law, at, start, v, b)),* }
+            }
+            fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+                match self { $(Self::$law(law) => Law::volumetric(law, at)),* }
             }
             fn closed<const D: usize>(
                 &self, f_n: &Tensor<f64, D>, at: &Deformation<f64, D>, volume: f64,

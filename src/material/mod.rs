@@ -22,6 +22,7 @@ mod plastic;
 mod spectral;
 mod st_venant_kirchhoff;
 mod viscoelastic;
+mod volume;
 mod von_mises;
 
 pub use closed_tangent::ClosedTangent;
@@ -41,4 +42,5 @@ pub(crate) use piola::{admissible_or_rest, embed, piola};
 pub use plastic::{Criterion, Plastic, Returned};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use viscoelastic::{Branch, Viscoelastic, ViscoelasticParameters};
+pub use volume::VolumeResponse;
 pub use von_mises::{VonMises, VonMisesParameters};

@@ -30,6 +30,7 @@ impl Criterion for VonMises {
     type Parameters = VonMisesParameters;
     const NAME: &'static str = "von Mises";
     const ASSOCIATED: bool = true;
+    const ISOCHORIC: bool = true;
 
     fn build(given: &VonMisesParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
         let solid = given.elastic.lame(problems, &format!("{path}.elastic"));
