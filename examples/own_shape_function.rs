@@ -70,7 +70,12 @@ fn stretched(lame: Lame) -> Simulation<1, Material, Mixed> {
             h[(0, 0)] = gradient;
         }
     }
-    let bodies = vec![Body { name: "bar".into(), law: NeoHookean::ciarlet(lame).into(), density: DENSITY }];
+    let bodies = vec![Body {
+        name: "bar".into(),
+        law: NeoHookean::ciarlet(lame).into(),
+        density: DENSITY,
+        dilatation: Default::default(),
+    }];
     Simulation {
         settings: Settings { lumping: 0.02, ..Settings::default() },
         ..Simulation::new(grid, Mixed(0.5), bodies, particles, Clock::new(0.01, 0))

@@ -1,7 +1,22 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
-use crate::material::{Law, Start};
+use crate::material::{Law, Start, VolumeResponse};
+use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What change of volume the energy of a body sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Dilatation {
+    /// That of every particle.
+    #[default]
+    Pointwise,
+    /// The mean of the particles in a cell of the grid: a body that hardly changes its volume does not lock. For laws whose energy has a
+    /// part that depends on the volume alone; not for `st_venant_kirchhoff` and `drucker_prager`.
+    MeanDilatation,
+}
 
 /// A body: a law and a density shared by its particles.
 #[derive(Clone, Debug)]
@@ -12,6 +27,37 @@ pub struct Body<L> {
     pub law: L,
     /// Mass per reference volume, ρ₀.
     pub density: f64,
+    /// What change of volume its energy sees; pointwise of a law without [`Law::volumetric`], whatever stands here.
+    pub dilatation: Dilatation,
+}
+
+impl<L: Law> Body<L> {
+    /// Whether its change of volume is averaged.
+    pub(crate) fn averages(&self) -> bool {
+        self.dilatation == Dilatation::MeanDilatation && self.response(0.0).is_some()
+    }
+
+    /// What its law says of a volume that has become 1 + `change` times what it was.
+    pub(crate) fn response<T: Real>(&self, change: T) -> Option<VolumeResponse<T>> {
+        self.law.volumetric(&Deformation::new(Tensor::<T, 1>::from_element(change)))
+    }
+
+    /// The stiffness at rest of what a mean dilatation takes from the particles, U''(1); 0 of a body whose dilatation is pointwise.
+    pub(crate) fn mean_stiffness(&self) -> f64 {
+        let response = Some(0.0).filter(|_| self.averages()).and_then(|rest| self.response(rest));
+        response.map_or(0.0, |of| of.stiffness)
+    }
+
+    /// What the mean dilatation 1 + `change` adds to the energy per reference volume, U(θ) − U(J), and to each normal component of Cauchy's
+    /// stress, U'(θ) − U'(J), of a particle of volume ratio 1 + `j`; zeros of a body whose dilatation is pointwise.
+    pub(crate) fn averaged(&self, change: f64, j: f64) -> [f64; 2] {
+        if self.dilatation == Dilatation::Pointwise {
+            return [0.0; 2];
+        }
+        let of = |x: f64| self.response(x).map_or([0.0; 2], |of| [of.energy, of.stress / (1.0 + x)]);
+        let (mean, own) = (of(change), of(j));
+        [mean[0] - own[0], mean[1] - own[1]]
+    }
 }
 
 /// State of all particles, and of the points of loaded surfaces, at the last converged step; one entry per particle in each array. Without inertia those of velocity and
@@ -56,6 +102,8 @@ pub struct Particles<const D: usize> {
     pub memory: Vec<f64>,
     /// Numbers that the law with the longest memory remembers; 0 where all are elastic.
     pub remembered: usize,
+    /// θ − 1 of bodies whose change of volume is averaged, 0 of others; empty where there are none.
+    pub dilatation: Vec<f64>,
 }
 
 impl<const D: usize> Particles<D> {
@@ -127,6 +175,19 @@ impl<const D: usize> Particles<D> {
         if bodies.iter().any(|body| body.law.memory().len() > self.remembered) {
             self.remember_rest(bodies);
         }
+        self.make_room_for_dilatation(bodies);
+    }
+
+    /// θ of bodies that average it, at rest where none is there yet.
+    fn make_room_for_dilatation<L: Law>(&mut self, bodies: &[Body<L>]) {
+        if bodies.iter().any(Body::averages) {
+            self.dilatation.resize(self.len(), 0.0);
+        }
+    }
+
+    /// θ − 1 of the particle at the place `p`.
+    pub(crate) fn dilatation(&self, p: usize) -> f64 {
+        self.dilatation.get(p).copied().unwrap_or(0.0)
     }
 
     /// Gives every particle the memory that its law has at rest.
@@ -138,6 +199,8 @@ impl<const D: usize> Particles<D> {
             names.chain(std::iter::repeat(0.0)).take(width)
         };
         self.memory = self.body.iter().flat_map(at_rest).collect();
+        self.dilatation.clear();
+        self.make_room_for_dilatation(bodies);
     }
 
     /// Where the particles lie in memory, by id.
@@ -184,10 +247,12 @@ impl<const D: usize> Particles<D> {
     /// ```
     pub fn rearrange(&mut self, order: &[u32]) {
         let mut moved = vec![false; self.len()];
-        let Self { position, velocity, acceleration, displacement_gradient, volume, mass, body, id, .. } = self;
+        let Self {
+            position, velocity, acceleration, displacement_gradient, volume, mass, body, id, dilatation, ..
+        } = self;
         [position, velocity, acceleration].into_iter().for_each(|vectors| permute(vectors, order, &mut moved));
         permute(displacement_gradient, order, &mut moved);
-        [volume, mass].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
+        [volume, mass, dilatation].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
         [body, id].into_iter().for_each(|numbers| permute(numbers, order, &mut moved));
         if self.remembered > 0 {
             let of = |&p: &u32| self.memory[p as usize * self.remembered..][..self.remembered].iter().copied();

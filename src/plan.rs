@@ -2,13 +2,14 @@
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
+use crate::mechanics::dilatation::Cells;
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
-use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::sweep::{LANES, SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
-use crate::mechanics::terms::{Given, Terms};
+use crate::mechanics::terms::{Given, Terms, frozen_rows};
 use crate::mechanics::transfer::Projection;
-use crate::particles::Particles;
+use crate::particles::{Body, Particles};
 use crate::simulation::Simulation;
 use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
@@ -197,7 +198,9 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         Precision::Double => "only with solver.krylov.precision = \"mixed\"",
         Precision::Mixed => "of the linear systems; for shape functions that are products",
     };
-    let mut all = Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping, ghost: settings.ghost });
+    let averages = simulation.bodies.iter().any(Body::averages);
+    let mut all =
+        Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping, ghost: settings.ghost, averages });
     all.extend([
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),
@@ -253,7 +256,11 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
     // What is not there does not appear.
     let keeps = simulation.settings.renewal != Renewal::EveryStep;
-    let used: [(bool, &'static str, usize); 19] = [
+    let averages = simulation.bodies.iter().any(Body::averages);
+    // θ, also when the grid was new; which cell, and what a pass finds there.
+    let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
+    let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
+    let used: [(bool, &'static str, usize); 21] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -273,6 +280,8 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
         (faces > 0, "loaded surfaces", faces * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
+        (averages, "particles: mean dilatation", of_mean),
+        (averages, "frozen tangent: mean dilatation", frozen_mean),
         (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
         (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
         (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),

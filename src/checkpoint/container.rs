@@ -20,7 +20,7 @@ use std::io::{self, Read, Write};
 const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
 
 /// Version of the format.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Bytes of a header, at most: a scene has at most a quarter of that.
 const MAX_HEADER: u32 = 64 << 20;

@@ -39,6 +39,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         id,
         memory,
         remembered: _,
+        dilatation,
     } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
     let held: Vec<f64> = (0..loads.prescribed.len()).map(|one| u8::from(held.contains(&one)).into()).collect();
@@ -50,14 +51,16 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("acceleration", bytemuck::cast_slice(acceleration).into()),
         ("displacement_gradient", bytemuck::cast_slice(displacement_gradient).into()),
         ("memory", memory.as_slice().into()),
+        ("dilatation", dilatation.as_slice().into()),
         ("external_work", std::slice::from_ref(external_work).into()),
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    if let Some(Kept { position, displacement_gradient, motion, rate, velocity, acceleration }) = kept {
+    if let Some(Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration }) = kept {
         let vectors = [position, motion, rate, velocity, acceleration].map(|field| bytemuck::cast_slice(field));
         arrays.extend(KEPT.into_iter().zip(vectors).map(|(name, numbers)| (name, numbers.into())));
         arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
+        arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
     }
     arrays
 }
@@ -67,6 +70,9 @@ const KEPT: [&str; 5] = ["kept_position", "kept_motion", "kept_rate", "kept_velo
 
 /// H of the particles when it was new.
 const KEPT_GRADIENT: &str = "kept_displacement_gradient";
+
+/// θ − 1, likewise.
+const KEPT_DILATATION: &str = "kept_dilatation";
 
 /// The grid that was kept, if one was; how many nodes it has only a step can tell.
 ///
@@ -79,11 +85,13 @@ fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kep
     };
     let Some(gradient) = of(KEPT_GRADIENT) else { return Ok(None) };
     let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
+    let dilatation = of(KEPT_DILATATION).unwrap_or_default().to_vec();
     let [position, motion, rate, velocity, acceleration] = KEPT.map(vectors);
     let fits = [position.len(), displacement_gradient.len()] == [particles; 2]
+        && (dilatation.is_empty() || dilatation.len() == particles)
         && rate.len() == motion.len()
         && [velocity.len(), acceleration.len()].into_iter().all(|length| length == 0 || length == motion.len());
-    let kept = Kept { position, displacement_gradient, motion, rate, velocity, acceleration };
+    let kept = Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration };
     if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
 }
 
@@ -136,6 +144,7 @@ pub(super) fn restore<const D: usize, L, A>(
             "acceleration" => bytemuck::cast_slice_mut(&mut particles.acceleration),
             "displacement_gradient" => bytemuck::cast_slice_mut(&mut particles.displacement_gradient),
             "memory" => &mut particles.memory,
+            "dilatation" => &mut particles.dilatation,
             "dissipated" => std::slice::from_mut(&mut simulation.dissipated),
             "external_work" => std::slice::from_mut(&mut simulation.external_work),
             _ => continue,

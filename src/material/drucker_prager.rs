@@ -104,6 +104,7 @@ impl DruckerPrager {
 impl Criterion for DruckerPrager {
     type Parameters = DruckerPragerParameters;
     const NAME: &'static str = "Drucker-Prager";
+    const ISOCHORIC: bool = false;
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {
         let DruckerPragerParameters { elastic, friction, dilatancy, cohesion, cone } = given;

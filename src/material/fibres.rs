@@ -1,6 +1,6 @@
 //! One family of fibres in an elastic matrix.
 
-use super::{Lame, Law, Listed, Material, NeoHookean, Parameters, Start};
+use super::{Lame, Law, Listed, Material, NeoHookean, Parameters, Start, VolumeResponse};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
@@ -82,6 +82,10 @@ impl FibreReinforced {
 }
 
 impl Law for FibreReinforced {
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        self.base.volumetric(at)
+    }
+
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
         let base = self.base.energy(at, start);
         self.stretched(at).1.map_or(base, |x| {

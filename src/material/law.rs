@@ -1,6 +1,6 @@
 //! What a law is: the traits that the residual asks.
 
-use super::{ClosedTangent, Material, embed};
+use super::{ClosedTangent, Material, VolumeResponse, embed};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, outer, symmetric};
 use num_dual::Dual;
@@ -124,6 +124,11 @@ pub trait Law: Send + Sync {
         b: &Vector<T, D>,
     ) -> Tensor<T, D> {
         density(v, |a| self.elasticity(at, start, &outer(a, b)))
+    }
+
+    /// As [`Elastic::volumetric`].
+    fn volumetric<T: Real>(&self, _at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        None
     }
 
     /// As [`Elastic::closed`].
@@ -261,6 +266,25 @@ pub trait Elastic: Send + Sync {
         density(v, |a| self.elasticity(at, &outer(a, b)))
     }
 
+    /// The part of the energy that depends on the volume ratio θ alone, at θ = 1 + `at.h`, if it has one that carries its resistance to
+    /// changes of volume: what a mean dilatation replaces by that of a cell. The same answer, some or none, at every θ.
+    ///
+    /// ```
+    /// use bfree::material::{Elastic, Lame, NeoHookean};
+    /// use bfree::tensor::{Deformation, Tensor};
+    /// use num_dual::Dual64;
+    ///
+    /// // θ U' and θ (θ U')' are the derivatives that they say they are.
+    /// let law = NeoHookean::ciarlet(Lame::new(3.0, 1.0)?);
+    /// let at = Deformation::<Dual64, 1>::new(Tensor::from_element(Dual64::new(0.25, 1.25)));
+    /// let of = law.volumetric(&at).ok_or("it has one")?;
+    /// assert!((of.energy.eps - of.stress.re).abs() < 1e-15 && (of.stress.eps - of.stiffness.re).abs() < 1e-15);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    fn volumetric<T: Real>(&self, _at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        None
+    }
+
     /// The whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`, for gradients taken in the
     /// configuration `n` whose deformation gradient is `f_n`, if it has this form; the same answer at every state.
     ///
@@ -316,6 +340,10 @@ impl<E: Elastic> Law for E {
         b: &Vector<T, D>,
     ) -> Tensor<T, D> {
         Elastic::tangent_density(self, at, v, b)
+    }
+    #[inline(always)]
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        Elastic::volumetric(self, at)
     }
     #[inline(always)]
     fn closed<const D: usize>(

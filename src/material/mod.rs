@@ -24,6 +24,7 @@ mod spectral;
 mod st_venant_kirchhoff;
 mod variants;
 mod viscoelastic;
+mod volume;
 mod von_mises;
 
 pub use closed_tangent::ClosedTangent;
@@ -45,4 +46,5 @@ pub use plastic::{Criterion, Plastic, Returned};
 pub(crate) use spectral::principal_values;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use viscoelastic::{Branch, Viscoelastic, ViscoelasticParameters};
+pub use volume::VolumeResponse;
 pub use von_mises::{VonMises, VonMisesParameters};

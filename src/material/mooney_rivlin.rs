@@ -1,6 +1,6 @@
 //! A compressible Mooney–Rivlin solid.
 
-use super::{Ciarlet, Elastic, Lame, Listed, Volumetric};
+use super::{Ciarlet, Elastic, Lame, Listed, VolumeResponse, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, contract, identity, scaled, second_invariant, symmetric, trace};
@@ -52,6 +52,10 @@ impl MooneyRivlin {
 }
 
 impl Elastic for MooneyRivlin {
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        Some(Ciarlet::response(self.volumetric, at))
+    }
+
     /// 2 (c₁ + 2c₂) (tr E − ln J) + 4c₂ I₂(E) + U, for I₁ − 3 = 2 tr E and I₂ − 3 = 4 tr E + 4 I₂(E)
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
         at.trace_e_minus_log_jacobian() * T::lit(self.shear())

@@ -1,7 +1,7 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed};
+use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed, VolumeResponse};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
@@ -19,6 +19,15 @@ pub trait Volumetric: Copy + Default + Send + Sync + 'static {
 
     /// J (J U')' for Λ = `lambda`.
     fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
+
+    /// U and its derivatives for Λ = `lambda`.
+    fn response<T: Real>(lambda: f64, at: &Deformation<T, 1>) -> VolumeResponse<T> {
+        VolumeResponse {
+            energy: Self::energy(at) * T::lit(0.5 * lambda),
+            stress: Self::stress(lambda, at),
+            stiffness: Self::stiffness(lambda, at),
+        }
+    }
 }
 
 /// Ciarlet: Λ/4 (J²−1) − Λ/2 ln J, the paper's law (appendix B.1).
@@ -173,6 +182,10 @@ impl<U: Volumetric> Elastic for NeoHookean<U> {
         scaled(&outer(&cv, &cb), U::stiffness(self.lame.lambda, at))
             - scaled(&c_inv, q * cb.dot(v))
             - scaled(&outer(&cb, &cv), q)
+    }
+
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        Some(U::response(self.lame.lambda, at))
     }
 
     /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_nᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed

@@ -3,7 +3,7 @@
 use super::hencky::{Principal, Strained};
 use super::law::derivative;
 use super::spectral::{Function, Power, primitive_trace};
-use super::{Ciarlet, Lame, Law, Listed, Start, Volumetric};
+use super::{Ciarlet, Lame, Law, Listed, Start, VolumeResponse, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, identity, scaled};
@@ -94,6 +94,10 @@ impl Law for Ogden {
             return derivative(at, x, |at| self.stress(at, start));
         }
         self.moduli(at).elasticity(x)
+    }
+
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        Some(Ciarlet::response(self.lambda, at))
     }
 
     fn tangent_blocks<const D: usize>(

@@ -2,7 +2,9 @@
 
 use super::hencky::{Principal, Radial, Strained};
 use super::law::derivative;
-use super::{DISSIPATED, Lame, Law, Listed, PLASTIC_STRAIN, Remembered, Start};
+use super::{
+    DISSIPATED, Lame, Law, Listed, Logarithmic, PLASTIC_STRAIN, Remembered, Start, VolumeResponse, Volumetric,
+};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
@@ -22,6 +24,9 @@ pub trait Criterion: Clone + Send + Sync + Sized + 'static {
 
     /// Whether what flow takes in a step is a potential of it: associated flow, and the work of hardening along the way and not at its end.
     fn has_potential(&self) -> bool;
+
+    /// Whether the flow keeps the volume, and neither stress nor flow depend on the pressure: tr ε is ln J then.
+    const ISOCHORIC: bool;
 
     /// The solid and its criterion; or `None`, and `problems` of the keys below `path`.
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)>;
@@ -171,6 +176,11 @@ impl<Y: Criterion> Law for Plastic<Y> {
         let mut blocks = [[Tensor::zeros(); D]; D];
         principal.radial_moduli(&radial).add_blocks(f_n, &mut blocks);
         blocks
+    }
+
+    /// K/2 (ln J)², where the flow leaves it alone.
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        Y::ISOCHORIC.then(|| Logarithmic::response(self.solid.bulk_modulus(), at))
     }
 
     fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {

@@ -64,6 +64,12 @@ macro_rules! law_of_variants {
         ) -> $crate::tensor::Tensor<T, D> {
             match self { $(Self::$variant(law) => $crate::material::Law::tangent_density(law, at, start, v, b)),+ }
         }
+        fn volumetric<T: $crate::scalar::Real>(
+            &self,
+            at: &$crate::tensor::Deformation<T, 1>,
+        ) -> Option<$crate::material::VolumeResponse<T>> {
+            match self { $(Self::$variant(law) => $crate::material::Law::volumetric(law, at)),+ }
+        }
         fn closed<const D: usize>(
             &self,
             f_n: &$crate::tensor::Tensor<f64, D>,

@@ -3,7 +3,7 @@
 use super::hencky::{Principal, Radial, Strained};
 use super::law::derivative;
 use super::plastic::zero;
-use super::{DISSIPATED, Lame, Law, Listed, Material, NeoHookean, Parameters, Remembered, Start};
+use super::{DISSIPATED, Lame, Law, Listed, Material, NeoHookean, Parameters, Remembered, Start, VolumeResponse};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
@@ -144,6 +144,11 @@ impl Law for Viscoelastic {
             Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).elasticity(x)
         });
         springs.fold(self.base.elasticity(at, &Start::NONE, x), |sum, stress: Tensor<T, D>| sum + stress)
+    }
+
+    /// That of the base: branches have no viscosity in volume, nor springs.
+    fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
+        self.base.volumetric(at)
     }
 
     fn tangent_blocks<const D: usize>(

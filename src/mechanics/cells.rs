@@ -17,7 +17,8 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             prescribed: self.held(),
             ..LocalForm::default()
         };
-        let terms: Vec<_> = self.terms.iter().filter_map(|term| term.product_at_points()).map(|(_, add)| add).collect();
+        let terms: Vec<_> =
+            self.terms.iter().filter_map(|term| term.product_at_points(None)).map(|(_, add)| add).collect();
         // Gradients are counted in units of 1/h.
         let factor = (self.unit.length / grid.spacing).powi(2);
         let mut places = HashMap::new();
@@ -80,7 +81,8 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
     pub(super) fn joined(&self) -> Neighbours {
         let mut bends = Vec::new();
         self.terms.iter().for_each(|term| term.add_bends(&mut bends));
-        let reach = self.supports.reach().max(if bends.is_empty() { 0 } else { 2 });
+        let further = self.terms.iter().map(|term| term.reach()).max().unwrap_or(0);
+        let reach = (self.supports.reach() + further).max(if bends.is_empty() { 0 } else { 2 });
         Neighbours { nodes: self.indices(), reach, prescribed: self.held() }
     }
 

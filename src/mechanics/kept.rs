@@ -64,6 +64,8 @@ pub struct Kept<const D: usize> {
     pub(crate) position: Vec<Vector<f64, D>>,
     /// H, likewise.
     pub(crate) displacement_gradient: Vec<Tensor<f64, D>>,
+    /// θ − 1, likewise, where a body averages it.
+    pub(crate) dilatation: Vec<f64>,
     /// φ of the active nodes.
     pub(crate) motion: Vec<Vector<f64, D>>,
     /// Δφ/Δt of the last step.
@@ -79,12 +81,14 @@ impl<const D: usize> Kept<D> {
     pub(crate) fn exchange(&mut self, particles: &mut Particles<D>) {
         std::mem::swap(&mut self.position, &mut particles.position);
         std::mem::swap(&mut self.displacement_gradient, &mut particles.displacement_gradient);
+        std::mem::swap(&mut self.dilatation, &mut particles.dilatation);
     }
 
     /// Remembers where the particles were when the grid was new, and what has become of the nodes in a step of length `dt`.
     pub(crate) fn renew(&mut self, particles: &Particles<D>, end: &Nodal<D>, dphi: &[Vector<f64, D>], dt: f64) {
         self.position.clone_from(&particles.position);
         self.displacement_gradient.clone_from(&particles.displacement_gradient);
+        self.dilatation.clone_from(&particles.dilatation);
         self.motion = end.motion.to_vec();
         self.velocity = end.velocity.to_vec();
         self.acceleration = end.acceleration.to_vec();
@@ -102,6 +106,9 @@ impl<const D: usize> Kept<D> {
     pub(crate) fn rearrange(&mut self, order: &[u32]) {
         self.position = order.iter().map(|&from| self.position[from as usize]).collect();
         self.displacement_gradient = order.iter().map(|&from| self.displacement_gradient[from as usize]).collect();
+        if !self.dilatation.is_empty() {
+            self.dilatation = order.iter().map(|&from| self.dilatation[from as usize]).collect();
+        }
     }
 
     /// The prescribed conditions that a particle has come to: it is in a cell with a node of that condition that feels nothing yet, and

@@ -3,6 +3,7 @@
 mod affine;
 mod cells;
 pub mod check;
+pub(crate) mod dilatation;
 pub mod kept;
 pub mod loads;
 pub mod mass;

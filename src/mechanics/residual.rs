@@ -107,7 +107,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             out.fill(Vector::zeros());
             self.terms.add_at_nodes(&picked, dphi, out);
         }
-        let mut points = self.terms.at_points::<T>(&picked, part);
+        let mut points = self.terms.at_points::<T>(&picked, part, dphi);
         // Of values the magnitudes are those at the nodes.
         points.retain(|(flow, _)| !magnitude || flow.gradient);
         let (flows, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();

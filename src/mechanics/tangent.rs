@@ -57,7 +57,8 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
     pub fn product(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
         out.fill(Vector::zeros());
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
-        let (flows, all): (Vec<_>, Vec<_>) = self.terms.iter().filter_map(|term| term.product_at_points()).unzip();
+        let (flows, all): (Vec<_>, Vec<_>) =
+            self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
         if let Some(flow) = flows.into_iter().reduce(Flow::and) {
             let (field, sums) = (bytemuck::cast_slice(u), bytemuck::cast_slice_mut(out));
             self.supports.product(field, flow, sums, &|group, at: &At<X, D, D>, sums: &mut At<X, D, D>| {

@@ -54,9 +54,12 @@ impl Field {
         let particles = &simulation.particles;
         let id = particles.id[place] as usize;
         let h = || particles.displacement_gradient[place];
-        let law = || &simulation.bodies[particles.body[place] as usize].law;
+        let body = &simulation.bodies[particles.body[place] as usize];
+        let law = || &body.law;
+        let averaged = || body.averaged(particles.dilatation(place), Deformation::new(h()).j);
         let stress = || {
             cauchy_stress(law(), &particles.start(place, 0.0), h())
+                .map(|stress| stress + Tensor::<f64, 3>::identity() * averaged()[1])
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
         let recalled = |name| particles.start(place, 0.0).recall(law(), name).unwrap_or(0.0);
@@ -85,7 +88,9 @@ impl Field {
             Self::PrincipalStress => out.extend(principal_values(&stress()?)),
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
-            Self::EnergyDensity => out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0))),
+            Self::EnergyDensity => {
+                out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0)) + averaged()[0]);
+            }
             Self::PlasticStrain => out.push(recalled(PLASTIC_STRAIN)),
             Self::DissipatedDensity => out.push(recalled(DISSIPATED)),
             Self::Mass => out.push(particles.mass[place]),

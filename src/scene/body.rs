@@ -2,9 +2,11 @@
 
 use super::grid::GridBox;
 use super::shape::Shape;
-use crate::material;
+use crate::material::{self, Law};
+use crate::particles::Dilatation;
 use crate::problems::{Number, Problems};
 use crate::shape::{EDGE, Fill, Layout};
+use crate::tensor::{Deformation, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -22,6 +24,9 @@ pub struct Body {
     pub particles: Option<ParticleFile>,
     /// The law.
     pub material: material::Parameters,
+    /// What change of volume the energy sees.
+    #[serde(default)]
+    pub volumetric: Dilatation,
     /// Mass per reference volume, > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: f64,
@@ -85,7 +90,15 @@ impl Body {
             (Some(_), Some(_)) => problems.refuse(path, "both shape and particles", "must have exactly one of the two"),
             (None, None) => problems.refuse(path, "neither shape nor particles", "must have exactly one of the two"),
         }
-        self.material.law(problems, &format!("{path}.material"));
+        let law = self.material.law(problems, &format!("{path}.material"));
+        if let Some(law) = law.filter(|_| self.volumetric == Dilatation::MeanDilatation) {
+            problems.require(
+                law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some(),
+                &format!("{path}.volumetric"),
+                "\"mean_dilatation\"",
+                "must be of a law whose energy has a part that depends on the volume alone, which this one has not",
+            );
+        }
         problems.positive(&format!("{path}.density"), self.density);
         if let Some(velocity) = &self.velocity {
             problems.vector(&format!("{path}.velocity"), velocity, dimension);

@@ -72,7 +72,12 @@ impl Scene {
             let path = format!("bodies[{i}]");
             self.fill(body, &path, &means, &grid, i as u32, &mut particles)?;
             if let Some(law) = body.material.law(&mut problems, &format!("{path}.material")) {
-                bodies.push(particles::Body { name: body.name.clone(), law, density: body.density });
+                bodies.push(particles::Body {
+                    name: body.name.clone(),
+                    law,
+                    density: body.density,
+                    dilatation: body.volumetric,
+                });
             }
         }
         let Some(approximation) = self.shape_functions(&mut problems).filter(|_| problems.is_empty()) else {

@@ -115,7 +115,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     /// let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
     /// let mut particles = Particles::default();
     /// particles.push_without_inertia(Vector::from([1.75]), 0.5, 0.5, 0);
-    /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0 }];
+    /// let bodies = vec![Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default() }];
     /// let simulation = Simulation {
     ///     settings: Settings { scheme: Arc::new(Statics), ..Settings::default() },
     ///     ..Simulation::new(grid, Bspline::Quadratic, bodies, particles, Clock::new(1.0, 0))
@@ -276,7 +276,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     pub fn with_laws<M: Law>(self, law: impl Fn(&Body<L>) -> M) -> Simulation<D, M, A> {
         let bodies = self.bodies.iter();
         let bodies = bodies
-            .map(|body| Body { name: body.name.clone(), law: law(body), density: body.density })
+            .map(|body| Body {
+                name: body.name.clone(),
+                law: law(body),
+                density: body.density,
+                dilatation: body.dilatation,
+            })
             .collect::<Vec<_>>();
         let mut particles = self.particles;
         particles.remember_rest(&bodies);
@@ -312,8 +317,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         (0..particles.len())
             .map(|p| {
                 let at = Deformation::new(particles.displacement_gradient[p]);
-                let law = &self.bodies[particles.body[p] as usize].law;
-                particles.volume[p] * law.energy(&at, &particles.start(p, 0.0))
+                let body = &self.bodies[particles.body[p] as usize];
+                let [more, _] = body.averaged(particles.dilatation(p), at.j);
+                particles.volume[p] * (body.law.energy(&at, &particles.start(p, 0.0)) + more)
             })
             .sum()
     }

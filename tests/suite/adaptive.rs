@@ -33,6 +33,7 @@ fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
         name: "bar".into(),
         law: Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?)),
         density: 1.0,
+        dilatation: Default::default(),
     }];
     Ok(Simulation {
         loads: Loads { prescribed: vec![wall(false), wall(true)], ..Loads::default() },

@@ -83,7 +83,7 @@ fn bar(dt: f64, damping: Rayleigh, speed: f64, free: bool) -> Result<Simulation<
     let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
     let prescribed = if free { vec![] } else { vec![wall(false), wall(true)] };
     let grid = Grid { origin: Vector::zeros(), spacing: h, cells: [CELLS + 2 * beside] };
-    let bodies = vec![Body { name: "bar".into(), law, density: 1.0 }];
+    let bodies = vec![Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default() }];
     Ok(Simulation {
         loads: Loads { prescribed, damping: Some(damping), ..Loads::default() },
         settings: Settings { lumping: 0.0, newton: tight(), ..Settings::default() },

@@ -37,7 +37,12 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
     }
     let gravity = Vector::from([number(&reference["gravity"][0]), number(&reference["gravity"][1])]);
     let grid = Grid { origin: Vector::zeros(), spacing: 0.5, cells: [12, 10] };
-    let bodies = vec![Body { name: "body".into(), law: Material::from(NeoHookean::ciarlet(lame)), density }];
+    let bodies = vec![Body {
+        name: "body".into(),
+        law: Material::from(NeoHookean::ciarlet(lame)),
+        density,
+        dilatation: Default::default(),
+    }];
     Ok(Simulation {
         loads: Loads {
             gravity: Some(Gravity { acceleration: gravity, curve: Curve::constant(1.0) }),

@@ -111,7 +111,12 @@ const SECOND: usize = 7;
 /// A cloud whose second body has a law that lies.
 fn cloud<const D: usize>(stress: f64, fault: Fault, closed: bool, factor: f64) -> Result<Cloud<D>, Failure> {
     let law = NeoHookean::ciarlet(Lame::new(1.5 * stress, stress)?);
-    let body = |fault| Body { name: "part".into(), law: Faulty { law, fault, closed, factor }, density: 1.0 };
+    let body = |fault| Body {
+        name: "part".into(),
+        law: Faulty { law, fault, closed, factor },
+        density: 1.0,
+        dilatation: Default::default(),
+    };
     let mut particles = Particles::default();
     for p in 0..12 {
         let number = |k: usize| irregular(31 * p + k);

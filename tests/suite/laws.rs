@@ -94,7 +94,9 @@ fn materials() -> Vec<Material> {
 }
 
 fn bodies<L>(laws: impl IntoIterator<Item = L>) -> Vec<Body<L>> {
-    laws.into_iter().map(|law| Body { name: "body".into(), law, density: 1.0 }).collect()
+    laws.into_iter()
+        .map(|law| Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() })
+        .collect()
 }
 
 fn bits<const D: usize>(field: &[Vector<f64, D>]) -> Vec<u64> {

@@ -267,7 +267,7 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     let mut particles = Particles::default();
     particles.push(Vector::from([0.5, 0.5]), Vector::zeros(), 1.0, 3.0, 0);
     let law = Material::from(NeoHookean::ciarlet(Lame::new(1.0, 1.0)?));
-    let bodies = [Body { name: "body".into(), law, density: 3.0 }];
+    let bodies = [Body { name: "body".into(), law, density: 3.0, dilatation: Default::default() }];
     let (supports, nodes) = Supports::new(&Approximation::from(Linear), &grid, &particles.position)?;
     let (nodal, zero) = (Nodal::at_rest(&particles, &supports), vec![Vector::zeros(); nodes.len()]);
     let alphas = Newmark::default().alphas(1.0);

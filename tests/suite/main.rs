@@ -6,6 +6,7 @@ mod approximation;
 mod compaction;
 mod contact;
 mod damping;
+mod dilatation;
 mod direct;
 mod dynamics;
 mod equilibrium;

@@ -26,7 +26,7 @@ fn single<const D: usize>(h: Tensor<f64, D>) -> Result<Simulation<D>, Failure> {
     particles.push(Vector::repeat(0.5), Vector::zeros(), 0.25, 0.5, 0);
     particles.displacement_gradient[0] = h;
     let law = Material::from(NeoHookean::ciarlet(Lame::new(LAMBDA, SHEAR)?));
-    let bodies = vec![Body { name: "body".into(), law, density: 2.0 }];
+    let bodies = vec![Body { name: "body".into(), law, density: 2.0, dilatation: Default::default() }];
     let grid = Grid { origin: Vector::zeros(), spacing: 0.25, cells: [4; D] };
     Ok(Simulation::new(grid, Approximation::from(Linear), bodies, particles, Clock::new(0.01, 3)))
 }

@@ -254,7 +254,7 @@ fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>,
         particles.push(x + random.vector() * 0.3, random.vector(), 1.0, 1.0 + 0.5 * random.number(), 0);
     }
     let law = Material::from(NeoHookean::ciarlet(Lame::new(2.0, 1.0)?));
-    Ok((grid, particles, [Body { name: "body".into(), law, density: 1.0 }]))
+    Ok((grid, particles, [Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() }]))
 }
 
 /// What a step computes by sums over blocks.
@@ -481,8 +481,9 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let closed = law.closed(&identity(), &Deformation::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
     let ClosedTangent { both, .. } = closed;
     let numbers = D * D + triangle + 2 + if both.is_some() { 2 * triangle } else { 0 };
-    let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0 }];
-    let general = [Body { name: "body".into(), law: General(law.clone()), density: 1.0 }];
+    let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0, dilatation: Default::default() }];
+    let general =
+        [Body { name: "body".into(), law: General(law.clone()), density: 1.0, dilatation: Default::default() }];
     for (precision, size) in [(Precision::Double, 8), (Precision::Mixed, 4)] {
         // Eight lanes a group, whether they are full or not.
         let lanes = 8 * tiled.windows().len();

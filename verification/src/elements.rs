@@ -292,7 +292,7 @@ mod tests {
     fn a_bar_rings_at_its_exact_frequency() -> Result<(), Box<dyn std::error::Error>> {
         // A free bar of length 1 with v = V cos(πx): small, so linear; period 2/c.
         let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
-        let body = Body { name: "bar".into(), law, density: 1.0 };
+        let body = Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default() };
         let mut bar = Elements::<1, _>::new(Vector::zeros(), 0.1, [10], body, Clock::new(2.0 / 400.0, 0))?;
         bar.set_velocity(|x| x.map(|x| 1e-6 * (std::f64::consts::PI * x).cos()));
         let start = bar.velocity.clone();

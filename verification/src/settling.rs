@@ -41,8 +41,12 @@ pub(crate) fn block<const D: usize>(
     let floor = Prescribed { name: "floor".into(), on: Selection::Face { axis: D - 1, upper: false }, motion };
     let acceleration = Vector::from_fn(|i, _| if i == D - 1 { -0.05 } else { 0.0 });
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells + 4; D] };
-    let bodies =
-        vec![Body { name: "block".into(), law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()), density: 1.0 }];
+    let bodies = vec![Body {
+        name: "block".into(),
+        law: law.unwrap_or_else(|| NeoHookean::ciarlet(lame).into()),
+        density: 1.0,
+        dilatation: Default::default(),
+    }];
     Ok(Simulation {
         loads: Loads {
             gravity: Some(Gravity { acceleration, curve: Curve::constant(1.0) }),

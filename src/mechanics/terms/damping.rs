@@ -67,7 +67,9 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        if let Some((flow, add)) = self.stiffness.as_ref().and_then(Frozen::<f64, D>::product_at_points) {
+        if let Some((flow, add)) =
+            self.stiffness.as_ref().and_then(|of| Frozen::<f64, D>::product_at_points(of, Some(v)))
+        {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
             let out = bytemuck::cast_slice_mut(&mut of_stiffness);
             self.step.supports.product::<f64>(bytemuck::cast_slice(v), flow, out, &add);
@@ -157,8 +159,8 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenDamping<'_, X, D> {
         self.each().for_each(|frozen| frozen.add_product_at_nodes(u, out));
     }
 
-    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
-        let (flows, all): (Vec<_>, Vec<_>) = self.each().filter_map(Frozen::product_at_points).unzip();
+    fn product_at_points(&self, u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+        let (flows, all): (Vec<_>, Vec<_>) = self.each().filter_map(|of| of.product_at_points(u)).unzip();
         let flow = flows.into_iter().reduce(Flow::and)?;
         Some((flow, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))
     }

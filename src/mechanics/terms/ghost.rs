@@ -40,7 +40,9 @@ impl Ghost {
         }
         let (grid, nodes) = (step.supports.grid(), step.supports.active());
         // Volume, and volume times modulus, of what each node has of the bodies.
-        let moduli: Vec<f64> = (0..step.bodies.len()).map(|body| step.modulus(body)).collect();
+        // What cells do not resist in the mean, their second differences shall not resist either.
+        let averaged = |body: usize| step.bodies[body].mean_stiffness();
+        let moduli: Vec<f64> = (0..step.bodies.len()).map(|body| step.modulus(body) - averaged(body)).collect();
         let volume = |p: usize| step.particles.present_volume(p);
         let spread = |value: &(dyn Fn(usize) -> f64 + Sync)| {
             let mut share: Vec<Vector<f64, 1>> = vec![Vector::zeros(); nodes.len()];

@@ -62,7 +62,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     /// q = (1−ε) m a
-    fn at_points<T: Number>(&self, _: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _: Part, _: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
         let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize).unwrap_or(0.0));
@@ -122,7 +122,7 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMass<'_, D> {
         }
     }
 
-    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+    fn product_at_points(&self, _: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
         let add: ProductAtPoints<'_, X, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = X::lit(self.factor * self.mass.consistent(p as usize).unwrap_or(0.0));

@@ -8,6 +8,7 @@ mod body_force;
 mod damping;
 mod ghost;
 mod inertia;
+mod mean_dilatation;
 mod pressure;
 mod stress;
 mod traction;
@@ -16,6 +17,8 @@ pub use body_force::{BodyForce, ForceField};
 pub use damping::{Damping, Rayleigh};
 pub use ghost::Ghost;
 pub use inertia::Inertia;
+pub use mean_dilatation::MeanDilatation;
+pub(crate) use mean_dilatation::frozen_rows;
 pub use pressure::Pressure;
 pub use stress::Stress;
 pub use traction::Traction;
@@ -127,6 +130,8 @@ pub(crate) struct Given<'a, const D: usize> {
     pub lumping: f64,
     /// γ
     pub ghost: f64,
+    /// Whether a body averages its change of volume.
+    pub averages: bool,
 }
 
 /// Whether a term, or a part of it, is there, and why: `(name, used, why)`.
@@ -154,8 +159,8 @@ pub(crate) trait Term<const D: usize>: Sync {
     /// Adds what acts at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
-    /// What acts at the particles, and what of u and L it reads and of q and σ it writes. Only the occurrences of Δφ in `part` carry derivatives.
-    fn at_points<T: Number>(&self, _part: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    /// What acts at the particles at Δφ, and what of u and L it reads and of q and σ it writes. Only the occurrences of Δφ in `part` carry derivatives.
+    fn at_points<T: Number>(&self, _part: Part, _dphi: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
         None
     }
 
@@ -190,8 +195,9 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
     /// Adds what acts at the nodes.
     fn add_product_at_nodes(&self, _u: &[Vector<X, D>], _out: &mut [Vector<X, D>]) {}
 
-    /// What acts at the particles, and what it reads and writes.
-    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+    /// What acts at the particles in the product with `u`, and what it reads and writes; without `u`, where gradients are the same at all
+    /// particles of a cell.
+    fn product_at_points(&self, _u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
         None
     }
 
@@ -204,6 +210,11 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
     /// What adds to the diagonal blocks at the particles.
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
         None
+    }
+
+    /// How many nodes further along an axis than shape functions its entries reach.
+    fn reach(&self) -> u32 {
+        0
     }
 }
 
@@ -284,10 +295,11 @@ macro_rules! terms {
                 &self,
                 picked: impl Fn(&str, Role) -> bool,
                 part: Part,
+                dphi: &[Vector<T, D>],
             ) -> Vec<(Flow, AtPoints<'_, T, D>)> {
                 let mut all = Vec::new();
                 $(if let Some(term) = self.$field.as_ref().filter(|_| picked(<$term as Term<D>>::NAME, <$term as Term<D>>::ROLE)) {
-                    all.extend(term.at_points(part));
+                    all.extend(term.at_points(part, dphi));
                 })*
                 all
             }
@@ -344,6 +356,7 @@ macro_rules! terms {
 terms! {
     inertia: Inertia<'a, D>,
     stress: Stress<'a, D, L>,
+    mean_dilatation: MeanDilatation<'a, D, L>,
     damping: Damping<'a, D, L>,
     ghost: Ghost,
     body_force: BodyForce<D>,

@@ -76,7 +76,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         vec![("internal force", true, format!("F S of every particle, {D}×{D}"))]
     }
 
-    fn at_points<T: Number>(&self, part: Part) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, part: Part, _: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
         Some((Flow::GRADIENT, Box::new(self.laws.stresses(part))))
     }
 
@@ -137,7 +137,7 @@ impl<X: Laned> FrozenStress<X> {
 }
 
 impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X> {
-    fn product_at_points(&self) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+    fn product_at_points(&self, _: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
         let factor = X::lit(self.factor);
         Some((
             Flow::GRADIENT,

@@ -3,6 +3,7 @@
 use super::Nodal;
 use crate::grid::Grid;
 use crate::material::{Law, PLASTIC_STRAIN, Start, admissible_or_rest};
+use crate::mechanics::dilatation;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::compose;
 use crate::mechanics::schemes::Alphas;
@@ -220,6 +221,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
         let mut next = vec![0.0; remembered];
+        particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
         let Particles { position, velocity, acceleration, displacement_gradient, volume, memory, body, .. } = particles;
         supports.each_particle(
             self.motion(),

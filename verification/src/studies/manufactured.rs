@@ -139,7 +139,7 @@ fn simulate<P: Problem>(
     } else {
         Vec::new()
     };
-    let bodies = vec![Body { name: "body".into(), law: law.clone(), density }];
+    let bodies = vec![Body { name: "body".into(), law: law.clone(), density, dilatation: Default::default() }];
     let mut simulation = Simulation { loads: Loads {
             prescribed,
             field: Some(force_field(*problem, law, density, reference.clone())),

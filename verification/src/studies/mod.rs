@@ -103,6 +103,7 @@ studies!(
     riemann,
     compaction,
     column,
+    locking,
     robust,
     rebound,
     tradeoff,

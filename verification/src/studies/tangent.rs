@@ -16,11 +16,11 @@ use bfree::mechanics::loads::{
 };
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Rayleigh;
-use bfree::particles::{Body, Particles};
+use bfree::particles::{Body, Dilatation, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{NewtonSettings, Precision};
-use bfree::tensor::{Tensor, Vector, contract, determinant, trace};
+use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, trace};
 
 pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
 
@@ -115,9 +115,12 @@ fn dimension<const D: usize, L: Law + Clone>(
         for (shape, approximation) in shapes() {
             let mut random = Random::new(seed);
             let mut simulation = cloud::<D, L>(law.clone(), approximation.clone(), regime, &mut random)?;
-            for pressed in [true, false] {
+            for (pressed, averaged) in [(true, false), (false, false), (false, true)] {
                 if !pressed {
                     simulation.loads.surface.clear();
+                }
+                if averaged && !average(&mut simulation, &mut random) {
+                    continue;
                 }
                 let mut ways = vec![(shape.to_owned(), Prepared::new(&simulation)?)];
                 if ways[0].1.supports.is_tiled() {
@@ -131,13 +134,20 @@ fn dimension<const D: usize, L: Law + Clone>(
                         random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
                     prepared.prescribe(&mut dphi);
                     for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
-                        // What does not depend on the pressure was measured with it.
-                        if !pressed && ![SYMMETRY, POTENTIAL].contains(&measured.quantity.as_str()) {
+                        // What does not depend on the pressure, or on the mean of cells, was measured with and without.
+                        let of_all = |name: &&str| measured.quantity.starts_with(name);
+                        let here: &[&str] = match averaged {
+                            false => &[SYMMETRY, POTENTIAL],
+                            true => &[SYMMETRY, POTENTIAL, MEAN, "whole product", "diagonal blocks"],
+                        };
+                        if !pressed && !here.iter().any(|name| of_all(name)) {
                             continue;
                         }
                         let asymmetric = measured.quantity == PRESSURE_ASYMMETRY;
                         let bound = if asymmetric { Bound::AtLeast(1e-3) } else { measured.bound };
-                        let labels: [&str; 5] = [&measured.quantity, name, &D.to_string(), regime.name(), way];
+                        let with_mean = averaged && !of_all(&MEAN);
+                        let quantity = measured.quantity.clone() + if with_mean { WITH_MEAN } else { "" };
+                        let labels: [&str; 5] = [&quantity, name, &D.to_string(), regime.name(), way];
                         report.push(&labels, measured.value, bound);
                     }
                 }
@@ -145,6 +155,20 @@ fn dimension<const D: usize, L: Law + Clone>(
         }
     }
     Ok(())
+}
+
+/// The term by which cells see the mean of their changes of volume, as the residual calls it.
+const MEAN: &str = "mean dilatation";
+
+/// What is added to the name of a quantity of a body that has it.
+const WITH_MEAN: &str = ", mean dilatation";
+
+/// Gives the body the mean dilatation of cells, on a grid that is not the first; `false` if its law has none.
+fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &mut Random) -> bool {
+    let [body] = simulation.bodies.as_mut_slice() else { return false };
+    body.dilatation = Dilatation::MeanDilatation;
+    simulation.particles.dilatation = (0..simulation.particles.len()).map(|_| 0.1 * random.signed()).collect();
+    body.law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some()
 }
 
 /// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, damped, under
@@ -179,7 +203,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
     let mut motion = std::array::from_fn(|_| None);
     motion[0] = Some(Motion::Rest);
     let grid = Grid { origin: Vector::zeros(), spacing: SPACING, cells: [6; D] };
-    let bodies = vec![Body { name: "cloud".into(), law, density }];
+    let bodies = vec![Body { name: "cloud".into(), law, density, dilatation: Default::default() }];
     Ok(Simulation { loads: Loads {
             gravity: Some(Gravity { acceleration: random.vector() * (speed / dt), curve: Curve::constant(1.0) }),
             surface: vec![SurfaceLoad {

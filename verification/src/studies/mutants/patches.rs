@@ -40,6 +40,7 @@ const LEVELS: Check = Check::Test("multigrid::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const TRANSFERS: Check = Check::Test("transfer::");
+const CELLS: Check = Check::Test("dilatation::");
 const FLOWS: Check = Check::Test("flow::");
 const MEMORY: Check = Check::Study("memory");
 const SOLVER: Check = Check::Unit("solver::");
@@ -48,7 +49,7 @@ const SOLIDS: Check = Check::Unit("shape::");
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, TRANSFERS, FLOWS, MEMORY, SOLVER, SOLIDS,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS,
 ];
 
 /// What is to become of a patch.
@@ -97,6 +98,8 @@ const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
 const GHOST: &str = "src/mechanics/terms/ghost.rs";
+const MEAN: &str = "src/mechanics/terms/mean_dilatation.rs";
+const DILATATION: &str = "src/mechanics/dilatation.rs";
 const PRESSURE: &str = "src/mechanics/terms/pressure.rs";
 const KERNEL: &str = "src/mechanics/sweep/kernel.rs";
 const DIAGONAL: &str = "src/mechanics/sweep/blocks.rs";
@@ -231,6 +234,38 @@ pub(super) const PATCHES: &[Patch] = &[
         "T::lit(0.5 / self.step.alphas.a4)",
         "T::lit(1.0 / self.step.alphas.a4)",
         Killed(&[TANGENT], &[DYNAMICS])),
+    patch("the law's own pressure added where the mean takes its place", MEAN,
+        "states[cell].pressure - response.stress / jacobian",
+        "states[cell].pressure + response.stress / jacobian",
+        Killed(&[TANGENT, CELLS], &[POINTS])),
+    patch("the product without what couples the particles of a cell", MEAN,
+        "coupling[cell] * weight[lane]",
+        "X::zero() * coupling[cell] * weight[lane]",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("diagonal blocks without what couples the particles of a cell", MEAN,
+        "blocks[node] += b * b.transpose() * *k;",
+        "blocks[node] += b * b.transpose() * (*k * 0.0);",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("k without the change of v in pi", MEAN,
+        "(of.stiffness - of.stress) * volume",
+        "of.stiffness * volume",
+        Killed(&[TANGENT], &[POINTS])),
+    patch("the potential of the mean without the law's own", MEAN,
+        "-own.energy * volume",
+        "own.energy * volume",
+        Killed(&[TANGENT, CELLS], &[POINTS])),
+    patch("means of cells over the volumes at rest, not those of when the grid was new", DILATATION,
+        "volume += particles.present_volume(*particle as usize);",
+        "volume += particles.volume[*particle as usize];",
+        Killed(&[CELLS], &[POINTS])),
+    patch("a mean dilatation that forgets that of the grids before", DILATATION,
+        "change + T::lit(before) + change * T::lit(before)",
+        "change + T::lit(before * 0.0)",
+        Killed(&[CELLS], &[POINTS])),
+    patch("a grid that is kept with the mean dilatation of the last step", KEPT_GRID,
+        "std::mem::swap(&mut self.dilatation, &mut particles.dilatation);",
+        "",
+        Killed(&[CELLS], &[POINTS])),
     patch("R with the other sign of dead loads", TERMS,
         "*out -= force.map(T::lit)",
         "*out += force.map(T::lit)",

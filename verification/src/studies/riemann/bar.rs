@@ -232,7 +232,7 @@ pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, St
     let exact = jump.exact()?;
     let count = (half_length(&exact) / mesh.h).round();
     let law = Material::from(NeoHookean::ciarlet(jump.lame()?));
-    let body = Body { name: "bar".into(), law, density: DENSITY };
+    let body = Body { name: "bar".into(), law, density: DENSITY, dilatation: Default::default() };
     let steps = steps(jump, mesh);
     let clock = Clock::new(END / steps as f64, 0);
     let origin = Vector::from([MIDDLE - count * mesh.h]);

@@ -1,0 +1,131 @@
+//! The mean dilatation of the particles of a cell: Θ = Σ V_p ΔJ_p / Σ V_p, with ΔJ_p the change of volume since the grid was new and V_p the
+//! volume there. The cell of a particle is the one that it was in then; the particles of two bodies are averaged apart.
+//!
+//! A particle remembers θ_n, the product of the Θ of all grids before, and sees θ = Θ θ_n: where the grid is renewed, stresses go on as they
+//! were. On a grid that is kept, θ_n stays that of when the grid was new, as H does.
+
+use crate::material::Law;
+use crate::mechanics::sweep::{LANES, Number, Supports};
+use crate::particles::{Body, Particles};
+use crate::scalar::Real;
+use crate::tensor::{Deformation, Vector};
+
+/// No cell.
+const NONE: u32 = u32::MAX;
+
+/// A particle of a cell, by its places in memory and in the sweep: eight times its group, and its lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Member {
+    pub particle: u32,
+    pub slot: u32,
+}
+
+/// The particles whose change of volume is averaged, cell by cell.
+#[derive(Debug)]
+pub(crate) struct Cells {
+    /// In the order of cells and ids, so that sums do not depend on the places of particles in memory.
+    members: Vec<Member>,
+    /// Where the members of each cell begin, and where those of the last one end.
+    starts: Vec<u32>,
+    /// The cell of each particle.
+    of: Vec<u32>,
+    /// Σ V_p
+    volumes: Vec<f64>,
+}
+
+impl Cells {
+    /// Bytes of a particle, at most.
+    pub const BYTES: usize = size_of::<Member>() + 2 * size_of::<u32>() + size_of::<f64>();
+
+    /// Those of bodies that average their change of volume; `None` if none does.
+    pub fn of<const D: usize, L: Law>(
+        particles: &Particles<D>,
+        bodies: &[Body<L>],
+        supports: &Supports<D>,
+    ) -> Option<Self> {
+        let averages: Vec<bool> = bodies.iter().map(Body::averages).collect();
+        if !averages.contains(&true) {
+            return None;
+        }
+        let (grid, mut keyed) = (supports.grid(), Vec::new());
+        supports.each_group(|group| {
+            for (lane, &particle) in group.particles.iter().enumerate() {
+                let (p, slot) = (particle as usize, (group.number * LANES + lane) as u32);
+                let body = particles.body[p];
+                let averaged = averages[body as usize] && particles.is_solid(p);
+                if let Some(cell) = grid.cell(&particles.position[p]).filter(|_| averaged) {
+                    keyed.push(((grid.id(cell), body), particles.id[p], Member { particle, slot }));
+                }
+            }
+        });
+        keyed.sort_unstable_by_key(|&(cell, id, _)| (cell, id));
+        let mut cells = Self {
+            members: keyed.iter().map(|&(.., member)| member).collect(),
+            starts: vec![0],
+            of: vec![NONE; particles.len()],
+            volumes: Vec::new(),
+        };
+        for same in keyed.chunk_by(|one, next| one.0 == next.0) {
+            let mut volume = 0.0;
+            for (.., Member { particle, .. }) in same {
+                cells.of[*particle as usize] = cells.volumes.len() as u32;
+                volume += particles.present_volume(*particle as usize);
+            }
+            cells.volumes.push(volume);
+            cells.starts.push(cells.starts[cells.volumes.len() - 1] + same.len() as u32);
+        }
+        Some(cells)
+    }
+
+    /// The members of every cell, with its volume when the grid was new.
+    pub fn iter(&self) -> impl Iterator<Item = (&[Member], f64)> {
+        let ranges = self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
+        ranges.map(|range| &self.members[range]).zip(self.volumes.iter().copied())
+    }
+
+    /// The cell of a particle, if it has one.
+    #[inline(always)]
+    pub fn cell(&self, particle: u32) -> Option<usize> {
+        Some(self.of[particle as usize]).filter(|&cell| cell != NONE).map(|cell| cell as usize)
+    }
+
+    /// Θ − 1 of every cell after the motion of the nodes since the grid was new; 0 where a cell is turned inside out.
+    pub fn changes<T: Number, const D: usize>(
+        &self,
+        particles: &Particles<D>,
+        supports: &Supports<D>,
+        motion: &[Vector<T, D>],
+    ) -> Vec<T> {
+        let mut grown = vec![T::zero(); particles.len()];
+        supports.each_particle(
+            motion,
+            |p, _, g| Deformation::new(g).j * T::lit(particles.present_volume(p)),
+            |p, more| grown[p] = more,
+        );
+        let mean = |(members, volume): (&[Member], f64)| {
+            let sum = members.iter().fold(T::zero(), |sum, member| sum + grown[member.particle as usize]);
+            let change = sum * T::lit(1.0 / volume);
+            if change.value() > -1.0 { change } else { T::zero() }
+        };
+        self.iter().map(mean).collect()
+    }
+}
+
+/// θ − 1 of θ = Θ θ_n, from Θ − 1 and θ_n − 1.
+#[inline(always)]
+pub(crate) fn total<T: Real>(change: T, before: f64) -> T {
+    change + T::lit(before) + change * T::lit(before)
+}
+
+/// θ − 1 of all particles after the motion of the nodes since the grid was new; empty where no body averages.
+pub(crate) fn after<const D: usize, L: Law>(
+    particles: &Particles<D>,
+    bodies: &[Body<L>],
+    supports: &Supports<D>,
+    motion: &[Vector<f64, D>],
+) -> Vec<f64> {
+    let Some(cells) = Cells::of(particles, bodies, supports) else { return Vec::new() };
+    let changes = cells.changes(particles, supports, motion);
+    let of = |p: u32| cells.cell(p).map_or(0.0, |cell| total(changes[cell], particles.dilatation(p as usize)));
+    (0..particles.len() as u32).map(of).collect()
+}

@@ -1,0 +1,269 @@
+//! The mean dilatation of cells: what a body gains in energy because its volumetric part U sees θ, the mean of a cell, and not J,
+//!
+//! Π = Σ_p V₀ [U(θ_p) − U(J_p)],  θ_p = Θ_c θ_n,  Θ_c = v/V_c,  v = Σ_{p∈c} V₀ J_p,
+//!
+//! beside W(F) of the law, which has U(J). A cell has one pressure then, as finite elements have with linear motions and a constant pressure
+//! (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985), and Π is a potential: the tangent is symmetric.
+//!
+//! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_n N_I, a = V₀ J A, A = ΔF⁻ᵀ:
+//!
+//!     π = ∂Π/∂v of the first sum = Σ V₀ T(θ) / v          σ = (π − T(J)/J) a
+//!     k = ∂π/∂v = Σ V₀ (θ T' − T) / v²                     δσ = k (Σ_{q∈c} a_q : L_q) a + V₀ [(J π − J T') (A:L) A − (J π − T) A Lᵀ A]
+//!
+//! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
+
+use super::{
+    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
+};
+use crate::material::{Law, VolumeResponse, admissible_or_rest};
+use crate::mechanics::dilatation::{Cells, Member, total};
+use crate::mechanics::point::{Inadmissible, Part, compose};
+use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Number, Product, Supports, add_quadratic};
+use crate::pooled::Pooled;
+use crate::scalar::Real;
+use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
+
+/// Σ_p V₀ [U(θ_p) − U(J_p)]; not there where no body averages its change of volume.
+pub struct MeanDilatation<'a, const D: usize, L> {
+    step: Step<'a, D, L>,
+    cells: Cells,
+}
+
+/// What a cell is at one Δφ.
+struct State<T> {
+    /// Θ − 1
+    change: T,
+    /// π
+    pressure: T,
+    /// k
+    stiffness: T,
+}
+
+/// What a particle is at one Δφ.
+struct Local<T: Real, const D: usize> {
+    jacobian: T,
+    response: VolumeResponse<T>,
+    /// V₀ J A
+    a: Tensor<T, D>,
+}
+
+impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
+    pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
+        let cells = Cells::of(step.particles, step.bodies, step.supports)?;
+        Some(Self { step: *step, cells })
+    }
+
+    /// U of the body of a particle at 1 + `change`; nothing of one that has none, which is in no cell.
+    fn response<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
+        let nothing = VolumeResponse { energy: T::zero(), stress: T::zero(), stiffness: T::zero() };
+        self.step.bodies[self.step.particles.body[p] as usize].response(change).unwrap_or(nothing)
+    }
+
+    /// U at θ of a particle in a cell of Θ.
+    fn at_mean<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
+        self.response(p, total(change, self.step.particles.dilatation(p)))
+    }
+
+    /// U at J, with which the law resists already.
+    fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
+        let h_n = &self.step.particles.displacement_gradient[p];
+        let (at, _) = admissible_or_rest(compose(g, h_n));
+        let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
+        let a = scaled(&(cofactor(&at.f) * f_n_t), T::lit(self.step.particles.volume[p]));
+        Local { jacobian: at.jacobian, response: self.response(p, at.j), a }
+    }
+
+    fn states<T: Number>(&self, dphi: &[Vector<T, D>]) -> Vec<State<T>> {
+        let Step { particles, supports, .. } = self.step;
+        let changes = self.cells.changes(particles, supports, dphi);
+        let state = |((members, volume), change): ((&[_], f64), T)| {
+            let (mut stress, mut stiffness) = (T::zero(), T::zero());
+            for p in members.iter().map(|member: &Member| member.particle as usize) {
+                let (of, volume) = (self.at_mean(p, change), T::lit(particles.volume[p]));
+                stress += of.stress * volume;
+                stiffness += (of.stiffness - of.stress) * volume;
+            }
+            let per_volume = ((change + T::one()) * T::lit(volume)).recip();
+            State { change, pressure: stress * per_volume, stiffness: stiffness * per_volume * per_volume }
+        };
+        self.cells.iter().zip(changes).map(state).collect()
+    }
+}
+
+impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
+    const NAME: &'static str = "mean dilatation";
+
+    fn planned(given: Given<'_, D>) -> Vec<Reason> {
+        let why = match given.averages {
+            false => "only with volumetric = \"mean_dilatation\" of a body",
+            true => "one change of volume for the particles of a cell; a pass more a residual and a product",
+        };
+        vec![(<Self as Term<D>>::NAME, given.averages, why.into())]
+    }
+
+    fn at_points<T: Number>(&self, _: Part, dphi: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
+        let states = self.states(dphi);
+        Some((
+            Flow::GRADIENT,
+            Box::new(move |group, at, sums| {
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    let Some(cell) = self.cells.cell(p) else { continue };
+                    let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
+                    let pressure = states[cell].pressure - response.stress / jacobian;
+                    for i in 0..D {
+                        for k in 0..D {
+                            sums.gradient[i][k][lane] += pressure * a[(i, k)];
+                        }
+                    }
+                }
+                Ok(())
+            }),
+        ))
+    }
+
+    fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
+        let Step { particles, supports, .. } = self.step;
+        let states = self.states(dphi);
+        let mut energies = vec![[T::zero(); 2]; particles.len()];
+        supports.each_particle(
+            dphi,
+            |p, _, g| {
+                let Some(cell) = self.cells.cell(p as u32) else { return [T::zero(); 2] };
+                let volume = T::lit(particles.volume[p]);
+                let (mean, own) = (self.at_mean(p, states[cell].change), self.local(p, &g).response);
+                [mean.energy * volume, -own.energy * volume]
+            },
+            |p, both| energies[p] = both,
+        );
+        Some(Ok(summed(energies.into_iter().flatten())))
+    }
+
+    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
+        let supports = self.step.supports;
+        let states = self.states(dphi);
+        let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
+        let factor = 1.0 / (unit.scale * unit.length * unit.length);
+        let mut rows = supports.pool().unspecified(supports.groups() * count, [X::zero(); LANES]);
+        supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
+            rows.fill([X::zero(); LANES]);
+            for (lane, &p) in group.particles.iter().enumerate() {
+                let Some(cell) = self.cells.cell(p) else { continue };
+                let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
+                let volume = self.step.particles.volume[p as usize];
+                let weight = volume * jacobian;
+                for i in 0..D {
+                    for k in 0..D {
+                        rows[i * D + k][lane] = X::lit(a[(i, k)] / weight);
+                    }
+                }
+                // κ = V₀ (J π − J T'), q = V₀ (J π − T), and V₀ J
+                let of_mean = weight * states[cell].pressure;
+                rows[closed - 2][lane] = X::lit(factor * (of_mean - volume * response.stiffness));
+                rows[closed - 1][lane] = X::lit(factor * (of_mean - volume * response.stress));
+                rows[closed][lane] = X::lit(weight);
+            }
+        });
+        let stiffness = states.into_iter().map(|state| state.stiffness / unit.scale).collect();
+        Ok(Some(Box::new(FrozenMean { cells: &self.cells, supports, rows, stiffness, length: unit.length })))
+    }
+}
+
+/// Numbers of a particle in the frozen tangent.
+pub(crate) const fn frozen_rows(dimension: usize) -> usize {
+    Form::Closed.rows(dimension) + 1
+}
+
+/// δσ, with the mean of the cells first.
+struct FrozenMean<'a, X: Laned, const D: usize> {
+    cells: &'a Cells,
+    supports: &'a Supports<D>,
+    /// A, zeros, κ, q, and V₀ J.
+    rows: Pooled<[X; LANES]>,
+    /// k over the scale.
+    stiffness: Vec<f64>,
+    /// In which gradients are taken.
+    length: f64,
+}
+
+impl<X: Laned, const D: usize> FrozenMean<'_, X, D> {
+    /// A, zeros, κ and q of a group, and V₀ J.
+    fn of_group(&self, group: usize) -> (&[[X; LANES]], &[X; LANES]) {
+        let count = frozen_rows(D);
+        let rows = &self.rows[group * count..(group + 1) * count];
+        (&rows[..count - 1], &rows[count - 1])
+    }
+
+    /// k δv of every cell, with δv = Σ V₀ J A : ∇u.
+    fn coupling(&self, u: &[Vector<X, D>]) -> Vec<X> {
+        let pool = self.supports.pool();
+        let u: Pooled<Vector<f64, D>> = pool.collect(u.iter().map(|u| u.map(X::value)));
+        let mut grown = pool.unspecified(self.supports.groups(), [0.0; LANES]);
+        self.supports.fill_rows(&u, 1, &mut grown, &|group, at, grown: &mut [[f64; LANES]]| {
+            let (a, weight) = self.of_group(group.number);
+            let mut sum = [0.0; LANES];
+            for (a, l) in a.iter().zip(at.gradient.as_flattened()) {
+                (0..LANES).for_each(|lane| sum[lane] += a[lane].value() * l[lane]);
+            }
+            grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane].value());
+        });
+        let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
+        let sum = |((members, _), k): ((&[Member], f64), &f64)| {
+            X::lit(k / self.length * members.iter().map(|member| slot(member.slot)).sum::<f64>())
+        };
+        self.cells.iter().zip(&self.stiffness).map(sum).collect()
+    }
+}
+
+impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
+    fn product_at_points(&self, u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+        let coupling = self.coupling(u?);
+        Some((
+            Flow::GRADIENT,
+            Box::new(move |group, at, sums| {
+                let (rows, weight) = self.of_group(group.number);
+                let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
+                let mut pulls = [X::zero(); LANES];
+                for (lane, &p) in group.particles.iter().enumerate() {
+                    pulls[lane] = self.cells.cell(p).map_or(X::zero(), |cell| coupling[cell] * weight[lane]);
+                }
+                <X as Laned>::product(D, Product { form: Form::Closed, rows, l, out });
+                for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(rows) {
+                    (0..LANES).for_each(|lane| out[lane] += pulls[lane] * a[lane]);
+                }
+            }),
+        ))
+    }
+
+    fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
+        let factor = self.length * self.length;
+        Some(Box::new(move |group, form| {
+            add_quadratic(Form::Closed, D, self.of_group(group.number).0, factor, form);
+        }))
+    }
+
+    /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the coupling is in the blocks, too.
+    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+        let mut sums = vec![Vector::<f64, D>::zeros(); blocks.len()];
+        let mut touched = Vec::new();
+        for ((members, _), k) in self.cells.iter().zip(&self.stiffness) {
+            for member in members {
+                let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
+                let (rows, weight) = self.of_group(group);
+                let a = Tensor::<f64, D>::from_fn(|i, k| (rows[i * D + k][lane] * weight[lane]).value());
+                for (node, _, grad_n) in self.supports.of(member.particle as usize) {
+                    sums[node] += a * grad_n;
+                    touched.push(node);
+                }
+            }
+            for node in touched.drain(..) {
+                let b = std::mem::replace(&mut sums[node], Vector::zeros());
+                blocks[node] += b * b.transpose() * *k;
+            }
+        }
+    }
+
+    /// Particles of one cell see nodes that are one apart, with functions that change at the middle of a cell.
+    fn reach(&self) -> u32 {
+        1
+    }
+}

@@ -1,0 +1,204 @@
+//! The mean dilatation of cells: what it is, what is remembered of it, and that bodies with it do not lock.
+
+use crate::support::{Failure, scene};
+use bfree::checkpoint::{Checkpoints, Identity, restore};
+use bfree::field::Field;
+use bfree::mechanics::schemes::Alphas;
+use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::plan::Plan;
+use bfree::simulation::Simulation;
+use bfree::tensor::{Tensor, Vector, determinant, identity};
+use serde_json::Value;
+use std::num::NonZeroU64;
+
+const MEAN: &str = r#"bodies.0.volumetric="mean_dilatation""#;
+const LINEAR: &str = r#"approximation="linear""#;
+
+/// Cook's membrane of G = 422.5 kPa.
+fn membrane(poisson: f64, spacing: f64, steps: u32, more: &[&str]) -> Result<Simulation<2>, Failure> {
+    let given = [
+        format!("grid={{\"size\":[60,84],\"spacing\":{spacing}}}"),
+        format!("bodies.0.material.neo_hookean={{\"young\":{},\"poisson\":{poisson}}}", 0.845 * (1.0 + poisson)),
+        format!("time.step={}", 1.0 / f64::from(steps)),
+        "output={}".to_owned(),
+    ];
+    let given: Vec<&str> = given.iter().map(String::as_str).chain(more.iter().copied()).collect();
+    scene("cook.json", &given)
+}
+
+fn run(simulation: &mut Simulation<2>) -> Result<(), Failure> {
+    while simulation.clock.time() < 1.0 - 1e-9 {
+        simulation.advance()?;
+    }
+    Ok(())
+}
+
+/// How far the middle of the free edge has come: the mean of the loaded points beside it.
+fn tip(simulation: &Simulation<2>, start: &Simulation<2>) -> f64 {
+    let (now, before) = (simulation.particles.by_id(), start.particles.by_id());
+    let away = |p: &usize| (before.position[*p] - Vector::from([48.0, 52.0])).norm();
+    let nearest = (0..before.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+    now.position[nearest][1] - before.position[nearest][1]
+}
+
+/// Over several grids, particles that all change their volume alike have their own volume for a mean: θ = J, and the energy is that of the law.
+#[test]
+fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Failure> {
+    let mut averaged = membrane(0.49, 4.0, 1, &[MEAN, LINEAR])?;
+    let mut pointwise = membrane(0.49, 4.0, 1, &[LINEAR])?;
+    let mut f = identity::<f64, 2>();
+    for (k, h) in [[0.1, 0.05, -0.02, 0.03], [-0.15, 0.0, 0.1, 0.08], [0.04, -0.1, 0.0, -0.06]].into_iter().enumerate()
+    {
+        let h = Tensor::<f64, 2>::new(h[0], h[1], h[2], h[3]);
+        let mut energies = Vec::new();
+        for simulation in [&mut averaged, &mut pointwise] {
+            let (supports, nodes) =
+                Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+            let dphi: Vec<_> =
+                nodes.positions(&simulation.grid).map(|(_, x)| h * (x - Vector::from([24.0, 40.0]))).collect();
+            let nodal = Nodal::default();
+            let equilibrium = simulation.equilibrium(&supports, &nodal, &[], Alphas::START, 0.0);
+            let (energy, _) = equilibrium.potential::<f64>(&dphi).ok_or("a potential")??;
+            let (at_rest, _) =
+                equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
+            // What a step begins with is what the last one has left.
+            assert!((at_rest / simulation.strain_energy() - 1.0).abs() < 1e-11 || k == 0, "{at_rest}");
+            energies.push(energy);
+            let update = Update::new(&Alphas::START, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
+            let mut particles = simulation.particles.clone();
+            update.commit(&mut particles, &simulation.bodies, &supports, 1.0);
+            simulation.particles = particles;
+        }
+        assert!((energies[0] / energies[1] - 1.0).abs() < 1e-11, "{energies:?}");
+        f = (identity::<f64, 2>() + h) * f;
+        let particles = &averaged.particles;
+        let solid = (0..particles.len()).filter(|&p| particles.is_solid(p));
+        let worst = solid.map(|p| (particles.dilatation[p] - (determinant(&f) - 1.0)).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-12, "grid {k}: {worst}");
+    }
+    // A body without it has no room for it.
+    assert!(pointwise.particles.dilatation.is_empty());
+    Ok(())
+}
+
+/// On a grid that is kept the answer does not depend on the steps; on one that is renewed, energies go on as they were.
+#[test]
+fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> {
+    let tight = "solver.newton.tolerance=1e-12";
+    let start = membrane(0.49, 6.0, 1, &[MEAN, LINEAR, tight])?;
+    let (mut one, mut four) = (start.clone(), membrane(0.49, 6.0, 4, &[MEAN, LINEAR, tight])?);
+    run(&mut one)?;
+    run(&mut four)?;
+    let (a, b) = (tip(&one, &start), tip(&four, &start));
+    assert!((a / b - 1.0).abs() < 1e-8, "{a} {b}");
+    let mut renewed = membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.renewed="every_step""#])?;
+    for _ in 0..2 {
+        renewed.advance()?;
+    }
+    let (supports, nodes) = Supports::new(&renewed.approximation, &renewed.grid, &renewed.particles.position)?;
+    let nodal = Nodal::default();
+    let equilibrium = renewed.equilibrium(&supports, &nodal, &[], Alphas::START, 0.0);
+    let (energy, _) = equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
+    assert!((energy / renewed.strain_energy() - 1.0).abs() < 1e-11, "{energy} {}", renewed.strain_energy());
+    // And θ is not J.
+    let particles = &renewed.particles;
+    let jacobian = |p: usize| determinant(&(identity::<f64, 2>() + particles.displacement_gradient[p]));
+    assert!((0..particles.len()).any(|p| (jacobian(p) - 1.0 - particles.dilatation[p]).abs() > 1e-2));
+    Ok(())
+}
+
+#[test]
+fn tangents_are_exact_in_both_precisions() -> Result<(), Failure> {
+    for precision in ["double", "mixed"] {
+        for shape in [LINEAR, "approximation={\"bspline\":{\"degree\":2}}"] {
+            let precision = format!("solver.krylov.precision=\"{precision}\"");
+            let mut simulation = membrane(0.45, 8.0, 2, &[MEAN, shape, &precision, "grid.renewed=\"every_step\""])?;
+            simulation.settings.check_tangent = NonZeroU64::new(1);
+            run(&mut simulation)?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
+    let fresh = || membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.2}"#]);
+    let bits = |simulation: &Simulation<2>| -> Vec<u64> {
+        let particles = simulation.particles.by_id();
+        particles
+            .dilatation
+            .iter()
+            .chain(particles.position.iter().flat_map(|x| x.iter()))
+            .map(|x| x.to_bits())
+            .collect()
+    };
+    let mut found = Vec::new();
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let simulation = pool.install(|| -> Result<_, String> {
+            let mut simulation = fresh().map_err(|error| error.to_string())?;
+            run(&mut simulation).map_err(|error| error.to_string())?;
+            Ok(simulation)
+        })?;
+        found.push(bits(&simulation));
+    }
+    assert_eq!(found[0], found[1]);
+    for after in [1, 3] {
+        let (folder, start) = (tempfile::tempdir()?, fresh()?);
+        let identity = Identity::new(Value::Null, &start.particles);
+        let settings = OutputSettings {
+            directory: folder.path().to_owned(),
+            fields: vec![Field::Pressure],
+            snapshot_every: None,
+            probes: vec![],
+            end_time: 1.0,
+            audience: Audience::Nobody,
+        };
+        let mut simulation = start.clone();
+        let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
+        for _ in 0..after {
+            simulation.advance()?;
+        }
+        let mut checkpoints = Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None);
+        checkpoints.write(&simulation, &mut recorder)?;
+        let mut continued = start.clone();
+        restore(folder.path(), &identity, &mut continued)?;
+        run(&mut continued)?;
+        assert_eq!(bits(&continued), found[0], "after {after} steps");
+    }
+    Ok(())
+}
+
+/// Against nine-node elements with three volumes each, 32 × 32 of them: see the study `locking`, which does it in full.
+#[test]
+fn a_membrane_that_keeps_its_volume_does_not_lock() -> Result<(), Failure> {
+    for (shape, bound) in [(LINEAR, 0.02), ("approximation={\"bspline\":{\"degree\":3}}", 0.01)] {
+        let end = |more: &[&str]| -> Result<f64, Failure> {
+            let start = membrane(0.4999, 3.0, 4, &[&[shape], more].concat())?;
+            let mut simulation = start.clone();
+            run(&mut simulation)?;
+            Ok(tip(&simulation, &start))
+        };
+        let (locked, free) = (end(&[])?, end(&[MEAN])?);
+        assert!((free / KNOWN - 1.0).abs() < bound, "{shape}: {free}");
+        assert!((locked / KNOWN - 1.0).abs() > 2.0 * bound, "{shape}: {locked}");
+    }
+    Ok(())
+}
+
+/// The end of the membrane of ν = 0.4999.
+const KNOWN: f64 = 12.06;
+
+#[test]
+fn a_law_without_such_a_part_is_refused_and_the_plan_says_what_it_costs() -> Result<(), Failure> {
+    let law = r#"bodies.0.material={"st_venant_kirchhoff":{"young":1,"poisson":0.3}}"#;
+    let refused = scene::<2>("cook.json", &[MEAN, law]).err().ok_or("no such part")?.to_string();
+    assert!(refused.contains("bodies[0].volumetric"), "{refused}");
+    let [without, with] = [&[][..], &[MEAN][..]].map(|more| membrane(0.49, 6.0, 4, more));
+    let [without, with] = [Plan::of(&without?)?, Plan::of(&with?)?];
+    let names = |plan: &Plan| plan.arrays.iter().filter(|array| array.name.contains("mean dilatation")).count();
+    assert_eq!((names(&without), names(&with)), (0, 2));
+    Ok(())
+}
