@@ -140,7 +140,7 @@ fn dimension<const D: usize, L: Law + Clone>(
                             false => &[SYMMETRY, POTENTIAL],
                             true => &[SYMMETRY, POTENTIAL, MEAN, "whole product", "diagonal blocks"],
                         };
-                        if !pressed && !here.iter().any(|name| of_all(name)) {
+                        if !pressed && !here.iter().any(&of_all) {
                             continue;
                         }
                         let asymmetric = measured.quantity == PRESSURE_ASYMMETRY;
