@@ -7,8 +7,10 @@
 //!
 //! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_n N_I, a = V₀ J A, A = ΔF⁻ᵀ:
 //!
-//!     π = ∂Π/∂v of the first sum = Σ V₀ T(θ) / v          σ = (π − T(J)/J) a
-//!     k = ∂π/∂v = Σ V₀ (θ T' − T) / v²                     δσ = k (Σ_{q∈c} a_q : L_q) a + V₀ [(J π − J T') (A:L) A − (J π − T) A Lᵀ A]
+//! ```text
+//! π = ∂Π/∂v of the first sum = Σ V₀ T(θ) / v          σ = (π − T(J)/J) a
+//! k = ∂π/∂v = Σ V₀ (θ T' − T) / v²                     δσ = k (Σ_{q∈c} a_q : L_q) a + V₀ [(J π − J T') (A:L) A − (J π − T) A Lᵀ A]
+//! ```
 //!
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
