@@ -1,7 +1,7 @@
 //! The law of a body: one of the shipped ones, or that of an energy in Python.
 
 use crate::energy::Recorded;
-use bfree::material::{FromEnergy, Law as _, Material};
+use bfree::material::{FromEnergy, Material};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use verification::check_material;
