@@ -143,6 +143,11 @@ fn dimension<const D: usize, L: Law + Clone>(
                         if !pressed && !here.iter().any(&of_all) {
                             continue;
                         }
+                        // In 1D all deformation is a change of volume: the term is the difference of two that are nearly the same,
+                        // and what rounding leaves of it is judged in the whole product.
+                        if D == 1 && of_all(&MEAN) {
+                            continue;
+                        }
                         let asymmetric = measured.quantity == PRESSURE_ASYMMETRY;
                         let bound = if asymmetric { Bound::AtLeast(1e-3) } else { measured.bound };
                         let with_mean = averaged && !of_all(&MEAN);
