@@ -56,23 +56,31 @@ impl<const D: usize> Facet<D> {
 }
 
 /// A convex piece of a box that lies in the solid.
-pub(super) struct Piece<'a, const D: usize> {
+pub(super) struct Piece<const D: usize> {
     pub volume: f64,
     pub centroid: Vector<f64, D>,
-    pub extent: Extent<'a, D>,
+    pub extent: Extent<D>,
 }
 
 /// What a piece is.
-#[derive(Clone, Copy)]
-pub(super) enum Extent<'a, const D: usize> {
+pub(super) enum Extent<const D: usize> {
     /// A box, by its edges.
-    Box(&'a Vector<f64, D>),
+    Box(Vector<f64, D>),
     /// A simplex that the surface may bound.
-    Simplex(&'a Simplex<D>, &'a Cut<D>),
+    Simplex(Simplex<D>),
+}
+
+/// A simplex of D corners where the solid ends.
+pub(super) struct End<const D: usize> {
+    pub corners: Vec<Vector<f64, D>>,
+    pub outward: Vector<f64, D>,
+    pub area: f64,
+    /// How far the surface may be from it.
+    pub departure: f64,
 }
 
 /// Corners 0 … D.
-type Simplex<const D: usize> = [Vector<f64, D>; 4];
+pub(super) type Simplex<const D: usize> = [Vector<f64, D>; 4];
 
 /// The planes that cut a box, as seen from its centre, and how far the surface may be from them.
 pub(super) struct Cut<const D: usize> {
@@ -115,7 +123,7 @@ impl<const D: usize> Shape<D> {
             return (rest.max(0.0), if rest > 0.0 { center + (center - centroid) * (volume / rest) } else { center });
         }
         let (mut volume, mut moment) = (0.0, Vector::zeros());
-        self.pieces(None, lower, edges, spacing, FLAT, &mut |piece| {
+        self.pieces(None, lower, edges, spacing, FLAT, &mut |piece, _| {
             volume += piece.volume;
             moment += piece.centroid * piece.volume;
         });
@@ -193,32 +201,36 @@ impl<const D: usize> Shape<D> {
             facets.into_iter().for_each(|facet| add(facet, 0.0));
             return sides;
         }
-        self.pieces(region, lower, edges, spacing, flat, &mut |piece| {
-            let Extent::Simplex(simplex, cut) = piece.extent else { return };
-            for apex in 0..=D {
-                if let Some(facet) = self.facet(simplex, apex, piece.volume, cut, spacing) {
-                    add(facet, cut.departure);
-                }
+        self.pieces(region, lower, edges, spacing, flat, &mut |piece, cut| {
+            for end in self.ends(&piece, cut, spacing) {
+                add(Facet::flat(&end.corners, end.outward, end.area), end.departure);
             }
         });
         sides
     }
 
+    /// The sides of a piece that lie in a plane where the solid ends.
+    pub(super) fn ends(&self, piece: &Piece<D>, cut: Option<&Cut<D>>, spacing: f64) -> Vec<End<D>> {
+        let (Extent::Simplex(simplex), Some(cut)) = (&piece.extent, cut) else { return Vec::new() };
+        (0..=D).filter_map(|apex| self.end(simplex, apex, piece.volume, cut, spacing)).collect()
+    }
+
     /// The side of a simplex across from a corner, if it lies in a plane where the solid ends.
-    fn facet(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<Facet<D>> {
+    fn end(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<End<D>> {
         let hair = EDGE * spacing;
-        let mut side = simplex[..=D].to_vec();
-        side.swap_remove(apex);
+        let mut corners = simplex[..=D].to_vec();
+        corners.swap_remove(apex);
         let height = |plane: &Face<D>| cut.distance(plane, &simplex[apex]);
-        let lies_in =
-            |plane: &&Face<D>| height(plane).abs() > hair && side.iter().all(|x| cut.distance(plane, x).abs() <= hair);
+        let lies_in = |plane: &&Face<D>| {
+            height(plane).abs() > hair && corners.iter().all(|x| cut.distance(plane, x).abs() <= hair)
+        };
         let plane = cut.planes.iter().find(lies_in)?;
         let outward = plane.1 * -height(plane).signum();
         // V = A height / D
         let area = D as f64 * volume / height(plane).abs();
-        let facet = Facet::flat(&side, outward, area);
-        let beyond = facet.position + outward * (2.0 * cut.departure + 1e3 * hair);
-        (!self.contains(&beyond)).then_some(facet)
+        let middle = corners.iter().sum::<Vector<f64, D>>() / D as f64;
+        let beyond = middle + outward * (2.0 * cut.departure + 1e3 * hair);
+        (!self.contains(&beyond)).then_some(End { corners, outward, area, departure: cut.departure })
     }
 
     /// Whether a piece with this centroid lies in the solid: near a curved surface, by the plane that stands for it.
@@ -232,7 +244,7 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Hands over the convex pieces that a box and the solid have in common; `region` cuts them once more.
+    /// Hands over the convex pieces that a box and the solid have in common, and the planes that cut them; `region` cuts them once more.
     pub(super) fn pieces(
         &self,
         region: Option<&Self>,
@@ -240,7 +252,7 @@ impl<const D: usize> Shape<D> {
         edges: &Vector<f64, D>,
         spacing: f64,
         flat: f64,
-        visit: &mut dyn FnMut(Piece<'_, D>),
+        visit: &mut dyn FnMut(Piece<D>, Option<&Cut<D>>),
     ) {
         let (center, radius) = around(lower, edges);
         let distance = self.signed_distance(&center);
@@ -248,7 +260,7 @@ impl<const D: usize> Shape<D> {
             return;
         }
         if distance <= -radius {
-            visit(Piece { volume: edges.product(), centroid: center, extent: Extent::Box(edges) });
+            visit(Piece { volume: edges.product(), centroid: center, extent: Extent::Box(*edges) }, None);
             return;
         }
         let (mut planes, mut departure) = (Vec::new(), 0.0_f64);
@@ -285,11 +297,11 @@ impl<const D: usize> Shape<D> {
             }
             simplices = parts;
         }
-        for simplex in &simplices {
-            let volume = volume(simplex);
+        for simplex in simplices {
+            let volume = volume(&simplex);
             let centroid = simplex[..=D].iter().sum::<Vector<f64, D>>() / (D + 1) as f64;
             if volume > 0.0 && self.holds_by(&cut, &centroid) {
-                visit(Piece { volume, centroid, extent: Extent::Simplex(simplex, &cut) });
+                visit(Piece { volume, centroid, extent: Extent::Simplex(simplex) }, Some(&cut));
             }
         }
     }

@@ -16,10 +16,10 @@ pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
 pub enum Fill {
     /// Every particle has the volume and the centroid of that part of its box that lies in the shape: volume, mass and first moments
     /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout boxes have half the
-    /// size; in 1D and 2D, but for shapes of triangles, the particles of a cut cell are instead points that integrate products of
-    /// polynomials of the shape functions' degree over what of it lies in the shape: up to 4 of linear functions, 16 of cubic ones and of
-    /// LME, and 9 in each quarter of a cell of quadratic ones. A surface that is loaded then has two points for each side in half a cell,
-    /// and three in 3D.
+    /// size; but for shapes of triangles, the particles of a cut cell are instead points that integrate products of polynomials of the
+    /// shape functions' degree p over what of it lies in the shape: up to (p + 1)^D of linear functions, of cubic ones and of LME (p = 3),
+    /// and as many in each half, quarter or eighth of a cell of quadratic ones. A surface that is loaded then has two points for each side
+    /// in half a cell, and three in 3D.
     #[default]
     Cut,
     /// Those that lie in the shape, each for its whole box.
@@ -85,7 +85,7 @@ pub struct Seed<const D: usize> {
 const SLIVER: f64 = 0.1;
 
 /// As much of a piece that is integrated: what joins a neighbour changes its second moments.
-const THIN: f64 = 1e-3;
+pub(super) const THIN: f64 = 1e-3;
 
 /// Parts as small as that are round-off, and so is what is missing in a box that is as full.
 const NOTHING: f64 = 1e-9;
@@ -151,13 +151,13 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
     // As its pieces are below: cells beside each other must agree on which of them is whole.
     let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
-    let integrated = |lower: Vector<f64, D>| shape.quadrature(&lower, &size, h, how.degree);
+    let integrated = |lower: Vector<f64, D>, degree: u32| shape.quadrature(&lower, &size, h, degree);
     let is_full = |cell: [u64; D]| {
         let lowers = indices([u64::from(how.pieces()); D]).map(|i| {
             let within = |k: usize| i[k] as f64 / f64::from(how.pieces());
             Vector::from_fn(|k, _| grid.origin[k] + ((first[k] + cell[k]) as f64 + within(k)) * h)
         });
-        let volume = |lower: Vector<f64, D>| match integrated(lower) {
+        let volume = |lower: Vector<f64, D>| match integrated(lower, 0) {
             Some(points) => points.iter().map(|point| point.volume).sum(),
             None => shape.part(&lower, &size, h).0,
         };
@@ -206,7 +206,8 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
                 continue;
             }
             if how.rule == Fill::Cut && distance > -across {
-                let all = (how.layout == Layout::Gauss).then(|| lowers(how.pieces()).map(&integrated).collect());
+                let all = (how.layout == Layout::Gauss)
+                    .then(|| lowers(how.pieces()).map(|lower| integrated(lower, how.degree)).collect());
                 parts = Some(match all.flatten() {
                     Some(boxes) => Parts { boxes, along: how.pieces(), full: &gauss, sliver: THIN },
                     None => {

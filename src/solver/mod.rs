@@ -7,6 +7,7 @@ mod conjugate_gradient;
 mod forcing;
 mod gmres;
 mod newton;
+mod nonnegative;
 mod preconditioner;
 pub mod vector;
 
@@ -17,6 +18,7 @@ pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
     NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
 };
+pub(crate) use nonnegative::NonnegativeLeastSquares;
 #[cfg(feature = "direct")]
 pub use preconditioner::Direct;
 pub use preconditioner::{

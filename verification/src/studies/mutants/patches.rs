@@ -143,6 +143,7 @@ const LINEAR: &str = "src/solver/newton/linear.rs";
 const BLOCKS: &str = "src/solver/preconditioner/block_jacobi.rs";
 const MULTIGRID: &str = "src/solver/preconditioner/multigrid/mod.rs";
 const MULTIGRID_LEVEL: &str = "src/solver/preconditioner/multigrid/level.rs";
+const NONNEGATIVE: &str = "src/solver/nonnegative.rs";
 const CUT: &str = "src/shape/cut.rs";
 const FILL: &str = "src/shape/fill.rs";
 const LAYOUT: &str = "src/shape/layout.rs";
@@ -852,8 +853,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "cut.distance(plane, x) <= 0.0",
         Killed(&[ORDER], &[PATCH, SOLIDS])),
     patch("a surface's normal inwards", CUT,
-        "Facet::flat(&side, outward, area)",
-        "Facet::flat(&side, -outward, area)",
+        "Facet::flat(&end.corners, end.outward, end.area)",
+        "Facet::flat(&end.corners, -end.outward, end.area)",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("half of a surface in 2D, a third in 3D", CUT,
         "D as f64 * volume / height(plane).abs()",
@@ -880,13 +881,21 @@ pub(super) const PATCHES: &[Patch] = &[
         "Seed { position: centroid - edges * 0.5, volume }",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("points of a simplex as in a cube", QUADRATURE,
-        "weight * u.powi((D - 1 - k) as i32) * (k + 1) as f64",
-        "weight",
+        "point.volume * weight * u.powi(before as i32) * (before + 1) as f64",
+        "point.volume * weight",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("cut cells integrated to one degree less", FILL,
-        "shape.quadrature(&lower, &size, h, how.degree)",
-        "shape.quadrature(&lower, &size, h, how.degree.saturating_sub(1))",
+        "integrated(lower, how.degree)",
+        "integrated(lower, how.degree.saturating_sub(1))",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
+    patch("the gap between planes and a curved surface left out", QUADRATURE,
+        "volume: foot.volume * weight * height",
+        "volume: 0.0",
+        Killed(&[SOLIDS], &[PATCH])),
+    patch("non-negative least squares that step below zero", NONNEGATIVE,
+        "(x + step <= 0.0)",
+        "(x + step <= f64::NEG_INFINITY)",
+        Killed(&[SOLVER], &[PATCH])),
     patch("points of a surface all in its middle", QUADRATURE,
         "position: self.position + by,",
         "position: self.position,",

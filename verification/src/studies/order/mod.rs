@@ -6,6 +6,7 @@ mod block;
 mod hole;
 mod rebound;
 mod ring;
+mod shell;
 mod transfers;
 mod vortex;
 
@@ -264,6 +265,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     block::run(*effort, &mut outcome);
     hole::run(&mut outcome);
     ring::run(&mut outcome);
+    shell::run(*effort, &mut outcome);
     beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
     transfers::run(*effort, &mut outcome);
