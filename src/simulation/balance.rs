@@ -91,10 +91,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         supports: &Supports<D>,
     ) -> StepError {
-        let loose = equilibrium.step.nodal.is_static().then(|| loose(&self.grid, equilibrium, supports.active()));
-        match loose.flatten() {
+        if !equilibrium.step.nodal.is_static() {
+            return StepError::Newton(error);
+        }
+        match loose(&self.grid, equilibrium, supports.active()) {
             Some(loose) => StepError::Loose { loose, source: error },
-            None => StepError::Newton(error),
+            None => StepError::Unbalanced { source: error },
         }
     }
 

@@ -77,7 +77,9 @@ impl FailedAttempt {
     pub(super) fn new(dt: f64, mut spent: Spent, error: &StepError) -> Self {
         spent.watch.give_up();
         let newton = match error {
-            StepError::Newton(source) | StepError::Loose { source, .. } => (*source.history).clone(),
+            StepError::Newton(source) | StepError::Unbalanced { source } | StepError::Loose { source, .. } => {
+                (*source.history).clone()
+            }
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
@@ -99,6 +101,15 @@ pub enum StepError {
     /// Newton found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
+    /// Without inertia, Newton found no equilibrium.
+    #[error(
+        "no equilibrium was found; without inertia there may be none, where a load is larger than the bodies bear: prescribe the \
+         motion there, follow the path (time.inertia = \"arc_length\"), or give the scene inertia"
+    )]
+    Unbalanced {
+        /// What Newton's method says.
+        source: NewtonError<Inadmissible>,
+    },
     /// What was kept is not of these particles and functions.
     #[error(
         "the grid that was kept has {kept} nodes, and the particles have {nodes}: after a change by hand, put None into \
