@@ -171,7 +171,7 @@ impl Run {
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {
             directory: directory.clone(),
-            fields: scene.output.fields(scene.time.inertia),
+            fields: scene.fields(),
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
             end_time: if shortens { end } else { last as f64 * simulation.clock.nominal() },
