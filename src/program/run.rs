@@ -104,6 +104,15 @@ enum Lost {
     Foreign(PathBuf),
 }
 
+/// A checkpoint behind the end.
+#[derive(Debug, thiserror::Error)]
+#[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
+struct Past {
+    path: PathBuf,
+    time: f64,
+    end: f64,
+}
+
 /// No place for results.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot create the directory {}", directory.display())]
@@ -181,7 +190,7 @@ impl Run {
         let reference = Reference::of(&simulation);
         let _claim = self.claim(&directory)?;
         let restored = match self.restart {
-            true => Some(self.restore(&directory, &identity, &mut simulation)?),
+            true => Some(self.restore(&directory, &identity, &mut simulation, end)?),
             false => self.begin(&directory).map(|()| None)?,
         };
         let mut recorder = match &restored {
@@ -297,8 +306,13 @@ impl Run {
         directory: &Path,
         identity: &Identity,
         simulation: &mut Simulation<D>,
+        end: f64,
     ) -> Result<Restored, Failure> {
         let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
+        let time = simulation.clock.time();
+        if simulation.clock.nominal_steps() > simulation.clock.whole_steps(end) {
+            return Err(Failure::scene(Past { path: restored.path, time, end }));
+        }
         let unusable = restored.unusable.iter();
         unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
         if let Some(program) = &restored.other_program {

@@ -90,7 +90,7 @@ impl Output {
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),
-                format_args!("{field:?}, given before,"),
+                format_args!("{}, given before,", field.name()),
                 "must be listed once",
             );
         }

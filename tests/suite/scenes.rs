@@ -321,7 +321,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""fixed": 1e-7"#, r#""fixed": 1"#, "solver.krylov.forcing.fixed", &["1 is not", "0.9"]),
     (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
     (r#""checkpoint": 0.2"#, r#""checkpoint": 0"#, "output.checkpoint", &["0 is not", "> 0"]),
-    (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
+    (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "stress, given before"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
     // tip is a stress: its columns are tip_xx, tip_yy, …
     (
