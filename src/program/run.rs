@@ -10,6 +10,7 @@ use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
 use bfree::simulation::Simulation;
+use bfree::solver::Stop;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
@@ -187,6 +188,8 @@ impl Run {
             audience: self.audience(),
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
+        let asked_to_stop = interrupted.clone();
+        simulation.settings.stop = Some(Stop(Arc::new(move || asked_to_stop.load(Ordering::Relaxed))));
         let reference = Reference::of(&simulation);
         let _claim = self.claim(&directory)?;
         let restored = match self.restart {
@@ -231,6 +234,8 @@ impl Run {
                     let recorded = recorder.record(&simulation, &step);
                     recorded.inspect_err(|_| unwritten(simulation.clock.time())).map_err(Failure::run)?;
                 }
+                // What the next round says.
+                Err(error) if error.cause.is_stopped() => {}
                 Err(error) => {
                     failure = Some(error);
                     break;

@@ -6,7 +6,7 @@ use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::rigid::Loose;
 use crate::mechanics::sweep::SupportError;
 use crate::phases::Stopwatch;
-use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport};
+use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
 use crate::tensor::Vector;
 
 /// What a condition does to the bodies: the reaction at t_{n+1}, and spread over the step the impulse with which a wall takes along nodes
@@ -165,6 +165,13 @@ pub enum StepError {
         /// Where it would be.
         position: Vec<f64>,
     },
+}
+
+impl StepError {
+    /// Whether it was [stopped](crate::solver::Stop).
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped { .. }))
+    }
 }
 
 /// The simulation cannot go on. The particles are as after the last good step.
