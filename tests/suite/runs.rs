@@ -172,7 +172,7 @@ fn a_step_that_is_stopped_loses_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The printed lattice of the rebound lies on cell faces. Moved by far less than 1e-9 h, it is on the same side of them.
+/// The printed lattice of the rebound lies on cell faces. Moved by some roundings, it is on the same side of them.
 #[test]
 fn round_off_does_not_decide_in_which_cell_a_particle_on_a_face_is() -> Result<(), Failure> {
     for family in [r#"approximation="linear""#, r#"approximation="gimp""#] {
