@@ -123,7 +123,7 @@ impl Problems {
     pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x) && x > 1.0 / LARGEST;
         let allowed = if x > 0.0 {
-            format!("must lie between {:e} and {LARGEST:e}", 1.0 / LARGEST)
+            format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST)
         } else {
             "must be finite and > 0".into()
         };

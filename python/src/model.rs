@@ -7,6 +7,7 @@ use bfree::clock::Clock;
 use bfree::field::Field;
 use bfree::output::{OutputError, Reference};
 use bfree::simulation::{AdvanceError, Simulation, StepError};
+use bfree::solver::Stop;
 use std::sync::Arc;
 
 /// What Python asks of a simulation.
@@ -15,6 +16,8 @@ pub trait Model: Send + Sync {
     fn clock(&self) -> &Clock;
     fn set_clock(&mut self, clock: Clock);
     fn advance(&mut self) -> Result<Step, AdvanceError>;
+    /// Who may want a step to end.
+    fn stop(&mut self, stop: Option<Stop>);
     /// By the ids of the particles; as many numbers as there are particles and components.
     fn values(&self, field: Field) -> Result<Vec<f64>, OutputError>;
     fn coming(&self) -> Result<Arc<dyn System>, StepError>;
@@ -47,6 +50,10 @@ impl<const D: usize> Model for Sized<D> {
     fn advance(&mut self) -> Result<Step, AdvanceError> {
         let report = self.simulation.advance()?;
         Ok(Step::of(&report, self.simulation.clock.time(), &self.simulation.loads.prescribed))
+    }
+
+    fn stop(&mut self, stop: Option<Stop>) {
+        self.simulation.settings.stop = stop;
     }
 
     fn values(&self, field: Field) -> Result<Vec<f64>, OutputError> {

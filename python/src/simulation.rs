@@ -7,10 +7,11 @@ use crate::system::{System, Tangent};
 use crate::{chain, step_error};
 use bfree::field::{Field, Kind};
 use bfree::output::OutputError;
+use bfree::solver::Stop;
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// A simulation: an iterator over its steps.
 #[pyclass(module = "bfree")]
@@ -74,11 +75,22 @@ fn shaped<'py>(py: Python<'py>, kind: Kind, dimension: usize, values: &[f64]) ->
 
 #[pymethods]
 impl Simulation {
-    /// Takes a step.
+    /// Takes a step. Ctrl-C ends it before the next iteration of Newton's method, and nothing has moved.
     fn advance(&mut self, py: Python<'_>) -> PyResult<Step> {
         self.arrays.clear();
         self.coming = None;
-        py.detach(|| self.model.advance()).map_err(|error| step_error(&error))
+        let raised = Arc::new(Mutex::new(None));
+        let seen = raised.clone();
+        self.model.stop(Some(Stop(Arc::new(move || {
+            let signals = Python::attach(|py| py.check_signals());
+            signals.map_err(|error| seen.lock().map(|mut seen| *seen = Some(error))).is_err()
+        }))));
+        let step = py.detach(|| self.model.advance());
+        self.model.stop(None);
+        match raised.lock().ok().and_then(|mut raised| raised.take()) {
+            Some(error) => Err(error),
+            None => step.map_err(|error| step_error(&error)),
+        }
     }
 
     fn __iter__(this: Py<Self>) -> Py<Self> {

@@ -243,6 +243,18 @@ def test_other_threads_go_on_while_a_step_is_taken():
     assert sum(start < at < end for at in counted) > 0.1 * (end - start) / 1e-3, end - start
 
 
+def test_a_step_can_be_interrupted_and_nothing_has_moved():
+    # One load step of seconds.
+    simulation = bfree.Scene(ROOT / "scenes" / "cook.json", set={"grid.spacing": 0.25, "time.step": 1}).build()
+    before = simulation.particles.position
+    handler = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    with pytest.raises(KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        simulation.advance()
+    signal.signal(signal.SIGALRM, handler)
+    assert simulation.time == 0 and (simulation.particles.position == before).all()
+
+
 def test_a_run_can_be_interrupted_and_goes_on():
     simulation = bfree.Scene(REBOUND).build()
     # As Ctrl-C, from a clock of the kernel: a thread of Python might come too late on a machine that is busy.

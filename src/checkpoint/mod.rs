@@ -173,7 +173,7 @@ pub enum CheckpointError {
     },
     /// The particles at the start are others.
     #[error(
-        "{} is of a run that started with other particles: {array} differs; has a particle file changed?", path.display()
+        "{} is of a run that started with other particles: {array} differs; has a file of particles, triangles or pixels changed?", path.display()
     )]
     OtherParticles {
         /// The checkpoint.

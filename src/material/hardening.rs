@@ -17,10 +17,10 @@ pub struct Hardening {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub linear: f64,
-    /// Growth (stress) that plastic strain approaches; softening if negative, ≥ -`initial`. Default 0.
+    /// Growth (stress) that plastic strain approaches, with a `rate`; softening if negative, ≥ -`initial`. Default 0.
     #[serde(default)]
     pub saturation: f64,
-    /// How fast it approaches it (no unit), ≥ 0. Default 0.
+    /// How fast it approaches it (no unit), > 0 with a `saturation`. Default 0.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub rate: f64,
@@ -114,6 +114,12 @@ impl Hardening {
             Number(saturation),
             format_args!("must be at least -initial = {}", Number(least)),
         );
+        // One without the other does nothing.
+        if strong && (rate > 0.0) != (saturation != 0.0) {
+            let allowed = if rate > 0.0 { "needs a saturation" } else { "must be > 0 with a saturation" };
+            problems.refuse(&at("rate"), Number(rate), allowed);
+            return false;
+        }
         let softens = linear + saturation * rate;
         let stable = softens > -stiffness;
         problems.require(

@@ -4,6 +4,7 @@
 //! A particle remembers θ_n, the product of the Θ of all grids before, and sees θ = Θ θ_n: where the grid is renewed, stresses go on as they
 //! were. On a grid that is kept, θ_n stays that of when the grid was new, as H does.
 
+use crate::grid::{Grid, indices};
 use crate::material::Law;
 use crate::mechanics::sweep::{LANES, Number, Supports};
 use crate::particles::{Body, Particles};
@@ -29,6 +30,8 @@ pub(crate) struct Cells {
     starts: Vec<u32>,
     /// The cell of each particle.
     of: Vec<u32>,
+    /// Points of surfaces, which have no volume, and the nearest cell.
+    beside: Vec<(usize, usize)>,
     /// Σ V_p
     volumes: Vec<f64>,
 }
@@ -63,9 +66,12 @@ impl Cells {
             members: keyed.iter().map(|&(.., member)| member).collect(),
             starts: vec![0],
             of: vec![NONE; particles.len()],
+            beside: Vec::new(),
             volumes: Vec::new(),
         };
+        let mut keys = Vec::new();
         for same in keyed.chunk_by(|one, next| one.0 == next.0) {
+            keys.push(same[0].0);
             let mut volume = 0.0;
             for (.., Member { particle, .. }) in same {
                 cells.of[*particle as usize] = cells.volumes.len() as u32;
@@ -73,6 +79,16 @@ impl Cells {
             }
             cells.volumes.push(volume);
             cells.starts.push(cells.starts[cells.volumes.len() - 1] + same.len() as u32);
+        }
+        for p in (0..particles.len()).filter(|&p| !particles.is_solid(p) && averages[particles.body[p] as usize]) {
+            let (x, body) = (&particles.position[p], particles.body[p]);
+            let near = neighbours(grid, x).filter_map(|cell| {
+                let number = keys.binary_search(&(grid.id(cell), body)).ok()?;
+                let middle = grid.position(cell) + Vector::repeat(0.5 * grid.spacing);
+                Some((number, (x - middle).norm_squared()))
+            });
+            let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
+            cells.beside.extend(nearest.map(|(number, _)| (p, number)));
         }
         Some(cells)
     }
@@ -111,6 +127,17 @@ impl Cells {
     }
 }
 
+/// The cell of a place and those around it.
+fn neighbours<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> impl Iterator<Item = [u32; D]> {
+    grid.cell(x).into_iter().flat_map(move |at| {
+        indices([3; D]).filter_map(move |step| {
+            let cell: [Option<u32>; D] =
+                std::array::from_fn(|k| (at[k] + step[k] as u32).checked_sub(1).filter(|&i| i < grid.cells[k]));
+            cell.iter().all(Option::is_some).then(|| cell.map(Option::unwrap_or_default))
+        })
+    })
+}
+
 /// θ − 1 of θ = Θ θ_n, from Θ − 1 and θ_n − 1.
 #[inline(always)]
 pub(crate) fn total<T: Real>(change: T, before: f64) -> T {
@@ -126,6 +153,10 @@ pub(crate) fn after<const D: usize, L: Law>(
 ) -> Vec<f64> {
     let Some(cells) = Cells::of(particles, bodies, supports) else { return Vec::new() };
     let changes = cells.changes(particles, supports, motion);
-    let of = |p: u32| cells.cell(p).map_or(0.0, |cell| total(changes[cell], particles.dilatation(p as usize)));
-    (0..particles.len() as u32).map(of).collect()
+    let seen = |p: usize, cell: usize| total(changes[cell], particles.dilatation(p));
+    let of = |p: usize| cells.cell(p as u32).map_or(0.0, |cell| seen(p, cell));
+    let mut all: Vec<f64> = (0..particles.len()).map(of).collect();
+    // Points of surfaces see the mean of the cell that is nearest, so that stresses there are the body's.
+    cells.beside.iter().for_each(|&(p, cell)| all[p] = seen(p, cell));
+    all
 }

@@ -129,6 +129,10 @@ impl<const D: usize, L: Law> NonlinearProblem for OnPath<'_, D, L> {
         None
     }
 
+    fn is_stopped(&self) -> bool {
+        self.start.is_stopped()
+    }
+
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
         let mut slope = self.slope(self.load(bytemuck::cast_slice(x)))?;
         slope.iter_mut().for_each(|slope| *slope /= self.path.weight);

@@ -7,6 +7,7 @@ use crate::mechanics::sweep::{Flow, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::particles::Body;
 use crate::pooled::Pooled;
+use crate::solver::Stop;
 use crate::tensor::Vector;
 
 pub use crate::mechanics::point::{Inadmissible, compose};
@@ -53,12 +54,14 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub terms: Terms<'a, D, L>,
     /// Degrees of freedom that are not solved for.
     pub prescribed: &'a [PrescribedDof],
+    /// Who may want the search for it to end.
+    pub stop: Option<&'a Stop>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The terms that act in a step, on its free degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
-        Self { step, terms: Terms::of(&step), prescribed }
+        Self { step, terms: Terms::of(&step), prescribed, stop: None }
     }
 
     /// R(Δφ) at every active node; at prescribed degrees of freedom, the reaction.

@@ -287,6 +287,10 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
         Self::is_symmetric(self)
     }
 
+    fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.0())
+    }
+
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
         Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
     }

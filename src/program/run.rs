@@ -10,6 +10,7 @@ use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
 use bfree::simulation::Simulation;
+use bfree::solver::Stop;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
@@ -104,6 +105,15 @@ enum Lost {
     Foreign(PathBuf),
 }
 
+/// A checkpoint behind the end.
+#[derive(Debug, thiserror::Error)]
+#[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
+struct Past {
+    path: PathBuf,
+    time: f64,
+    end: f64,
+}
+
 /// No place for results.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot create the directory {}", directory.display())]
@@ -171,17 +181,19 @@ impl Run {
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {
             directory: directory.clone(),
-            fields: scene.output.fields(scene.time.inertia),
+            fields: scene.fields(),
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
             end_time: if shortens { end } else { last as f64 * simulation.clock.nominal() },
             audience: self.audience(),
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
+        let asked_to_stop = interrupted.clone();
+        simulation.settings.stop = Some(Stop(Arc::new(move || asked_to_stop.load(Ordering::Relaxed))));
         let reference = Reference::of(&simulation);
         let _claim = self.claim(&directory)?;
         let restored = match self.restart {
-            true => Some(self.restore(&directory, &identity, &mut simulation)?),
+            true => Some(self.restore(&directory, &identity, &mut simulation, end)?),
             false => self.begin(&directory).map(|()| None)?,
         };
         let mut recorder = match &restored {
@@ -222,6 +234,8 @@ impl Run {
                     let recorded = recorder.record(&simulation, &step);
                     recorded.inspect_err(|_| unwritten(simulation.clock.time())).map_err(Failure::run)?;
                 }
+                // What the next round says.
+                Err(error) if error.cause.is_stopped() => {}
                 Err(error) => {
                     failure = Some(error);
                     break;
@@ -297,8 +311,13 @@ impl Run {
         directory: &Path,
         identity: &Identity,
         simulation: &mut Simulation<D>,
+        end: f64,
     ) -> Result<Restored, Failure> {
         let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
+        let time = simulation.clock.time();
+        if simulation.clock.nominal_steps() > simulation.clock.whole_steps(end) {
+            return Err(Failure::scene(Past { path: restored.path, time, end }));
+        }
         let unusable = restored.unusable.iter();
         unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
         if let Some(program) = &restored.other_program {

@@ -117,7 +117,7 @@ impl SceneArguments {
 
 /// What a run writes of the particles, beside the probes; no other field is computed.
 fn written(scene: &Scene) -> String {
-    let names: Vec<&str> = scene.output.fields(scene.time.inertia).iter().map(|field| field.name()).collect();
+    let names: Vec<&str> = scene.fields().iter().map(|field| field.name()).collect();
     match scene.output.every {
         Some(every) => format!("{} of all particles every {every}", names.join(", ")),
         None => "no snapshots (output.every): no field is computed of all particles".into(),

@@ -111,11 +111,19 @@ impl Body {
 fn check_inside<const D: usize>(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
     let (Some(grid), Some(shape)) = (grid.build::<D>(), shape.build::<D>()) else { return };
     let (min, max) = shape.bounding_box();
+    if (0..D).any(|k| max[k] < min[k]) {
+        problems.refuse(
+            path,
+            "an empty shape",
+            "must hold something: its parts do not meet, or nothing is left of them",
+        );
+        return;
+    }
     let slack = EDGE * grid.spacing;
     for k in 0..D {
         let (lower, upper) = (grid.origin[k], grid.origin[k] + f64::from(grid.cells[k]) * grid.spacing);
         let beyond = (min[k].is_finite() && min[k] < lower - slack) || (max[k].is_finite() && max[k] > upper + slack);
-        let apart = max[k] <= lower || min[k] >= upper || max[k] < min[k];
+        let apart = max[k] <= lower || min[k] >= upper;
         let axis = ["x", "y", "z"][k.min(2)];
         problems.require(
             !beyond && !apart,

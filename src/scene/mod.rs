@@ -38,7 +38,8 @@ pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
 
 use crate::approximation;
-use crate::material::Law;
+use crate::field::Field;
+use crate::material::{Law, Material, PLASTIC_STRAIN};
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::schemes::LONG_STEPS;
@@ -252,6 +253,30 @@ impl Scene {
         accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0)
     }
 
+    /// The fields of a snapshot.
+    ///
+    /// ```
+    /// use bfree::field::Field;
+    ///
+    /// // Without inertia there are no velocities to show; where a metal flows, its plastic strain is what pictures show.
+    /// let of = |name: &str| {
+    ///     let asked = ["output.fields=null".parse()?];
+    ///     Ok::<_, Box<dyn std::error::Error>>(bfree::scene::read_file(format!("scenes/{name}.json").as_ref(), &asked)?.fields())
+    /// };
+    /// assert_eq!(of("cook")?, [Field::Displacement, Field::Stress, Field::Jacobian]);
+    /// assert_eq!(of("tube")?, [Field::PlasticStrain, Field::Displacement, Field::Stress, Field::Jacobian]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn fields(&self) -> Vec<Field> {
+        let flows = self.laws().any(|law| law.memory().iter().any(|one| one.name == PLASTIC_STRAIN));
+        self.output.fields(self.time.inertia, flows)
+    }
+
+    /// The laws of the bodies that have a sound one.
+    fn laws(&self) -> impl Iterator<Item = Material> {
+        self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
+    }
+
     /// Loads that need nothing of grid and particles.
     fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
         Loads { damping: self.damping, ..Loads::default() }
@@ -259,11 +284,9 @@ impl Scene {
 
     /// What makes the tangent unsymmetric, if something does.
     fn unsymmetric(&self) -> Option<&'static str> {
-        let law = |body: &body::Body| body.material.law(&mut Problems::default(), "");
-        let flows = || self.bodies.iter().filter_map(law).any(|law| !law.is_symmetric());
         if !self.pressures.is_empty() {
             Some("pressures make")
-        } else if flows() {
+        } else if self.laws().any(|law| !law.is_symmetric()) {
             Some("a law with friction makes")
         } else {
             None
@@ -318,7 +341,7 @@ impl Scene {
             self.transfer.get_or_insert_default();
         }
         self.ghost_stiffness = Some(self.ghost());
-        self.output.fields = Some(self.output.fields(self.time.inertia));
+        self.output.fields = Some(self.fields());
         self
     }
 

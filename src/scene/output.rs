@@ -21,7 +21,8 @@ pub struct Output {
     /// bits. One more is written at the start, at the end and on Ctrl-C; the last two are kept. Default: no checkpoints.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub checkpoint: Option<f64>,
-    /// The fields of a snapshot, each at most once. Default: displacement, velocity, stress, jacobian; without inertia no velocity.
+    /// The fields of a snapshot, each at most once; pictures show the first. Default: displacement, velocity, stress, jacobian; without inertia
+    /// no velocity; before them plastic_strain where a body may flow.
     pub fields: Option<Vec<Field>>,
     /// Histories of one field at one place, written every step.
     #[serde(default)]
@@ -58,21 +59,12 @@ pub enum At {
 }
 
 impl Output {
-    /// The fields of a snapshot of bodies with or without inertia.
-    ///
-    /// ```
-    /// use bfree::field::Field;
-    /// use bfree::scene::{output::Output, time::Inertia};
-    ///
-    /// // Without inertia there are no velocities to show.
-    /// let (moving, still) = (Output::default().fields(Inertia::Newmark), Output::default().fields(Inertia::None));
-    /// let without: Vec<_> = moving.into_iter().filter(|&field| field != Field::Velocity).collect();
-    /// assert_eq!(still, without);
-    /// ```
-    pub fn fields(&self, inertia: Inertia) -> Vec<Field> {
+    /// The fields of a snapshot of bodies with or without inertia, that flow or do not.
+    pub(super) fn fields(&self, inertia: Inertia, flows: bool) -> Vec<Field> {
         self.fields.clone().unwrap_or_else(|| {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
             fields.retain(|field| inertia.has_inertia() || !field.needs_inertia());
+            fields.splice(..0, flows.then_some(Field::PlasticStrain));
             fields
         })
     }
@@ -98,7 +90,7 @@ impl Output {
             problems.require(
                 !again,
                 &format!("output.fields[{i}]"),
-                format_args!("{field:?}, given before,"),
+                format_args!("{}, given before,", field.name()),
                 "must be listed once",
             );
         }

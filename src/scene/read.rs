@@ -324,6 +324,7 @@ fn explain(message: &str) -> String {
     let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
     let expected = match expected {
         "f64" => "a number",
+        "u8" => "a whole number from 0 to 255",
         "u32" => "a whole number from 0 to 4294967295",
         "a sequence" => "a list",
         "a boolean" => "true or false",

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::shape::Shape as Drawn;
 use super::{BodyUse, Scene};
-use crate::grid::indices;
+use crate::grid::{Grid, indices};
 use crate::mechanics::loads::SurfaceLoad;
 use crate::mechanics::loads::{Pressing, Selection};
 use crate::shape::{EDGE, Fill, Intersection, Shape, around};
@@ -26,6 +26,9 @@ const UNSURE: f64 = 1e-3;
 
 /// Cells across a body, at least, to bend and to press.
 const CELLS: f64 = 2.0;
+
+/// How well a thickness is known, which is twice a depth of particles that need not lie in the middle: no body of two cells is named.
+const ABOUT: f64 = 0.95;
 
 /// Bodies of a scene, as they were built.
 struct Bodies<'a, const D: usize> {
@@ -66,7 +69,17 @@ impl Scene {
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
         let filled = self.filled_otherwise(simulation);
         all.extend(filled.into_iter().filter_map(|(number, body)| missed(number, &body)));
-        all.extend(without_nodes(simulation));
+        let prescribed = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
+            Selection::Region(region) => Some(region.clone()),
+            Selection::Face { .. } => None,
+        });
+        let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes);
+        all.extend(without_nodes(&simulation.grid, "prescribed", prescribed));
+        all.extend(without_nodes(
+            &simulation.grid,
+            "initial_velocity.nodes",
+            initial.filter_map(|node| node.region.build()),
+        ));
         let loaded = self.tractions.iter().zip(&simulation.loads.surface).enumerate();
         all.extend(loaded.filter_map(|(i, (traction, load))| {
             let body = self.bodies.iter().find(|body| body.name == traction.body)?;
@@ -157,7 +170,7 @@ impl<const D: usize> Bodies<'_, D> {
     fn thin(&self, body: usize) -> Option<String> {
         let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.spacing());
         let width = |p: usize| particles.volume[p].powf(1.0 / D as f64);
-        let enough = CELLS * h * (1.0 - EDGE);
+        let enough = CELLS * h * ABOUT;
         let across = match &self.shapes[body] {
             Some(shape) => {
                 let mut most: f64 = 0.0;
@@ -178,8 +191,8 @@ impl<const D: usize> Bodies<'_, D> {
         (across < enough).then(|| {
             let name = &self.scene[body].name;
             format!(
-                "body {name:?} is at most {across:.4e} thick, {:.2} cells; from {CELLS} on it bends and presses as it should: lower \
-                 grid.spacing",
+                "body {name:?} is about {across:.3e} thick where it is thickest, {:.2} cells; from {CELLS} on it bends and presses as it \
+                 should: lower grid.spacing",
                 across / h
             )
         })
@@ -202,28 +215,21 @@ fn missed(number: usize, body: &BodyUse) -> Option<String> {
     ))
 }
 
-/// Prescribed regions in which no node lies.
-fn without_nodes<const D: usize>(simulation: &Simulation<D>) -> Vec<String> {
-    let grid = &simulation.grid;
-    let regions = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
-        Selection::Region(region) => Some(region),
-        Selection::Face { .. } => None,
+/// Regions in which no node lies.
+fn without_nodes<const D: usize>(grid: &Grid<D>, list: &str, regions: impl Iterator<Item = Shape<D>>) -> Vec<String> {
+    let all = regions.enumerate().filter_map(|(i, region)| {
+        let (first, count) = around(grid, &region);
+        let at = |index: [u64; D]| grid.position(std::array::from_fn(|k| (first[k] + index[k]) as u32));
+        let cure = if count.contains(&0) {
+            "it lies outside of the grid"
+        } else if !indices(count.map(|cells| cells + 1)).any(|index| region.holds(&at(index), grid.spacing)) {
+            "make it larger, by up to grid.spacing"
+        } else {
+            return None;
+        };
+        Some(format!("{list}[{i}].region holds no node of the grid, and so nothing: {cure}"))
     });
-    let has_none = |region: &Shape<D>| {
-        let (first, count) = around(grid, region);
-        let empty = count.contains(&0);
-        let mut nodes = indices(count.map(|cells| cells + 1));
-        empty
-            || !nodes
-                .any(|i| region.holds(&grid.position(std::array::from_fn(|k| (first[k] + i[k]) as u32)), grid.spacing))
-    };
-    let all = regions.enumerate().filter(|(_, region)| has_none(region));
-    all.map(|(i, _)| {
-        format!(
-            "prescribed[{i}].region holds no node of the grid, and so nothing: make it larger, by up to grid.spacing"
-        )
-    })
-    .collect()
+    all.collect()
 }
 
 /// A traction on more than one side of pixels.

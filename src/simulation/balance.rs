@@ -12,7 +12,7 @@ use crate::mechanics::rigid::loose;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
-use crate::solver::{NewtonError, NewtonReport, newton};
+use crate::solver::{NewtonError, NewtonFailure, NewtonReport, newton};
 use crate::tensor::Vector;
 
 /// Forces in balance.
@@ -39,7 +39,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let theta = scheme.instant();
         let [from, mut to] =
             if scheme.follows_path() { [self.path.load, self.path.load_step(dt)] } else { [t, t + theta * dt] };
-        let under = |load: f64| self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
+        let under = |load: f64| {
+            let equilibrium = self.equilibrium(supports, nodal, prescribed, scheme.balance(dt), load);
+            Equilibrium { stop: self.settings.stop.as_ref(), ..equilibrium }
+        };
         let mut equilibrium = under(to);
         let mut phi = self.initial_guess(supports, nodal, kept, theta * dt);
         for dof in prescribed {
@@ -91,10 +94,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         supports: &Supports<D>,
     ) -> StepError {
-        let loose = equilibrium.step.nodal.is_static().then(|| loose(&self.grid, equilibrium, supports.active()));
-        match loose.flatten() {
+        if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped { .. }) {
+            return StepError::Newton(error);
+        }
+        match loose(&self.grid, equilibrium, supports.active()) {
             Some(loose) => StepError::Loose { loose, source: error },
-            None => StepError::Newton(error),
+            None => StepError::Unbalanced { source: error },
         }
     }
 

@@ -80,6 +80,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub workspace: Workspace<D>,
 }
 
+/// The share of Λ + 2G that resists changes of volume from which on multigrid is taken, about that of ν = 0.4998: at 0.4999 diagonal blocks find no step.
+const ISOCHORIC: f64 = 0.999;
+
 /// The shape functions of the last step, in whose memory the next one makes its own, and from whose order of particles it starts to
 /// sort, and memory for its vectors. They are no state: a clone has none, no checkpoint holds them, and a step that fails leaves no shape
 /// functions.
@@ -239,6 +242,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let across = self.clock.nominal() / self.grid.spacing;
         let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
         let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
+        let isochoric = |body: &Body<L>| {
+            let volumetric = body.response::<f64>(0.0).map_or(0.0, |of| of.stiffness);
+            volumetric > ISOCHORIC * p_wave_modulus(&body.law)
+        };
         let splines = self.approximation.separable().is_some_and(|functions| functions.is_spline());
         self.settings.preconditioner.chosen::<D>(Preconditioned {
             particles: self.particles.len(),
@@ -246,6 +253,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             long,
             on_path: self.settings.scheme.follows_path(),
             flows: self.remembers(PLASTIC_STRAIN),
+            isochoric: self.bodies.iter().any(isochoric),
         })
     }
 

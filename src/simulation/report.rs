@@ -6,7 +6,7 @@ use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::rigid::Loose;
 use crate::mechanics::sweep::SupportError;
 use crate::phases::Stopwatch;
-use crate::solver::{LinearError, NewtonError, NewtonHistory, NewtonReport};
+use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
 use crate::tensor::Vector;
 
 /// What a condition does to the bodies: the reaction at t_{n+1}, and spread over the step the impulse with which a wall takes along nodes
@@ -77,7 +77,9 @@ impl FailedAttempt {
     pub(super) fn new(dt: f64, mut spent: Spent, error: &StepError) -> Self {
         spent.watch.give_up();
         let newton = match error {
-            StepError::Newton(source) | StepError::Loose { source, .. } => (*source.history).clone(),
+            StepError::Newton(source) | StepError::Unbalanced { source } | StepError::Loose { source, .. } => {
+                (*source.history).clone()
+            }
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
@@ -99,6 +101,15 @@ pub enum StepError {
     /// Newton found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
+    /// Without inertia, Newton found no equilibrium.
+    #[error(
+        "no equilibrium was found; without inertia there may be none, where a load is larger than the bodies bear: prescribe the \
+         motion there, follow the path (time.inertia = \"arc_length\"), or give the scene inertia"
+    )]
+    Unbalanced {
+        /// What Newton's method says.
+        source: NewtonError<Inadmissible>,
+    },
     /// What was kept is not of these particles and functions.
     #[error(
         "the grid that was kept has {kept} nodes, and the particles have {nodes}: after a change by hand, put None into \
@@ -154,6 +165,13 @@ pub enum StepError {
         /// Where it would be.
         position: Vec<f64>,
     },
+}
+
+impl StepError {
+    /// Whether it was [stopped](crate::solver::Stop).
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped { .. }))
+    }
 }
 
 /// The simulation cannot go on. The particles are as after the last good step.

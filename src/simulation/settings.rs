@@ -4,7 +4,7 @@ use crate::mechanics::kept::Renewal;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::transfer::{Projection, WallUpdate};
-use crate::solver::{NewtonSettings, Preconditioning};
+use crate::solver::{NewtonSettings, Preconditioning, Stop};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroU64;
@@ -53,6 +53,8 @@ pub struct Settings {
     pub error_tolerance: Option<f64>,
     /// Compare the tangent with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,
+    /// Who may want a step to end before it is done.
+    pub stop: Option<Stop>,
 }
 
 impl Default for Settings {
@@ -71,6 +73,7 @@ impl Default for Settings {
             preconditioner: Preconditioning::default(),
             error_tolerance: None,
             check_tangent: None,
+            stop: None,
         }
     }
 }

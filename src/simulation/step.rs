@@ -167,7 +167,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             };
             failed.push(FailedAttempt::new(dt, spent, &cause));
             let mended = match cause {
-                StepError::Newton(_) | StepError::Inaccurate { .. } => true,
+                ref stopped if stopped.is_stopped() => false,
+                StepError::Newton(_) | StepError::Unbalanced { .. } | StepError::Inaccurate { .. } => true,
                 // A step too long to see a wall.
                 StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
                 // In balance before its end, and inside out there.

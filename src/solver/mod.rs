@@ -9,6 +9,7 @@ mod gmres;
 mod newton;
 mod nonnegative;
 mod preconditioner;
+mod stop;
 pub mod vector;
 
 pub use conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
@@ -26,6 +27,7 @@ pub use preconditioner::{
     Preconditioning,
 };
 pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
+pub use stop::Stop;
 
 use vector::Entry;
 
@@ -199,6 +201,11 @@ pub trait NonlinearProblem {
 
     /// Whether every tangent is symmetric; nothing less than certainty counts.
     fn is_symmetric(&self) -> bool {
+        false
+    }
+
+    /// Whether the search is to end without a solution: asked before every iteration.
+    fn is_stopped(&self) -> bool {
         false
     }
 

@@ -43,6 +43,31 @@ fn tip(simulation: &Simulation<2>, start: &Simulation<2>) -> f64 {
     now.position[nearest][1] - before.position[nearest][1]
 }
 
+/// Pressed by its top without moving sideways, a block has one stress: at the loaded surface too, whose points have no volume.
+#[test]
+fn a_loaded_surface_shows_the_stress_of_the_body() -> Result<(), Failure> {
+    let given = [
+        r#"grid={"size":[1,1.25],"spacing":0.25}"#,
+        r#"bodies.0.shape={"box":{"min":[0,0],"max":[1,1]}}"#,
+        r#"bodies.0.material={"neo_hookean":{"young":1000,"poisson":0.3}}"#,
+        MEAN,
+        r#"boundary={"left":"sliding","right":"sliding","bottom":"sliding"}"#,
+        r#"tractions=[{"body":"membrane","traction":[0,-200],"region":{"half_space":{"point":[0,1],"normal":[0,-1]}},"curve":[[0,0],[1,1]]}]"#,
+        "output={}",
+        "time.step=0.25",
+    ];
+    let mut simulation: Simulation<2> = scene("cook.json", &given)?;
+    let reference = Reference::of(&simulation);
+    run(&mut simulation)?;
+    let stresses = Field::Stress.values(&simulation, &reference)?;
+    let particles = simulation.particles.by_id();
+    assert!((0..particles.len()).any(|p| !particles.is_solid(p)));
+    for (p, stress) in stresses.chunks(6).enumerate() {
+        assert!((stress[1] + 200.0).abs() < 0.01, "{p} of {}: {stress:?}", particles.len());
+    }
+    Ok(())
+}
+
 /// Over several grids, particles that all change their volume alike have their own volume for a mean: θ = J, and the energy is that of the law.
 #[test]
 fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Failure> {

@@ -366,6 +366,16 @@ fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
             "softens faster",
         ),
         (
+            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":1}}}"#,
+            "yield_stress.rate",
+            "> 0 with a saturation",
+        ),
+        (
+            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"rate":1}}}"#,
+            "yield_stress.rate",
+            "needs a saturation",
+        ),
+        (
             r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}}"#,
             "friction",
             "< 90",

@@ -1,8 +1,10 @@
 //! What nobody should give to the program, and somebody will.
 
+use crate::images;
 use crate::support::{Failure, Random};
+use bfree::causes;
 use bfree::checkpoint::{self, Identity};
-use bfree::scene::{self, Scene, SceneError, particle_file};
+use bfree::scene::{self, Scene, SceneError, particle_file, surface_file};
 use bfree::simulation::Simulation;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -15,6 +17,7 @@ fn shipped() -> Result<Vec<String>, Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut paths =
         std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>, Failure>>()?;
+    paths.retain(|path| path.extension().is_some_and(|ending| ending == "json"));
     paths.sort();
     paths.iter().map(|path| Ok(std::fs::read_to_string(path)?)).collect()
 }
@@ -278,12 +281,16 @@ fn moduli_and_densities_near_the_least_number_run_or_are_refused_by_key() -> Res
         let set = [format!("bodies[0].density={density}"), format!("bodies[0].material.neo_hookean.young={young}")];
         Ok(set.iter().map(|set| set.parse()).collect::<Result<Vec<_>, _>>()?)
     };
-    for least in ["5e-324", "1e-308", "1e-300", "1e-160", "1e160", "1e308"] {
+    for least in ["5e-324", "1e-308", "1e-300", "1e-160", "1e-100", "1e160", "1e308"] {
         for (given, key) in
             [((least, "1"), "bodies[0].density"), (("1", least), "bodies[0].material.neo_hookean.young")]
         {
             let message = scene::read(base, &set(given.0, given.1)?).expect_err(least).to_string();
-            assert!(message.contains(&format!("{key}: {least} is not allowed; must lie between")), "{message}");
+            assert!(
+                message
+                    .contains(&format!("{key}: {least} is not allowed; must be greater than 1e-100 and at most 1e100")),
+                "{message}"
+            );
         }
     }
     // In free flight, soft or not so stiff that a step is nothing but round-off beside it.
@@ -350,21 +357,45 @@ fn fuzz() -> Result<(), Failure> {
     let scenes: Vec<Value> = texts.iter().map(|text| serde_json::from_str(text)).collect::<Result<_, _>>()?;
     let (identity, fresh, good) = checkpointed(folder.path())?;
     let table = b"x,y,volume,vx,vy\n1,1,0.25,0,0\n1.5,1,0.25,1e-3,-2\n2,1,0.25,0,0\n";
+    // A picture, and a tetrahedron in both formats.
+    let bytes: Vec<u8> = (0..600_u32).map(|i| (i * 7 % 256) as u8).collect();
+    let picture = images::grey([30, 20], &bytes)?;
+    let mut stl = Vec::new();
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(stl_io::Vertex::new);
+    let sides = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|side| side.map(|i: usize| corners[i]));
+    let sides = sides.map(|vertices| stl_io::Triangle { normal: stl_io::Normal::new([0.0; 3]), vertices });
+    stl_io::write_stl(&mut stl, sides.iter())?;
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 4\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+    let image = json!({"file": "fuzz.png", "min": [1, 1], "max": [3, 3], "values": [0, 100]});
+    let pictured = scene::read(&images::scene_of(&[4, 4], &[images::body("a", &image)], json!({})), &[])?;
     let mut random = Random(1);
     let (mut refused, mut built, mut slowest) = (0_u64, 0_u64, (Duration::ZERO, String::new()));
     for k in 0..inputs {
-        let input = match k % 10 {
+        let input = match k % 13 {
             0..6 => changed(&scenes, &mut random).to_string().into_bytes(),
             6 | 7 => broken(random.of(&texts).clone().as_bytes(), &mut random),
             8 => broken(table, &mut random),
+            9 => broken(&picture, &mut random),
+            10 => broken(&stl, &mut random),
+            11 => broken(ply, &mut random),
             _ => broken(&good, &mut random),
         };
-        if k % 10 == 9 {
-            std::fs::write(folder.path().join("checkpoint_1.bfree"), &input)?;
+        let file = match k % 13 {
+            9 => Some("fuzz.png"),
+            10 => Some("fuzz.stl"),
+            11 => Some("fuzz.ply"),
+            12 => Some("checkpoint_1.bfree"),
+            _ => None,
+        };
+        let file = file.map(|name| folder.path().join(name));
+        if let Some(file) = &file {
+            std::fs::write(file, &input)?;
         }
         let mut simulation = fresh.clone();
         let start = Instant::now();
-        let judged = catch_unwind(AssertUnwindSafe(|| match k % 10 {
+        let judged = catch_unwind(AssertUnwindSafe(|| match k % 13 {
             0..8 => match scene::read(&String::from_utf8_lossy(&input), &[]) {
                 Ok(scene) if small(&scene) => {
                     build(&scene);
@@ -377,6 +408,14 @@ fn fuzz() -> Result<(), Failure> {
                 }
             },
             8 => (particle_file::read::<2>(&input[..]).is_err(), false),
+            9 => match pictured.clone().build::<2>(folder.path()) {
+                Ok(_) => (false, true),
+                Err(error) => {
+                    assert!(causes::on_one_line(&error).contains("fuzz.png"), "{error}");
+                    (true, false)
+                }
+            },
+            10 | 11 => (file.as_ref().is_none_or(|file| surface_file::read_file(file).is_err()), false),
             _ => {
                 let result = checkpoint::restore(folder.path(), &identity, &mut simulation);
                 assert!(result.is_err() || input == good, "a damaged checkpoint is taken for a good one");

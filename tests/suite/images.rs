@@ -21,16 +21,16 @@ fn png(size: [u32; 2], color: png::ColorType, depth: png::BitDepth, bytes: &[u8]
     Ok(file)
 }
 
-fn grey(size: [u32; 2], bytes: &[u8]) -> Result<Vec<u8>, Failure> {
+pub(crate) fn grey(size: [u32; 2], bytes: &[u8]) -> Result<Vec<u8>, Failure> {
     png(size, png::ColorType::Grayscale, png::BitDepth::Eight, bytes)
 }
 
 /// A body of pixels of the values, for a grid of two or three dimensions.
-fn body(name: &str, image: &Value) -> Value {
+pub(crate) fn body(name: &str, image: &Value) -> Value {
     json!({"name": name, "shape": {"image": image}, "density": 2, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
 }
 
-fn scene_of(size: &[u32], bodies: &[Value], more: Value) -> String {
+pub(crate) fn scene_of(size: &[u32], bodies: &[Value], more: Value) -> String {
     let mut scene = json!({"grid": {"size": size, "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": bodies});
     if let (Some(scene), Value::Object(more)) = (scene.as_object_mut(), more) {
         scene.extend(more);

@@ -1,6 +1,7 @@
-//! Soil at its limit and beyond, beside published results. Metals: `tutorial.rs`.
+//! Metal and soil at their limits and beyond, beside published results. More of metals: `tutorial.rs`.
 
 use crate::support::{Failure, scene};
+use bfree::causes;
 use bfree::simulation::Simulation;
 
 /// How far the crest of the slope sinks with its strength divided by `factor`: c/F, tan φ/F (m).
@@ -26,6 +27,22 @@ fn a_slope_fails_at_the_factor_of_griffiths_and_lane() -> Result<(), Failure> {
     let [safe, before, after] = [1.0, 1.35, 1.45].map(sinking);
     let (safe, before, after) = (safe?, before?, after?);
     assert!(before < 2.0 * safe && after > 5.0 * safe, "{safe} m, {before} m, {after} m");
+    Ok(())
+}
+
+/// A tube bears 2/√3 Y ln(b/a) = 0.1921 GPa (Hill): steps are halved up to there, and the end says what may be wrong.
+#[test]
+fn a_pressure_that_a_tube_cannot_bear_is_found_and_said() -> Result<(), Failure> {
+    let mut simulation: Simulation<2> = scene("tube.json", &["time.end=1", "grid.spacing=24"])?;
+    let error = loop {
+        if let Err(error) = simulation.advance() {
+            break error;
+        }
+    };
+    let borne = 0.2 * error.time / (2.0 / 3.0_f64.sqrt() * 0.24 * 2.0_f64.ln());
+    assert!((0.99..1.005).contains(&borne), "{borne}");
+    let text = causes::on_one_line(&error);
+    assert!(text.contains("larger than the bodies bear") && text.contains("arc_length"), "{text}");
     Ok(())
 }
 

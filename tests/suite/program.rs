@@ -237,7 +237,7 @@ fn options_are_judged_like_the_scene() -> Result<(), Failure> {
     let out = directory.path().join("run");
     for (option, value, allowed) in [
         ("--until", "nan", "finite and > 0"),
-        ("--until", "inf", "between 1e-100 and 1e100"),
+        ("--until", "inf", "greater than 1e-100 and at most 1e100"),
         ("--until", "-5", "finite and > 0"),
         ("--until", "0", "finite and > 0"),
         ("--until", "0.01", "at least one step, 0.05"),

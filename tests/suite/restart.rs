@@ -83,7 +83,12 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
     let history = std::fs::read_to_string(parts.join("history.csv"))?;
     assert!(history.lines().last().is_some_and(|row| row.starts_with("7,0.32,0.0")), "{history}");
     assert!(run("rebound.json", &parts, &[&common, &["--until", "0.73", "--restart"]])?.status.success());
-    assert_same(&whole, &parts)
+    assert_same(&whole, &parts)?;
+    // What has been reached is not given back.
+    let earlier = run("rebound.json", &parts, &[&common, &["--until", "0.3", "--restart"]])?;
+    let text = String::from_utf8_lossy(&earlier.stderr);
+    assert!(!earlier.status.success() && text.contains("beyond the end, t = 0.3"), "{text}");
+    Ok(())
 }
 
 #[test]

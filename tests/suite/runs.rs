@@ -2,7 +2,9 @@
 
 use crate::support::{Failure, scene};
 use bfree::simulation::{AdvanceError, Simulation, StepError};
-use bfree::solver::NewtonSettings;
+use bfree::solver::{NewtonSettings, Stop};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Everything a particle carries, as bits.
 fn bits<const D: usize>(simulation: &Simulation<D>) -> Vec<u64> {
@@ -147,6 +149,26 @@ fn a_run_that_cannot_go_on_says_why() -> Result<(), Failure> {
     assert!(matches!(*cause, StepError::Newton(_)));
     assert_eq!((time, dt, failed.len()), (0.0, 0.25 * simulation.clock.nominal(), 3));
     assert_eq!(bits(&simulation), before);
+    Ok(())
+}
+
+/// Ctrl-C in the middle of a step: it is given up at once and not halved, nothing has moved, and what comes after has the same bits.
+#[test]
+fn a_step_that_is_stopped_loses_nothing() -> Result<(), Failure> {
+    for (name, overrides) in [("rebound.json", &[][..]), ("elastica.json", &["time.step=0.5"])] {
+        let fresh = scene::<2>(name, overrides)?;
+        let mut undisturbed = fresh.clone();
+        undisturbed.advance()?;
+        let (mut stopped, asked) = (fresh.clone(), Arc::new(AtomicUsize::new(0)));
+        let count = asked.clone();
+        stopped.settings.stop = Some(Stop(Arc::new(move || count.fetch_add(1, Ordering::Relaxed) > 0)));
+        let Err(error) = stopped.advance() else { return Err("its second iteration is not made".into()) };
+        assert!(error.cause.is_stopped() && error.failed.len() == 1, "{error:?}");
+        assert_eq!((asked.load(Ordering::Relaxed), bits(&stopped), stopped.clock.steps()), (2, bits(&fresh), 0));
+        stopped.settings.stop = None;
+        stopped.advance()?;
+        assert_eq!(bits(&stopped), bits(&undisturbed));
+    }
     Ok(())
 }
 

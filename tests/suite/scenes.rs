@@ -56,6 +56,9 @@ fn shipped_scenes_are_sound() {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder("scenes")).unwrap() {
         let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "json") {
+            continue;
+        }
         let scene = scene::read_file(&path, &[]).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         assert!(scene.title.is_some(), "{}", path.display());
         names.push(path.file_stem().unwrap().to_string_lossy().into_owned());
@@ -75,6 +78,7 @@ fn shipped_scenes_are_sound() {
             "cook",
             "cook_plastic",
             "elastica",
+            "foam",
             "rebound",
             "rebound_fast",
             "riemann",
@@ -321,7 +325,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""fixed": 1e-7"#, r#""fixed": 1"#, "solver.krylov.forcing.fixed", &["1 is not", "0.9"]),
     (r#""every": 0.1"#, r#""every": 0"#, "output.every", &["0 is not", "> 0"]),
     (r#""checkpoint": 0.2"#, r#""checkpoint": 0"#, "output.checkpoint", &["0 is not", "> 0"]),
-    (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "Stress"]),
+    (r#"["velocity", "stress"]"#, r#"["stress", "stress"]"#, "output.fields[1]", &["once", "stress, given before"]),
     (r#""name": "mid""#, r#""name": "tip""#, "output.probes[1].name", &["differ"]),
     // tip is a stress: its columns are tip_xx, tip_yy, …
     (

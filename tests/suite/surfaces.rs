@@ -265,6 +265,27 @@ fn surfaces_that_bound_nothing_are_refused_with_the_place() {
     }
 }
 
+/// A box in a box is a cavity if it faces the other way, and a second solid in the same place if not.
+#[test]
+fn parts_of_a_surface_are_inside_and_outside_by_turns() {
+    let boxes = |sizes: &[(f64, bool)]| {
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for &(half, outwards) in sizes {
+            let first = vertices.len() as u32;
+            let (corners, sides) = cuboid(point([-half; 3]), point([half; 3]));
+            vertices.extend(corners);
+            triangles
+                .extend(sides.iter().map(|&[a, b, c]| if outwards { [a, b, c] } else { [a, c, b] }.map(|i| i + first)));
+        }
+        Surface::<3>::new(vertices, triangles).map(|_| ())
+    };
+    assert_eq!(boxes(&[(1.0, true), (0.5, false)]), Ok(()));
+    assert_eq!(boxes(&[(1.0, true), (0.5, false), (0.25, true)]), Ok(()));
+    for wrong in [&[(1.0, true), (0.5, true)][..], &[(1.0, true), (0.5, false), (0.25, false)]] {
+        assert!(matches!(boxes(wrong), Err(SurfaceError::Nested(_))), "{wrong:?}");
+    }
+}
+
 fn stl((vertices, triangles): &Triangles, path: &Path) -> Result<(), Failure> {
     let vertex = |i: u32| stl_io::Vertex::new(std::array::from_fn(|k| vertices[i as usize][k] as f32));
     let faces = triangles

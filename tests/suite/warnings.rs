@@ -72,18 +72,18 @@ fn a_body_of_less_than_two_cells_is_named_with_its_thickness() -> Result<(), Fai
     let nowhere = Path::new(".");
     let thick =
         |thickness: f64| warnings(json!([block("plate", [1.0, 2.0], [7.0, 2.0 + thickness])]), json!({}), nowhere);
-    assert_one(&thick(1.0)?, &["\"plate\" is at most 1.0000e0 thick, 1.00 cells"]);
+    assert_one(&thick(1.0)?, &["\"plate\" is about 1.000e0 thick", "1.00 cells"]);
     assert_eq!(thick(2.0)?, Vec::<String>::new());
     // Of the wall of a ring, not of the ring.
     let disc = |radius: f64| json!({"ball": {"center": [4, 4], "radius": radius}});
     let ring = json!([{"name": "ring", "shape": {"difference": {"of": disc(3.5), "minus": disc(2.7)}}, "density": 1,
                        "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}]);
-    assert_one(&warnings(ring, json!({}), nowhere)?, &["\"ring\" is at most", "cells"]);
+    assert_one(&warnings(ring, json!({}), nowhere)?, &["\"ring\" is about", "cells"]);
     let folder = tempfile::tempdir()?;
     std::fs::write(folder.path().join("p.csv"), "x,y,volume\n1.25,1.25,0.25\n1.75,1.25,0.25\n2.25,1.25,0.25\n")?;
     assert_one(
         &warnings(json!([file("bar", "p.csv")]), json!({}), folder.path())?,
-        &["\"bar\" is at most 5.0000e-1 thick, 0.50 cells"],
+        &["\"bar\" is about 5.000e-1 thick", "0.50 cells"],
     );
     Ok(())
 }
@@ -113,7 +113,12 @@ fn a_prescribed_region_between_nodes_is_named() -> Result<(), Failure> {
     let found = warnings(bodies.clone(), region(3.2), Path::new("."))?;
     assert_one(&found, &["prescribed[1].region holds no node of the grid"]);
     assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!(warnings(bodies, region(2.7), Path::new("."))?, Vec::<String>::new());
+    assert_eq!(warnings(bodies.clone(), region(2.7), Path::new("."))?, Vec::<String>::new());
+    let beside = json!({"initial_velocity": {"nodes": [{"region": {"box": {"min": [1.1, 1.1], "max": [1.9, 1.9]}}, "velocity": [1, 0]},
+                                                       {"region": {"box": {"min": [9, 9], "max": [10, 10]}}, "velocity": [1, 0]}]}});
+    let found = warnings(bodies, beside, Path::new("."))?;
+    assert_one(&found, &["initial_velocity.nodes[0].region holds no node", "make it larger"]);
+    assert_one(&found, &["initial_velocity.nodes[1].region holds no node", "outside of the grid"]);
     Ok(())
 }
 

@@ -4,6 +4,7 @@
 
 use crate::table::{Table, csv_field};
 use serde::{Serialize, Serializer};
+use std::collections::HashMap;
 use std::fmt;
 use std::io::{self, Write};
 
@@ -397,13 +398,22 @@ impl Report {
     }
 
     fn matrix(&self, rows: &[usize], column: usize, attained: usize) -> Table {
-        let across = in_order(self.cells.iter().map(|cell| cell.labels[column].clone()));
-        let row_of = |cell: &Cell| rows.iter().map(|&k| cell.labels[k].clone()).collect::<Vec<_>>();
-        let header = rows.iter().map(|&k| self.columns[k].as_str()).chain(across.iter().map(String::as_str));
+        let across = in_order(self.cells.iter().map(|cell| cell.labels[column].as_str()));
+        let header = rows.iter().map(|&k| self.columns[k].as_str()).chain(across.iter().copied());
         let mut table = Table::new(&self.title, header);
-        for row in in_order(self.cells.iter().map(row_of)) {
+        // Rows in the order of their first appearance: a sweep has hundreds of them, and hundreds of thousands of cells.
+        let (mut row_of, mut all) = (HashMap::new(), Vec::new());
+        for cell in &self.cells {
+            let labels: Vec<&str> = rows.iter().map(|&k| cell.labels[k].as_str()).collect();
+            let row = *row_of.entry(labels.clone()).or_insert(all.len());
+            if row == all.len() {
+                all.push((labels, HashMap::<&str, Vec<&Cell>>::new()));
+            }
+            all[row].1.entry(&cell.labels[column]).or_default().push(cell);
+        }
+        for (labels, places) in all {
             let places = across.iter().map(|label| {
-                let here = self.cells.iter().filter(|cell| row_of(cell) == row && cell.labels[column] == *label);
+                let here = places.get(label).into_iter().flatten().copied();
                 worst(here).map_or_else(
                     || "-".into(),
                     |cell| {
@@ -415,7 +425,7 @@ impl Report {
                     },
                 )
             });
-            table.push(row.clone().into_iter().chain(places));
+            table.push(labels.into_iter().map(str::to_owned).chain(places));
         }
         table
     }

@@ -8,7 +8,7 @@ pub struct Level {
     /// Its word, if it has one.
     pub name: Option<&'static str>,
     /// The error of the displacement, relative to its size: the largest of the study's smooth problems, rounded up; with more than 12
-    /// cells, of those in two dimensions.
+    /// cells, of those in two dimensions. Infinite where none is promised.
     pub error: f64,
     /// Cells across the least extent of the smallest body.
     pub cells: f64,
@@ -16,33 +16,39 @@ pub struct Level {
     pub courant: f64,
     /// Particles per cell along each axis.
     pub particles_per_cell: u32,
-    /// γ̂ of the shape functions.
-    pub gamma: f64,
-    /// ε of the mass matrix.
-    pub lumping: f64,
+    /// γ̂ of the shape functions; `None` leaves the scene's default functions.
+    pub gamma: Option<f64>,
+    /// ε of the mass matrix; `None` leaves the scene's default.
+    pub lumping: Option<f64>,
     /// Where Newton's method stops.
     pub tolerance: f64,
 }
 
-/// The first row; others have in common with it what they do not name.
+/// As coarse as the coarsest templates of `bfree new`, with steps at least as long, and no linear system beside Newton's: implicit
+/// steps need not resolve waves to show a motion. It is there to be fast; no error is promised.
 const DRAFT: Level = Level {
     name: Some("draft"),
-    error: 0.035,
-    cells: 6.0,
-    courant: 2.0,
+    error: f64::INFINITY,
+    cells: 4.0,
+    courant: 8.0,
     particles_per_cell: 2,
-    gamma: 1.4,
-    lumping: 0.1,
+    gamma: None,
+    lumping: None,
     tolerance: 1e-4,
 };
 
+/// The first row with an error; others have in common with it what they do not name.
+const COARSEST: Level =
+    Level { name: None, error: 0.035, cells: 6.0, courant: 2.0, gamma: Some(1.4), lumping: Some(0.1), ..DRAFT };
+
 /// All rows, by falling error.
-const LEVELS: [Level; 5] = [
+const LEVELS: [Level; 6] = [
     DRAFT,
-    Level { name: None, error: 0.014, cells: 8.0, courant: 1.0, ..DRAFT },
-    Level { name: Some("standard"), error: 0.005, cells: 12.0, courant: 1.0, ..DRAFT },
-    Level { name: None, error: 0.0022, cells: 18.0, courant: 1.0, tolerance: 1e-6, ..DRAFT },
-    Level { name: Some("reference"), error: 0.0014, cells: 24.0, courant: 0.5, tolerance: 1e-9, ..DRAFT },
+    COARSEST,
+    Level { error: 0.014, cells: 8.0, courant: 1.0, ..COARSEST },
+    Level { name: Some("standard"), error: 0.005, cells: 12.0, courant: 1.0, ..COARSEST },
+    Level { error: 0.0022, cells: 18.0, courant: 1.0, tolerance: 1e-6, ..COARSEST },
+    Level { name: Some("reference"), error: 0.0014, cells: 24.0, courant: 0.5, tolerance: 1e-9, ..COARSEST },
 ];
 
 /// The rows of the table, by falling error.
@@ -59,7 +65,7 @@ pub fn levels() -> &'static [Level] {
 
 /// The least and the greatest error that can be asked for.
 pub(super) fn range() -> [f64; 2] {
-    [LEVELS[LEVELS.len() - 1].error, LEVELS[0].error]
+    [LEVELS[LEVELS.len() - 1].error, COARSEST.error]
 }
 
 /// The knobs of the first row that is as accurate, with as few cells as the line from the row before it allows, log over log.
@@ -70,19 +76,20 @@ pub(super) fn between(error: f64) -> Option<Level> {
     }
     let at = LEVELS.iter().position(|level| level.error <= error)?;
     let level = LEVELS[at];
-    let Some(before) = at.checked_sub(1).map(|at| LEVELS[at]) else { return Some(level) };
+    let before = match at.checked_sub(1).map(|at| LEVELS[at]) {
+        Some(before) if before.error.is_finite() => before,
+        _ => return Some(level),
+    };
     let share = (error / level.error).ln() / (before.error / level.error).ln();
     Some(Level { name: None, error, cells: level.cells * (before.cells / level.cells).powf(share), ..level })
 }
 
 impl Level {
     /// Keys of the scene, but those that follow from lengths and speeds.
-    pub(super) fn keys(&self) -> [(&'static str, Value); 3] {
-        [
-            ("approximation", json!({ "lme": { "gamma": self.gamma } })),
-            ("time.lumping", self.lumping.into()),
-            ("solver.newton.tolerance", self.tolerance.into()),
-        ]
+    pub(super) fn keys(&self) -> impl Iterator<Item = (&'static str, Value)> {
+        let functions = self.gamma.map(|gamma| ("approximation", json!({ "lme": { "gamma": gamma } })));
+        let lumping = self.lumping.map(|lumping| ("time.lumping", lumping.into()));
+        functions.into_iter().chain(lumping).chain([("solver.newton.tolerance", self.tolerance.into())])
     }
 }
 
@@ -94,8 +101,10 @@ mod tests {
     fn errors_fall_and_cells_rise_from_row_to_row_and_between_them() {
         for pair in LEVELS.windows(2) {
             assert!(pair[1].error < pair[0].error && pair[1].cells > pair[0].cells);
-            let middle = between((pair[0].error * pair[1].error).sqrt()).map_or(f64::NAN, |level| level.cells);
-            assert!(middle > pair[0].cells && middle < pair[1].cells, "{middle}");
+            if pair[0].error.is_finite() {
+                let middle = between((pair[0].error * pair[1].error).sqrt()).map_or(f64::NAN, |level| level.cells);
+                assert!(middle > pair[0].cells && middle < pair[1].cells, "{middle}");
+            }
             assert_eq!(between(pair[1].error), Some(Level { name: None, ..pair[1] }));
         }
         // What the schema says of the range.
@@ -105,6 +114,8 @@ mod tests {
             schema.contains(&format!("\"minimum\":{least}")) && schema.contains(&format!("\"maximum\":{greatest}")),
             "{schema}"
         );
-        assert_eq!((between(2.0 * LEVELS[0].error), between(f64::NAN), between(0.0)), (None, None, None));
+        for outside in [2.0 * COARSEST.error, f64::INFINITY, f64::NAN, 0.0] {
+            assert_eq!(between(outside), None);
+        }
     }
 }

@@ -9,7 +9,7 @@ pub use sound::SurfaceError;
 use super::{Face, Facet, Solid};
 use crate::tensor::{Tensor, Vector};
 use nalgebra::{Matrix3, Vector3};
-use sound::{crossing, neighbours};
+use sound::{crossing, neighbours, nested};
 use std::sync::Arc;
 use tree::{Bounds, Tree};
 
@@ -66,7 +66,7 @@ impl<const D: usize> Surface<D> {
     /// ```
     ///
     /// # Errors
-    /// A surface that is open, faces both ways, crosses itself or encloses nothing; and where.
+    /// A surface that is open, faces both ways, crosses itself, lies in itself or encloses nothing; and where.
     pub fn new(vertices: Vec<Vector<f64, D>>, triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
         if D != 3 {
             return Err(SurfaceError::Dimension(D));
@@ -138,6 +138,9 @@ impl Mesh {
         let tree = Self::tree(&vertices, &triangles);
         if let Some(x) = crossing(&vertices, &triangles, &tree) {
             return Err(SurfaceError::Crossing([x[0], x[1], x[2]]));
+        }
+        if let Some(x) = nested(&vertices, &triangles, &neighbours) {
+            return Err(SurfaceError::Nested([x[0], x[1], x[2]]));
         }
         let (mut normals, mut at_vertices) = (Vec::new(), vec![Vector3::zeros(); vertices.len()]);
         for triangle in &triangles {

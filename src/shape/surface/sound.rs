@@ -1,6 +1,6 @@
 //! Which surfaces bound a solid: closed ones, turned one way, that do not cross themselves.
 
-use super::tree::Tree;
+use super::tree::{Bounds, Tree};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
@@ -43,6 +43,11 @@ pub enum SurfaceError {
     /// Two triangles that cross.
     #[error("a surface that crosses itself at {0:?}")]
     Crossing([f64; 3]),
+    /// A part of the surface that lies in another one, or a cavity that does not.
+    #[error(
+        "a surface whose parts are not inside and outside by turns: the part at {0:?} should face the other way, or is in the way"
+    )]
+    Nested([f64; 3]),
     /// No volume.
     #[error("a surface that encloses nothing")]
     Flat,
@@ -104,6 +109,49 @@ pub fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) 
         }
     }
     None
+}
+
+/// How far the windings of the other parts around a part may be from what they should be: ½ where parts touch.
+const TOUCHING: f64 = 0.75;
+
+/// A place on a part of the surface that bounds no solid together with the others. One that faces outwards lies in none of them, or in as
+/// many as there are cavities around it; a cavity lies in one more.
+pub fn nested(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], neighbours: &[[u32; 3]]) -> Option<Vector3<f64>> {
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    let mut seen = vec![false; triangles.len()];
+    for first in 0..triangles.len() {
+        let (mut part, mut next) = (Vec::new(), vec![first]);
+        while let Some(i) = next.pop() {
+            if !std::mem::replace(&mut seen[i], true) {
+                part.push(i);
+                next.extend(neighbours[i].iter().map(|&k| k as usize));
+            }
+        }
+        parts.extend((!part.is_empty()).then_some(part));
+    }
+    if parts.len() == 1 {
+        return None;
+    }
+    let corners = |i: usize| triangles[i].map(|corner| vertices[corner as usize]);
+    let bounds: Vec<Bounds> = parts.iter().map(|part| Bounds::of(part.iter().flat_map(|&i| corners(i)))).collect();
+    parts.iter().enumerate().find_map(|(own, part)| {
+        let x = corners(part[0])[0];
+        let volume: f64 =
+            part.iter().map(|&i| corners(i).map(|corner| corner - x)).map(|[a, b, c]| a.dot(&b.cross(&c))).sum();
+        let others = (0..parts.len()).filter(|&other| other != own && bounds[other].squared_distance(&x) == 0.0);
+        let winding: f64 = others.flat_map(|other| &parts[other]).map(|&i| solid_angle(corners(i), &x)).sum();
+        let around = winding / (4.0 * std::f64::consts::PI);
+        let expected = if volume < 0.0 { 1.0 } else { 0.0 };
+        ((around - expected).abs() > TOUCHING).then_some(x)
+    })
+}
+
+/// The solid angle of a triangle, > 0 from inside (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
+fn solid_angle(corners: [Vector3<f64>; 3], x: &Vector3<f64>) -> f64 {
+    let [a, b, c] = corners.map(|corner| corner - x);
+    let [p, q, r] = [a.norm(), b.norm(), c.norm()];
+    let below = p * q * r + a.dot(&b) * r + b.dot(&c) * p + c.dot(&a) * q;
+    2.0 * a.dot(&b.cross(&c)).atan2(below)
 }
 
 /// Where an edge of `one` goes through `other`, neither having a vertex of the other's.

@@ -24,7 +24,7 @@ impl Bounds {
     }
 
     /// Squared distance of a point, 0 inside.
-    fn squared_distance(&self, x: &Vector3<f64>) -> f64 {
+    pub fn squared_distance(&self, x: &Vector3<f64>) -> f64 {
         (x - x.sup(&self.0).inf(&self.1)).norm_squared()
     }
 }

@@ -30,6 +30,12 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         #[source]
         source: E,
     },
+    /// Somebody asked for an end.
+    #[error("it was stopped before iteration {iteration}")]
+    Stopped {
+        /// The iteration.
+        iteration: usize,
+    },
     /// NaN or infinity.
     #[error("{what} is not finite at iteration {iteration} (0 is the initial guess)")]
     NotFinite {

@@ -101,6 +101,9 @@ fn iterate<E: std::error::Error + 'static>(
             return Ok(Convergence::Tolerance);
         }
         let iteration = history.iterations.len() + 1;
+        if problem.is_stopped() {
+            return Err(NewtonFailure::Stopped { iteration });
+        }
         if iteration > settings.max_iterations {
             return Err(NewtonFailure::MaxIterations { allowed: settings.max_iterations, residual, target });
         }

@@ -86,7 +86,7 @@ pub trait Preconditioner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// Multigrid for large bodies, and for those that may flow, without inertia or in steps of Courant numbers above 10, else the diagonal
+    /// Multigrid for large bodies, and for those that may flow or hardly change their volume, without inertia or in steps of Courant numbers above 10, else the diagonal
     /// blocks; for small elastic ones of those in 1D and 2D the direct solve, where the program has it.
     #[default]
     Automatic,
@@ -114,6 +114,8 @@ pub struct Preconditioned {
     /// Whether a law has plastic strain: near a limit load, multigrid takes a fourth to a sixtieth of the iterations of diagonal blocks
     /// (`docs/src/tutorial/plasticity.md`).
     pub flows: bool,
+    /// Whether a body changes its volume so little that diagonal blocks find no step (`docs/src/choosing.md`).
+    pub isochoric: bool,
 }
 
 /// Particles in 1D, 2D and 3D from which on multigrid was the faster one; and with splines, which diagonal blocks serve better: in 3D it is
@@ -142,13 +144,15 @@ impl Preconditioning {
     /// let long = Preconditioned { long: true, ..small };
     /// assert_eq!(Automatic.chosen::<3>(long).1, "faster for so many particles and these functions");
     /// assert_eq!(Automatic.chosen::<3>(Preconditioned { flows: true, ..long }), (Multigrid, "the body may flow"));
+    /// let isochoric = Preconditioned { isochoric: true, ..long };
+    /// assert_eq!(Automatic.chosen::<3>(isochoric), (Multigrid, "a body hardly changes its volume"));
     /// let on_path = Preconditioned { on_path: true, ..long };
     /// assert_eq!(Automatic.chosen::<3>(on_path), (Multigrid, "restarts lose what few iterations keep"));
     /// // What is asked for is used.
     /// assert_eq!(Multigrid.chosen::<3>(small), (Multigrid, "it was asked for"));
     /// ```
     pub fn chosen<const D: usize>(self, of: Preconditioned) -> (Self, &'static str) {
-        let Preconditioned { particles, splines, long, on_path, flows } = of;
+        let Preconditioned { particles, splines, long, on_path, flows, isochoric } = of;
         let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
         let axes = (D - 1).min(2);
         match self {
@@ -160,6 +164,7 @@ impl Preconditioning {
             Self::Automatic if long && Self::HAS_DIRECT && particles <= few[axes] => {
                 (Self::Direct, "few particles, and inertia does not dominate")
             }
+            Self::Automatic if long && isochoric => (Self::Multigrid, "a body hardly changes its volume"),
             Self::Automatic if long && particles >= many[axes] => {
                 (Self::Multigrid, "many particles, and inertia does not dominate")
             }

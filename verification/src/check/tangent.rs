@@ -117,8 +117,14 @@ pub(crate) fn measure<const D: usize, L: Law>(
     let mut measured = Vec::new();
     // Of the last whole term, whose parts follow it.
     let mut of_term = [0.0; DIRECTIONS];
-    for piece in equilibrium.terms.pieces() {
+    // Of each diagonal block: the parts that it is the sum of may cancel, and what is rounded is of their size.
+    let mut sizes = vec![0.0; dphi.len()];
+    let pieces = equilibrium.terms.pieces();
+    for &piece in &pieces {
         let frozen = equilibrium.tangent_of(piece, dphi)?;
+        if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
+            sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
+        }
         let single = equilibrium.single_tangent(Some(piece), dphi)?;
         let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
         let mut products = Vec::new();
@@ -163,11 +169,11 @@ pub(crate) fn measure<const D: usize, L: Law>(
     }
     measured.push(Measured::new("whole product", worst, bound));
     let columns = columns(equilibrium, &tangent, dphi.len());
-    measured.push(Measured::new("diagonal blocks", apart(&tangent.diagonal_blocks(), &columns), bound));
+    measured.push(Measured::new("diagonal blocks", apart(&tangent.diagonal_blocks(), &columns, &sizes), bound));
     if let Some(single) = &single {
         measured.push(Measured::new(format!("whole product{IN_SINGLE}"), worst_in_single, Bound::AtMost(SINGLE)));
         let blocks: Vec<_> = single.diagonal_blocks().iter().map(|block| block * single.scale()).collect();
-        let value = apart(&free_rows(equilibrium, blocks), &columns);
+        let value = apart(&free_rows(equilibrium, blocks), &columns, &sizes);
         measured.push(Measured::new(format!("diagonal blocks{IN_SINGLE}"), value, Bound::AtMost(SINGLE)));
     }
 
@@ -246,11 +252,11 @@ fn columns<const D: usize, L>(
     columns
 }
 
-/// The largest relative difference of blocks from their columns.
-fn apart<const D: usize>(blocks: &[Tensor<f64, D>], columns: &[(usize, usize, Vector<f64, D>)]) -> f64 {
+/// The largest difference of blocks from their columns, relative to their sizes.
+fn apart<const D: usize>(blocks: &[Tensor<f64, D>], columns: &[(usize, usize, Vector<f64, D>)], sizes: &[f64]) -> f64 {
     columns.iter().fold(0.0, |value, (node, k, column)| {
         let difference = (column - blocks[*node].column(*k)).norm();
-        worse(value, if difference == 0.0 { 0.0 } else { difference / blocks[*node].norm() })
+        worse(value, if difference == 0.0 { 0.0 } else { difference / sizes[*node] })
     })
 }
 

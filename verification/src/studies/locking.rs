@@ -42,8 +42,6 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
         format!("bodies.0.material.neo_hookean={{\"young\":{},\"poisson\":{poisson}}}", 0.845 * (1.0 + poisson)),
         format!("bodies.0.volumetric=\"{volumetric}\""),
         "output={}".to_owned(),
-        // Diagonal blocks find no step from ν = 0.4999 on.
-        format!("solver.krylov.preconditioner=\"{}\"", if poisson > 0.499 { "multigrid" } else { "automatic" }),
     ];
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     let mut simulation: Simulation<2> = shipped::scene("cook", &overrides)?.build(&shipped::folder())?;

@@ -104,6 +104,7 @@ studies!(
     compaction,
     column,
     locking,
+    expansion,
     robust,
     rebound,
     tradeoff,

@@ -86,6 +86,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         "f32: the product in single precision; in 1D, where its numbers may cancel, that of a part is relative to its \
          term.",
     );
+    report.note("Diagonal blocks: relative to the sum of the sizes of their parts, which cancel where J is large.");
     report.note(
         "eps = 0.3, so that the lumped and the consistent mass both act; a wall holds one component of some nodes.",
     );

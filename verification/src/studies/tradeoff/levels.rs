@@ -41,7 +41,7 @@ fn asked(effort: Effort) -> Vec<Accuracy> {
     match effort {
         Effort::Short => rows.iter().filter(|level| level.name.is_some()).map(named).collect(),
         Effort::Full => {
-            let between = rows.windows(2).map(|pair| Accuracy::Error((pair[0].error * pair[1].error).sqrt()));
+            let between = rows.windows(2).filter(|pair| pair[0].error.is_finite()).map(|pair| Accuracy::Error((pair[0].error * pair[1].error).sqrt()));
             let mut all: Vec<_> = rows.iter().map(named).chain(between).collect();
             let error = |one: &Accuracy| one.level().map_or(0.0, |level| level.error);
             all.sort_by(|a, b| error(b).total_cmp(&error(a)));
@@ -71,7 +71,7 @@ pub(super) fn report(all: &[Measured], effort: Effort) -> Report {
         if effort == Effort::Full {
             for accuracy in asked(effort) {
                 let (Some(point), Some(level)) = (of(accuracy), accuracy.level()) else { continue };
-                let bound = if measured.smooth { Bound::AtMost(MET) } else { Bound::Reported };
+                let bound = if measured.smooth && level.error.is_finite() { Bound::AtMost(MET) } else { Bound::Reported };
                 report.push(&["error over the one aimed for", &accuracy.to_string(), measured.problem], point.error / level.error, bound);
             }
         }

@@ -1,0 +1,165 @@
+//! A thick cylinder of metal that is all but rigid until it flows, widened from a = 10 to 85 mm in plane strain: a quarter of it between planes
+//! of symmetry, with linear functions and the mean dilatation of cells, on a grid that is kept.
+//!
+//! G = 3.8 GPa, K = 40 GPa, σ_Y = 0.5 MPa, a₀ = 10 mm, b₀ = 20 mm (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). Where volumes stay
+//! as they are, r² = R² + a² − a₀², and the stress at the hole falls all along the path:
+//!
+//! ```text
+//! σ_rr(a) = σ_Y/√3 ln [a²/(b₀² + a² − a₀²)]
+//! ```
+//!
+//! No pressure could be given that falls. So the nodes in the hole are moved, as what fills it would if it kept its volume but for the a² − a₀² that
+//! are pumped in at the axis; and the stress is what makes their forces work: −σ_rr dV = Σ f·dx with V = π a²/4.
+
+use super::{Effort, Outcome, StudyError};
+use crate::report::{Bound, Report};
+use crate::shipped;
+use crate::table::Table;
+use bfree::mechanics::loads::{Curve, Motion, Prescribed, Selection};
+use bfree::shape::{Ball, Shape};
+use bfree::simulation::{Simulation, StepReport};
+use bfree::tensor::Vector;
+use std::f64::consts::PI;
+
+/// What the study shows.
+pub(super) const ABOUT: &str = "a rigid-plastic cylinder whose hole is widened from 10 to 85 mm, against the formula of its stress";
+
+/// a at the start and the end, b at the start, and σ_Y.
+const INNER: [f64; 2] = [10.0, 85.0];
+const OUTER: f64 = 20.0;
+const YIELD: f64 = 0.5;
+
+/// a at which the short effort ends.
+const DOUBLED: f64 = 2.0 * INNER[0];
+
+/// Five cells across the wall.
+const SPACING: f64 = 2.0;
+
+/// Steps in which a grows by the same factor each.
+const STEPS: u32 = 100;
+
+/// Relative error of the stress.
+const BOUND: f64 = 0.01;
+
+/// Every so many steps a row.
+const ROWS: u64 = 5;
+
+/// a at the time t, 0 to 1.
+fn inner(t: f64) -> f64 {
+    INNER[0] * (INNER[1] / INNER[0]).powf(t)
+}
+
+/// Where what was at X is when the hole has the radius a.
+fn moved(x: &Vector<f64, 2>, a: f64) -> Vector<f64, 2> {
+    x * (1.0 + (a * a - INNER[0] * INNER[0]) / x.norm_squared()).sqrt()
+}
+
+/// σ_rr at the hole of radius a.
+fn known(a: f64) -> f64 {
+    YIELD / 3.0_f64.sqrt() * (a * a / (OUTER * OUTER + a * a - INNER[0] * INNER[0])).ln()
+}
+
+/// The cylinder on a grid of spacing `h`, and the nodes that are moved; the conditions that move them are the last ones.
+fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> {
+    let box_side = (INNER[1] * 1.1 / h).ceil() * h;
+    let body = format!(
+        r#"bodies.0.shape={{"intersection":[{{"difference":{{"of":{{"ball":{{"center":[0,0],"radius":{OUTER}}}}},"minus":{{"ball":{{"center":[0,0],"radius":{}}}}}}}}},{{"box":{{"min":[0,0],"max":[{OUTER},{OUTER}]}}}}]}}"#,
+        INNER[0]
+    );
+    let (bulk, shear) = (40e3, 3.8e3);
+    let overrides = [
+        format!(r#"grid={{"size":[{box_side},{box_side}],"spacing":{h},"renewed":"never"}}"#),
+        r#"approximation="linear""#.to_owned(),
+        format!(r#"time={{"step":{},"end":1,"inertia":"none","initial_guess":"last_step"}}"#, 1.0 / f64::from(STEPS)),
+        body,
+        format!(
+            r#"bodies.0.material={{"von_mises":{{"elastic":{{"bulk":{bulk},"shear":{shear}}},"yield_stress":{{"initial":{YIELD}}}}}}}"#
+        ),
+        r#"bodies.0.volumetric="mean_dilatation""#.to_owned(),
+        "pressures=[]".to_owned(),
+        // It would hold second differences of the whole motion, which are large here.
+        "ghost_stiffness=0".to_owned(),
+        r#"solver={"newton":{"tolerance":1e-6,"max_iterations":60}}"#.to_owned(),
+        "output={}".to_owned(),
+    ];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let mut simulation: Simulation<2> = shipped::scene("tube", &overrides)?.build(&shipped::folder())?;
+    let side = (INNER[0] / h) as u32;
+    let all = (0..=side).flat_map(|i| (0..=side).map(move |k| Vector::from([f64::from(i) * h, f64::from(k) * h])));
+    // Linear functions reach no farther than a cell.
+    let nodes: Vec<_> = all.filter(|x| (INNER[0] - 1.5 * h..=INNER[0]).contains(&x.norm())).collect();
+    for x in &nodes {
+        let curve = |i: usize| {
+            let times = (0..=STEPS).map(|step| f64::from(step) / f64::from(STEPS));
+            Curve::new(times.map(|t| [t, moved(x, inner(t))[i] - x[i]]).collect())
+        };
+        simulation.loads.prescribed.push(Prescribed {
+            name: "in the hole".into(),
+            on: Selection::Region(Shape::from(Ball { center: *x, radius: 0.1 * h })),
+            motion: [Some(Motion::Displacement(curve(0)?)), Some(Motion::Displacement(curve(1)?))],
+        });
+    }
+    Ok((simulation, nodes))
+}
+
+/// σ_rr by the work of the forces on the nodes that are moved.
+fn stress(step: &StepReport<2>, nodes: &[Vector<f64, 2>], a: f64) -> f64 {
+    let forces = step.reactions.iter().rev().zip(nodes.iter().rev());
+    // dx/da = a x/|x|²
+    let power = forces.map(|(reaction, node)| {
+        let x = moved(node, a);
+        reaction.force.dot(&x) * a / x.norm_squared()
+    });
+    -power.sum::<f64>() / (0.5 * PI * a)
+}
+
+/// Runs the study.
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+    let end = if *effort == Effort::Full { INNER[1] - 1e-6 } else { DOUBLED };
+    let mut table = Table::new(
+        "a cylinder that is widened: stress at the hole, MPa",
+        ["inner radius", "computed", "formula", "error", "Newton", "Krylov"],
+    );
+    let (mut simulation, nodes) = cylinder(SPACING)?;
+    // The largest error while a is at most doubled, and how far all errors are within the bound.
+    let (mut doubled, mut reached) = (0.0_f64, INNER[0]);
+    let (mut newton, mut krylov) = (0, 0);
+    while inner(simulation.clock.time()) < end {
+        let Ok(step) = simulation.advance() else { break };
+        newton += step.newton.history.iterations.len();
+        krylov += step.newton.history.counts.krylov_iterations;
+        let a = inner(simulation.clock.time());
+        let (computed, known) = (stress(&step, &nodes, a), known(a));
+        let error = computed / known - 1.0;
+        if a <= DOUBLED {
+            doubled = doubled.max(error.abs());
+        }
+        let over = error.abs() > BOUND;
+        if over || simulation.clock.steps() % ROWS == 0 {
+            table.push([
+                format!("{a:.2}"),
+                format!("{computed:.5}"),
+                format!("{known:.5}"),
+                format!("{:+.2} %", 100.0 * error),
+                newton.to_string(),
+                krylov.to_string(),
+            ]);
+        }
+        if over {
+            break;
+        }
+        reached = a;
+    }
+    let mut report = Report::new("a cylinder that is widened: how far its stress is that of the formula", &["what"]);
+    report.push(&["error until the inner radius is doubled"], doubled, Bound::AtMost(BOUND));
+    if *effort == Effort::Full {
+        report.push(&[REACHED], reached, Bound::AtLeast(end));
+    }
+    report.note(NOTE);
+    Ok(Outcome { reports: vec![report], tables: vec![table], ..Outcome::default() })
+}
+
+const REACHED: &str = "inner radius to which the error is within 1 %";
+
+const NOTE: &str = "A cell of the reference configuration becomes a/a₀ times as long and as thin: cut from the circle that it follows, its chord leaves \
+     (a/a₀)² h/(8 a₀) of its thickness, which is what linear functions miss.";
