@@ -64,7 +64,7 @@ pub(super) struct Piece<const D: usize> {
 
 /// What a piece is.
 pub(super) enum Extent<const D: usize> {
-    /// A box, by its edges.
+    /// A box, by its edges, of either sign.
     Box(Vector<f64, D>),
     /// A simplex that the surface may bound.
     Simplex(Simplex<D>),
@@ -244,7 +244,8 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Hands over the convex pieces that a box and the solid have in common, and the planes that cut them; `region` cuts them once more.
+    /// Hands over the convex pieces that a box and the solid have in common, and the planes that cut them; `region` cuts them once more. The
+    /// box may lie below `lower`, by edges < 0.
     pub(super) fn pieces(
         &self,
         region: Option<&Self>,
@@ -260,7 +261,7 @@ impl<const D: usize> Shape<D> {
             return;
         }
         if distance <= -radius {
-            visit(Piece { volume: edges.product(), centroid: center, extent: Extent::Box(*edges) }, None);
+            visit(Piece { volume: edges.product().abs(), centroid: center, extent: Extent::Box(*edges) }, None);
             return;
         }
         let (mut planes, mut departure) = (Vec::new(), 0.0_f64);
@@ -279,7 +280,7 @@ impl<const D: usize> Shape<D> {
             }
         }
         if (departure > flat * spacing || distinct.len() > MANY) && radius > flat * spacing {
-            let k = edges.imax();
+            let k = edges.iamax();
             let mut half = *edges;
             half[k] *= 0.5;
             let mut upper = *lower;

@@ -18,7 +18,7 @@ pub enum Layout {
 }
 
 /// Points along an axis and their weights, both in cells.
-type Points = Vec<(f64, f64)>;
+pub(super) type Points = Vec<(f64, f64)>;
 
 impl Layout {
     /// The points of a cell.

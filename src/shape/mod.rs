@@ -8,6 +8,7 @@ mod cut;
 mod fill;
 mod half_space;
 mod layout;
+mod moments;
 mod pixels;
 mod polygon;
 mod quadrature;

@@ -6,13 +6,12 @@
 //! with these moments, at no more points than there are products, exist (Tchakaloff's theorem; Davis, Math. Comput. 21, 1967), and
 //! non-negative least squares finds them. Surfaces have D points of the same centroid and the same second moments in each box.
 
-use super::cut::{End, Extent, Facet, Piece, around};
+use super::cut::{End, Facet, Piece, around};
 use super::fill::THIN;
+use super::moments::{few, in_simplex};
 use super::{EDGE, Layout, Seed, Shape};
 use crate::grid::indices;
-use crate::solver::NonnegativeLeastSquares;
 use crate::tensor::{Tensor, Vector};
-use nalgebra::DVector;
 
 /// How far a surface may depart from the planes that stand for it, relative to the spacing, where particles integrate. What lies between is
 /// integrated too: planes of boxes beside each other do not meet, by the square of this.
@@ -23,12 +22,6 @@ const OF_SURFACES: [f64; 3] = [3e-5, 3e-5, 3e-4];
 
 /// Points along an axis of a piece of surface, and across the gap below it.
 const IN_GAP: u32 = 3;
-
-/// What is left of moments by round-off, relative to the volume.
-const ROUND_OFF: f64 = 1e-14;
-
-/// Points that are tried for each of the polynomials: more where fewer have not the moments.
-const TRIED: [usize; 4] = [4, 16, 64, 256];
 
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate over what lies in the box every product of polynomials of this degree along each axis; `None`
@@ -43,11 +36,7 @@ impl<const D: usize> Shape<D> {
         if !self.has_planes(lower, edges) {
             return None;
         }
-        let (mut pieces, mut gaps) = (Vec::new(), Vec::new());
-        self.pieces(None, lower, edges, spacing, FINE, &mut |piece, cut| {
-            self.ends(&piece, cut, spacing).iter().for_each(|end| self.add_gap(end, spacing, &mut gaps));
-            pieces.push(piece);
-        });
+        let (pieces, gaps) = self.pieces_and_gaps(lower, edges, spacing);
         let sum = |volume: f64, piece: &Piece<D>| volume + piece.volume;
         let (flat, gap) = (pieces.iter().fold(0.0, sum), gaps.iter().map(|gap| gap.volume).sum::<f64>());
         if flat + gap >= THIN * edges.product() {
@@ -63,14 +52,41 @@ impl<const D: usize> Shape<D> {
         )
     }
 
+    /// The pieces of what lies in a box, and points of the gaps between their planes and the surface. The box is seen from the corner that
+    /// is deepest in the solid, so that a mirrored solid has mirrored pieces.
+    fn pieces_and_gaps(
+        &self,
+        lower: &Vector<f64, D>,
+        edges: &Vector<f64, D>,
+        spacing: f64,
+    ) -> (Vec<Piece<D>>, Vec<Seed<D>>) {
+        let rise = |i: [u64; D]| {
+            let at: Vector<f64, D> = Vector::from_fn(|k, _| i[k] as f64);
+            at.add_scalar(-0.5) * self.signed_distance(&(lower + edges.component_mul(&at)))
+        };
+        let rise: Vector<f64, D> = indices([2; D]).map(rise).sum();
+        let (mut corner, mut edges) = (*lower, *edges);
+        for k in (0..D).filter(|&k| rise[k] < -EDGE * spacing) {
+            corner[k] += edges[k];
+            edges[k] = -edges[k];
+        }
+        let rule = Layout::Gauss.points(IN_GAP);
+        let (mut pieces, mut gaps) = (Vec::new(), Vec::new());
+        self.pieces(None, &corner, &edges, spacing, FINE, &mut |piece, cut| {
+            self.ends(&piece, cut, spacing).iter().for_each(|end| self.add_gap(end, &rule, spacing, &mut gaps));
+            pieces.push(piece);
+        });
+        (pieces, gaps)
+    }
+
     /// Points between a plane and the surface that it stands for, their volumes < 0 where the surface lies below it.
-    fn add_gap(&self, end: &End<D>, spacing: f64, points: &mut Vec<Seed<D>>) {
+    fn add_gap(&self, end: &End<D>, rule: &[(f64, f64)], spacing: f64, points: &mut Vec<Seed<D>>) {
         if end.departure <= EDGE * spacing {
             return;
         }
-        for foot in in_simplex(&end.corners, end.area, IN_GAP) {
+        for foot in in_simplex(&end.corners, end.area, rule) {
             let height = self.height(&foot.position, end);
-            for (u, weight) in Layout::Gauss.points(IN_GAP) {
+            for (u, weight) in rule {
                 let position = foot.position + end.outward * (u * height);
                 points.push(Seed { position, volume: foot.volume * weight * height });
             }
@@ -127,155 +143,6 @@ impl<const D: usize> Shape<D> {
     }
 }
 
-impl<const D: usize> Piece<D> {
-    /// Gauss's points in it, for products of polynomials of this degree.
-    fn points(&self, degree: u32) -> Vec<Seed<D>> {
-        match &self.extent {
-            Extent::Box(edges) => {
-                let along = Layout::Gauss.points(degree / 2 + 1);
-                let point = |i: [u64; D]| {
-                    let at = i.map(|i| along[i as usize]);
-                    let position = Vector::from_fn(|k, _| self.centroid[k] + (at[k].0 - 0.5) * edges[k]);
-                    Seed { position, volume: at.iter().fold(self.volume, |volume, (_, weight)| volume * weight) }
-                };
-                indices([along.len() as u64; D]).map(point).collect()
-            }
-            // Together they are of degree D p, and the map from a cube has D − 1 more along one axis.
-            Extent::Simplex(simplex) => in_simplex(&simplex[..=D], self.volume, (D as u32 * (degree + 1)).div_ceil(2)),
-        }
-    }
-
-    /// Its place for each of a cube: equal volumes have equal volumes.
-    fn place(&self, u: [f64; D]) -> Vector<f64, D> {
-        match &self.extent {
-            Extent::Box(edges) => Vector::from_fn(|k, _| self.centroid[k] + (u[k] - 0.5) * edges[k]),
-            Extent::Simplex(simplex) => (0..D)
-                .rev()
-                .fold(simplex[D], |inner, k| simplex[k] + (inner - simplex[k]) * u[k].powf(((D - k) as f64).recip())),
-        }
-    }
-
-    /// The box around it.
-    fn bounds(&self) -> [Vector<f64, D>; 2] {
-        match &self.extent {
-            Extent::Box(edges) => [self.centroid - edges * 0.5, self.centroid + edges * 0.5],
-            Extent::Simplex(simplex) => {
-                [Vector::inf, Vector::sup].map(|bound: fn(&Vector<f64, D>, &Vector<f64, D>) -> _| {
-                    simplex[1..=D].iter().fold(simplex[0], |all, corner| bound(&all, corner))
-                })
-            }
-        }
-    }
-}
-
-/// Gauss's points, n along each of d axes, of the simplex with d + 1 corners and this measure.
-fn in_simplex<const D: usize>(corners: &[Vector<f64, D>], measure: f64, n: u32) -> Vec<Seed<D>> {
-    let along = Layout::Gauss.points(n);
-    let Some((last, others)) = corners.split_last() else { return Vec::new() };
-    // x = x₀ + u₁ (x₁ − x₀ + u₂ (x₂ − x₁ + …)), of measure d! V Π u_k^(d−k)
-    let start = vec![Seed { position: *last, volume: measure }];
-    others.iter().rev().enumerate().fold(start, |inner, (before, corner)| {
-        let spread = |point: &Seed<D>, (u, weight): (f64, f64)| Seed {
-            position: corner + (point.position - corner) * u,
-            volume: point.volume * weight * u.powi(before as i32) * (before + 1) as f64,
-        };
-        inner.iter().flat_map(|point| along.iter().map(move |&at| spread(point, at))).collect()
-    })
-}
-
-/// Products of Legendre's polynomials on the box around some points.
-struct Legendre<const D: usize> {
-    /// Its middle, and half of its edges.
-    middle: Vector<f64, D>,
-    half: Vector<f64, D>,
-    degree: u32,
-}
-
-impl<const D: usize> Legendre<D> {
-    fn new(around: &[Piece<D>], degree: u32) -> Self {
-        let nothing: [Vector<f64, D>; 2] = [f64::INFINITY, f64::NEG_INFINITY].map(Vector::repeat);
-        let [low, high] = around
-            .iter()
-            .map(Piece::bounds)
-            .fold(nothing, |[low, high], [lower, upper]| [low.inf(&lower), high.sup(&upper)]);
-        Self { middle: (low + high) * 0.5, half: (high - low) * 0.5, degree }
-    }
-
-    fn count(&self) -> usize {
-        (self.degree as usize + 1).pow(D as u32)
-    }
-
-    /// What they are at a place.
-    fn at(&self, x: &Vector<f64, D>, values: &mut Vec<f64>) {
-        values.clear();
-        values.push(1.0);
-        for k in 0..D {
-            let s = if self.half[k] > 0.0 { (x[k] - self.middle[k]) / self.half[k] } else { 0.0 };
-            let below = values.len();
-            let (mut before, mut value) = (0.0, 1.0);
-            for n in (0..self.degree).map(f64::from) {
-                // (n + 1) P_{n+1} = (2n + 1) s P_n − n P_{n−1}
-                (before, value) = (value, ((2.0 * n + 1.0) * s * value - n * before) / (n + 1.0));
-                (0..below).for_each(|i| values.push(values[i] * value));
-            }
-        }
-    }
-
-    /// Adds V times what they are at these points.
-    fn add_moments(&self, points: &[Seed<D>], moments: &mut DVector<f64>) {
-        let mut values = Vec::new();
-        for point in points {
-            self.at(&point.position, &mut values);
-            moments.iter_mut().zip(&values).for_each(|(moment, value)| *moment += point.volume * value);
-        }
-    }
-
-    /// ∫ of them over the pieces and the gaps.
-    fn moments(&self, pieces: &[Piece<D>], gaps: &[Seed<D>]) -> DVector<f64> {
-        let mut moments = DVector::zeros(self.count());
-        pieces.iter().for_each(|piece| self.add_moments(&piece.points(self.degree), &mut moments));
-        self.add_moments(gaps, &mut moments);
-        moments
-    }
-}
-
-/// As many points in the pieces as there are products of polynomials, at most, with volumes > 0 that have the moments of all and of the gaps.
-fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree: u32) -> Vec<Seed<D>> {
-    if let ([whole @ Piece { extent: Extent::Box(_), .. }], []) = (pieces, gaps) {
-        return whole.points(degree);
-    }
-    let legendre = Legendre::new(pieces, degree);
-    let moments = legendre.moments(pieces, gaps);
-    let volume = moments[0];
-    let mut problem = NonnegativeLeastSquares::new(moments);
-    // How much lies in the pieces up to each.
-    let sum = |sum: &mut f64, piece: &Piece<D>| {
-        *sum += piece.volume;
-        Some(*sum)
-    };
-    let up_to: Vec<f64> = pieces.iter().scan(0.0, sum).collect();
-    // Weyl's sequence fills the pieces evenly.
-    let place = |k: usize| {
-        let u = |root: f64| (root.sqrt() * (k + 1) as f64).fract();
-        let within = u(2.0) * up_to.last().copied().unwrap_or(0.0);
-        let piece = pieces.get(up_to.partition_point(|&sum| sum <= within)).or(pieces.last())?;
-        Some(piece.place(std::array::from_fn(|k| u([3.0, 5.0, 7.0][k]))))
-    };
-    let (mut values, mut points) = (Vec::new(), Vec::new());
-    for tries in TRIED {
-        for k in points.len()..tries * legendre.count() {
-            let Some(point) = place(k) else { return Vec::new() };
-            legendre.at(&point, &mut values);
-            problem.offer(DVector::from_column_slice(&values));
-            points.push(point);
-        }
-        if problem.solve(ROUND_OFF * volume) <= ROUND_OFF * volume {
-            break;
-        }
-    }
-    problem.solution().map(|(k, volume)| Seed { position: points[k], volume }).collect()
-}
-
 impl<const D: usize> Facet<D> {
     /// D points with equal parts of its area, which they have centroid, spread and turn in common with: on a flat piece exact for polynomials
     /// of second degree. They lie in it where it is convex.
@@ -319,6 +186,7 @@ impl<const D: usize> Facet<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shape::moments::Legendre;
     use crate::shape::{Ball, Block, Cone, Difference, Similar, rotation};
 
     /// Volumes stay positive, and no moment changes, in any cell of which there is more than a sliver.
@@ -326,11 +194,7 @@ mod tests {
         let edges = Vector::repeat((boxes as f64).recip());
         for i in indices([boxes; D]) {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
-            let (mut all, mut gaps) = (Vec::new(), Vec::new());
-            shape.pieces(None, &lower, &edges, edges[0], FINE, &mut |piece, cut| {
-                shape.ends(&piece, cut, edges[0]).iter().for_each(|end| shape.add_gap(end, edges[0], &mut gaps));
-                all.push(piece);
-            });
+            let (all, gaps) = shape.pieces_and_gaps(&lower, &edges, edges[0]);
             let few = shape.quadrature(&lower, &edges, edges[0], degree).unwrap();
             let volume: f64 = few.iter().map(|point| point.volume).sum();
             if volume < THIN * edges.product() {
@@ -360,6 +224,28 @@ mod tests {
         let cylinder = Cone::new(ends, [0.2, 0.2]).unwrap();
         for shape in [ball, holed.into(), cylinder.into(), turned()] {
             has_moments_of_all(&shape, 3, 4);
+        }
+    }
+
+    /// In every direction: what is symmetric stays so under loads.
+    #[test]
+    fn mirrored_solids_have_mirrored_points() {
+        let edges = Vector::repeat(1.0);
+        let center = Vector::from([0.1, -0.2, 0.3]);
+        let points = |mirror: [u64; 3]| {
+            let seen = |x: &Vector<f64, 3>| Vector::from_fn(|k, _| if mirror[k] > 0 { 1.0 - x[k] } else { x[k] });
+            let ball: Shape<3> = Ball { center: seen(&center), radius: 0.9 }.into();
+            let points = ball.quadrature(&Vector::zeros(), &edges, 1.0, 3).unwrap();
+            points.into_iter().map(|point| (seen(&point.position), point.volume)).collect::<Vec<_>>()
+        };
+        let first = points([0; 3]);
+        assert!(first.len() > 32);
+        for mirror in indices([2; 3]) {
+            let mirrored = points(mirror);
+            assert_eq!(mirrored.len(), first.len());
+            for ((x, volume), (other, same)) in first.iter().zip(&mirrored) {
+                assert!((x - other).norm() < 1e-12 && (volume - same).abs() < 1e-12, "{mirror:?}: {x} {other}");
+            }
         }
     }
 

@@ -2,12 +2,15 @@
 
 use nalgebra::DVector;
 
-/// What is left of a column by those before it, relative to its size, if it is independent of them.
+/// What is left of a column of length 1 by those before it, if it is independent of them.
 const INDEPENDENT: f64 = 1e-8;
 
 /// The problem, and its solution over the columns that were offered so far.
 pub(crate) struct NonnegativeLeastSquares {
+    /// Of length 1: the one that is taken next is the one that by itself leaves least, whatever its size was.
     columns: Vec<DVector<f64>>,
+    /// How long they were.
+    sizes: Vec<f64>,
     /// b − A x
     rest: DVector<f64>,
     /// The columns with x > 0.
@@ -21,17 +24,27 @@ pub(crate) struct NonnegativeLeastSquares {
 impl NonnegativeLeastSquares {
     /// No column yet: x = 0.
     pub(crate) fn new(b: DVector<f64>) -> Self {
-        Self { columns: Vec::new(), rest: b, free: Vec::new(), x: Vec::new(), q: Vec::new(), r: Vec::new() }
+        Self {
+            columns: Vec::new(),
+            sizes: Vec::new(),
+            rest: b,
+            free: Vec::new(),
+            x: Vec::new(),
+            q: Vec::new(),
+            r: Vec::new(),
+        }
     }
 
-    /// One more column of A.
+    /// One more column of A, not 0.
     pub(crate) fn offer(&mut self, column: DVector<f64>) {
-        self.columns.push(column);
+        let size = column.norm();
+        self.columns.push(column / size);
+        self.sizes.push(size);
     }
 
     /// The columns with x > 0, in the order they were offered, and their x.
     pub(crate) fn solution(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.free.iter().copied().zip(self.x.iter().copied())
+        self.free.iter().zip(&self.x).map(|(&column, x)| (column, x / self.sizes[column]))
     }
 
     /// Solves with all columns that were offered, from the last solution, until |A x − b| ≤ `least`; returns what it is.
@@ -62,7 +75,6 @@ impl NonnegativeLeastSquares {
     /// Adds a column to those with x > 0; `false` if it depends on them.
     fn free_one(&mut self, column: usize) -> bool {
         let mut direction = self.columns[column].clone();
-        let size = direction.norm();
         let mut above = vec![0.0; self.q.len()];
         // Gram and Schmidt, twice is enough.
         for _ in 0..2 {
@@ -73,7 +85,7 @@ impl NonnegativeLeastSquares {
             }
         }
         let left = direction.norm();
-        if left <= INDEPENDENT * size {
+        if left <= INDEPENDENT {
             return false;
         }
         above.push(left);

@@ -146,6 +146,7 @@ const MULTIGRID_LEVEL: &str = "src/solver/preconditioner/multigrid/level.rs";
 const NONNEGATIVE: &str = "src/solver/nonnegative.rs";
 const CUT: &str = "src/shape/cut.rs";
 const FILL: &str = "src/shape/fill.rs";
+const MOMENTS: &str = "src/shape/moments.rs";
 const LAYOUT: &str = "src/shape/layout.rs";
 const SURFACE: &str = "src/scene/filling.rs";
 const NOT_A_KNOT: &str = "src/approximation/not_a_knot.rs";
@@ -880,9 +881,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "Seed { position: centroid, volume }",
         "Seed { position: centroid - edges * 0.5, volume }",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
-    patch("points of a simplex as in a cube", QUADRATURE,
-        "point.volume * weight * u.powi(before as i32) * (before + 1) as f64",
-        "point.volume * weight",
+    patch("points of a simplex as in a cube", MOMENTS,
+        "let weight = weight * u.powi(before as i32) * (before + 1) as f64;",
+        "",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("cut cells integrated to one degree less", FILL,
         "integrated(lower, how.degree)",
@@ -896,6 +897,10 @@ pub(super) const PATCHES: &[Patch] = &[
         "(x + step <= 0.0)",
         "(x + step <= f64::NEG_INFINITY)",
         Killed(&[SOLVER], &[PATCH])),
+    patch("boxes cut as seen from their lower corner", QUADRATURE,
+        "rise[k] < -EDGE * spacing",
+        "rise[k] < f64::NEG_INFINITY",
+        Killed(&[SOLIDS, LOADS], &[PATCH])),
     patch("points of a surface all in its middle", QUADRATURE,
         "self.position + by",
         "self.position",
