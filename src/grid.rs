@@ -2,6 +2,9 @@
 
 use crate::tensor::Vector;
 
+/// How far from a node a place is on it, relative to its distance from the origin: what rounding may have moved it by.
+const ON_NODE: f64 = 32.0 * f64::EPSILON;
+
 /// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
 ///
 /// ```
@@ -38,20 +41,30 @@ pub struct Axis {
 impl Axis {
     /// `x` in units of the spacing, from node 0; `None` outside the axis (or if `x` is not a number).
     ///
-    /// The upper end is where the last node is: rounding in (x − origin)/h does not push it out.
+    /// The upper end is where the last node is: rounding in (x − origin)/h does not push it out. What is within round-off of a node is on it:
+    /// the gradients of linear functions leap there, and round-off does not decide to which side.
     ///
     /// ```
     /// use bfree::grid::Axis;
     ///
     /// let axis = Axis { origin: -1.0, spacing: 0.5, cells: 4 };
     /// assert_eq!((axis.local(-1.0), axis.local(0.25), axis.local(1.0)), (Some(0.0), Some(2.5), Some(4.0)));
+    /// assert_eq!((axis.local(-0.5 - 1e-15), axis.local(-0.5 + 1e-15)), (Some(1.0), Some(1.0)));
     /// assert_eq!((axis.local(1.0 + 1e-15), axis.local(f64::NAN)), (None, None));
     /// ```
     #[inline]
     pub fn local(&self, x: f64) -> Option<f64> {
         let cells = f64::from(self.cells);
         let inside = x >= self.origin && x <= self.origin + cells * self.spacing;
-        inside.then(|| ((x - self.origin) / self.spacing).min(cells))
+        inside.then(|| self.spacings(x).min(cells))
+    }
+
+    /// (x − origin)/h, for an x that is not below the origin.
+    #[inline(always)]
+    pub(crate) fn spacings(&self, x: f64) -> f64 {
+        let s = (x - self.origin) / self.spacing;
+        let node = f64::from((s + 0.5) as u32);
+        if (s - node).abs() <= ON_NODE * s { node } else { s }
     }
 
     /// Last node of the axis.

@@ -199,8 +199,14 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         Precision::Mixed => "of the linear systems; for shape functions that are products",
     };
     let averages = simulation.bodies.iter().any(Body::averages);
-    let mut all =
-        Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping, ghost: settings.ghost, averages });
+    let mut all = Terms::<D, L>::planned(Given {
+        loads,
+        scheme,
+        lumping: settings.lumping,
+        ghost: settings.ghost,
+        renewal: settings.renewal,
+        averages,
+    });
     all.extend([
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),

@@ -26,6 +26,8 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         path: Path { load, increment, speed, weight },
         kept,
         held,
+        // Those of the scene.
+        borne: _,
         workspace: _,
     } = simulation;
     let Particles {
@@ -56,8 +58,19 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    if let Some(Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration }) = kept {
-        let vectors = [position, motion, rate, velocity, acceleration].map(|field| bytemuck::cast_slice(field));
+    if let Some(Kept {
+        position,
+        displacement_gradient,
+        dilatation,
+        motion,
+        rate,
+        velocity,
+        acceleration,
+        unbalanced,
+    }) = kept
+    {
+        let vectors =
+            [position, motion, rate, velocity, acceleration, unbalanced].map(|field| bytemuck::cast_slice(field));
         arrays.extend(KEPT.into_iter().zip(vectors).map(|(name, numbers)| (name, numbers.into())));
         arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
         arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
@@ -66,7 +79,8 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
 }
 
 /// Of a grid that is kept: x of the particles, then φ, its rate, v and a of the nodes.
-const KEPT: [&str; 5] = ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration"];
+const KEPT: [&str; 6] =
+    ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration", "kept_unbalanced"];
 
 /// H of the particles when it was new.
 const KEPT_GRADIENT: &str = "kept_displacement_gradient";
@@ -86,12 +100,14 @@ fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kep
     let Some(gradient) = of(KEPT_GRADIENT) else { return Ok(None) };
     let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
     let dilatation = of(KEPT_DILATATION).unwrap_or_default().to_vec();
-    let [position, motion, rate, velocity, acceleration] = KEPT.map(vectors);
+    let [position, motion, rate, velocity, acceleration, unbalanced] = KEPT.map(vectors);
     let fits = [position.len(), displacement_gradient.len()] == [particles; 2]
         && (dilatation.is_empty() || dilatation.len() == particles)
         && rate.len() == motion.len()
-        && [velocity.len(), acceleration.len()].into_iter().all(|length| length == 0 || length == motion.len());
-    let kept = Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration };
+        && [velocity.len(), acceleration.len(), unbalanced.len()]
+            .into_iter()
+            .all(|length| length == 0 || length == motion.len());
+    let kept = Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration, unbalanced };
     if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
 }
 
@@ -129,6 +145,9 @@ pub(super) fn restore<const D: usize, L, A>(
     simulation.kept = None;
     simulation.rearrange(&order);
     simulation.kept = kept;
+    if simulation.clock.steps() > 0 {
+        simulation.bear();
+    }
     let held = arrays.iter().filter(|array| array.name == "held").flat_map(|array| &array.values);
     simulation.held = held.enumerate().filter(|(_, held)| **held > 0.0).map(|(one, _)| one).collect();
     let path = &mut simulation.path;

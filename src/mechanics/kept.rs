@@ -22,7 +22,8 @@ const ALONE: f64 = 1e-9;
 
 /// When the background grid is renewed. While a grid is kept, its held nodes stay held. It is renewed in any case where a body comes to a
 /// part of a wall, or of a prescribed region, at which no body was; and with inertia in every step as long as a body feels the wall that it
-/// has come to, or two bodies touch.
+/// has come to, or two bodies touch. In load steps, what a new grid does not balance of a state that the last one did is carried over as a force on
+/// its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Renewal {
@@ -74,6 +75,8 @@ pub struct Kept<const D: usize> {
     pub(crate) velocity: Vec<Vector<f64, D>>,
     /// a
     pub(crate) acceleration: Vec<Vector<f64, D>>,
+    /// R₀, carried over from the grid before; none with inertia, and on the first grid.
+    pub(crate) unbalanced: Vec<Vector<f64, D>>,
 }
 
 impl<const D: usize> Kept<D> {
@@ -92,14 +95,16 @@ impl<const D: usize> Kept<D> {
         self.motion = end.motion.to_vec();
         self.velocity = end.velocity.to_vec();
         self.acceleration = end.acceleration.to_vec();
+        self.unbalanced = end.unbalanced.to_vec();
         self.rate = dphi.iter().map(|dphi| dphi / dt).collect();
     }
 
     /// What the nodes are at the start of a step, with their masses.
     pub(crate) fn state(&self, masses: Nodal<D>, pool: &Pool) -> Nodal<D> {
-        let [velocity, acceleration, motion] =
-            [&self.velocity, &self.acceleration, &self.motion].map(|field| pool.collect(field.iter().copied()));
-        Nodal { velocity, acceleration, motion, ..masses }
+        let [velocity, acceleration, motion, unbalanced] =
+            [&self.velocity, &self.acceleration, &self.motion, &self.unbalanced]
+                .map(|field| pool.collect(field.iter().copied()));
+        Nodal { velocity, acceleration, motion, unbalanced, ..masses }
     }
 
     /// As [`Particles::rearrange`].

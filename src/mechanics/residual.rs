@@ -23,7 +23,7 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
 
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
-/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
+/// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A − R₀,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
 ///
 /// ```
 /// use bfree::mechanics::{loads::{Curve, Gravity}, schemes::Newmark, sweep::Supports, transfer::Nodal};

@@ -14,6 +14,9 @@ const MANY: usize = 6;
 /// The cosine of the angle between two pieces of surface in a box that are taken as one.
 const ALIKE: f64 = 0.9;
 
+/// How far apart two sides of a part are, at least, over what a surface may depart from the planes that stand for them.
+const APART: f64 = 8.0;
+
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet<const D: usize> {
@@ -237,7 +240,9 @@ impl<const D: usize> Shape<D> {
     fn holds_by(&self, cut: &Cut<D>, x: &Vector<f64, D>) -> bool {
         let (distance, normal) = self.distance_and_normal(x);
         let along = |plane: &&Face<D>| plane.1.dot(&normal);
-        let nearest = cut.planes.iter().max_by(|a, b| along(a).abs().total_cmp(&along(b).abs()));
+        // The surface is as near as it departs from its plane.
+        let near = |plane: &&Face<D>| cut.distance(plane, x).abs() <= 2.0 * cut.departure;
+        let nearest = cut.planes.iter().filter(near).max_by(|a, b| along(a).abs().total_cmp(&along(b).abs()));
         match nearest {
             Some(plane) if distance.abs() <= cut.departure => cut.distance(plane, x) * along(&plane) <= 0.0,
             _ => distance <= 0.0,
@@ -279,7 +284,13 @@ impl<const D: usize> Shape<D> {
                 distinct.push(plane);
             }
         }
-        if (departure > flat * spacing || distinct.len() > MANY) && radius > flat * spacing {
+        // The two sides of a thin part must not be taken for each other.
+        let close = |a: &Face<D>, b: &Face<D>| {
+            let along = a.1.dot(&b.1);
+            along.abs() > ALIKE && (a.0 - b.0 * along.signum()).abs() < APART * departure
+        };
+        let blurred = distinct.iter().enumerate().any(|(i, a)| distinct[..i].iter().any(|b| close(a, b)));
+        if (departure > flat * spacing || blurred || distinct.len() > MANY) && radius > flat * spacing {
             let k = edges.iamax();
             let mut half = *edges;
             half[k] *= 0.5;

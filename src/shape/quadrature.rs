@@ -282,4 +282,16 @@ mod tests {
         let fourth = fourth / (4.0 * pi * 0.45_f64.powi(7) / 105.0) - 1.0;
         assert!(volume.abs() < 1e-5 && fourth.abs() < 1e-4, "{volume:e}, {fourth:e}");
     }
+
+    /// Planes that stand for one side of a thin shell are not taken for those of the other: a tenth of a box thick, a thirtieth.
+    #[test]
+    fn thin_shells_have_their_volume() {
+        let ball = |radius| Shape::from(Ball { center: Vector::from([0.51, 0.48, 0.53]), radius });
+        for thickness in [0.02, 0.006] {
+            let shell = Difference { of: Box::new(ball(0.45)), minus: Box::new(ball(0.45 - thickness)) };
+            let exact = 4.0 / 3.0 * std::f64::consts::PI * (0.45_f64.powi(3) - (0.45 - thickness).powi(3));
+            let error = sums(&shell.into(), 5, |_| 1.0) / exact - 1.0;
+            assert!(error.abs() < 1e-4, "{thickness}: {error:e}");
+        }
+    }
 }

@@ -18,6 +18,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let contact = renewal != Renewal::EveryStep && self.in_contact(&kept, &supports, prescribed);
         let keeps = renewal.keeps(strain) && !contact;
         self.kept = keeps.then_some(kept);
+        self.bear();
         let leaping = supports.leaping();
         leaping.iter().for_each(|order| self.rearrange(order));
         self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
@@ -35,5 +36,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         !comes.is_empty()
             || (inertia && prescribed.iter().any(|dof| !held.contains(&dof.owner)))
             || (inertia && self.bodies.len() > 1 && touch(particles, grid, supports))
+    }
+}
+
+impl<const D: usize, L, A> Simulation<D, L, A> {
+    /// Remembers the loads that are in balance where the next grid is new; with inertia nothing is carried over.
+    pub(crate) fn bear(&mut self) {
+        let carries = self.kept.is_none() && !self.settings.scheme.has_inertia();
+        self.borne = carries.then(|| self.loads.clone());
     }
 }

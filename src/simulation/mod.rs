@@ -76,6 +76,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub kept: Option<Kept<D>>,
     /// Prescribed conditions that bodies felt in the first step, by number, without those that one has come to since: the others are contacts.
     pub held: BTreeSet<usize>,
+    /// The loads that the last load step balanced, where the next grid is new. What that does not balance of them is carried over, as long as
+    /// it lasts. Whoever changes particles by hand puts `None` here, too, or what that brings out of balance is carried over as well.
+    pub borne: Option<Loads<D>>,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
 }
@@ -140,6 +143,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
             path: Path::default(),
             kept: None,
             held: BTreeSet::new(),
+            borne: None,
             workspace: Workspace::default(),
         }
     }
@@ -167,7 +171,8 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
         self.workspace.supports = None;
         self.particles.rearrange(order);
         self.kept.iter_mut().for_each(|kept| kept.rearrange(order));
-        let mut points = self.loads.surface.iter_mut().flat_map(|load| &mut load.points).peekable();
+        let loads = std::iter::once(&mut self.loads).chain(&mut self.borne);
+        let mut points = loads.flat_map(|loads| &mut loads.surface).flat_map(|load| &mut load.points).peekable();
         if points.peek().is_some() {
             let mut places = vec![0; order.len()];
             order.iter().enumerate().for_each(|(to, &from)| places[from as usize] = to);
@@ -301,6 +306,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             path: self.path,
             kept: self.kept,
             held: self.held,
+            borne: self.borne,
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
     }

@@ -5,14 +5,16 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::{PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::Equilibrium;
+use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
 use crate::nodes::Nodes;
 use crate::particles::Particles;
+use crate::pooled::Pooled;
 use crate::solver::LinearError;
+use crate::tensor::Vector;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step, those of the last one if the grid is kept.
@@ -58,13 +60,39 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The state of the nodes at t_n: projected from the particles, or what the nodes of a grid that is kept have had since.
-    pub(super) fn nodal(&self, supports: &Supports<D>, kept: Option<&Kept<D>>) -> Result<Nodal<D>, StepError> {
+    pub(super) fn nodal(
+        &self,
+        supports: &Supports<D>,
+        prescribed: &[PrescribedDof],
+        kept: Option<&Kept<D>>,
+    ) -> Result<Nodal<D>, StepError> {
         let nodes = supports.nodes();
         match kept {
-            None => Ok(self.project(supports)?),
+            None => {
+                let nodal = self.project(supports)?;
+                Ok(Nodal { unbalanced: self.unbalanced(supports, &nodal, prescribed)?, ..nodal })
+            }
             Some(kept) if kept.motion.len() == nodes => Ok(kept.state(self.masses(supports), supports.pool())),
             Some(kept) => Err(StepError::OtherGrid { kept: kept.motion.len(), nodes }),
         }
+    }
+
+    /// R₀ = R(0) at t_n on a grid that is new, under the loads that were in balance on the one before.
+    fn unbalanced(
+        &self,
+        supports: &Supports<D>,
+        nodal: &Nodal<D>,
+        prescribed: &[PrescribedDof],
+    ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let Some(loads) = &self.borne else { return Ok(Pooled::default()) };
+        let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
+        let step = self.equilibrium(supports, nodal, prescribed, Alphas::START, t).step;
+        // Laws are asked what they are at t_n, and not what becomes of them in a step.
+        let at_start = Equilibrium::new(terms::Step { loads, dt: 0.0, ..step }, prescribed);
+        let (still, mut unbalanced): (Pooled<Vector<f64, D>>, Pooled<_>) = (supports.field(), supports.field());
+        at_start.residual_into::<f64>(&still, &mut unbalanced)?;
+        at_start.clear_prescribed(&mut unbalanced);
+        Ok(unbalanced)
     }
 
     /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.

@@ -57,7 +57,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let prescribed = self.prescribed_from(&nodes, kept.as_ref());
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
-        let projected = self.nodal(&supports, kept.as_ref())?;
+        let projected = self.nodal(&supports, &prescribed, kept.as_ref())?;
         spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed);
         watch.lap(Phase::Projection, supports.passes());

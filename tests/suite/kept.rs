@@ -2,6 +2,7 @@
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::loads::Pressing;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
 use std::num::NonZeroU64;
@@ -88,6 +89,48 @@ fn a_strain_makes_it_anew() -> Result<(), Failure> {
     assert!(!Renewal::Strain(0.05).keeps(f64::NAN));
     let error = beam(1, &[r#"grid.renewed={"strain": 0}"#]).err().ok_or("no strain")?.to_string();
     assert!(error.contains("grid.renewed.strain") && error.contains("> 0"), "{error}");
+    Ok(())
+}
+
+/// On a new grid stresses are out of balance. That is carried over: under loads that rest nothing moves.
+#[test]
+fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
+    for renewed in [r#"grid.renewed="every_step""#, r#"grid.renewed={"strain": 0.05}"#] {
+        let mut simulation = beam(8, &[renewed, "tractions.0.curve=[[0,0],[0.5,1]]"])?;
+        let mut renewals = 0;
+        for _ in 0..4 {
+            renewals += u32::from(simulation.advance()?.renewed);
+        }
+        assert!(renewals > 1, "{renewals}");
+        let loaded = simulation.clone();
+        run(&mut simulation)?;
+        // Newton's tolerance of 1e-12 in residuals, of a beam 6 long and soft in bending.
+        assert!(apart(&loaded, &simulation) < 1e-8, "{renewed}: {:e}", apart(&loaded, &simulation));
+    }
+    Ok(())
+}
+
+/// What is carried over is what the step before left: loads that are changed by hand act in full.
+#[test]
+fn loads_changed_between_steps_are_not_taken_for_what_was_in_balance() -> Result<(), Failure> {
+    let by_curve = |curve: &str| beam(8, &[r#"grid.renewed="every_step""#, &format!("tractions.0.curve={curve}")]);
+    let mut by_hand = by_curve("[[0,0],[0.5,1]]")?;
+    let mut doubled = by_curve("[[0,0],[0.5,1],[0.625,2]]")?;
+    for _ in 0..4 {
+        by_hand.step()?;
+        doubled.step()?;
+    }
+    let before = by_hand.clone();
+    by_hand.loads.surface[0].pressing = Pressing::Traction(Vector::from([0.0, -20.0]));
+    // A copy in another order of its particles.
+    let mut reversed = by_hand.clone();
+    reversed.rearrange(&(0..by_hand.particles.len() as u32).rev().collect::<Vec<_>>());
+    for simulation in [&mut by_hand, &mut doubled, &mut reversed] {
+        simulation.step()?;
+    }
+    assert!(apart(&before, &by_hand) > 0.1, "{:e}", apart(&before, &by_hand));
+    assert!(apart(&doubled, &by_hand) < 1e-8, "{:e}", apart(&doubled, &by_hand));
+    assert!(apart(&doubled, &reversed) < 1e-8, "{:e}", apart(&doubled, &reversed));
     Ok(())
 }
 

@@ -95,7 +95,7 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
 fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     // Walls and smoothing; a prescribed motion with work and a load; halved steps in the middle of whole ones.
-    let scenes: [(&str, &[&str]); 7] = [
+    let scenes: [(&str, &[&str]); 8] = [
         ("rebound.json", &SMOOTHED),
         ("compaction.json", &["--set", "output.checkpoint=0.1", "--until", "0.5", "--threads", "2"]),
         (
@@ -140,6 +140,20 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
                 "output.checkpoint=0.5",
                 "--until",
                 "10",
+            ],
+        ),
+        // Load steps, with a grid made anew now and then, and what it does not balance carried over.
+        (
+            "elastica.json",
+            &[
+                "--set",
+                r#"grid.renewed={"strain":0.05}"#,
+                "--set",
+                "grid.spacing=0.5",
+                "--set",
+                "time.step=0.02",
+                "--set",
+                "output.checkpoint=0.1",
             ],
         ),
     ];

@@ -172,6 +172,28 @@ fn a_step_that_is_stopped_loses_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
+/// The printed lattice of the rebound lies on cell faces. Moved by some roundings, it is on the same side of them.
+#[test]
+fn round_off_does_not_decide_in_which_cell_a_particle_on_a_face_is() -> Result<(), Failure> {
+    for family in [r#"approximation="linear""#, r#"approximation="gimp""#] {
+        let energies = [0.0, 1e-13, -1e-13].map(|by| {
+            let mut simulation = scene::<2>("rebound.json", &[family])?;
+            simulation.particles.position.iter_mut().for_each(|x| x.add_scalar_mut(by));
+            while simulation.clock.steps() < 500 {
+                simulation.advance()?;
+            }
+            Ok::<_, Failure>([simulation.strain_energy(), simulation.particles.kinetic_energy()])
+        });
+        let [plain, above, below] = energies;
+        let (plain, above, below) = (plain?, above?, below?);
+        assert!(plain[0] > 1e-3 * plain[1], "it has touched the wall: {plain:?}");
+        for (moved, rest) in above.iter().zip(&plain).chain(below.iter().zip(&plain)) {
+            assert!((moved / rest - 1.0).abs() < 1e-6, "{family}: {above:?} {below:?} {plain:?}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn a_particle_that_leaves_the_grid_is_named() -> Result<(), Failure> {
     let free = r#"boundary={"bottom":"sliding","top":"sliding"}"#;

@@ -154,18 +154,6 @@ pub const KNOWN: &[Known] = &[
     },
     Known {
         study: "order",
-        what: "a block of J from 0.3 to 1.7 on 32 cells, 2 x 2 particles in each, the grid renewed after half of the load: error of the \
-               stress; 0.05 and 0.01 asked, what a prototype left",
-        why: "Particles that have moved are no good quadrature points of a new grid; the error does not fall with h. On a grid that is kept it is 0.003.",
-        since: "22 November 2026",
-        factor: 1.2,
-        cells: &[
-            short_effort(&["once", "quadratic", "regular"], 0.0573),
-            short_effort(&["once", "cubic", "regular"], 0.0155),
-        ],
-    },
-    Known {
-        study: "order",
         what: "a surface that cuts cells, cubic functions and ghost stiffness of 1e-3: order of the stress from 16 to 32 cells; 1.5 asked",
         why: "Ghost stiffness straightens the field: an error of order gamma h in a layer of width h. It shows at 3e-4 of the stress; with a tenth \
               of the stiffness the order is 1.5.",

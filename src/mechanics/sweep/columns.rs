@@ -118,7 +118,7 @@ impl WithLanes<f64> for Places<'_> {
         let last = f64::from(axis.cells);
         let places = along.cells.iter_mut().zip(&mut along.below).zip(&mut along.above);
         for (&x, ((cell, below), above)) in along.x.iter().zip(places) {
-            let place = Place::at(axis, ((x - axis.origin) / axis.spacing).min(last));
+            let place = Place::at(axis, axis.spacings(x).min(last));
             (*cell, *below, *above) = (place.cell, place.below, place.above);
         }
         // j ≥ 1 with j < R − d

@@ -5,6 +5,7 @@
 //! the list is summed by [`Equilibrium`](super::residual::Equilibrium), and planned and checked without being named anywhere else.
 
 mod body_force;
+mod carried_over;
 mod damping;
 mod ghost;
 mod inertia;
@@ -14,6 +15,7 @@ mod stress;
 mod traction;
 
 pub use body_force::{BodyForce, ForceField};
+pub use carried_over::CarriedOver;
 pub use damping::{Damping, Rayleigh};
 pub use ghost::Ghost;
 pub use inertia::Inertia;
@@ -24,6 +26,7 @@ pub use stress::Stress;
 pub use traction::Traction;
 
 use crate::material::Law;
+use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
@@ -130,6 +133,7 @@ pub(crate) struct Given<'a, const D: usize> {
     pub lumping: f64,
     /// γ
     pub ghost: f64,
+    pub renewal: Renewal,
     /// Whether a body averages its change of volume.
     pub averages: bool,
 }
@@ -361,15 +365,16 @@ terms! {
     ghost: Ghost,
     body_force: BodyForce<D>,
     traction: Traction<D>,
+    carried_over: CarriedOver<D>,
     pressure: Pressure<'a, D>,
 }
 
-/// A dead load is a term by the force it puts on the nodes: −f, with the energy −f·Δφ and no tangent.
+/// A dead load is a term by the force f that it puts on the nodes: −f, with the energy −f·Δφ and no tangent.
 macro_rules! dead_load {
-    ($load:ident, $name:literal) => {
+    ($load:ident, $name:literal, $role:ident) => {
         impl<const D: usize> Term<D> for $load<D> {
             const NAME: &'static str = $name;
-            const ROLE: Role = Role::Loads;
+            const ROLE: Role = Role::$role;
 
             fn planned(given: Given<'_, D>) -> Vec<Reason> {
                 Self::reasons(given)

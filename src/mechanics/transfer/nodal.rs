@@ -45,6 +45,8 @@ pub struct Nodal<const D: usize> {
     pub acceleration: Pooled<Vector<f64, D>>,
     /// φ_n, the motion since the grid was new; empty where it is.
     pub motion: Pooled<Vector<f64, D>>,
+    /// R₀, what was out of balance when the grid was made anew; empty on the first grid, and with inertia.
+    pub unbalanced: Pooled<Vector<f64, D>>,
     /// Iterations the projection took (0 for a lumped mass).
     pub iterations: usize,
 }

@@ -187,6 +187,7 @@ impl<'a, const D: usize> Update<'a, D> {
             velocity: sum(&projected.velocity, &self.delta_velocity),
             acceleration: sum(&projected.acceleration, &self.delta_acceleration),
             motion: projected.velocity.pool().collect(self.motion().iter().copied()),
+            unbalanced: projected.unbalanced.clone(),
             ..Nodal::default()
         }
     }

@@ -81,18 +81,26 @@ fn dimension<const D: usize>(name: &str, shape: &Approximation, inset: f64, repo
             _ => &[x, 5.3 * SPACING, 7.0 * SPACING],
         };
         let mut worst: Result<f64, ApproximationError> = Ok(0.0);
-        let mut nodes = 0;
+        let (mut nodes, mut moved) = (0, 0.0);
         for &other in others {
             let at = Vector::<f64, D>::from_fn(|k, _| if k == 0 { x } else { other });
+            moved = worse(moved, at.map(onto_node).norm());
             let (mut scratch, mut support) = (Scratch::default(), Support::default());
             let errors = shape.evaluate(&grid(), &at, &mut scratch, &mut support).map(|()| errors(&at, &support));
             nodes = nodes.max(support.nodes.len());
             worst = worst.and_then(|worst| Ok(worse(worst, errors?)));
         }
         let along = (nodes as f64).powf(1.0 / D as f64);
-        let bound = D as f64 * (ROUNDINGS + along) * f64::EPSILON + inset;
+        let bound = D as f64 * (ROUNDINGS + along) * f64::EPSILON + inset + moved;
         solvable(report, &format!("{name}, D = {D}"), place, worst, bound);
     }
+}
+
+/// How far `x` is moved, in spacings: what is on a node to 32 roundings of its place is on it (`Axis::local`).
+fn onto_node(x: f64) -> f64 {
+    let s = x / SPACING;
+    let distance = (s - s.round()).abs();
+    if distance <= 32.0 * f64::EPSILON * s { distance } else { 0.0 }
 }
 
 /// The largest error of ΣN = 1, Σ N D = 0, Σ ∇N = 0, Σ D ⊗ ∇N = −I, with D = x − x_I, each over the sum of its magnitudes.

@@ -94,6 +94,8 @@ const STRESS: &str = "src/mechanics/terms/stress.rs";
 const PATH: &str = "src/mechanics/path.rs";
 const AFFINE: &str = "src/mechanics/affine.rs";
 const KEPT_GRID: &str = "src/mechanics/kept.rs";
+const CARRIED: &str = "src/mechanics/terms/carried_over.rs";
+const STEP_START: &str = "src/simulation/start.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
@@ -825,6 +827,22 @@ pub(super) const PATCHES: &[Patch] = &[
         "end.acceleration.to_vec()",
         "vec![Vector::zeros(); end.acceleration.len()]",
         Killed(&[ORDER], &[DYNAMICS])),
+    patch("what a new grid does not balance is not carried over", CARRIED,
+        "(!unbalanced.is_empty())",
+        "(unbalanced.len() == usize::MAX)",
+        Killed(&[KEPT, ORDER], &[DYNAMICS])),
+    patch("a grid that is kept forgets what it carries", KEPT_GRID,
+        "end.unbalanced.to_vec()",
+        "Vec::new()",
+        Killed(&[KEPT], &[DYNAMICS])),
+    patch("what relaxes in a step is carried over too", STEP_START,
+        "terms::Step { loads, dt: 0.0, ..step }",
+        "terms::Step { loads, ..step }",
+        Killed(&[FLOWS], &[KEPT])),
+    patch("loads changed by hand count as borne", STEP_START,
+        "terms::Step { loads, dt: 0.0, ..step }",
+        "terms::Step { dt: 0.0, ..step }",
+        Killed(&[KEPT], &[ORDER])),
     patch("no strain makes a grid anew", UPDATE,
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5)",
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.0)",

@@ -203,7 +203,6 @@ fn renewed(effort: Effort, outcome: &mut Outcome) {
                     Ok(stress) => {
                         row.push(format!("{stress:.2e}"));
                         if cells == 32 && renewal == Renewal::EveryStep {
-                            let bound = if steps == 2 { bound } else { Bound::Reported };
                             report.push(&labels, stress, bound);
                         }
                     }
