@@ -62,10 +62,10 @@ impl<const D: usize> Cone<D> {
         let from_end = x - self.ends[0];
         let s = from_end.dot(&self.along);
         let off_axis = from_end - self.along * s;
-        // What round-off leaves near the axis may point along it: once more.
+        // What round-off leaves near the axis may point along it: once more; and if little is left then, that is round-off too.
         let radial = off_axis - self.along * off_axis.dot(&self.along);
         let rho = radial.norm();
-        (Vector::from([s, rho]), if rho > 0.0 { radial / rho } else { self.across })
+        (Vector::from([s, rho]), if rho > 0.01 * off_axis.norm() { radial / rho } else { self.across })
     }
 }
 
