@@ -1,0 +1,120 @@
+//! How particles fill lanes and windows, and how many bytes are stored for them.
+
+use super::*;
+
+/// How often each window (nodes along each axis, particles) is there.
+fn windows<const D: usize>(cells: [u32; D], per_axis: u32) -> Vec<([usize; 3], usize, usize)> {
+    let (grid, positions) = regular(cells, per_axis);
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &positions).unwrap();
+    let mut all = supports.windows();
+    all.sort_unstable();
+    all.chunk_by(|a, b| a == b).map(|same| (same[0].0, same[0].1, same.len())).collect()
+}
+
+#[test]
+fn a_regular_layout_fills_the_vector_lanes() {
+    // Eight particles a cell, 2×2×2 nodes; four a cell, two cells side by side; two a cell, four side by side.
+    assert_eq!(windows([6, 5, 4], 2), [([2, 2, 2], 8, 120)]);
+    assert_eq!(windows([32, 20], 2), [([3, 2, 1], 8, 320)]);
+    assert_eq!(windows([64], 2), [([5, 1, 1], 8, 16)]);
+    // One a cell: no more cells side by side than six nodes hold, and none from another block (32 cells in 1D, 16 in
+    // 2D, 4 in 3D) or another row.
+    assert_eq!(windows([64], 1), [([3, 1, 1], 2, 2), ([6, 1, 1], 5, 12)]);
+    assert_eq!(windows([32, 3], 1), [([2, 2, 1], 1, 6), ([6, 2, 1], 5, 18)]);
+    assert_eq!(windows([8, 2, 2], 1), [([5, 2, 2], 4, 8)]);
+    // Nine or more in a cell: eight, and the rest.
+    assert_eq!(windows([3, 1], 3), [([2, 2, 1], 1, 3), ([2, 2, 1], 8, 3)]);
+    assert_eq!(windows([2], 9), [([2, 1, 1], 1, 2), ([2, 1, 1], 8, 2)]);
+    // Cells apart do not share a window.
+    let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [64] };
+    let apart = [0.5, 2.5, 3.5].map(|x| Vector::from([x]));
+    let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &apart).unwrap();
+    assert_eq!(supports.windows(), [([2, 1, 1], 1), ([3, 1, 1], 2)]);
+    let (plain, _) = Supports::plain(&Approximation::from(Linear), &grid, &apart).unwrap();
+    assert!(plain.windows().is_empty());
+}
+
+fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
+    let (grid, positions) = regular([3; D], 2);
+    let bytes = |positions: &[Vector<f64, D>]| {
+        Supports::plain(&Approximation::from(Linear), &grid, positions).map(|(plain, _)| plain.bytes())
+    };
+    let (plain, nodes) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
+    let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
+    assert!(positions.len() <= 256, "one block");
+    // An entry is a place in the list of nodes, N and ∇N; particles say where they lie in memory and where their
+    // entries begin.
+    assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + 2 * positions.len() + 1));
+    let many: Vec<_> = positions.iter().cycle().take(600).copied().collect();
+    assert_eq!(bytes(&many)?, bytes(&many[..256])? + bytes(&many[256..512])? + bytes(&many[512..])?);
+    // Weights of every window, eight lanes wide; the particles of each lane; a slot of each particle; the nodes twice.
+    let (tiled, nodes) = Supports::new(&Approximation::from(Linear), &grid, &positions)?;
+    let windows = tiled.windows();
+    let weights: usize = windows.iter().map(|(width, _)| 2 * 64 * width[..D].iter().sum::<usize>()).sum();
+    let least = weights + windows.len() * (8 * 4 + 12) + 4 * positions.len() + 8 * nodes.len();
+    assert!((least..least + 512).contains(&tiled.bytes()), "{} for at least {least}", tiled.bytes());
+    Ok(())
+}
+
+/// A law without a closed form.
+struct General(Material);
+
+impl Law for General {
+    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+        self.0.energy(at, start)
+    }
+
+    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
+        self.0.stress(at, start)
+    }
+
+    fn elasticity<T: Real, const D: usize>(
+        &self,
+        at: &Deformation<T, D>,
+        start: &Start<'_>,
+        x: &Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        self.0.elasticity(at, start, x)
+    }
+}
+
+fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Result<(), Failure> {
+    let (grid, positions) = regular([3; D], 2);
+    let shape = Approximation::from(Linear);
+    let (tiled, _) = Supports::with_precision(&shape, &grid, &positions, Precision::Mixed)?;
+    let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
+    let mut particles = Particles::default();
+    positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
+    // A, the upper triangle of B, κ and q; those of b and c where the law has them; 𝔸 itself without a closed form.
+    let triangle = D * (D + 1) / 2;
+    let closed = law.closed(&identity(), &Deformation::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
+    let ClosedTangent { both, .. } = closed;
+    let numbers = D * D + triangle + 2 + if both.is_some() { 2 * triangle } else { 0 };
+    let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0, dilatation: Default::default() }];
+    let general =
+        [Body { name: "body".into(), law: General(law.clone()), density: 1.0, dilatation: Default::default() }];
+    for (precision, size) in [(Precision::Double, 8), (Precision::Mixed, 4)] {
+        // Eight lanes a group, whether they are full or not.
+        let lanes = 8 * tiled.windows().len();
+        let counted = frozen_bytes(&particles, &bodies, &tiled, precision);
+        assert_eq!(counted, lanes * numbers * size, "{D}D {law:?}, {precision:?}");
+        let counted = frozen_bytes(&particles, &general, &tiled, precision);
+        assert_eq!(counted, lanes * D.pow(4) * size, "{D}D {law:?} by ℂmat, {precision:?}");
+    }
+    let lanes = 8 * positions.len().div_ceil(8);
+    assert_eq!(frozen_bytes(&particles, &bodies, &plain, Precision::Double), lanes * numbers * 8);
+    Ok(())
+}
+
+#[test]
+fn bytes_are_counted_as_they_are_stored() -> Result<(), Failure> {
+    bytes_are_those_of_the_arrays::<1>()?;
+    bytes_are_those_of_the_arrays::<2>()?;
+    bytes_are_those_of_the_arrays::<3>()?;
+    for law in closed_laws(Lame::new(1.0, 1.0)?) {
+        frozen_bytes_are_those_of_the_tangent::<1>(&law)?;
+        frozen_bytes_are_those_of_the_tangent::<2>(&law)?;
+        frozen_bytes_are_those_of_the_tangent::<3>(&law)?;
+    }
+    Ok(())
+}
