@@ -78,7 +78,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     arrays
 }
 
-/// Of a grid that is kept: x of the particles, then φ, its rate, v and a of the nodes.
+/// Of a grid that is kept: x of the particles, then φ, its rate, v, a and R₀ of the nodes.
 const KEPT: [&str; 6] =
     ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration", "kept_unbalanced"];
 

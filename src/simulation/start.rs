@@ -84,7 +84,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         nodal: &Nodal<D>,
         prescribed: &[PrescribedDof],
     ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let Some(loads) = &self.borne else { return Ok(Pooled::default()) };
+        let Some(loads) = self.borne.as_ref().filter(|_| nodal.is_static()) else { return Ok(Pooled::default()) };
         let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
         let step = self.equilibrium(supports, nodal, prescribed, Alphas::START, t).step;
         // Laws are asked what they are at t_n, and not what becomes of them in a step.

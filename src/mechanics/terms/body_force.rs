@@ -63,4 +63,4 @@ impl<const D: usize> BodyForce<D> {
     }
 }
 
-dead_load!(BodyForce, "body force", Loads);
+dead_load!(BodyForce<D>, "body force", Loads);

@@ -2,25 +2,28 @@
 //! this one, or each new grid adds an error of its own to the stresses.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
-use crate::mechanics::kept::Renewal;
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
-use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
 /// R₀
-pub struct CarriedOver<const D: usize>(Pooled<Vector<f64, D>>);
+pub struct CarriedOver<'a, const D: usize>(&'a [Vector<f64, D>]);
 
-impl<const D: usize> CarriedOver<D> {
-    pub(super) fn of<L>(step: &Step<'_, D, L>) -> Option<Self> {
+impl<'a, const D: usize> CarriedOver<'a, D> {
+    pub(super) fn of<L>(step: &Step<'a, D, L>) -> Option<Self> {
         let unbalanced = &step.nodal.unbalanced;
-        (!unbalanced.is_empty()).then(|| Self(unbalanced.clone()))
-    }
-
-    fn reasons(Given { scheme, renewal, .. }: Given<'_, D>) -> Vec<Reason> {
-        let used = !scheme.has_inertia() && renewal != Renewal::Never;
-        vec![("carried over", used, "in load steps, what a grid that is made anew does not balance".into())]
+        (!unbalanced.is_empty()).then_some(Self(unbalanced))
     }
 }
 
-dead_load!(CarriedOver, "carried over", Stores);
+impl<const D: usize> CarriedOver<'_, D> {
+    fn reasons(Given { scheme, .. }: Given<'_, D>) -> Vec<Reason> {
+        vec![(
+            "carried over",
+            !scheme.has_inertia(),
+            "in load steps, what a grid that is made anew does not balance".into(),
+        )]
+    }
+}
+
+dead_load!(CarriedOver<'_, D>, "carried over", Stores);

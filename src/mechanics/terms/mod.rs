@@ -26,7 +26,6 @@ pub use stress::Stress;
 pub use traction::Traction;
 
 use crate::material::Law;
-use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
@@ -133,7 +132,6 @@ pub(crate) struct Given<'a, const D: usize> {
     pub lumping: f64,
     /// γ
     pub ghost: f64,
-    pub renewal: Renewal,
     /// Whether a body averages its change of volume.
     pub averages: bool,
 }
@@ -365,14 +363,15 @@ terms! {
     ghost: Ghost,
     body_force: BodyForce<D>,
     traction: Traction<D>,
-    carried_over: CarriedOver<D>,
+    carried_over: CarriedOver<'a, D>,
     pressure: Pressure<'a, D>,
 }
 
-/// A dead load is a term by the force f that it puts on the nodes: −f, with the energy −f·Δφ and no tangent.
+/// A dead load is a term by the force f that it puts on the nodes: −f, with the energy −f·Δφ and no tangent. The last word says where its
+/// work goes.
 macro_rules! dead_load {
-    ($load:ident, $name:literal, $role:ident) => {
-        impl<const D: usize> Term<D> for $load<D> {
+    ($load:ty, $name:literal, $role:ident) => {
+        impl<const D: usize> Term<D> for $load {
             const NAME: &'static str = $name;
             const ROLE: Role = Role::$role;
 
@@ -381,7 +380,7 @@ macro_rules! dead_load {
             }
 
             fn add_at_nodes<T: Number>(&self, _: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
-                out.iter_mut().zip(&self.0).for_each(|(out, force)| *out -= force.map(T::lit));
+                out.iter_mut().zip(self.0.iter()).for_each(|(out, force)| *out -= force.map(T::lit));
             }
 
             fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
@@ -390,7 +389,7 @@ macro_rules! dead_load {
             }
 
             fn add_magnitudes_at_nodes(&self, _: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-                out.iter_mut().zip(&self.0).for_each(|(out, force)| *out += force.abs());
+                out.iter_mut().zip(self.0.iter()).for_each(|(out, force)| *out += force.abs());
             }
         }
     };

@@ -32,4 +32,4 @@ impl<const D: usize> Traction<D> {
     }
 }
 
-dead_load!(Traction, "traction", Loads);
+dead_load!(Traction<D>, "traction", Loads);
