@@ -870,7 +870,7 @@ pub(super) const PATCHES: &[Patch] = &[
     patch("which side of a hole is the body's by its plane alone", CUT,
         "cut.distance(plane, x) * along(&plane) <= 0.0",
         "cut.distance(plane, x) <= 0.0",
-        Killed(&[ORDER], &[PATCH, SOLIDS])),
+        Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("a surface's normal inwards", CUT,
         "Facet::flat(&end.corners, end.outward, end.area)",
         "Facet::flat(&end.corners, -end.outward, end.area)",
