@@ -232,7 +232,8 @@ impl<const D: usize> Shape<D> {
         // V = A height / D
         let area = D as f64 * volume / height(plane).abs();
         let middle = corners.iter().sum::<Vector<f64, D>>() / D as f64;
-        let beyond = middle + outward * (2.0 * cut.departure + 1e3 * hair);
+        // Past a plane that is taken for the same, and not past the next one.
+        let beyond = middle + outward * (2.0 * cut.departure + 8.0 * hair);
         (!self.contains(&beyond)).then_some(End { corners, outward, area, departure: cut.departure })
     }
 
@@ -274,9 +275,10 @@ impl<const D: usize> Shape<D> {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
         let hair = EDGE * spacing;
+        // Nowhere in the box further from each other than a hair.
         let same = |a: &Face<D>, b: &Face<D>| {
             let along = a.1.dot(&b.1).signum();
-            (a.1 - b.1 * along).norm() <= 1e-6 && (a.0 - b.0 * along).abs() <= hair
+            (a.1 - b.1 * along).norm() * radius + (a.0 - b.0 * along).abs() <= hair
         };
         let mut distinct: Vec<Face<D>> = Vec::new();
         for plane in planes {

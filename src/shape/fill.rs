@@ -18,7 +18,7 @@ pub enum Fill {
     /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout boxes have half the
     /// size; but for shapes of triangles, the particles of a cut cell are instead points that integrate products of polynomials of the
     /// shape functions' degree p over what of it lies in the shape: up to (p + 1)^D of linear functions, of cubic ones and of LME (p = 3),
-    /// and as many in each half, quarter or eighth of a cell of quadratic ones. A surface that is loaded then has two points for each side
+    /// and as many in each half, quarter or eighth of a cell of quadratic ones; where no such points are found, as above. A surface that is loaded then has two points for each side
     /// in half a cell, and three in 3D.
     #[default]
     Cut,

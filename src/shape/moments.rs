@@ -11,6 +11,9 @@ use nalgebra::DVector;
 /// What is left of moments by round-off, relative to the volume.
 const ROUND_OFF: f64 = 1e-14;
 
+/// What may be left of them.
+const MET: f64 = 1e-10;
+
 /// Points that are tried for each of the polynomials: more where fewer have not the moments.
 const TRIED: [usize; 4] = [4, 16, 64, 256];
 
@@ -151,10 +154,11 @@ impl<const D: usize> Legendre<D> {
     }
 }
 
-/// As many points in the pieces as there are products of polynomials, at most, with volumes > 0 that have the moments of all and of the gaps.
-pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree: u32) -> Vec<Seed<D>> {
+/// As many points in the pieces as there are products of polynomials, at most, with volumes > 0 that have the moments of all and of the gaps;
+/// `None` if none are found.
+pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree: u32) -> Option<Vec<Seed<D>>> {
     if let ([whole @ Piece { extent: Extent::Box(_), .. }], []) = (pieces, gaps) {
-        return whole.points(&Rules::new::<D>(degree));
+        return Some(whole.points(&Rules::new::<D>(degree)));
     }
     let legendre = Legendre::new(pieces, degree);
     let moments = legendre.moments(pieces, gaps);
@@ -173,17 +177,19 @@ pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree:
         let piece = pieces.get(up_to.partition_point(|&sum| sum <= within)).or(pieces.last())?;
         Some(piece.place(std::array::from_fn(|k| u([3.0, 5.0, 7.0][k]))))
     };
-    let (mut values, mut points) = (DVector::zeros(legendre.count()), Vec::new());
+    let (mut values, mut points, mut missed) = (DVector::zeros(legendre.count()), Vec::new(), f64::INFINITY);
     for tries in TRIED {
         for k in points.len()..tries * legendre.count() {
-            let Some(point) = place(k) else { return Vec::new() };
+            let point = place(k)?;
             legendre.at(&point, &mut values);
             problem.offer(values.clone());
             points.push(point);
         }
-        if problem.solve(ROUND_OFF * volume) <= ROUND_OFF * volume {
+        missed = problem.solve(ROUND_OFF * volume);
+        if missed <= ROUND_OFF * volume {
             break;
         }
     }
-    problem.solution().map(|(k, volume)| Seed { position: points[k], volume }).collect()
+    let found = || problem.solution().map(|(k, volume)| Seed { position: points[k], volume }).collect();
+    (missed <= MET * volume).then(found)
 }

@@ -25,7 +25,8 @@ const IN_GAP: u32 = 3;
 
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate over what lies in the box every product of polynomials of this degree along each axis; `None`
-    /// where the surface is one of triangles, of which only volumes and centroids are known. Of a part that is thin it is one point.
+    /// where the surface is one of triangles, of which only volumes and centroids are known, and where no such points are found. Of a part
+    /// that is thin it is one point.
     pub(super) fn quadrature(
         &self,
         lower: &Vector<f64, D>,
@@ -40,7 +41,7 @@ impl<const D: usize> Shape<D> {
         let sum = |volume: f64, piece: &Piece<D>| volume + piece.volume;
         let (flat, gap) = (pieces.iter().fold(0.0, sum), gaps.iter().map(|gap| gap.volume).sum::<f64>());
         if flat + gap >= THIN * edges.product() {
-            return Some(few(&pieces, &gaps, degree));
+            return few(&pieces, &gaps, degree);
         }
         // It is joined to what is beside it.
         let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();

@@ -255,7 +255,11 @@ fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
         let half = Vector::repeat(0.5 * h);
         let halves = indices([2 * u64::from(cells); 2]).flat_map(|i| {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * half[k]);
-            plate.quadrature(&lower, &half, h, 3).unwrap()
+            // Of one of them no points are found.
+            plate.quadrature(&lower, &half, h, 3).unwrap_or_else(|| {
+                let (volume, position) = plate.part(&lower, &half, h);
+                vec![Seed { position, volume }]
+            })
         });
         let exact: f64 = halves.map(|seed| seed.volume * square(seed.position[0]) * square(seed.position[1])).sum();
         assert!((found / exact - 1.0).abs() < 1e-5, "{cells}: {found} {exact}");
