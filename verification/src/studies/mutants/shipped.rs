@@ -4,6 +4,7 @@ use super::patches::{CHECKS, Check, Fate, PATCHES, Patch};
 use super::schemata::{MODULE, Misfit, VARIABLE, apply, module};
 use crate::report::{Bound, Report};
 use crate::studies::Outcome;
+use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -69,25 +70,34 @@ pub(super) fn run(outcome: &mut Outcome) -> Result<(), ShippedFaultError> {
         "faults in the shipped files: checks whose verdict is not the one foretold",
         &["fault", "file", "killed by", "still green", "seconds"],
     );
-    for (number, patch) in (1..).zip(PATCHES) {
-        judge(&programs, &source, number, patch, &mut report)?;
+    // Side by side: most checks keep one core busy, and none is timed.
+    let judged = PATCHES.par_iter().enumerate().map(|(k, patch)| judge(&programs, &source, k + 1, patch));
+    for (patch, judged) in PATCHES.iter().zip(judged.collect::<Result<Vec<_>, _>>()?) {
+        judged.notes.into_iter().for_each(|note| report.note(note));
+        let labels = [patch.name, patch.file, &judged.killers, &judged.spared, &judged.seconds];
+        report.push(&labels, f64::from(judged.wrong), Bound::AtMost(0.0));
     }
     outcome.reports.push(report);
     Ok(())
 }
 
-fn judge(
-    programs: &Programs,
-    source: &Path,
-    number: usize,
-    patch: &Patch,
-    report: &mut Report,
-) -> Result<(), ShippedFaultError> {
+/// What became of a fault.
+struct Judged {
+    killers: String,
+    spared: String,
+    seconds: String,
+    /// Verdicts that are not those foretold.
+    wrong: u32,
+    notes: Vec<String>,
+}
+
+fn judge(programs: &Programs, source: &Path, number: usize, patch: &Patch) -> Result<Judged, ShippedFaultError> {
     let start = Instant::now();
+    let mut notes = Vec::new();
     let (killers, spared) = match patch.fate {
         Fate::Killed(killers, spared) => (killers, spared),
         Fate::Equivalent(reason) => {
-            report.note(format!("equivalent: {}: {reason}", patch.name));
+            notes.push(format!("equivalent: {}: {reason}", patch.name));
             (&[][..], CHECKS)
         }
     };
@@ -98,10 +108,10 @@ fn judge(
         if (verdict != Verdict::Passes) != dies {
             wrong += 1;
             let what = if dies { "survives" } else { "is also killed by" };
-            report.note(format!("{} {what} {}", patch.name, check.name()));
+            notes.push(format!("{} {what} {}", patch.name, check.name()));
         }
         if verdict == Verdict::Hangs {
-            report.note(format!("{}: {} was stopped after {} s", patch.name, check.name(), PATIENCE.as_secs()));
+            notes.push(format!("{}: {} was stopped after {} s", patch.name, check.name(), PATIENCE.as_secs()));
         }
     }
     let names = |checks: &[Check]| match checks {
@@ -109,9 +119,7 @@ fn judge(
         some => some.iter().map(|check| check.name()).collect::<Vec<_>>().join(" "),
     };
     let seconds = format!("{:.1}", start.elapsed().as_secs_f64());
-    let labels = [patch.name, patch.file, &names(killers), &names(spared), &seconds];
-    report.push(&labels, f64::from(wrong), Bound::AtMost(0.0));
-    Ok(())
+    Ok(Judged { killers: names(killers), spared: names(spared), seconds, wrong, notes })
 }
 
 /// Copies every file git knows or would add, patched, to `source`; files that are there already stay untouched, and so stay built, others
