@@ -194,6 +194,7 @@ pub const KNOWN: &[Known] = &[
             timed(&["solver.krylov.forcing", "manufactured 2D"], 0.93),
             timed(&["solver.krylov.forcing", "compaction 2D"], 0.88),
             timed(&["time.initial_guess", "manufactured 2D"], 0.76),
+            timed(&["time.initial_guess", "manufactured 3D"], 0.98),
             timed(&["approximation.lme.tolerance", "manufactured 2D"], 0.993),
             timed(&["approximation.lme.tolerance", "manufactured 3D"], 0.998),
             timed(&["transfer", "Riemann 1D"], 0.995),
