@@ -2,7 +2,7 @@
 
 use crate::tensor::Vector;
 
-/// How far from a node a place is on it, relative to its distance from the origin: what rounding may have moved it by.
+/// How far from a node a place is on it, relative to its coordinate and that of the grid's origin: what rounding may have moved it by.
 const ON_NODE: f64 = 32.0 * f64::EPSILON;
 
 /// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
@@ -51,6 +51,9 @@ impl Axis {
     /// assert_eq!((axis.local(-1.0), axis.local(0.25), axis.local(1.0)), (Some(0.0), Some(2.5), Some(4.0)));
     /// assert_eq!((axis.local(-0.5 - 1e-15), axis.local(-0.5 + 1e-15)), (Some(1.0), Some(1.0)));
     /// assert_eq!((axis.local(1.0 + 1e-15), axis.local(f64::NAN)), (None, None));
+    /// // Far from 0, rounding moves places by more: 1000.3 − 1000 is not 0.3.
+    /// let far = Axis { origin: 1000.0, spacing: 0.1, cells: 40 };
+    /// assert_eq!((far.local(1000.3), far.local(1000.3 + 2e-13), far.local(1000.3 + 1e-9).is_some_and(|s| s > 3.0)), (Some(3.0), Some(3.0), true));
     /// ```
     #[inline]
     pub fn local(&self, x: f64) -> Option<f64> {
@@ -64,7 +67,8 @@ impl Axis {
     pub(crate) fn spacings(&self, x: f64) -> f64 {
         let s = (x - self.origin) / self.spacing;
         let node = f64::from((s + 0.5) as u32);
-        if (s - node).abs() <= ON_NODE * s { node } else { s }
+        let rounded = ON_NODE * (x.abs() + self.origin.abs());
+        if (s - node).abs() * self.spacing <= rounded { node } else { s }
     }
 
     /// Last node of the axis.

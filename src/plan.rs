@@ -199,8 +199,14 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         Precision::Mixed => "of the linear systems; for shape functions that are products",
     };
     let averages = simulation.bodies.iter().any(Body::averages);
-    let mut all =
-        Terms::<D, L>::planned(Given { loads, scheme, lumping: settings.lumping, ghost: settings.ghost, averages });
+    let mut all = Terms::<D, L>::planned(Given {
+        loads,
+        scheme,
+        lumping: settings.lumping,
+        ghost: settings.ghost,
+        averages,
+        renews: simulation.may_renew(),
+    });
     all.extend([
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),
@@ -260,7 +266,8 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     // θ, also when the grid was new; which cell, and what a pass finds there.
     let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
     let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
-    let used: [(bool, &'static str, usize); 22] = [
+    let asks = simulation.loads.field.is_some() && (keeps || !moves);
+    let used: [(bool, &'static str, usize); 23] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -278,8 +285,10 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (moves, "nodal fields: v, a", nodes * 4 * vector),
         (keeps, "particles: x, H when the grid was new", particles * (vector + tensor)),
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
+        // Where they are, and where they were in the last load step.
+        (asks, "particles: x for a field of forces", particles * vector * (usize::from(keeps) + usize::from(!moves))),
         // As projected, and with prescribed values in place; and over a grid that is kept. Not on the first grid.
-        (!moves, "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
+        (!moves && simulation.may_renew(), "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
         // And those that were in balance.
         (faces > 0, "loaded surfaces", faces * if moves { 1 } else { 2 } * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),

@@ -3,9 +3,10 @@
 use super::container::Array;
 use crate::clock::Reached;
 use crate::mechanics::kept::Kept;
+use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::particles::Particles;
-use crate::simulation::Simulation;
+use crate::simulation::{Borne, Reaction, Simulation};
 use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
@@ -26,8 +27,8 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         path: Path { load, increment, speed, weight },
         kept,
         held,
-        // Those of the scene.
-        borne: _,
+        joined,
+        borne,
         workspace: _,
     } = simulation;
     let Particles {
@@ -48,6 +49,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
         ("id", id.into()),
         ("held", held.into()),
+        (JOINED, joined.iter().flatten().map(|&body| f64::from(body)).collect()),
         ("position", bytemuck::cast_slice(position).into()),
         ("velocity", bytemuck::cast_slice(velocity).into()),
         ("acceleration", bytemuck::cast_slice(acceleration).into()),
@@ -75,8 +77,26 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
         arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
     }
+    // Its loads are those of the scene.
+    if let Some(Borne { loads: _, reactions, together, asked }) = borne {
+        let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
+        arrays.push((BORNE, std::iter::once(f64::from(u8::from(*together))).chain(forces).collect()));
+        arrays.push((BORNE_ASKED, bytemuck::cast_slice(asked).into()));
+    }
     arrays
 }
+
+/// Which bodies are joined.
+const JOINED: &str = "joined";
+
+/// What the last load step balanced: whether bodies moved nodes together, then the reactions.
+const BORNE: &str = "borne";
+
+/// Where it asked for forces.
+const BORNE_ASKED: &str = "borne_asked";
+
+/// Arrays that are not always there, or not always of one length.
+const VARYING: [&str; 3] = ["kept_", JOINED, BORNE];
 
 /// Of a grid that is kept: x of the particles, then φ, its rate, v, a and R₀ of the nodes.
 const KEPT: [&str; 6] =
@@ -111,6 +131,29 @@ fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kep
     if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
 }
 
+/// What the last load step balanced, without its loads.
+///
+/// # Errors
+/// Numbers that are not those of so many particles or conditions.
+fn borne<const D: usize>(
+    numbers: &[f64],
+    asked: &[f64],
+    particles: usize,
+    conditions: usize,
+) -> Result<Option<Borne<D>>, String> {
+    let Some((together, reactions)) = numbers.split_first() else { return Ok(None) };
+    if reactions.len() != conditions * (D + 1) || ![0, particles * D].contains(&asked.len()) {
+        return Err("what the last step balanced, of other particles or conditions".into());
+    }
+    let reaction = |one: &[f64]| Reaction { force: Vector::from_column_slice(&one[..D]), torque: one[D] };
+    Ok(Some(Borne {
+        loads: Loads::default(),
+        reactions: reactions.chunks_exact(D + 1).map(reaction).collect(),
+        together: *together > 0.0,
+        asked: asked.chunks_exact(D).map(Vector::from_column_slice).collect(),
+    }))
+}
+
 /// The order in which particles lie in `ids`, by their present places; `None` if they are not the same particles.
 fn order(present: &[u32], ids: &[f64]) -> Option<Vec<u32>> {
     let mut places = vec![None; present.len()];
@@ -130,7 +173,8 @@ pub(super) fn restore<const D: usize, L, A>(
     reached: Reached,
     arrays: &[Array],
 ) -> Result<(), String> {
-    for (name, values) in inherited(simulation).into_iter().filter(|(name, _)| !name.starts_with("kept_")) {
+    let varies = |name: &str| VARYING.iter().any(|start| name.starts_with(start));
+    for (name, values) in inherited(simulation).into_iter().filter(|(name, _)| !varies(name)) {
         let found = arrays.iter().find(|array| array.name == name).ok_or_else(|| format!("no array {name}"))?;
         if found.values.len() != values.len() {
             return Err(format!("{} numbers of {name} instead of {}", found.values.len(), values.len()));
@@ -140,14 +184,17 @@ pub(super) fn restore<const D: usize, L, A>(
         arrays.iter().filter(|array| array.name == "id").flat_map(|array| &array.values).copied().collect::<Vec<_>>();
     let order = order(&simulation.particles.id, &ids).ok_or("ids that are not those of the particles")?;
     let kept = kept(arrays, simulation.particles.len())?;
+    let of = |name: &str| arrays.iter().find(|array| array.name == name).map_or(&[][..], |array| &array.values);
+    let borne = borne(of(BORNE), of(BORNE_ASKED), simulation.particles.len(), simulation.loads.prescribed.len())?;
     simulation.clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
     // What no array holds goes where it was, too.
     simulation.kept = None;
     simulation.rearrange(&order);
     simulation.kept = kept;
-    if simulation.clock.steps() > 0 {
-        simulation.bear();
-    }
+    simulation.borne = borne;
+    // In the order in which the particles lie now, but for its loads, which have just been rearranged.
+    simulation.borne.iter_mut().for_each(|borne| borne.loads.clone_from(&simulation.loads));
+    simulation.joined = of(JOINED).chunks_exact(2).map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
     let held = arrays.iter().filter(|array| array.name == "held").flat_map(|array| &array.values);
     simulation.held = held.enumerate().filter(|(_, held)| **held > 0.0).map(|(one, _)| one).collect();
     let path = &mut simulation.path;

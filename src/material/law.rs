@@ -23,7 +23,7 @@ pub const DISSIPATED: &str = "dissipated";
 /// What a law is given beside F: how long the step is, and what the particle remembers at its beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<'a> {
-    /// Δt
+    /// Δt; 0 where a load step starts on a new grid, and what was in balance is asked for.
     pub dt: f64,
     /// The numbers that [`Law::memory`] names, at t_n.
     pub memory: &'a [f64],

@@ -14,16 +14,16 @@ use crate::pooled::Pool;
 use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt::{Display, Formatter};
 
 /// A node is one body's if the number of the body varies less there than this, relative to its square.
 const ALONE: f64 = 1e-9;
 
 /// When the background grid is renewed. While a grid is kept, its held nodes stay held. It is renewed in any case where a body comes to a
-/// part of a wall, or of a prescribed region, at which no body was; and with inertia in every step as long as a body feels the wall that it
-/// has come to, or two bodies touch. In load steps, what a new grid does not balance of a state that the last one did is carried over as a force on
-/// its nodes.
+/// part of a wall, or of a prescribed region, at which no body was, and in load steps where one comes to a part of another that it did not
+/// touch at the start; and with inertia in every step as long as a body feels the wall that it has come to, or two bodies touch. In load steps,
+/// what a new grid does not balance of a state that the last one did is carried over as a force on its nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Renewal {
@@ -153,15 +153,49 @@ impl<const D: usize> Kept<D> {
         };
         (0..prescribed.len()).filter(|&one| comes(one)).collect()
     }
+
+    /// Whether a particle has come to a body that its own is not joined to: it is in a cell with a node of that body, and was in one without.
+    pub(crate) fn meets(&self, particles: &Particles<D>, joined: &BTreeSet<[u32; 2]>, grid: &Grid<D>) -> bool {
+        let body = &particles.body;
+        let [now, before] = [&particles.position, &self.position].map(|position| seen(position, body, grid));
+        let beside = |x: &Vector<f64, D>, own: u32, seen: &HashMap<u64, BTreeSet<u32>>| {
+            let others = |index| seen.get(&grid.id(index)).into_iter().flatten();
+            let is_contact = |&other: &u32| other != own && !joined.contains(&pair(own, other));
+            grid.cell(x).is_some_and(|cell| corners(cell).flat_map(others).any(is_contact))
+        };
+        let mut all = particles.position.iter().zip(&self.position).zip(body);
+        all.any(|((x, was), &own)| beside(x, own, &now) && !beside(was, own, &before))
+    }
+}
+
+fn pair(one: u32, other: u32) -> [u32; 2] {
+    [one.min(other), one.max(other)]
+}
+
+/// The bodies in the cells around each node.
+fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> HashMap<u64, BTreeSet<u32>> {
+    let mut seen: HashMap<u64, BTreeSet<u32>> = HashMap::new();
+    for (cell, body) in cells(position.iter().zip(body.iter().copied()), grid) {
+        for index in corners(grid.index(cell)) {
+            seen.entry(grid.id(index)).or_default().insert(body);
+        }
+    }
+    seen
+}
+
+/// The bodies that lie in cells with a common corner.
+pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> BTreeSet<[u32; 2]> {
+    let seen = seen(position, body, grid);
+    let of_node = |bodies: &BTreeSet<u32>| {
+        let bodies = bodies.clone();
+        bodies.clone().into_iter().flat_map(move |one| bodies.clone().into_iter().map(move |other| [one, other]))
+    };
+    seen.values().flat_map(of_node).filter(|[one, other]| one < other).collect()
 }
 
 /// Whether two bodies touch, or did when the shape functions were made: they lie in cells with a common corner, or move a node together.
 pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, supports: &Supports<D>) -> bool {
-    let mut owners = HashMap::new();
-    let bodies = particles.position.iter().zip(particles.body.iter().copied());
-    let mut sees =
-        |(cell, body)| corners(grid.index(cell)).any(|index| *owners.entry(grid.id(index)).or_insert(body) != body);
-    if cells(bodies, grid).into_iter().any(&mut sees) {
+    if !pairs(&particles.position, &particles.body, grid).is_empty() {
         return true;
     }
     // The variance of the number of the body, weighted with N.

@@ -48,11 +48,7 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
         let (supports, nodes) =
             Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
         let prescribed = self.prescribed(&nodes);
-        let projected = match &kept {
-            Some(kept) => kept.state(simulation.masses(&supports), supports.pool()),
-            None => simulation.project(&supports)?,
-        };
-        let nodal = projected.with_prescribed(&prescribed);
+        let nodal = simulation.nodal(&supports, &prescribed, kept.as_ref())?.with_prescribed(&prescribed);
         Ok(Coming { simulation, supports, nodal, prescribed })
     }
 }

@@ -1,24 +1,35 @@
 //! What stays after a step: the grid, unless something makes it anew, and its shape functions.
 
-use super::Simulation;
+use super::{Reaction, Simulation};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::kept::{Kept, Renewal, touch};
+use crate::mechanics::kept::{Kept, Renewal, pairs, touch};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::Supports;
+use crate::tensor::Vector;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Keeps the grid, unless a strain, a wall or another body makes it anew; and its functions, or their memory, with the particles in
     /// their order.
-    pub(super) fn keep(&mut self, kept: Kept<D>, supports: Supports<D>, strain: f64, prescribed: &[PrescribedDof]) {
+    pub(super) fn keep(
+        &mut self,
+        kept: Kept<D>,
+        supports: Supports<D>,
+        strain: f64,
+        prescribed: &[PrescribedDof],
+        (reactions, asked): (Vec<Reaction<D>>, Vec<Vector<f64, D>>),
+    ) {
         if self.clock.steps() == 0 {
             self.held = prescribed.iter().map(|dof| dof.owner).collect();
         }
         let renewal = self.settings.renewal;
+        if self.clock.steps() == 0 && self.bodies.len() > 1 {
+            self.joined = pairs(&kept.position, &self.particles.body, &self.grid);
+        }
         let contact = renewal != Renewal::EveryStep && self.in_contact(&kept, &supports, prescribed);
         let keeps = renewal.keeps(strain) && !contact;
         self.kept = keeps.then_some(kept);
-        self.bear();
+        self.bear(reactions, asked, &supports);
         let leaping = supports.leaping();
         leaping.iter().for_each(|order| self.rearrange(order));
         self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
@@ -26,23 +37,23 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.workspace.serves = keeps && leaping.is_none();
     }
 
-    /// Whether a body has come to a wall; with inertia also whether it feels one still, or another body: on a grid that is kept it would
-    /// never leave.
+    /// Whether a body has come to a wall, or in load steps to another body; with inertia also whether it feels one still: on a grid that is
+    /// kept it would never leave.
     fn in_contact(&mut self, kept: &Kept<D>, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
-        let Self { particles, grid, loads, held, .. } = self;
+        let Self { particles, grid, loads, held, joined, .. } = self;
         let comes = kept.met(&particles.position, &loads.prescribed, grid, supports.active());
         held.retain(|one| !comes.contains(one));
         let inertia = self.settings.scheme.has_inertia();
         !comes.is_empty()
             || (inertia && prescribed.iter().any(|dof| !held.contains(&dof.owner)))
-            || (inertia && self.bodies.len() > 1 && touch(particles, grid, supports))
+            || (self.bodies.len() > 1
+                && if inertia { touch(particles, grid, supports) } else { kept.meets(particles, joined, grid) })
     }
 }
 
 impl<const D: usize, L, A> Simulation<D, L, A> {
-    /// Remembers the loads that are in balance where the next grid is new; with inertia nothing is carried over.
-    pub(crate) fn bear(&mut self) {
-        let carries = self.kept.is_none() && !self.settings.scheme.has_inertia();
-        self.borne = carries.then(|| self.loads.clone());
+    /// Whether a strain, a wall or another body may make the grid anew.
+    pub(crate) fn may_renew(&self) -> bool {
+        self.settings.renewal != Renewal::Never || !self.loads.prescribed.is_empty() || self.bodies.len() > 1
     }
 }

@@ -1,6 +1,7 @@
 //! A simulation: the state at the last converged step, and how it goes on (`step.rs`).
 
 mod balance;
+mod borne;
 mod coming;
 mod keep;
 mod report;
@@ -9,6 +10,7 @@ mod start;
 mod step;
 mod work;
 
+pub use borne::Borne;
 pub use coming::Coming;
 pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
@@ -76,9 +78,12 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub kept: Option<Kept<D>>,
     /// Prescribed conditions that bodies felt in the first step, by number, without those that one has come to since: the others are contacts.
     pub held: BTreeSet<usize>,
-    /// The loads that the last load step balanced, where the next grid is new. What that does not balance of them is carried over, as long as
-    /// it lasts. Whoever changes particles by hand puts `None` here, too, or what that brings out of balance is carried over as well.
-    pub borne: Option<Loads<D>>,
+    /// Bodies that touched as the first step began, by number, the lower one first: in load steps they stay joined as they are, and others are
+    /// contacts.
+    pub joined: BTreeSet<[u32; 2]>,
+    /// What the last load step balanced, where the next grid is new. What that does not balance of it is carried over, as long as it lasts.
+    /// Whoever changes particles or laws by hand puts `None` here, too, or what that brings out of balance is carried over as well.
+    pub borne: Option<Borne<D>>,
     /// What the next step uses again; nothing depends on it.
     pub workspace: Workspace<D>,
 }
@@ -143,6 +148,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
             path: Path::default(),
             kept: None,
             held: BTreeSet::new(),
+            joined: BTreeSet::new(),
             borne: None,
             workspace: Workspace::default(),
         }
@@ -171,7 +177,9 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
         self.workspace.supports = None;
         self.particles.rearrange(order);
         self.kept.iter_mut().for_each(|kept| kept.rearrange(order));
-        let loads = std::iter::once(&mut self.loads).chain(&mut self.borne);
+        self.borne.iter_mut().for_each(|borne| borne.rearrange(order));
+        let borne = self.borne.iter_mut().map(|borne| &mut borne.loads);
+        let loads = std::iter::once(&mut self.loads).chain(borne);
         let mut points = loads.flat_map(|loads| &mut loads.surface).flat_map(|load| &mut load.points).peekable();
         if points.peek().is_some() {
             let mut places = vec![0; order.len()];
@@ -306,7 +314,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             path: self.path,
             kept: self.kept,
             held: self.held,
-            borne: self.borne,
+            joined: self.joined,
+            // Other laws have to be balanced.
+            borne: None,
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
     }

@@ -5,16 +5,14 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::{PrescribedDof, prescribed_dofs};
-use crate::mechanics::residual::{Equilibrium, Inadmissible};
+use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
 use crate::nodes::Nodes;
 use crate::particles::Particles;
-use crate::pooled::Pooled;
 use crate::solver::LinearError;
-use crate::tensor::Vector;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step, those of the last one if the grid is kept.
@@ -72,27 +70,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 let nodal = self.project(supports)?;
                 Ok(Nodal { unbalanced: self.unbalanced(supports, &nodal, prescribed)?, ..nodal })
             }
-            Some(kept) if kept.motion.len() == nodes => Ok(kept.state(self.masses(supports), supports.pool())),
+            Some(kept) if kept.motion.len() == nodes => {
+                // The particles are where the grid was new, and it remembers where they are.
+                let asked = self.loads.field.iter().flat_map(|_| kept.position.iter().copied());
+                let state = kept.state(self.masses(supports), supports.pool());
+                Ok(Nodal { asked: supports.pool().collect(asked), ..state })
+            }
             Some(kept) => Err(StepError::OtherGrid { kept: kept.motion.len(), nodes }),
         }
-    }
-
-    /// R₀ = R(0) at t_n on a grid that is new, under the loads that were in balance on the one before.
-    fn unbalanced(
-        &self,
-        supports: &Supports<D>,
-        nodal: &Nodal<D>,
-        prescribed: &[PrescribedDof],
-    ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        let Some(loads) = self.borne.as_ref().filter(|_| nodal.is_static()) else { return Ok(Pooled::default()) };
-        let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
-        let step = self.equilibrium(supports, nodal, prescribed, Alphas::START, t).step;
-        // Laws are asked what they are at t_n, and not what becomes of them in a step.
-        let at_start = Equilibrium::new(terms::Step { loads, dt: 0.0, ..step }, prescribed);
-        let (still, mut unbalanced): (Pooled<Vector<f64, D>>, Pooled<_>) = (supports.field(), supports.field());
-        at_start.residual_into::<f64>(&still, &mut unbalanced)?;
-        at_start.clear_prescribed(&mut unbalanced);
-        Ok(unbalanced)
     }
 
     /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.

@@ -82,6 +82,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, from, dt, &dphi, &update)?;
 
         // Nothing fails from here on.
+        let asked = self.loads.field.iter().filter(|_| !scheme.has_inertia()).flat_map(|_| match &nodal.asked[..] {
+            [] => &self.particles.position,
+            asked => asked,
+        });
+        let borne = (reactions.clone(), asked.copied().collect());
         let renewed = kept.is_none();
         let mut next = kept.take().unwrap_or_default();
         if self.settings.renewal != Renewal::EveryStep {
@@ -92,7 +97,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.path = self.path.after(to, &dphi, dt);
         }
         let passes = supports.passes();
-        self.keep(next, supports, strain, &prescribed);
+        self.keep(next, supports, strain, &prescribed, borne);
         watch.lap(Phase::Update, passes);
         self.external_work += work;
         self.dissipated += dissipated;

@@ -2,7 +2,6 @@
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::kept::Renewal;
-use bfree::mechanics::loads::Pressing;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
 use std::num::NonZeroU64;
@@ -92,48 +91,6 @@ fn a_strain_makes_it_anew() -> Result<(), Failure> {
     Ok(())
 }
 
-/// On a new grid stresses are out of balance. That is carried over: under loads that rest nothing moves.
-#[test]
-fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
-    for renewed in [r#"grid.renewed="every_step""#, r#"grid.renewed={"strain": 0.05}"#] {
-        let mut simulation = beam(8, &[renewed, "tractions.0.curve=[[0,0],[0.5,1]]"])?;
-        let mut renewals = 0;
-        for _ in 0..4 {
-            renewals += u32::from(simulation.advance()?.renewed);
-        }
-        assert!(renewals > 1, "{renewals}");
-        let loaded = simulation.clone();
-        run(&mut simulation)?;
-        // Newton's tolerance of 1e-12 in residuals, of a beam 6 long and soft in bending.
-        assert!(apart(&loaded, &simulation) < 1e-8, "{renewed}: {:e}", apart(&loaded, &simulation));
-    }
-    Ok(())
-}
-
-/// What is carried over is what the step before left: loads that are changed by hand act in full.
-#[test]
-fn loads_changed_between_steps_are_not_taken_for_what_was_in_balance() -> Result<(), Failure> {
-    let by_curve = |curve: &str| beam(8, &[r#"grid.renewed="every_step""#, &format!("tractions.0.curve={curve}")]);
-    let mut by_hand = by_curve("[[0,0],[0.5,1]]")?;
-    let mut doubled = by_curve("[[0,0],[0.5,1],[0.625,2]]")?;
-    for _ in 0..4 {
-        by_hand.step()?;
-        doubled.step()?;
-    }
-    let before = by_hand.clone();
-    by_hand.loads.surface[0].pressing = Pressing::Traction(Vector::from([0.0, -20.0]));
-    // A copy in another order of its particles.
-    let mut reversed = by_hand.clone();
-    reversed.rearrange(&(0..by_hand.particles.len() as u32).rev().collect::<Vec<_>>());
-    for simulation in [&mut by_hand, &mut doubled, &mut reversed] {
-        simulation.step()?;
-    }
-    assert!(apart(&before, &by_hand) > 0.1, "{:e}", apart(&before, &by_hand));
-    assert!(apart(&doubled, &by_hand) < 1e-8, "{:e}", apart(&doubled, &by_hand));
-    assert!(apart(&doubled, &reversed) < 1e-8, "{:e}", apart(&doubled, &reversed));
-    Ok(())
-}
-
 /// A block that hangs from its top and is lowered onto a floor at which nothing was.
 #[test]
 fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
@@ -161,6 +118,58 @@ fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
     assert!(by_floor[by_floor.len() - 1].1 > 1.0, "{by_floor:?}");
     let lowest = simulation.particles.position.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min);
     assert!(lowest > 0.0, "{lowest}");
+    Ok(())
+}
+
+/// A punch that is driven onto a block, each of its own nodes as the grid was new. Blocks that touch at the start are joined, and that makes
+/// nothing anew.
+#[test]
+fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
+    let driven = |gap: f64| -> Result<_, Failure> {
+        let block = |name: &str, [low, high]: [[f64; 2]; 2]| {
+            format!(
+                r#"{{"name":"{name}","density":1,"material":{{"neo_hookean":{{"young":1200,"poisson":0}}}},"shape":{{"box":{{"min":{low:?},"max":{high:?}}}}}}}"#
+            )
+        };
+        let (below, above) = ([[0.5, 0.0], [1.5, 0.5]], [[0.8, 0.5 + gap], [1.2, 0.9 + gap]]);
+        let bodies = format!("bodies=[{},{}]", block("block", below), block("punch", above));
+        // Where the punch is all the time.
+        let grip = r#"prescribed=[{"region":{"half_space":{"point":[0,0.65],"normal":[0,-1]}},"displacement":[[0,[0,0]],[1,[0,-0.4]]]}]"#;
+        let onto = [
+            "grid={\"size\":[2,2],\"spacing\":0.1}",
+            &bodies,
+            r#"boundary={"bottom":"fixed"}"#,
+            "tractions=[]",
+            "output={}",
+            "time.step=0.05",
+            r#"approximation="linear""#,
+            grip,
+        ];
+        let mut simulation: Simulation<2> = scene(BEAM, &onto)?;
+        let mut by_floor = Vec::new();
+        while simulation.clock.time() < 1.0 - 1e-9 {
+            let step = simulation.advance()?;
+            by_floor.push((step.renewed, step.reactions[0].force[1]));
+        }
+        let end = |body: u32, best: fn(f64, f64) -> f64, start| {
+            let particles = &simulation.particles;
+            // The block below the punch.
+            let under = |(x, of): &(&Vector<f64, 2>, &u32)| **of == body && (x[0] - 1.0).abs() < 0.15;
+            let of_body = particles.position.iter().zip(&particles.body).filter(under);
+            of_body.map(|(x, _)| x[1]).fold(start, best)
+        };
+        let (highest, lowest) = (end(0, f64::max, 0.0), end(1, f64::min, 2.0));
+        Ok((by_floor, lowest - highest))
+    };
+    let (by_floor, apart) = driven(0.3)?;
+    let first = by_floor.iter().skip(1).position(|(renewed, _)| *renewed).ok_or("not made anew")? + 1;
+    // Particles 0.025 above the end of the punch come to the cell above the block after 0.225.
+    assert_eq!(first, 12, "{by_floor:?}");
+    assert!(by_floor[..first].iter().all(|(_, force)| force.abs() < 1e-9), "{by_floor:?}");
+    assert!(by_floor[by_floor.len() - 1].1 > 1.0 && apart > 0.0, "{apart}, {by_floor:?}");
+    let (by_floor, _) = driven(0.0)?;
+    // Until the block bulges to where the floor had felt nothing.
+    assert!(by_floor[1..10].iter().all(|(renewed, _)| !renewed) && by_floor[9].1 > 1.0, "{by_floor:?}");
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 mod accuracy;
 mod adaptive;
 mod approximation;
+mod carried;
 mod compaction;
 mod contact;
 mod damping;

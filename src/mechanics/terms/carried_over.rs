@@ -17,10 +17,10 @@ impl<'a, const D: usize> CarriedOver<'a, D> {
 }
 
 impl<const D: usize> CarriedOver<'_, D> {
-    fn reasons(Given { scheme, .. }: Given<'_, D>) -> Vec<Reason> {
+    fn reasons(Given { scheme, renews, .. }: Given<'_, D>) -> Vec<Reason> {
         vec![(
             "carried over",
-            !scheme.has_inertia(),
+            renews && !scheme.has_inertia(),
             "in load steps, what a grid that is made anew does not balance".into(),
         )]
     }

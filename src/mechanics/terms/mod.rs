@@ -134,6 +134,8 @@ pub(crate) struct Given<'a, const D: usize> {
     pub ghost: f64,
     /// Whether a body averages its change of volume.
     pub averages: bool,
+    /// Whether a grid may be made anew.
+    pub renews: bool,
 }
 
 /// Whether a term, or a part of it, is there, and why: `(name, used, why)`.

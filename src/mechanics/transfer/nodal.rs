@@ -47,6 +47,8 @@ pub struct Nodal<const D: usize> {
     pub motion: Pooled<Vector<f64, D>>,
     /// R₀, what was out of balance when the grid was made anew; empty on the first grid, and with inertia.
     pub unbalanced: Pooled<Vector<f64, D>>,
+    /// x_n of the particles, where a field of forces asks for it and they are elsewhere; else empty.
+    pub asked: Pooled<Vector<f64, D>>,
     /// Iterations the projection took (0 for a lumped mass).
     pub iterations: usize,
 }

@@ -39,6 +39,7 @@ const GHOSTS: Check = Check::Test("ghost::");
 const LEVELS: Check = Check::Test("multigrid::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
+const CARRIES: Check = Check::Test("carried::");
 const TRANSFERS: Check = Check::Test("transfer::");
 const CELLS: Check = Check::Test("dilatation::");
 const FLOWS: Check = Check::Test("flow::");
@@ -49,7 +50,7 @@ const SOLIDS: Check = Check::Unit("shape::");
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS,
 ];
 
 /// What is to become of a patch.
@@ -95,7 +96,6 @@ const PATH: &str = "src/mechanics/path.rs";
 const AFFINE: &str = "src/mechanics/affine.rs";
 const KEPT_GRID: &str = "src/mechanics/kept.rs";
 const CARRIED: &str = "src/mechanics/terms/carried_over.rs";
-const STEP_START: &str = "src/simulation/start.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
@@ -118,6 +118,7 @@ const ROTATION: &str = "src/mechanics/loads/rotation.rs";
 const STEP: &str = "src/simulation/step.rs";
 const STEP_BALANCE: &str = "src/simulation/balance.rs";
 const STEP_KEEP: &str = "src/simulation/keep.rs";
+const BORNE: &str = "src/simulation/borne.rs";
 const STEP_WORK: &str = "src/simulation/work.rs";
 const SIMULATION: &str = "src/simulation/mod.rs";
 const QUADRATURE: &str = "src/shape/quadrature.rs";
@@ -283,8 +284,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "of_particle(p)",
         Killed(&[MANUFACTURED, ORDER], &[DYNAMICS, TANGENT])),
     patch("a force field that stays what it was at t = 0", BODY_FORCE,
-        "field(particles.id[p] as usize, &particles.position[p], time)",
-        "field(particles.id[p] as usize, &particles.position[p], 0.0 * time)",
+        "field(particles.id[p] as usize, &position[p], time)",
+        "field(particles.id[p] as usize, &position[p], 0.0 * time)",
         Killed(&[MANUFACTURED, ORDER], &[DYNAMICS, TANGENT])),
     patch("sign of the follower pressure", PRESSURE,
         "out[node] += force * T::lit(n);",
@@ -570,7 +571,7 @@ pub(super) const PATCHES: &[Patch] = &[
     patch("v and b swapped in the neo-Hookean's Cmat", NEO_HOOKEAN,
         "scaled(&outer(&cb, &cv), q)",
         "scaled(&outer(&cv, &cb), q)",
-        Killed(&[POINTS], &[TANGENT, DYNAMICS])),
+        Killed(&[POINTS, TANGENT], &[DYNAMICS])),
     patch("ln J for its square in W", NEO_HOOKEAN,
         "at.log_jacobian() * at.log_jacobian()",
         "at.log_jacobian()",
@@ -830,19 +831,51 @@ pub(super) const PATCHES: &[Patch] = &[
     patch("what a new grid does not balance is not carried over", CARRIED,
         "(!unbalanced.is_empty())",
         "(unbalanced.len() == usize::MAX)",
-        Killed(&[KEPT, ORDER], &[DYNAMICS])),
+        Killed(&[CARRIES, ORDER], &[DYNAMICS])),
     patch("a grid that is kept forgets what it carries", KEPT_GRID,
         "end.unbalanced.to_vec()",
         "Vec::new()",
-        Killed(&[KEPT], &[DYNAMICS])),
-    patch("what relaxes in a step is carried over too", STEP_START,
-        "terms::Step { loads, dt: 0.0, ..step }",
-        "terms::Step { loads, ..step }",
+        Killed(&[CARRIES], &[DYNAMICS])),
+    patch("what relaxes in a step is carried over too", BORNE,
+        "terms::Step { loads: &borne.loads, dt: 0.0, ..step }",
+        "terms::Step { loads: &borne.loads, ..step }",
         Killed(&[FLOWS], &[KEPT])),
-    patch("loads changed by hand count as borne", STEP_START,
-        "terms::Step { loads, dt: 0.0, ..step }",
+    patch("loads changed by hand count as borne", BORNE,
+        "terms::Step { loads: &borne.loads, dt: 0.0, ..step }",
         "terms::Step { dt: 0.0, ..step }",
-        Killed(&[KEPT], &[ORDER])),
+        Killed(&[CARRIES], &[ORDER])),
+    patch("reactions begin again on a new grid", BORNE,
+        "-reaction.force",
+        "reaction.force * 0.0",
+        Killed(&[CARRIES], &[KEPT])),
+    patch("torques begin again on a new grid", BORNE,
+        "-reaction.torque",
+        "reaction.torque * 0.0",
+        Killed(&[CARRIES], &[KEPT])),
+    patch("a grip that is lost still holds", BORNE,
+        "(0..borne.reactions.len())",
+        "(0..0 * borne.reactions.len())",
+        Killed(&[CARRIES], &[KEPT])),
+    patch("a body that has gone still presses", BORNE,
+        "!self.together(supports)",
+        "false",
+        Killed(&[CARRIES], &[KEPT])),
+    patch("a field is asked where the grid was new", BODY_FORCE,
+        "asked.is_empty()",
+        "(asked.len() < usize::MAX)",
+        Killed(&[CARRIES], &[LOADS])),
+    patch("what a field was is asked where particles are now", BORNE,
+        "borne.asked.iter().copied()",
+        "borne.asked[..0].iter().copied()",
+        Killed(&[CARRIES], &[LOADS])),
+    patch("a body that is met in load steps is not felt", KEPT_GRID,
+        "!beside(was, own, &before)",
+        "false",
+        Killed(&[KEPT], &[CARRIES])),
+    patch("bodies that are joined are contacts", KEPT_GRID,
+        "!joined.contains(&pair(own, other))",
+        "(joined.len() < usize::MAX)",
+        Killed(&[KEPT], &[CARRIES])),
     patch("no strain makes a grid anew", UPDATE,
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5)",
         "largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.0)",
