@@ -225,6 +225,12 @@ const EISENSTAT_WALKER: &str = "exact, Eisenstat-Walker";
 const SPARSE: &str = "eps = 0: steps taken, of 200";
 const SAME_TIME_STEP: &str = "width / undissipated, same time step";
 
+/// Whether a cell with these labels may be on the list: those of one there are their beginning.
+pub fn may_list(labels: &[String]) -> bool {
+    let begin = |cell: &KnownCell| labels.iter().take(cell.labels.len()).eq(cell.labels);
+    KNOWN.iter().flat_map(|entry| entry.cells).any(begin)
+}
+
 /// Marks the cells of `study` that are on the list; an entry that is not exactly one cell of its reports becomes a
 /// report that fails.
 pub(crate) fn mark(known: &[Known], study: &str, effort: Effort, reports: &mut Vec<Report>) {

@@ -7,8 +7,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime};
+use verification::known::may_list;
 use verification::record::{self, Finding, Run};
-use verification::report::chain;
+use verification::report::{chain, stop_at_failures};
 use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 
 /// Everything that judges bfree.
@@ -24,6 +25,9 @@ struct Arguments {
     /// How much each study does; `full` as a study asks for full effort
     #[arg(long, value_enum, default_value_t = EffortArgument::Short)]
     effort: EffortArgument,
+    /// Stop at the first cell that fails; `mutants`, whose cells are to fail, goes on
+    #[arg(long)]
+    first: bool,
     /// Write every cell, table and remark as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -122,6 +126,7 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
     let mut chapters = Vec::new();
     for &(study, effort) in studies {
         let start = Instant::now();
+        stop_at_failures((arguments.first && study.name != "mutants").then_some(may_list));
         let result = study.run(effort);
         let seconds = start.elapsed().as_secs_f64();
         let before = text.len();

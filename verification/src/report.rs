@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 use std::collections::HashMap;
 use std::fmt;
 use std::io::{self, Write};
+use std::sync::{PoisonError, RwLock};
 
 /// What a value must satisfy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -257,6 +258,17 @@ enum Layout {
     Matrix { rows: Vec<usize>, column: usize, attained: usize },
 }
 
+/// Whether a cell with these labels may fail and not end the program.
+type Spared = fn(&[String]) -> bool;
+
+/// `None`: all are spared.
+static SPARED: RwLock<Option<Spared>> = RwLock::new(None);
+
+/// From now on the first cell that fails ends the program with exit code 1, unless its labels are `spared`; `None` takes that back.
+pub fn stop_at_failures(spared: Option<Spared>) {
+    *SPARED.write().unwrap_or_else(PoisonError::into_inner) = spared;
+}
+
 /// A titled table of cells.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -295,7 +307,13 @@ impl Report {
     /// Adds a cell; there should be one label for each column, and missing ones are empty.
     pub fn push(&mut self, labels: &[&str], value: f64, bound: Bound) {
         let labels = (0..self.columns.len()).map(|k| labels.get(k).map_or_else(String::new, |&l| l.into())).collect();
-        self.cells.push(Cell { labels, value, bound, listed: None });
+        let cell = Cell { labels, value, bound, listed: None };
+        let spared = *SPARED.read().unwrap_or_else(PoisonError::into_inner);
+        if !cell.passed() && spared.is_some_and(|spared| !spared(&cell.labels)) {
+            eprintln!("FAIL  {}: {}: {}", self.title, cell.name(), cell.finding());
+            std::process::exit(1);
+        }
+        self.cells.push(cell);
     }
 
     /// Marks the worst of the cells whose labels begin with `labels`, which may be several samples, as known to fail, and says how many

@@ -232,7 +232,7 @@ enum Verdict {
 /// Runs a check with fault `number` on.
 fn attempt(programs: &Programs, source: &Path, check: Check, number: usize) -> Result<Verdict, ShippedFaultError> {
     let (name, arguments): (&'static str, &[&str]) = match check {
-        Check::Study(study) => (STUDIES, &[study]),
+        Check::Study(study) => (STUDIES, &[study, "--first"]),
         Check::Test(module) => (SUITE, &[module, "--quiet"]),
         Check::Unit(module) => (UNITS, &[module, "--quiet"]),
     };
