@@ -1,0 +1,171 @@
+//! What a run and `bfree check` tell: the report, the history, progress, warnings.
+
+use super::{program, rebound, report, scene};
+use crate::support::Failure;
+use serde_json::Value;
+
+#[test]
+fn check_says_how_far_apart_bodies_feel_each_other() -> Result<(), Failure> {
+    let check = |set: &str| -> Result<String, Failure> {
+        let output = program().arg("check").arg(scene("collision.json")).args(["--set", set]).output()?;
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8(output.stderr)?);
+        Ok(String::from_utf8(output.stdout)?)
+    };
+    assert!(check("approximation=\"linear\"")?.contains("0.1000 to 0.3500 apart (0.4 to 1.4 spacings)"));
+    assert!(check("approximation={\"lme\": {\"gamma\": 2}}")?.contains("how far was not measured"));
+    Ok(())
+}
+
+#[test]
+fn load_steps_have_no_balance() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let out = directory.path().join("run");
+    let status = program()
+        .arg("run")
+        .arg(scene("column_static.json"))
+        .args(["--steps", "1", "--quiet", "--out"])
+        .arg(&out)
+        .status()?;
+    assert!(status.success());
+    let history = std::fs::read_to_string(out.join("history.csv"))?;
+    let columns: Vec<&str> = history.lines().next().unwrap_or_default().split(',').collect();
+    assert!(columns.contains(&"strain") && !columns.contains(&"balance"), "{columns:?}");
+    assert_eq!(history.lines().last().map(|row| row.split(',').count()), Some(columns.len()));
+    Ok(())
+}
+
+#[test]
+fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}},
+                               {"name": "near", "field": "velocity", "at": {"particle": [2.5, 2.5]}}]"#;
+    let arguments =
+        ["--set", far, "--until", "0.3", "--steps", "4", "--threads", "1", "--check-tangent", "3", "--quiet"];
+    let output = rebound(directory.path(), &arguments)?;
+    let message = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{message}");
+    assert!(
+        message.starts_with("warning: probe \"far\": the nearest particle") && message.contains("spacing 2.500e-1;"),
+        "{message}"
+    );
+    assert_eq!(message.lines().count(), 1, "{message}");
+    let report = report(directory.path())?;
+    let command = &report["command"];
+    assert_eq!((&command["until"], &command["steps"], &command["threads"]), (&0.3.into(), &4.into(), &1.into()));
+    assert_eq!((&command["check_tangent"], &command["set"][0]), (&3.into(), &far.into()));
+    assert_eq!(report["settings"]["time"]["end"], 0.3);
+    assert_eq!(report["steps"].as_array().map(Vec::len), Some(4));
+    assert_eq!((&report["outcome"], &report["surfaces"]), (&"finished".into(), &Value::Array(Vec::new())));
+    // 3 spacings beyond the disc of radius 1.5 around (2.5, 2.5), and half a diagonal of ¼ from its centre
+    assert!(report["probes"][0]["distance"].as_f64().is_some_and(|distance| distance > 10.0), "{report}");
+    assert_eq!(report["probes"][1]["distance"].as_f64(), Some(0.125 * 2.0_f64.sqrt()));
+    assert_eq!(report["probes"][1]["warning"], Value::Null);
+    let probes = std::fs::read_to_string(directory.path().join("probes.csv"))?;
+    assert!(probes.lines().skip(1).all(|row| row.split(',').nth(1) == Some("NaN")), "{probes}");
+    Ok(())
+}
+
+#[test]
+fn a_failed_run_reports_every_attempt_and_its_work() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    // One iteration never suffices, and the step is halved twice.
+    let few = ["--set", "solver.newton.max_iterations=1", "--set", "time.max_halvings=2", "--steps", "400", "--quiet"];
+    let output = rebound(directory.path(), &[&few[..], &["--set", "solver.newton.tolerance=1e-14"]].concat())?;
+    let message = String::from_utf8(output.stderr)?;
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(message.matches("allowed iterations").count(), 1, "{message}");
+    let report = report(directory.path())?;
+    let sum = |key: &str| {
+        let steps = report["steps"].as_array().into_iter().flatten();
+        let attempts = report["failed_attempts"].as_array().into_iter().flatten();
+        let within = steps.clone().flat_map(|step| step["failed_attempts"].as_array().into_iter().flatten());
+        steps.chain(attempts).chain(within).map(|line| line[key].as_array().map_or(0, Vec::len)).sum::<usize>()
+    };
+    let attempts = report["failed_attempts"].as_array().ok_or("no attempts")?;
+    assert_eq!(attempts.len(), 3, "{report}");
+    for (k, attempt) in attempts.iter().enumerate() {
+        assert_eq!(attempt["dt"].as_f64(), Some(0.05 * 0.5_f64.powi(k as i32)));
+        assert!(attempt["why"].as_str().is_some_and(|why| why.contains("after the 1 allowed iterations")), "{attempt}");
+    }
+    assert_eq!(report["outcome"], "failed");
+    assert_eq!(report["counts"]["newton_iterations"], sum("krylov_iterations"));
+    assert!(report["counts"]["failed_attempts"].as_u64().is_some_and(|count| count >= 3));
+    Ok(())
+}
+
+#[test]
+fn a_program_that_watches_reads_json() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let far = r#"output.probes=[{"name": "far", "field": "velocity", "at": {"point": [14, 4]}}]"#;
+    let arguments = ["--progress", "json", "--until", "24", "--set", "time.lumping=0.05", "--set", far];
+    let output = rebound(directory.path(), &arguments)?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{text}");
+    let lines: Vec<Value> = text.lines().map(serde_json::from_str).collect::<Result<_, _>>()?;
+    assert_eq!(lines[0]["event"], "warning");
+    assert!(lines[0]["message"].as_str().is_some_and(|words| words.starts_with("probe \"far\"")), "{text}");
+    let steps: Vec<&Value> = lines.iter().filter(|line| line["event"] == "step").collect();
+    let last = steps.last().ok_or("no step")?;
+    assert_eq!((&last["step"], &last["time"], &last["end"]), (&480.into(), &24.0.into(), &24.0.into()));
+    let history = std::fs::read_to_string(directory.path().join("history.csv"))?;
+    let row: Vec<&str> = history.lines().last().ok_or("no rows")?.split(',').collect();
+    assert_eq!((last["balance"].as_f64(), last["krylov"].to_string()), (row[7].parse().ok(), row[11].to_owned()));
+    assert!(last["seconds_left"].as_f64() == Some(0.0) && last["seconds"].as_f64() > Some(0.0), "{last}");
+    assert!(steps.is_sorted_by_key(|step| step["step"].as_u64()));
+    // what was warned of is in the report too
+    let warned = lines.iter().filter(|line| line["event"] == "warning" && line["kind"].is_string()).count();
+    assert_eq!(report(directory.path())?["warnings"].as_array().map(Vec::len), Some(warned));
+    // and so is an error
+    let wrong = rebound(directory.path(), &["--progress", "json", "--set", "time.step=-1"])?;
+    let error: Value = serde_json::from_slice(&wrong.stderr)?;
+    assert_eq!((&error["event"], &error["code"], wrong.status.code()), (&"error".into(), &2.into(), Some(2)));
+    assert!(error["message"].as_str().is_some_and(|text| text.contains("rebound.json")), "{error}");
+    assert!(
+        error["because"].to_string().contains("time.step") || error["message"].to_string().contains("time.step"),
+        "{error}"
+    );
+    let both = rebound(directory.path(), &["--progress", "json", "--quiet"])?;
+    assert_eq!(both.status.code(), Some(2));
+    Ok(())
+}
+
+#[test]
+fn a_run_warns_once_of_halved_steps_and_many_iterations() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let scene = scene("rebound_fast.json");
+    let arguments = ["--set", "time.step=0.2", "--set", "solver.newton.max_iterations=3", "--until", "6", "--quiet"];
+    let output = program().arg("run").arg(scene).arg("--out").arg(directory.path()).args(arguments).output()?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.success(), "{text}");
+    assert_eq!(text.matches("the step had to be halved").count(), 1, "{text}");
+    assert!(text.contains("of 3 allowed iterations"), "{text}");
+    let warnings = report(directory.path())?["warnings"].clone();
+    for warning in warnings.as_array().ok_or("no warnings")? {
+        let (time, step) = (warning["time"].as_f64().ok_or("no time")?, &warning["step"]);
+        let line = format!("warning: t = {time}, step {step}: {}", warning["message"].as_str().unwrap_or_default());
+        assert_eq!(text.matches(&line).count(), 1, "{line} in {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Result<(), Failure> {
+    const METHOD: &str = "solver.krylov.method=\"automatic\"";
+    let directory = tempfile::tempdir()?;
+    let arguments = ["--steps", "2", "--set", "solver.krylov.max_iterations=2", "--set", METHOD];
+    let mut run = program();
+    let output =
+        run.arg("run").arg(scene("compaction.json")).arg("--out").arg(directory.path()).args(arguments).output()?;
+    let (text, told) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
+    assert!(output.status.success(), "{told}");
+    assert!(text.contains("of conjugate gradients a step"), "{text}");
+    assert_eq!(told.matches("left unsolved after the 2 iterations allowed").count(), 1, "{told}");
+    let report = report(directory.path())?;
+    assert_eq!(report["counts"]["krylov_limited"], report["counts"]["newton_iterations"]);
+    let krylov = serde_json::json!({ "method": "conjugate gradients", "why": "the tangent is symmetric" });
+    assert_eq!((&report["krylov"], &report["warnings"][0]["kind"]), (&krylov, &"krylov_limited".into()));
+    let output = program().arg("check").arg(scene("compaction.json")).output()?;
+    let text = String::from_utf8(output.stdout)?;
+    assert!(text.contains("solver        GMRES(30): it was asked for"), "{text}");
+    Ok(())
+}
