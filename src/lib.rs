@@ -140,6 +140,7 @@
 //! | follow the loop over particles | [`mechanics::sweep`] |
 //! | use the solver for something else | [`solver::NonlinearProblem`], [`solver::LinearOperator`] |
 
+pub mod aggregation;
 pub mod approximation;
 pub mod causes;
 pub mod checkpoint;

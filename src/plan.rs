@@ -4,11 +4,12 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::kept::Renewal;
-use crate::mechanics::loads::{Motion, Pressing, SurfaceLoad, SurfacePoint};
+use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
 use crate::mechanics::sweep::{LANES, SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms, frozen_rows};
 use crate::mechanics::transfer::Projection;
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::simulation::Simulation;
 use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
@@ -144,16 +145,15 @@ impl Plan {
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
     ) -> Result<Self, SupportError> {
-        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
-        let (supports, nodes) =
-            Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
-        let prescribed = simulation.prescribed(&nodes);
+        let supports = simulation.new_supports(None)?;
+        let nodes = supports.active();
+        let prescribed = simulation.prescribed(nodes);
         Ok(Self {
             dimension: D,
             particles: simulation.particles.solid_places().len(),
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
-            unknowns: D * nodes.len() - prescribed.len(),
+            unknowns: unknowns(&supports, &prescribed),
             renewal: simulation.settings.renewal,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
@@ -189,6 +189,13 @@ impl Plan {
     }
 }
 
+/// Nodal values that are solved for.
+fn unknowns<const D: usize>(supports: &Supports<D>, prescribed: &[PrescribedDof]) -> usize {
+    let unknowns = Unknowns::new(supports, prescribed);
+    let follow: usize = unknowns.following_mask(supports.nodes()).into_iter().map(usize::from).sum();
+    D * supports.nodes() - prescribed.len() - follow
+}
+
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
     let (loads, settings) = (&simulation.loads, &simulation.settings);
     let scheme = &*settings.scheme;
@@ -203,11 +210,12 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         loads,
         scheme,
         lumping: settings.lumping,
-        ghost: settings.ghost,
+        ghost: if settings.aggregation { 0.0 } else { settings.ghost },
         averages,
         renews: simulation.may_renew(),
     });
     all.extend([
+        ("aggregation", settings.aggregation, aggregated(supports)),
         ("smoothing", smooths, "only with a transfer other than flip".into()),
         ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),
         ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
@@ -216,6 +224,16 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         ("single precision", precision_used(supports) == Precision::Mixed, precision.into()),
     ]);
     all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
+}
+
+/// How many nodes follow others.
+fn aggregated<const D: usize>(supports: &Supports<D>) -> String {
+    match supports.extension() {
+        None => "only with aggregation".into(),
+        Some(extension) => {
+            format!("{} of {} active nodes follow well-supported ones", extension.len(), supports.nodes())
+        }
+    }
 }
 
 /// How often the sweep asks which law it evaluates.
@@ -267,7 +285,8 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
     let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
     let asks = simulation.loads.field.is_some() && (keeps || !moves);
-    let used: [(bool, &'static str, usize); 23] = [
+    let followers = supports.extension().map_or(0, |extension| extension.bytes());
+    let used: [(bool, &'static str, usize); 24] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
@@ -295,6 +314,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (averages, "particles: mean dilatation", of_mean),
         (averages, "frozen tangent: mean dilatation", frozen_mean),
         (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (followers > 0, "nodes that follow others, and their weights", followers),
         (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
         (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),
         (true, "Krylov vectors", nodes * vector / share * krylov_vectors),

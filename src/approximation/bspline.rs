@@ -5,6 +5,7 @@ use super::kernel::{Kernel, folded};
 use super::{
     Approximation, ApproximationError, AxisWeights, Cells, Listed, NotAKnotBspline, Separable, Shipped, Validate,
 };
+use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -120,5 +121,9 @@ impl Separable for Bspline {
             Self::Quadratic => 3,
             Self::Cubic => 4,
         }
+    }
+
+    fn pieces(&self) -> Pieces {
+        Pieces { degree: self.width() as u32 - 1, share: 0.75, ..Pieces::LINEAR }
     }
 }

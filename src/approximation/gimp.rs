@@ -2,7 +2,10 @@
 
 use super::interior::Lane;
 use super::kernel::{Kernel, folded};
-use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
+use super::{
+    Approximation, ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Shipped, Validate,
+};
+use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::problems::Problems;
 
@@ -90,6 +93,14 @@ impl Separable for Gimp {
 
     fn shipped(&self) -> Option<Shipped<'_>> {
         self.validate(1).is_ok().then_some(Shipped::Gimp(self))
+    }
+
+    fn at_surface(&self) -> AtSurface<'_> {
+        AtSurface::Other(&Linear)
+    }
+
+    fn pieces(&self) -> Pieces {
+        Pieces { share: 0.75, ..Pieces::LINEAR }
     }
 
     fn width(&self) -> usize {

@@ -4,6 +4,7 @@ use super::interior::{Column, Interior};
 use super::{
     Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate, product::Place,
 };
+use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::problems::Problems;
 
@@ -37,6 +38,10 @@ impl Separable for Linear {
 
     fn shipped(&self) -> Option<Shipped<'_>> {
         Some(Shipped::Linear)
+    }
+
+    fn pieces(&self) -> Pieces {
+        Pieces { share: 0.25, ..Pieces::LINEAR }
     }
 
     fn width(&self) -> usize {

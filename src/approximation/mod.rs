@@ -37,9 +37,10 @@ pub(crate) use interior::{FURTHEST, Interior, InteriorVisitor, Lane, SETTLED};
 pub use linear::Linear;
 pub use lme::{Lme, LmeCircle, LmeParameters, LmeSupport, SMALLEST_TOLERANCE};
 pub use not_a_knot::NotAKnotBspline;
-pub use product::{AxisWeights, Separable};
+pub use product::{AtSurface, AxisWeights, Separable};
 pub(crate) use product::{Place, check, list};
 
+use crate::aggregation::Pieces;
 use crate::grid::Grid;
 use crate::problems::Problems;
 use crate::tensor::Vector;
@@ -156,6 +157,11 @@ pub trait ShapeFunction: Validate + Send + Sync {
 
     /// The functions of one coordinate whose product this is, if it is one.
     fn separable(&self) -> Option<&dyn Separable>;
+
+    /// By which polynomials nodes at the boundary of a body follow others.
+    fn pieces(&self) -> Pieces {
+        self.separable().map_or(Pieces::LINEAR, Separable::pieces)
+    }
 }
 
 impl<S: Separable> ShapeFunction for S {

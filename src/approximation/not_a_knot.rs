@@ -2,6 +2,7 @@
 
 use super::product::Place;
 use super::{ApproximationError, AxisWeights, Bspline, Separable, Validate};
+use crate::aggregation::Pieces;
 use crate::grid::Axis;
 
 /// B-splines without a kink next to the end of an axis: up to the second kink from a wall they are one polynomial of their degree, which
@@ -94,6 +95,11 @@ impl Separable for NotAKnotBspline {
 
     fn width(&self) -> usize {
         self.0.width()
+    }
+
+    fn pieces(&self) -> Pieces {
+        let own = self.0.pieces();
+        Pieces { curves_at_walls: true, extension: own.degree, ..own }
     }
 
     fn is_spline(&self) -> bool {

@@ -1,6 +1,7 @@
 //! Functions of one coordinate and their tensor product: the one path of all separable families.
 
 use super::{ApproximationError, Shipped, Support, Validate};
+use crate::aggregation::Pieces;
 use crate::grid::{Axis, Grid, indices};
 use crate::tensor::Vector;
 
@@ -84,10 +85,32 @@ pub trait Separable: Validate + Send + Sync {
         None
     }
 
+    /// With which functions loads on a surface act, and the motion of a surface is read.
+    fn at_surface(&self) -> AtSurface<'_> {
+        AtSurface::Own
+    }
+
+    /// By which polynomials nodes at the boundary of a body follow others.
+    fn pieces(&self) -> Pieces {
+        Pieces::LINEAR
+    }
+
     /// Whether they are B-splines, away from walls: diagonal blocks serve those better than other functions of that width.
     fn is_spline(&self) -> bool {
         matches!(self.shipped(), Some(Shipped::Bspline(_)))
     }
+}
+
+/// The functions at a point x of a loaded surface. Loads act through functions that balance the internal force: the sum σ Σ_p V_p ∇N_I(x_p)
+/// over the particles of a body under uniform stress is the same sum over its surface.
+#[derive(Clone, Copy)]
+pub enum AtSurface<'a> {
+    /// Those of the family: for particles that integrate, the two sums are the same.
+    Own,
+    /// Other functions. V_p ∇N_I of uGIMP is the difference of a hat between the ends of the particle, and the sum telescopes to hats.
+    Other(&'a dyn Separable),
+    /// Those of the nearest particle, continued linearly along each axis: they reach no node that the particle does not reach.
+    NearestParticle,
 }
 
 /// As [`Separable::axis`], and not longer than [`Separable::width`]: the sweep has no room for more.

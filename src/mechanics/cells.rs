@@ -2,6 +2,7 @@
 
 use crate::mechanics::sweep::{At, LANES, Laned};
 use crate::mechanics::tangent::Tangent;
+use crate::mechanics::unknowns::padded;
 use crate::solver::{LocalForm, Neighbours};
 use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
@@ -13,8 +14,11 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         let (tiles, volume) = (D.pow(4), grid.spacing.powi(D as i32));
         let mut form = LocalForm {
             grid: std::array::from_fn(|k| if k < D { grid.cells[k] } else { 0 }),
+            aggregated: self.supports.extension().is_some(),
+            degree: self.supports.extension().map_or(0, |extension| extension.degree()),
             nodes: self.indices(),
-            prescribed: self.held(),
+            prescribed: self.unknowns.prescribed_mask(self.supports.nodes()),
+            follows: self.unknowns.following_mask(self.supports.nodes()),
             ..LocalForm::default()
         };
         let terms: Vec<_> =
@@ -77,29 +81,24 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         form
     }
 
-    /// Nodes share an entry at a particle, or where second differences are held.
+    /// Nodes share an entry at a particle, or where second differences are held, and so do those that they follow.
     pub(super) fn joined(&self) -> Neighbours {
         let mut bends = Vec::new();
         self.terms.iter().for_each(|term| term.add_bends(&mut bends));
         let further = self.terms.iter().map(|term| term.reach()).max().unwrap_or(0);
         let reach = (self.supports.reach() + further).max(if bends.is_empty() { 0 } else { 2 });
-        Neighbours { nodes: self.indices(), reach, prescribed: self.held() }
+        let mut leaders = vec![Vec::new(); self.supports.nodes()];
+        for (outer, _, row) in self.unknowns.followers.rows() {
+            leaders[outer] = row.map(|(leader, _)| leader).collect();
+        }
+        let (prescribed, follows) =
+            (self.unknowns.prescribed_mask(self.supports.nodes()), self.unknowns.following_mask(self.supports.nodes()));
+        let fixed = prescribed.iter().zip(&follows).map(|(prescribed, follows)| *prescribed || *follows).collect();
+        Neighbours { nodes: self.indices(), reach, leaders, fixed }
     }
 
     fn indices(&self) -> Vec<[u32; 3]> {
         let (grid, active) = (self.supports.grid(), self.supports.active());
         active.ids().iter().map(|&id| padded(grid.index(id))).collect()
     }
-
-    /// Which unknowns are prescribed.
-    fn held(&self) -> Vec<bool> {
-        let mut held = vec![false; D * self.supports.nodes()];
-        self.prescribed.iter().for_each(|dof| held[dof.node * D + dof.component] = true);
-        held
-    }
-}
-
-/// An index of three axes.
-fn padded<const D: usize>(index: [u32; D]) -> [u32; 3] {
-    std::array::from_fn(|k| index.get(k).copied().unwrap_or(0))
 }

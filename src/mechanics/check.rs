@@ -114,6 +114,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
         let mut u = u.to_vec();
         self.clear_prescribed(&mut u);
+        let dphi = &*self.unknowns.extended(dphi);
         let bound = self.worst_bound(dphi)?;
         let product = |tangent: &Tangent<'_, D>| {
             let mut out = vec![Vector::zeros(); u.len()];
@@ -169,15 +170,19 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// The diagonal blocks against the product with unit vectors at nodes far enough apart: each sees only its own.
     fn check_blocks(&self, tangent: &Tangent<'_, D>, bound: f64) -> Result<(), CheckError> {
         let blocks = tangent.diagonal_blocks();
-        let held = |node, i| self.prescribed.iter().any(|dof| dof.node == node && dof.component == i);
+        let prescribed = self.unknowns.prescribed_mask(blocks.len());
+        let follows = self.unknowns.following_mask(blocks.len());
+        let held = |node: usize, i: usize| prescribed[node * D + i] || follows[node * D + i];
+        let uncoupled = self.unknowns.uncoupled();
         for node in (0..blocks.len()).step_by(blocks.len().div_ceil(BLOCKS).max(1)) {
             for i in (0..D).filter(|&i| !held(node, i)) {
                 let (mut unit, mut out) = (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
                 unit[node][i] = 1.0;
                 tangent.product(&unit, &mut out);
                 let (mut column, scale) = (blocks[node].column(i).into_owned(), blocks[node].norm());
-                // Prescribed rows are the identity's.
-                (0..D).filter(|&k| held(node, k)).for_each(|k| column[k] = 0.0);
+                // Rows of values that are no unknowns are the identity's.
+                let apart = |k: usize| k != i && uncoupled.contains(&node);
+                (0..D).filter(|&k| held(node, k) || apart(k)).for_each(|k| (column[k], out[node][k]) = (0.0, 0.0));
                 let found = compare("diagonal blocks", &[column], &[out[node]], bound, scale);
                 found.map_err(|error| CheckError::Mismatch(Box::new(TangentMismatch { node, ..error })))?;
             }

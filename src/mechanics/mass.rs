@@ -1,10 +1,12 @@
 //! The mass operator M̃ = (1−ε) M + ε lumped(M), with M_IJ = Σ_p m N_I N_J (eq. 42): product, projection, diagonal.
 
+use crate::aggregation::Followers;
 use crate::mechanics::sweep::{Supports, Weights};
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::{ConjugateGradientSettings, LinearError, LinearOperator, conjugate_gradient};
 use crate::tensor::Vector;
+use std::borrow::Cow;
 
 /// Below this fraction of the largest particle mass, a node's velocity and acceleration are zero.
 const LIGHT: f64 = 1e-14;
@@ -70,31 +72,39 @@ impl<const D: usize> Mass<'_, D> {
         &self,
         fields: [&[Vector<f64, D>]; K],
     ) -> Result<(Projected<K, D>, usize), LinearError> {
+        let followers = followers(self.supports);
+        let lumped = restricted(&followers, self.lumped);
         let right = |field: &[Vector<f64, D>]| {
-            let mut out = self.supports.field();
+            let mut out: Pooled<Vector<f64, D>> = self.supports.field();
             self.supports.spread(&mut out, |p| field[p] * self.particles.mass[p]);
+            followers.restrict(&mut out);
             out
         };
         let (mut nodal, mut iterations) = (fields.map(right), 0);
-        let inverse_diagonal = (self.lumping < 1.0).then(|| self.inverse_diagonal());
+        let inverse_diagonal = (self.lumping < 1.0).then(|| self.inverse_diagonal(&followers));
         let is_light = is_light(self.particles);
         for field in &mut nodal {
             match &inverse_diagonal {
-                Some(inverse_diagonal) => iterations += self.solve(&Jacobi(inverse_diagonal), field)?,
-                None => field.iter_mut().zip(self.lumped).for_each(|(w, &m)| *w /= m),
+                Some(inverse_diagonal) => iterations += self.solve(&followers, &Jacobi(inverse_diagonal), field)?,
+                None => field.iter_mut().zip(&*lumped).for_each(|(w, &m)| *w /= m),
             }
-            let light = field.iter_mut().zip(self.lumped).filter(|(_, m)| is_light(**m));
+            let light = field.iter_mut().zip(&*lumped).filter(|(_, m)| is_light(**m));
             light.for_each(|(w, _)| *w = Vector::zeros());
+            followers.extend(field);
         }
         Ok((nodal, iterations))
     }
 
-    /// 1/M̃_II; zero at nodes without mass.
-    fn inverse_diagonal(&self) -> Pooled<f64> {
+    /// 1/M̃_II; zero at nodes without mass, and at those that follow others.
+    fn inverse_diagonal(&self, followers: &Followers<D>) -> Pooled<f64> {
         let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
         self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
             Vector::from([(1.0 - self.lumping) * self.particles.mass[p]])
         });
+        for (outer, _, leaders) in followers.rows() {
+            let own = std::mem::replace(&mut diagonal[outer], 0.0);
+            leaders.for_each(|(leader, weight)| diagonal[leader] += weight * weight * own);
+        }
         // Of the least numbers above 0 there is no inverse.
         let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
         diagonal.iter_mut().for_each(|d| *d = inverse(*d));
@@ -102,7 +112,12 @@ impl<const D: usize> Mass<'_, D> {
     }
 
     /// By conjugate gradients from zero: where M̃ is singular, the solution of least norm.
-    fn solve(&self, jacobi: &Jacobi<'_, D>, field: &mut [Vector<f64, D>]) -> Result<usize, LinearError> {
+    fn solve(
+        &self,
+        followers: &Followers<D>,
+        jacobi: &Jacobi<'_, D>,
+        field: &mut [Vector<f64, D>],
+    ) -> Result<usize, LinearError> {
         let right = self.supports.pool().collect(field.iter().copied());
         field.fill(Vector::zeros());
         let settings = ConjugateGradientSettings {
@@ -110,14 +125,41 @@ impl<const D: usize> Mass<'_, D> {
             max_iterations: 10 * right.len() + 100,
         };
         let (right, solution) = (bytemuck::cast_slice(&right), bytemuck::cast_slice_mut(field));
-        Ok(conjugate_gradient(self, jacobi, right, solution, &settings, self.supports.pool())?.iterations)
+        let operator = Restricted { mass: self, followers };
+        Ok(conjugate_gradient(&operator, jacobi, right, solution, &settings, self.supports.pool())?.iterations)
     }
 }
 
-impl<const D: usize> LinearOperator for Mass<'_, D> {
+/// E of the nodes, whatever is prescribed of them.
+pub(super) fn followers<const D: usize>(supports: &Supports<D>) -> Followers<D> {
+    Followers::new(supports.extension().cloned().unwrap_or_default(), std::iter::empty())
+}
+
+/// Eᵀ m of masses, zero at nodes that follow others.
+pub(super) fn restricted<'a, const D: usize>(followers: &Followers<D>, mass: &'a [f64]) -> Cow<'a, [f64]> {
+    let mut mass = Cow::Borrowed(mass);
+    for (outer, _, leaders) in followers.rows() {
+        let mass = mass.to_mut();
+        let own = std::mem::replace(&mut mass[outer], 0.0);
+        leaders.for_each(|(leader, weight)| mass[leader] += weight * own);
+    }
+    mass
+}
+
+/// Eᵀ M̃ E
+struct Restricted<'a, const D: usize> {
+    mass: &'a Mass<'a, D>,
+    followers: &'a Followers<D>,
+}
+
+impl<const D: usize> LinearOperator for Restricted<'_, D> {
     fn apply(&self, x: &[f64], y: &mut [f64]) {
-        y.fill(0.0);
-        self.add_product(1.0, bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
+        let mut x: Pooled<Vector<f64, D>> = self.mass.supports.pool().collect(bytemuck::cast_slice(x).iter().copied());
+        self.followers.extend(&mut x);
+        let y: &mut [Vector<f64, D>] = bytemuck::cast_slice_mut(y);
+        y.fill(Vector::zeros());
+        self.mass.add_product(1.0, &x, y);
+        self.followers.restrict(y);
     }
 }
 

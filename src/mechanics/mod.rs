@@ -17,3 +17,4 @@ pub mod sweep;
 pub mod tangent;
 pub mod terms;
 pub mod transfer;
+pub(crate) mod unknowns;

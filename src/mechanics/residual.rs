@@ -5,6 +5,7 @@ use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
 use crate::mechanics::point::Part;
 use crate::mechanics::sweep::{Flow, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::pooled::Pooled;
 use crate::solver::Stop;
@@ -24,6 +25,9 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
 /// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
 ///
 /// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A − R₀,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
+///
+/// Where outer nodes follow inner ones ([`aggregation`](crate::aggregation)), all of this is Eᵀ R(E Δφ): values of outer nodes are not
+/// read, and their residual is zero.
 ///
 /// ```
 /// use bfree::mechanics::{loads::{Curve, Gravity}, schemes::Newmark, sweep::Supports, transfer::Nodal};
@@ -54,6 +58,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
     pub terms: Terms<'a, D, L>,
     /// Degrees of freedom that are not solved for.
     pub prescribed: &'a [PrescribedDof],
+    /// All that are.
+    pub(crate) unknowns: Unknowns<'a, D>,
     /// Who may want the search for it to end.
     pub stop: Option<&'a Stop>,
 }
@@ -61,7 +67,8 @@ pub struct Equilibrium<'a, const D: usize, L> {
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// The terms that act in a step, on its free degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
-        Self { step, terms: Terms::of(&step), prescribed, stop: None }
+        let unknowns = Unknowns::new(step.supports, prescribed);
+        Self { step, terms: Terms::of(&step), prescribed, unknowns, stop: None }
     }
 
     /// R(Δφ) at every active node; at prescribed degrees of freedom, the reaction.
@@ -106,6 +113,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         out: &mut [Vector<T, D>],
     ) -> Result<(), Inadmissible> {
         let magnitude = weights == Weights::Magnitude;
+        let dphi = &*self.unknowns.extended(dphi);
         if !magnitude {
             out.fill(Vector::zeros());
             self.terms.add_at_nodes(&picked, dphi, out);
@@ -114,16 +122,22 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         // Of values the magnitudes are those at the nodes.
         points.retain(|(flow, _)| !magnitude || flow.gradient);
         let (flows, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
-        let Some(flow) = flows.into_iter().reduce(Flow::and) else { return Ok(()) };
-        self.step.supports.sweep(Some(dphi), Flow { weights, ..flow }, out, |group, at, sums| {
-            for add in &all {
-                add(group, at, sums).map_err(|error| (error.particle, error))?;
-            }
-            if magnitude {
-                sums.gradient.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
-            }
-            Ok(())
-        })
+        if let Some(flow) = flows.into_iter().reduce(Flow::and) {
+            self.step.supports.sweep(Some(dphi), Flow { weights, ..flow }, out, |group, at, sums| {
+                for add in &all {
+                    add(group, at, sums).map_err(|error| (error.particle, error))?;
+                }
+                if magnitude {
+                    sums.gradient.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|x| *x = x.abs());
+                }
+                Ok(())
+            })?;
+        }
+        match magnitude {
+            true => self.unknowns.followers.restrict_magnitudes(out),
+            false => self.unknowns.followers.restrict(out),
+        }
+        Ok(())
     }
 
     /// The forces of loads on the nodes, at Δφ.
@@ -164,7 +178,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// As [`Self::residual`].
     pub fn sensitivity(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(dphi)?;
-        self.terms.add_sensitivity(dphi, &mut out)?;
+        self.terms.add_sensitivity(&self.unknowns.extended(dphi), &mut out)?;
+        self.unknowns.followers.restrict_magnitudes(&mut out);
         Ok(self.free_norm(out))
     }
 
@@ -175,7 +190,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut out = self.step.supports.field();
-        self.terms.add_magnitudes_at_nodes(dphi, &mut out);
+        self.terms.add_magnitudes_at_nodes(&self.unknowns.extended(dphi), &mut out);
         self.sum_into(|_, _| true, Part::Whole, Weights::Magnitude, dphi, &mut out)?;
         Ok(out)
     }
@@ -206,7 +221,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// # Errors
     /// As [`Self::residual`].
     pub fn potential<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
-        self.terms.energy(dphi)
+        self.terms.energy(&self.unknowns.extended(dphi))
     }
 
     /// Whether the tangent is symmetric.
@@ -216,8 +231,6 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     /// Sets the prescribed degrees of freedom of a field to zero.
     pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
-        for dof in self.prescribed {
-            field[dof.node][dof.component] = T::zero();
-        }
+        self.unknowns.clear_prescribed(field);
     }
 }

@@ -1,10 +1,10 @@
 //! The consistent tangent K(Δφ)·u, matrix-free: the terms frozen at Δφ, applied, never stored (eqs. 30, 34, 38).
 
 use crate::material::Law;
-use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{At, Flow, Form, LANES, Laned, Laws, Supports};
+use crate::mechanics::sweep::{At, Flow, Form, Group, LANES, Laned, Laws, Quadratic, Supports};
 use crate::mechanics::terms::{Frozen, Piece, Unit};
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::solver::{
@@ -46,7 +46,7 @@ use num_dual::Dual64;
 /// ```
 pub struct Tangent<'a, const D: usize, X = f64> {
     pub(super) supports: &'a Supports<D>,
-    pub(super) prescribed: &'a [PrescribedDof],
+    pub(super) unknowns: Unknowns<'a, D>,
     pub(super) particles: &'a Particles<D>,
     pub(super) terms: Vec<Box<dyn Frozen<X, D> + 'a>>,
     pub(super) unit: Unit,
@@ -56,6 +56,8 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
     /// K u, over the scale, on the free degrees of freedom (u is taken as zero on the prescribed ones).
     pub fn product(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
         out.fill(Vector::zeros());
+        let extended = self.unknowns.extended_in(self.supports, u);
+        let u = extended.as_deref().unwrap_or(u);
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
         let (flows, all): (Vec<_>, Vec<_>) =
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
@@ -65,28 +67,42 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }
-        for dof in self.prescribed {
-            out[dof.node][dof.component] = X::zero();
-        }
+        self.unknowns.followers.restrict(out);
+        self.unknowns.clear_prescribed(out);
     }
 
-    /// K_II, over the scale, of every active node; a prescribed degree of freedom has the identity's row and column.
+    /// K_II, over the scale, of every active node. A value that is prescribed, or follows others, has the identity's row and column.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let mut blocks: Pooled<Tensor<f64, D>> = self.supports.field();
         self.terms.iter().for_each(|term| term.add_blocks_at_nodes(&mut blocks));
+        self.unknowns.restrict_blocks(&mut blocks);
+        let functions = |particle| self.unknowns.functions(self.supports, particle);
+        self.terms.iter().for_each(|term| term.add_blocks_of_functions(&functions, &mut blocks));
         let all: Vec<_> = self.terms.iter().filter_map(|term| term.blocks_at_points()).collect();
         if !all.is_empty() {
-            self.supports.blocks(&mut blocks, &|group, form| all.iter().for_each(|add| add(group, form)));
+            let quadratic = |group: Group<'_>, form: &mut Quadratic| all.iter().for_each(|add| add(group, form));
+            self.supports.blocks(&mut blocks, &quadratic);
+            self.add_followers(&quadratic, &mut blocks);
         }
-        for dof in self.prescribed {
-            let (block, i) = (&mut blocks[dof.node], dof.component);
-            for k in 0..D {
-                block[(i, k)] = 0.0;
-                block[(k, i)] = 0.0;
-            }
-            block[(i, i)] = 1.0;
-        }
+        self.unknowns.finish_blocks(&mut blocks);
         blocks
+    }
+
+    /// Adds what following nodes change in the blocks of those that they follow.
+    fn add_followers(&self, quadratic: &dyn Fn(Group<'_>, &mut Quadratic), blocks: &mut [Tensor<f64, D>]) {
+        if self.unknowns.followers.is_empty() {
+            return;
+        }
+        let reached = self.unknowns.reached(self.supports);
+        self.supports.each_group(|group| {
+            if group.particles.iter().any(|&p| reached[p as usize]) {
+                let mut form = Quadratic::zero();
+                quadratic(group, &mut form);
+                for (lane, &p) in group.particles.iter().enumerate().filter(|(_, p)| reached[**p as usize]) {
+                    self.unknowns.add_followers(self.supports, p as usize, &form, lane, blocks);
+                }
+            }
+        });
     }
 
     /// The power of two that K is divided by; 1 in double precision.
@@ -158,9 +174,9 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         dphi: &[Vector<f64, D>],
         unit: Unit,
     ) -> Result<Tangent<'_, D, X>, Inadmissible> {
-        let terms = self.terms.freeze(piece, dphi, unit)?;
-        let (supports, particles, prescribed) = (self.step.supports, self.step.particles, self.prescribed);
-        Ok(Tangent { supports, prescribed, particles, terms, unit })
+        let terms = self.terms.freeze(piece, &self.unknowns.extended(dphi), unit)?;
+        let (supports, particles) = (self.step.supports, self.step.particles);
+        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms, unit })
     }
 
     /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.

@@ -118,6 +118,7 @@ impl Scene {
             lumping: self.time.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             ghost: self.ghost(),
+            aggregation: self.aggregation,
             renewal: self.grid.renewed(self.time.inertia),
             initial_guess: self.time.initial_guess(),
             wall_update: self.time.wall_update.unwrap_or_default(),

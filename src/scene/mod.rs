@@ -86,9 +86,14 @@ pub struct Scene {
     /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
+    /// Whether nodes with little of a body follow well-supported nodes (extended B-splines), in place of the ghost stiffness. Such nodes are
+    /// no unknowns: they continue the polynomial of the nearest well-filled cell. Loads on surfaces then act through functions that balance
+    /// the internal force. Default: false.
+    #[serde(default)]
+    pub aggregation: bool,
     /// Ghost stiffness γ (no unit), 0 to 1: stabilises nodes with little of a body. Second differences of the motion between such nodes are
     /// penalised by this share of the body's stiffness; momentum and uniform strains stay exact. Default: 0.001 without inertia, in steps of
-    /// Courant numbers above 10, and where the surface of a shape is loaded; else 0.
+    /// Courant numbers above 10, and where the surface of a shape is loaded; else, and with `aggregation`, 0.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
@@ -190,6 +195,8 @@ impl Scene {
         }
         if let Some(ghost) = self.ghost_stiffness {
             problems.between("ghost_stiffness", ghost, 0.0, 1.0);
+            let allowed = "aggregation is true, in place of the ghost stiffness: remove one of the two";
+            problems.require(!(self.aggregation && ghost > 0.0), "ghost_stiffness", ghost, allowed);
         }
         if let Some(gravity) = &self.gravity {
             gravity.check(&mut problems, dimension);
@@ -242,7 +249,7 @@ impl Scene {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
         let needed = self.courant() > LONG_STEPS || loads.into_iter().any(|load| load.surface.is_none());
-        self.ghost_stiffness.unwrap_or(if needed { GHOST } else { 0.0 })
+        self.ghost_stiffness.unwrap_or(if needed && !self.aggregation { GHOST } else { 0.0 })
     }
 
     /// The largest Courant number, that of waves of pressure; infinite without inertia.

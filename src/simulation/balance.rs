@@ -66,6 +66,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 report
             }
         };
+        equilibrium.unknowns.followers.extend(&mut phi);
         Ok(Balance { equilibrium, phi, newton, loads: [from, to] })
     }
 

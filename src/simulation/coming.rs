@@ -7,6 +7,7 @@ use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::unknowns::Unknowns;
 use crate::nodes::Nodes;
 use crate::tensor::Vector;
 
@@ -45,10 +46,10 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
         let mut kept = simulation.kept.take();
         kept.iter_mut().for_each(|kept| kept.exchange(&mut simulation.particles));
         simulation.particles.remember(&simulation.bodies);
-        let (supports, nodes) =
-            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-        let prescribed = self.prescribed(&nodes);
+        let supports = simulation.new_supports(None)?;
+        let prescribed = self.prescribed(supports.active());
         let nodal = simulation.nodal(&supports, &prescribed, kept.as_ref())?.with_prescribed(&prescribed);
+        let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));
         Ok(Coming { simulation, supports, nodal, prescribed })
     }
 }

@@ -26,6 +26,7 @@ use crate::mechanics::residual::unsymmetric;
 use crate::mechanics::schemes::{Alphas, LONG_STEPS};
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::{Krylov, Preconditioned, Preconditioning};
@@ -195,7 +196,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     pub(crate) fn damps(&self) -> bool {
         let on_surface = |point: &SurfacePoint<D>| !self.particles.is_solid(point.particle);
         let ties = || self.loads.surface.iter().flat_map(|load| &load.points).any(on_surface);
-        self.loads.damping.is_some() || self.settings.ghost > 0.0 || ties()
+        self.loads.damping.is_some() || !self.settings.aggregation && (self.settings.ghost > 0.0 || ties())
     }
 
     /// Whether a law remembers a number by this name.
@@ -409,17 +410,19 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if !self.settings.scheme.has_inertia() {
             return Ok(());
         }
-        let (supports, nodes) = Supports::new(&self.approximation, &self.grid, &self.particles.position)?;
-        let prescribed = self.prescribed(&nodes);
+        let supports = self.new_supports(None)?;
+        let prescribed = self.prescribed(supports.active());
+        let unknowns = Unknowns::new(&supports, &prescribed);
         let mut nodal = Nodal::at_rest(&self.particles, &supports);
         if self.loads.damping.is_some() {
-            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).velocity;
+            nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).extended(&unknowns).velocity;
         }
         // Δφ and a_n are zero, and with them the inertia; damping acts on v_n.
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, Alphas::START, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
-        nodal.accelerate(&self.particles, &unbalanced);
-        self.particles.acceleration = supports.values(&nodal.with_prescribed(&prescribed).acceleration);
+        nodal.accelerate(&self.particles, &supports, &unbalanced);
+        let nodal = nodal.with_prescribed(&prescribed).extended(&unknowns);
+        self.particles.acceleration = supports.values(&nodal.acceleration);
         Ok(())
     }
 }

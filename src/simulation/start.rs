@@ -1,32 +1,62 @@
 //! What a step starts from: shape functions, prescribed motion, the state of the nodes, and the equilibrium that is to be found.
 
-use super::{Simulation, StepError, Workspace};
-use crate::approximation::ShapeFunction;
+use super::{Simulation, StepError};
+use crate::approximation::{AtSurface, Separable, ShapeFunction};
 use crate::material::Law;
 use crate::mechanics::kept::Kept;
-use crate::mechanics::loads::{PrescribedDof, prescribed_dofs};
+use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::sweep::{Points, SupportError, Supports};
 use crate::mechanics::terms;
 use crate::mechanics::transfer::{Nodal, Projection};
+use crate::mechanics::unknowns::extension;
 use crate::nodes::Nodes;
-use crate::particles::Particles;
 use crate::solver::LinearError;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// The shape functions of a step, those of the last one if the grid is kept.
     pub(super) fn supports(&mut self, kept: bool) -> Result<Supports<D>, SupportError> {
-        let (Workspace { supports, serves, pool }, Particles { position, id, .. }) =
-            (&mut self.workspace, &self.particles);
-        let spare = supports.take();
-        match spare {
-            Some(supports) if kept && *serves => Ok(supports.again()),
-            spare => {
-                let precision = self.settings.newton.precision;
-                Ok(Supports::renewed(spare, &self.approximation, &self.grid, position, Some(id), precision, pool)?.0)
-            }
+        match self.workspace.supports.take() {
+            Some(supports) if kept && self.workspace.serves => Ok(supports.again()),
+            spare => self.new_supports(spare),
         }
+    }
+
+    /// The shape functions at the present positions, in the memory of others that are no longer needed.
+    pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
+        let Self { particles, loads, approximation, grid, settings, workspace, .. } = self;
+        let mut points = Points { ids: Some(&particles.id), ..Points::at(&particles.position) };
+        if settings.aggregation {
+            let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
+            points = at_surface_points(points, particles, loads, grid, at_surface);
+        }
+        let (precision, pool) = (settings.newton.precision, &workspace.pool);
+        let (supports, _) = Supports::renewed(spare, approximation, grid, &points, precision, pool)?;
+        Ok(self.aggregated(supports))
+    }
+
+    /// The same supports, where nodes with little of a body follow others if they are to.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// let mut simulation = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+    /// let followers = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+    ///     let (supports, _) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
+    ///     Ok(of.aggregated(supports).extension().map_or(0, |extension| extension.len()))
+    /// };
+    /// assert!(followers(&simulation)? > 0);
+    /// simulation.settings.aggregation = false;
+    /// assert_eq!(followers(&simulation)?, 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn aggregated(&self, supports: Supports<D>) -> Supports<D> {
+        if !self.settings.aggregation {
+            return supports;
+        }
+        let extension = extension(self.approximation.pieces(), &self.particles, &supports);
+        supports.with_extension(extension)
     }
 
     /// The degrees of freedom prescribed in the coming step.

@@ -8,6 +8,7 @@ use crate::material::Law;
 use crate::mechanics::kept::{Kept, Renewal};
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::{Committed, Update};
+use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
 
@@ -59,7 +60,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         let projected = self.nodal(&supports, &prescribed, kept.as_ref())?;
         spent.projection_iterations = projected.iterations;
-        let nodal = projected.with_prescribed(&prescribed);
+        let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
         let Balance { equilibrium, phi, newton, loads: [from, to] } =
@@ -71,7 +72,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
 
         let (end, walls) = (scheme.end(dt), self.settings.wall_update);
-        let mut update = Update::new(&end, &projected, &nodal, &prescribed, walls, &dphi);
+        let update = Update::new(&end, &projected, &nodal, &prescribed, walls, &dphi);
+        let mut update = update.extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
         if let Some(smoothing) = &self.settings.smoothing {
             update.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);

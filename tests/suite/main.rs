@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod adaptive;
+mod aggregation;
 mod approximation;
 mod carried;
 mod compaction;

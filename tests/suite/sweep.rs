@@ -9,7 +9,7 @@ use bfree::material::{ClosedTangent, Lame, Law, Material, NeoHookean, Start};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::sweep::{Flow, Supports, Weights};
+use bfree::mechanics::sweep::{Flow, Points, Supports, Weights};
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
@@ -347,7 +347,7 @@ fn renewal<const D: usize>() {
         for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
             let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
             let renewed =
-                Supports::renewed(Some(spare), &shape, &grid, &after, None, Precision::Mixed, &Pool::default())
+                Supports::renewed(Some(spare), &shape, &grid, &Points::at(&after), Precision::Mixed, &Pool::default())
                     .unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());

@@ -84,7 +84,7 @@ fn only_a_node_of_next_to_no_mass_gets_no_velocity_in_any_unit_of_mass() -> Resu
             assert_eq!(of(&nodal.acceleration), expected(-3.0));
             // a = −R/m, with R = −2 m.
             let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| Vector::from([-2.0 * m])).collect();
-            nodal.accelerate(&particles, &unbalanced);
+            nodal.accelerate(&particles, &supports, &unbalanced);
             assert_eq!(of(&nodal.acceleration), expected(2.0));
         }
     }

@@ -4,7 +4,7 @@ use super::starts::Starts;
 use super::{radius, validate};
 use crate::approximation::interior::{Column, FURTHEST, Interior, Lane, NODES, SETTLED, distance};
 use crate::approximation::product::Place;
-use crate::approximation::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
+use crate::approximation::{ApproximationError, AtSurface, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
 use std::sync::Arc;
 
@@ -289,6 +289,10 @@ impl Separable for Lme {
 
     fn shipped(&self) -> Option<Shipped<'_>> {
         (self.starts.is_some() && self.validate(1).is_ok()).then_some(Shipped::Lme(self))
+    }
+
+    fn at_surface(&self) -> AtSurface<'_> {
+        AtSurface::NearestParticle
     }
 
     fn width(&self) -> usize {

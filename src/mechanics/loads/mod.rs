@@ -1,9 +1,11 @@
 //! Loads and prescribed motion: gravity and its curve, tractions, follower pressure, moving walls.
 
+mod at_surface;
 mod curve;
 mod prescribed;
 mod rotation;
 
+pub(crate) use at_surface::at_surface_points;
 pub use curve::{Curve, CurveError};
 pub use prescribed::{Motion, MotionStep, Prescribed, PrescribedDof, Selection, prescribed_dofs};
 pub use rotation::Rotation;

@@ -3,6 +3,7 @@
 use super::kernel::{In, Pairs, Window, each_tile, tile};
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::Arithmetic;
+use crate::tensor::{Tensor, Vector};
 
 /// Pairs (k, l) with k ≤ l of D axes.
 const MOST_PAIRS: usize = 6;
@@ -20,6 +21,18 @@ impl Quadratic {
     /// Nothing yet.
     pub fn zero() -> Self {
         Self { bilinear: [[[[0.0; LANES]; 3]; 3]; MOST_PAIRS], mass: [0.0; LANES] }
+    }
+
+    /// B(∇N, ∇N) + m N² I of one particle.
+    pub(crate) fn block<const D: usize>(&self, lane: usize, n: f64, grad_n: &Vector<f64, D>) -> Tensor<f64, D> {
+        let mut block = Tensor::<f64, D>::identity() * (self.mass[lane] * n * n);
+        for l in 0..D {
+            for k in 0..=l {
+                let of_pair = &self.bilinear[pair(k, l)];
+                block += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
+            }
+        }
+        block
     }
 }
 

@@ -1,5 +1,6 @@
 //! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
 
+use super::Points;
 use super::block::{Block, Groups, Span};
 use super::columns::{Along, Columns, Family};
 use super::kernel::WIDEST_TILE;
@@ -8,7 +9,6 @@ use super::order::{Key, follows};
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
-use crate::tensor::Vector;
 use std::ops::Range;
 
 /// What one thread works in.
@@ -30,7 +30,7 @@ pub(super) struct Scratch {
 pub(super) fn block<const D: usize>(
     family: Family<'_>,
     grid: &Grid<D>,
-    positions: &[Vector<f64, D>],
+    points: &Points<'_, D>,
     keys: &[Key],
     single: bool,
     spare: Block,
@@ -39,7 +39,8 @@ pub(super) fn block<const D: usize>(
     let (mut size, mut origin) = ([1; 3], [0; 3]);
     for (k, along) in scratch.along.iter_mut().enumerate().take(D) {
         along.x.clear();
-        along.x.extend(keys.iter().map(|key| positions[key.particle as usize][k]));
+        along.x.extend(keys.iter().map(|key| points.positions[key.particle as usize][k]));
+        along.continue_by(k, keys, points);
         family.spans(&grid.axis(k), along)?;
         let [low, high] = union(&along.spans);
         size[k] = (high - low) as usize;

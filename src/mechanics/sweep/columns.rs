@@ -3,19 +3,24 @@
 //! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, each
 //! particle asks for its list.
 
+use super::Points;
 use super::lanes::{LANES, Lanes, Widest, WithLanes};
+use super::order::Key;
 use super::supports::WIDEST;
 use crate::approximation::{
-    self, ApproximationError, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED, Separable,
-    Shipped,
+    self, ApproximationError, AtSurface, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED,
+    Separable, Shipped,
 };
 use crate::grid::Axis;
+use std::collections::BTreeMap;
 use std::ops::{Add, Div, Mul, Range, Sub};
 
 /// A product of functions, and how far they reach if they have vector lanes.
 #[derive(Clone, Copy)]
 pub(super) struct Family<'a> {
     product: &'a dyn Separable,
+    /// Of points on a loaded surface.
+    at_surface: &'a dyn Separable,
     shipped: Option<(Shipped<'a>, f64)>,
 }
 
@@ -31,13 +36,27 @@ pub(super) struct Along {
     above: Vec<f64>,
     /// Whether a wall cuts the list.
     cut: Vec<bool>,
+    /// By what the functions of points on a loaded surface are continued, by their places in the block.
+    continued: BTreeMap<usize, f64>,
     list: AxisWeights,
+}
+
+impl Along {
+    /// Takes what continues the functions of the particles `keys` along the axis `k`.
+    pub(super) fn continue_by<const D: usize>(&mut self, k: usize, keys: &[Key], points: &Points<'_, D>) {
+        self.continued.clear();
+        if !points.continued.is_empty() {
+            let of = |(i, key): (usize, &Key)| Some((i, points.continued.get(&key.particle)?[k]));
+            self.continued.extend(keys.iter().enumerate().filter_map(of));
+        }
+    }
 }
 
 impl<'a> Family<'a> {
     pub(super) fn new(product: &'a dyn Separable) -> Self {
         let shipped = product.shipped().map(|shipped| (shipped, shipped.radius()));
-        Self { product, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
+        let at_surface = if let AtSurface::Other(other) = product.at_surface() { other } else { product };
+        Self { product, at_surface, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
     }
 
     /// Finds the lists of the particles at `along.x`, which lie on the axis.
@@ -48,12 +67,16 @@ impl<'a> Family<'a> {
         approximation::check(axis)?;
         if let Some((_, radius)) = self.shipped {
             f64::widest(Places { axis, radius, along });
-            return Ok(());
+        } else {
+            along.spans.clear();
+            for &x in &along.x {
+                approximation::list(self.product, axis, x, &mut along.list)?;
+                along.spans.push(span(&along.list));
+            }
         }
-        along.spans.clear();
-        for &x in &along.x {
-            approximation::list(self.product, axis, x, &mut along.list)?;
-            along.spans.push(span(&along.list));
+        for &i in along.continued.keys() {
+            approximation::list(self.at_surface, axis, along.x[i], &mut along.list)?;
+            along.spans[i] = span(&along.list);
         }
         Ok(())
     }
@@ -84,7 +107,12 @@ impl<'a> Family<'a> {
         }
         for (lane, i) in range.clone().enumerate() {
             out.spans[lane] = along.spans[i];
-            if listed[lane] {
+            if let Some(by) = along.continued.get(&i) {
+                let list = &mut along.list;
+                approximation::list(self.at_surface, axis, along.x[i], list)?;
+                list.values.iter_mut().zip(&list.derivatives).for_each(|(n, dn)| *n += by * dn);
+                out.take_list(lane, list);
+            } else if listed[lane] {
                 approximation::list(self.product, axis, along.x[i], &mut along.list)?;
                 out.take_list(lane, &along.list);
             }

@@ -40,7 +40,7 @@ pub(crate) use laned::add_quadratic;
 pub use lanes::LANES;
 pub use laws::Laws;
 pub use number::Number;
-pub use supports::{SupportError, Supports};
+pub use supports::{Points, SupportError, Supports};
 pub use tangents::{Form, Product};
 
 /// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.

@@ -2,10 +2,10 @@
 //! that are no products.
 
 use super::block::Group;
-use super::blocks::{Quadratic, pair};
+use super::blocks::Quadratic;
 use super::kernel::At;
 use super::lanes::LANES;
-use super::{Fill, Flow, Point, SupportError, Visit};
+use super::{Fill, Flow, Point, Points, SupportError, Visit};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
@@ -45,12 +45,13 @@ impl<const D: usize> Plain<D> {
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
-        positions: &[Vector<f64, D>],
+        points: &Points<'_, D>,
     ) -> Result<(Self, Nodes), SupportError> {
+        let positions = &points.positions;
         let count = positions.len().div_ceil(BLOCK);
         let built = parallel::map(count, &|b| {
             let particles = b * BLOCK..((b + 1) * BLOCK).min(positions.len());
-            Block::new(approximation, grid, positions, particles)
+            Block::new(approximation, grid, points, particles)
         })
         .into_iter()
         .collect::<Result<Vec<_>, _>>()?;
@@ -135,14 +136,7 @@ impl<const D: usize> Plain<D> {
             let mut form = Quadratic::zero();
             quadratic(group, &mut form);
             for (lane, (place, n, grad_n)) in block.entries_of(group) {
-                let sum = &mut buffer[place];
-                *sum += Tensor::<f64, D>::identity() * (form.mass[lane] * n * n);
-                for l in 0..D {
-                    for k in 0..=l {
-                        let of_pair = &form.bilinear[pair(k, l)];
-                        *sum += Tensor::from_fn(|i, j| of_pair[i][j][lane]) * (grad_n[k] * grad_n[l]);
-                    }
-                }
+                buffer[place] += form.block(lane, n, &grad_n);
             }
         });
     }
@@ -208,7 +202,7 @@ impl<const D: usize> Block<D> {
     fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
-        positions: &[Vector<f64, D>],
+        points: &Points<'_, D>,
         particles: Range<usize>,
     ) -> Result<(Self, Vec<u64>), SupportError> {
         let mut scratch = Scratch::default();
@@ -216,8 +210,12 @@ impl<const D: usize> Block<D> {
         let (mut offsets, mut found) = (vec![0], Vec::new());
         for particle in particles.clone() {
             approximation
-                .evaluate(grid, &positions[particle], &mut scratch, &mut support)
+                .evaluate(grid, &points.positions[particle], &mut scratch, &mut support)
                 .map_err(|source| SupportError { particle, source })?;
+            if let Some(by) = points.continued.get(&(particle as u32)) {
+                let rises = support.gradients.iter().map(|&gradient| Vector::from(gradient).dot(by));
+                support.values.iter_mut().zip(rises).for_each(|(n, rise)| *n += rise);
+            }
             let slopes = support.gradients.iter().map(|&gradient| Vector::from(gradient));
             let entries = support.nodes.iter().zip(&support.values).zip(slopes);
             found.extend(entries.map(|((&index, &n), grad_n)| (grid.id(index), n, grad_n)));

@@ -3,6 +3,7 @@
 use super::block::Group;
 use super::plain::Plain;
 use super::tiled::Tiled;
+use crate::aggregation::Extension;
 use crate::approximation::{ApproximationError, ShapeFunction};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
@@ -10,6 +11,9 @@ use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
@@ -54,13 +58,40 @@ pub struct Supports<const D: usize> {
     passes: AtomicU64,
     /// Where fields take their memory from.
     pool: Pool,
+    /// Which nodes follow others; `None` where every node is an unknown.
+    extension: Option<Arc<Extension>>,
 }
 
 impl<const D: usize> Clone for Supports<D> {
     fn clone(&self) -> Self {
-        let Self { way, grid, nodes, unit, pool, .. } = self;
+        let Self { way, grid, nodes, unit, pool, extension, .. } = self;
         let passes = AtomicU64::new(self.passes());
-        Self { way: way.clone(), grid: *grid, nodes: nodes.clone(), unit: *unit, passes, pool: pool.clone() }
+        let (way, nodes, pool, extension) = (way.clone(), nodes.clone(), pool.clone(), extension.clone());
+        Self { way, grid: *grid, nodes, unit: *unit, passes, pool, extension }
+    }
+}
+
+/// Where shape functions are evaluated.
+#[derive(Clone, Debug)]
+pub struct Points<'a, const D: usize> {
+    /// x of all particles.
+    pub positions: Cow<'a, [Vector<f64, D>]>,
+    /// What tells particles apart wherever they lie in memory; if it is not there, their places in memory do.
+    pub ids: Option<&'a [u32]>,
+    /// Of points on a loaded surface, by their places in memory: functions are [those of a surface](crate::approximation::Separable::at_surface), evaluated at x and
+    /// continued linearly along each axis by this vector.
+    pub continued: BTreeMap<u32, Vector<f64, D>>,
+}
+
+impl<'a, const D: usize> Points<'a, D> {
+    /// The particles at `positions`, none of which is on a loaded surface.
+    pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
+        Self { positions: positions.into(), ids: None, continued: BTreeMap::new() }
+    }
+
+    /// What a particle is called in messages.
+    pub(super) fn id(&self, particle: usize) -> usize {
+        self.ids.map_or(particle, |ids| ids[particle] as usize)
     }
 }
 
@@ -118,7 +149,7 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
         precision: Precision,
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, positions, None, precision, &Pool::default())
+        Self::renewed(None, approximation, grid, &Points::at(positions), precision, &Pool::default())
     }
 
     /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
@@ -126,7 +157,7 @@ impl<const D: usize> Supports<D> {
     /// sums are taken in the order of cells and ids.
     ///
     /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports};
+    /// use bfree::mechanics::{check::direction, sweep::{Points, Supports}};
     /// use bfree::pooled::Pool;
     /// use bfree::solver::Precision;
     /// use bfree::tensor::Vector;
@@ -137,7 +168,7 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &now, None, Precision::Double, &Pool::default())?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &Points::at(&now), Precision::Double, &Pool::default())?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
@@ -151,8 +182,7 @@ impl<const D: usize> Supports<D> {
         spare: Option<Self>,
         approximation: &A,
         grid: &Grid<D>,
-        positions: &[Vector<f64, D>],
-        ids: Option<&[u32]>,
+        points: &Points<'_, D>,
         precision: Precision,
         pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
@@ -163,13 +193,12 @@ impl<const D: usize> Supports<D> {
                     Way::Plain(_) => None,
                     Way::Tiled(tiled) => Some(tiled),
                 });
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, positions, ids, single, spare)?;
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, single, spare)?;
                 Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, single.then_some(grid.spacing), pool), nodes))
             }
             _ => {
-                let id = |particle: usize| ids.map_or(particle, |ids| ids[particle] as usize);
-                let by_id = |error: SupportError| SupportError { particle: id(error.particle), ..error };
-                let (plain, nodes) = Plain::new(approximation, grid, positions).map_err(by_id)?;
+                let by_id = |error: SupportError| SupportError { particle: points.id(error.particle), ..error };
+                let (plain, nodes) = Plain::new(approximation, grid, points).map_err(by_id)?;
                 Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, pool), nodes))
             }
         }
@@ -208,12 +237,23 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
-        let (plain, nodes) = Plain::new(approximation, grid, positions)?;
+        let (plain, nodes) = Plain::new(approximation, grid, &Points::at(positions))?;
         Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, &Pool::default()), nodes))
     }
 
     fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
-        Self { way, grid: *grid, nodes: nodes.clone(), unit, passes: AtomicU64::new(0), pool: pool.clone() }
+        let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
+        Self { way, grid: *grid, nodes, unit, passes, pool, extension: None }
+    }
+
+    /// The same, where outer nodes follow inner ones: equilibria on these supports are solved for the inner ones alone.
+    pub fn with_extension(self, extension: Extension) -> Self {
+        Self { extension: Some(Arc::new(extension)), ..self }
+    }
+
+    /// Which nodes follow others; `None` where every node is an unknown whatever it has of a body.
+    pub fn extension(&self) -> Option<&Arc<Extension>> {
+        self.extension.as_ref()
     }
 
     /// A nodal field of zeros, one entry for each active node.

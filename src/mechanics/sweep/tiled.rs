@@ -3,12 +3,12 @@
 //! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
 //! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
 
-use super::SupportError;
 use super::block::{Block, Group};
 use super::builder::{Row, block, number};
 use super::columns::Family;
 use super::lanes::LANES;
 use super::order::{self, Key};
+use super::{Points, SupportError};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
@@ -35,22 +35,21 @@ impl<const D: usize> Tiled<D> {
         approximation: &A,
         product: &dyn Separable,
         grid: &Grid<D>,
-        positions: &[Vector<f64, D>],
-        ids: Option<&[u32]>,
+        points: &Points<'_, D>,
         single: bool,
         spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
+        let positions = &*points.positions;
         // Whichever came first in time: the first particle without functions, and what they say of its whole position.
         let failure = |particle: usize, source: ApproximationError| {
             let (mut scratch, mut support) = (Scratch::default(), Support::default());
             let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
-            let id = |p: usize| ids.map_or(p, |ids| ids[p] as usize);
-            let failing = positions.iter().enumerate().filter_map(|(p, x)| Some((id(p), error(x)?)));
-            let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((id(particle), source));
+            let failing = positions.iter().enumerate().filter_map(|(p, x)| Some((points.id(p), error(x)?)));
+            let (particle, source) = failing.min_by_key(|&(id, _)| id).unwrap_or((points.id(particle), source));
             SupportError { particle, source }
         };
         let Self { mut blocks, mut slots, keys, mut rows, nodes } = spare.unwrap_or_default();
-        let keys = order::sorted(grid, positions, ids, keys).map_err(|particle| {
+        let keys = order::sorted(grid, positions, points.ids, keys).map_err(|particle| {
             let outside = ApproximationError::Outside { position: Vec::new(), lower: Vec::new(), upper: Vec::new() };
             failure(particle, outside)
         })?;
@@ -60,7 +59,7 @@ impl<const D: usize> Tiled<D> {
         parallel::for_each_with(blocks.iter_mut().zip(runs()), &|scratch, (place, keys)| match block(
             family,
             grid,
-            positions,
+            points,
             keys,
             single,
             std::mem::take(place),

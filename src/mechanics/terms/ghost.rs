@@ -9,6 +9,8 @@
 //! a layer of thickness h over the points has, and s = 1. Without inertia grids are kept, nothing runs ahead, and s = 1e-3. From a node
 //! that nothing else sees a tie takes no stiffness: it hands the load on, with its moment.
 //!
+//! Neither is there where outer nodes follow inner ones ([`aggregation`](crate::aggregation)).
+//!
 //! It is zero for every affine Δφ: momentum, moment of momentum, turning as a whole and the patch test stay exact.
 
 use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit, summed};
@@ -35,7 +37,8 @@ impl Ghost {
         let on_surfaces = |point: &&SurfacePoint<D>| !step.particles.is_solid(point.particle);
         let points = || step.loads.surface.iter().flat_map(|load| &load.points).filter(on_surfaces);
         let (at_all, loaded) = (step.ghost > 0.0, points().next().is_some());
-        if !at_all && !loaded {
+        // Where outer nodes follow inner ones, none is left alone with a load.
+        if step.supports.extension().is_some() || !at_all && !loaded {
             return None;
         }
         let (grid, nodes) = (step.supports.grid(), step.supports.active());

@@ -15,7 +15,8 @@
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
 use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
+    AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit,
+    summed,
 };
 use crate::material::{Law, VolumeResponse, admissible_or_rest};
 use crate::mechanics::dilatation::{Cells, Member, total};
@@ -244,7 +245,7 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
     }
 
     /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the coupling is in the blocks, too.
-    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+    fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         let mut sums = vec![Vector::<f64, D>::zeros(); blocks.len()];
         let mut touched = Vec::new();
         for ((members, _), k) in self.cells.iter().zip(&self.stiffness) {
@@ -252,8 +253,8 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
                 let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
                 let (rows, weight) = self.of_group(group);
                 let a = Tensor::<f64, D>::from_fn(|i, k| (rows[i * D + k][lane] * weight[lane]).value());
-                for (node, _, grad_n) in self.supports.of(member.particle as usize) {
-                    sums[node] += a * grad_n;
+                for (node, function) in functions(member.particle as usize) {
+                    sums[node] += Vector::from_fn(|i, _| (a * function.gradient[i])[i]);
                     touched.push(node);
                 }
             }

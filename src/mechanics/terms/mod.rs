@@ -32,6 +32,7 @@ use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::{Alphas, Scheme};
 use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
+use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
 use crate::solver::Bend;
 use crate::tensor::{Deformation, Tensor, Vector};
@@ -102,6 +103,9 @@ pub type AtPoints<'a, T, const D: usize> =
 
 /// As [`AtPoints`], of a frozen tangent, which always exists.
 pub type ProductAtPoints<'a, X, const D: usize> = Box<dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a>;
+
+/// The functions of all unknowns at a particle, by node.
+pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 /// Adds the quadratic form of a frozen tangent at the particles of a group.
 pub type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
@@ -205,11 +209,14 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
         None
     }
 
-    /// Adds to the diagonal blocks what acts at the nodes.
+    /// Adds to the diagonal blocks what nodes have for themselves.
     fn add_blocks_at_nodes(&self, _blocks: &mut [Tensor<f64, D>]) {}
 
     /// Adds the second differences that it holds, for coarser grids.
     fn add_bends(&self, _bends: &mut Vec<Bend>) {}
+
+    /// Adds to the diagonal blocks what is known by the functions of single particles.
+    fn add_blocks_of_functions(&self, _functions: &FunctionsAt<'_, D>, _blocks: &mut [Tensor<f64, D>]) {}
 
     /// What adds to the diagonal blocks at the particles.
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {

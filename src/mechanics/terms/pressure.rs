@@ -1,11 +1,11 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface: with an exact tangent, not symmetric on an open surface.
 
-use super::{Freezing, Frozen, Given, Reason, Role, Step, Sum, Term, Unit};
+use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term, Unit};
 use crate::mechanics::loads::{Pressing, PressurePoint};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Laned, Number, Supports};
 use crate::particles::Particles;
-use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity, outer, scaled};
+use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
 
 /// Σ_Γ p cof(F) N A N_I: it has no potential.
 pub struct Pressure<'a, const D: usize> {
@@ -93,11 +93,13 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenPressure<'_, D> {
     }
 
     /// N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
-    fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
+    fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
-            for (node, n, grad_n) in self.supports.of(*particle) {
-                let g = a * grad_n;
-                blocks[node] += scaled(&(outer(w, &g) - outer(&g, w)), n);
+            for (node, function) in functions(*particle) {
+                for k in 0..D {
+                    let g = a * function.gradient[k];
+                    (0..D).for_each(|i| blocks[node][(i, k)] += function.value[i] * (w[i] * g[k] - g[i] * w[k]));
+                }
             }
         }
     }

@@ -1,10 +1,12 @@
 //! Particles → nodes (eqs. 40–42).
 
+use crate::aggregation::Followers;
 use crate::mechanics::affine::affine;
 use crate::mechanics::loads::PrescribedDof;
-use crate::mechanics::mass::{Mass, is_light, lumped};
+use crate::mechanics::mass::{Mass, followers, is_light, lumped, restricted};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::solver::LinearError;
@@ -86,8 +88,9 @@ impl<const D: usize> Nodal<D> {
     /// ```
     pub fn fit(particles: &Particles<D>, supports: &Supports<D>) -> Self {
         let mass = lumped(particles, supports);
-        let [velocity, acceleration] =
-            affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
+        let mut fields = affine(particles, supports, &mass, [&particles.velocity, &particles.acceleration]);
+        fields.iter_mut().for_each(|field| aggregate(particles, supports, &mass, field));
+        let [velocity, acceleration] = fields;
         Self { mass, velocity, acceleration, ..Self::default() }
     }
 
@@ -149,15 +152,23 @@ impl<const D: usize> Nodal<D> {
     /// // An undeformed body under gravity: R_I = −m_I g, and all of it begins to fall.
     /// let g = Vector::from([0.0, -10.0]);
     /// let unbalanced: Vec<_> = nodal.mass.iter().map(|&m| g * -m).collect();
-    /// nodal.accelerate(particles, &unbalanced);
+    /// nodal.accelerate(particles, &supports, &unbalanced);
     /// assert!(nodal.acceleration.iter().all(|a| (a - g).norm() < 1e-14));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn accelerate(&mut self, particles: &Particles<D>, unbalanced: &[Vector<f64, D>]) {
-        let is_light = is_light(particles);
-        for ((a, r), &m) in self.acceleration.iter_mut().zip(unbalanced).zip(&self.mass) {
-            *a = if is_light(m) { Vector::zeros() } else { -r / m };
+    pub fn accelerate(&mut self, particles: &Particles<D>, supports: &Supports<D>, unbalanced: &[Vector<f64, D>]) {
+        self.acceleration.iter_mut().zip(unbalanced).for_each(|(a, r)| *a = -r);
+        let followers = followers(supports);
+        divide(particles, &followers, &self.mass, &mut self.acceleration);
+    }
+
+    /// The same where velocities and accelerations of nodes that follow others follow those that are prescribed.
+    pub(crate) fn extended(mut self, unknowns: &Unknowns<'_, D>) -> Self {
+        if !self.is_static() {
+            unknowns.followers.extend(&mut self.velocity);
+            unknowns.followers.extend(&mut self.acceleration);
         }
+        self
     }
 
     /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
@@ -185,6 +196,25 @@ impl<const D: usize> Nodal<D> {
         }
         overwritten
     }
+}
+
+/// The field E û with the momentum of the field `u`: Eᵀ m û = Eᵀ (m u).
+fn aggregate<const D: usize>(particles: &Particles<D>, supports: &Supports<D>, mass: &[f64], u: &mut [Vector<f64, D>]) {
+    let followers = followers(supports);
+    if !followers.is_empty() {
+        u.iter_mut().zip(mass).for_each(|(u, &m)| *u *= m);
+        divide(particles, &followers, mass, u);
+    }
+}
+
+/// E û with Eᵀ m û = Eᵀ p, in the place of p; zero at nodes that have next to no mass.
+fn divide<const D: usize>(particles: &Particles<D>, followers: &Followers<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
+    let is_light = is_light(particles);
+    followers.restrict(p);
+    for (p, &m) in p.iter_mut().zip(&*restricted(followers, mass)) {
+        *p = if is_light(m) { Vector::zeros() } else { *p / m };
+    }
+    followers.extend(p);
 }
 
 /// How nodes get velocity and acceleration from the particles.

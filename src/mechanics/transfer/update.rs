@@ -9,6 +9,7 @@ use crate::mechanics::residual::compose;
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
+use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
@@ -118,6 +119,25 @@ impl<'a, const D: usize> Update<'a, D> {
             kept = Some(nodal.motion.pool().collect(sums));
         }
         Self { dphi, kept, delta_velocity, delta_acceleration, impulses, smoothed: None }
+    }
+
+    /// The same where nodes that follow others follow those that a wall has changed, too.
+    pub(crate) fn extended(mut self, nodal: &Nodal<D>, unknowns: &Unknowns<'_, D>) -> Self {
+        if nodal.is_static() || unknowns.followers.is_empty() {
+            return self;
+        }
+        let mut by_forces = self.delta_velocity.clone();
+        unknowns.followers.extend(&mut self.delta_velocity);
+        unknowns.followers.extend(&mut self.delta_acceleration);
+        // What a wall changes in followers of its nodes is its impulse, too.
+        by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
+            *before = (after - *before) * m;
+        });
+        unknowns.followers.restrict(&mut by_forces);
+        for (dof, impulse) in unknowns.prescribed.iter().zip(&mut self.impulses) {
+            *impulse += by_forces[dof.node][dof.component];
+        }
+        self
     }
 
     /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it for Newmark's step: what it differs from Taylor's

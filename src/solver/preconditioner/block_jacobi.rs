@@ -22,6 +22,11 @@ impl<const D: usize> BlockJacobi<D> {
         self.inverse.len() / D
     }
 
+    /// The inverse blocks.
+    pub(super) fn inverses(&self) -> &[Tensor<f64, D>] {
+        bytemuck::cast_slice(&self.inverse)
+    }
+
     /// Takes the blocks of the first tangent it is shown.
     pub fn take(&mut self, tangent: &dyn DiagonalBlocks) {
         if self.inverse.is_empty() {

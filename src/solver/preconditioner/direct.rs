@@ -1,6 +1,6 @@
 //! The tangent as a sparse matrix, factorised by faer: for systems so small that this costs less than the iterations it saves.
 //!
-//! One product shows the columns of all nodes that share no neighbour, and (2r + 1)^D D products show every entry, r the reach of a node:
+//! One product shows the columns of all nodes that share no row, and some (2r + 1)^D D products show every entry, r the reach of a node:
 //! entries have whatever the product has, and its accuracy.
 
 use super::{BlockJacobi, Neighbours, Preconditioner};
@@ -10,7 +10,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{HashMap, HashSet};
 
 /// Sums have one order, whatever the number of threads.
 const PAR: Par = Par::Seq;
@@ -38,7 +38,7 @@ const PAR: Par = Par::Seq;
 ///
 ///     fn neighbours(&self) -> Option<Neighbours> {
 ///         let nodes = (0..self.0 as u32).map(|i| [i, 0, 0]).collect();
-///         Some(Neighbours { nodes, reach: 1, prescribed: vec![false; self.0] })
+///         Some(Neighbours { nodes, reach: 1, leaders: Vec::new(), fixed: vec![false; self.0] })
 ///     }
 /// }
 ///
@@ -76,24 +76,18 @@ struct Lower {
 
 impl Lower {
     fn of<S: Entry, const D: usize>(tangent: &dyn LinearOperator<S>, neighbours: &Neighbours) -> Self {
-        let Neighbours { nodes, reach, prescribed } = neighbours;
-        let numbers: HashMap<[u32; 3], usize> = nodes.iter().enumerate().map(|(number, &at)| (at, number)).collect();
-        let mut colours: BTreeMap<[u32; 3], Vec<usize>> = BTreeMap::new();
-        for (number, at) in nodes.iter().enumerate() {
-            colours.entry(at.map(|i| i % (2 * reach + 1))).or_default().push(number);
-        }
+        let Neighbours { nodes, fixed, .. } = neighbours;
+        let sharing = sharing::<D>(neighbours);
         let size = D * nodes.len();
         let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![S::zero(); size], vec![S::zero(); size]);
-        for colour in colours.values() {
-            let around: Vec<Vec<usize>> =
-                colour.iter().map(|&node| around::<D>(nodes[node], *reach, &numbers)).collect();
+        for colour in colours(&sharing) {
             for k in 0..D {
                 x.fill(S::zero());
-                colour.iter().filter(|&node| !prescribed[node * D + k]).for_each(|node| x[node * D + k] = S::one());
+                colour.iter().filter(|&node| !fixed[node * D + k]).for_each(|node| x[node * D + k] = S::one());
                 tangent.apply(&x, &mut y);
-                for (column, around) in colour.iter().map(|node| node * D + k).zip(&around) {
+                for (column, around) in colour.iter().map(|node| (node * D + k, &sharing[*node])) {
                     let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
-                    // A diagonal of zero is that of what is prescribed.
+                    // A diagonal of zero is that of what is fixed.
                     let value = |row: usize| if row == column && y[row] == S::zero() { 1.0 } else { y[row].value() };
                     columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
                 }
@@ -121,6 +115,41 @@ impl Lower {
         symbolic.factorize_numeric_llt(&mut values, matrix, Side::Lower, shift, PAR, memory, settings).ok()?;
         Some(Box::new(Factors { symbolic, values }))
     }
+}
+
+/// The nodes with which each node may share an entry, ascending: those within reach of it and of its followers, and what these follow.
+fn sharing<const D: usize>(neighbours: &Neighbours) -> Vec<Vec<usize>> {
+    let Neighbours { nodes, reach, leaders, .. } = neighbours;
+    let numbers: HashMap<[u32; 3], usize> = nodes.iter().enumerate().map(|(number, &at)| (at, number)).collect();
+    let mut sharing: Vec<Vec<usize>> = nodes.iter().map(|&at| around::<D>(at, *reach, &numbers)).collect();
+    let direct = sharing.clone();
+    for (outer, of_outer) in leaders.iter().enumerate() {
+        of_outer.iter().for_each(|&leader| sharing[leader].extend(&direct[outer]));
+    }
+    for around in &mut sharing {
+        let followed: Vec<usize> =
+            around.iter().flat_map(|&node| leaders.get(node).into_iter().flatten().copied()).collect();
+        around.extend(followed);
+        around.sort_unstable();
+        around.dedup();
+    }
+    sharing
+}
+
+/// Nodes by colour: two of a colour share no row.
+fn colours(sharing: &[Vec<usize>]) -> Vec<Vec<usize>> {
+    let (mut colours, mut of_row): (Vec<Vec<usize>>, Vec<HashSet<usize>>) =
+        (Vec::new(), vec![HashSet::new(); sharing.len()]);
+    for (node, rows) in sharing.iter().enumerate() {
+        let taken: HashSet<usize> = rows.iter().flat_map(|&row| of_row[row].iter().copied()).collect();
+        let colour = (0..).find(|colour| !taken.contains(colour)).unwrap_or(colours.len());
+        if colour == colours.len() {
+            colours.push(Vec::new());
+        }
+        colours[colour].push(node);
+        rows.iter().for_each(|&row| _ = of_row[row].insert(colour));
+    }
+    colours
 }
 
 /// The nodes within reach of a place, ascending.
@@ -198,8 +227,8 @@ mod tests {
     impl Net {
         fn neighbours(&self) -> Neighbours {
             let nodes: Vec<_> = (0..self.side.pow(2)).map(|i| [i % self.side + 3, i / self.side, 0]).collect();
-            let prescribed = (0..2 * nodes.len()).map(|unknown| unknown < 2).collect();
-            Neighbours { nodes, reach: 1, prescribed }
+            let fixed = (0..2 * nodes.len()).map(|unknown| unknown < 2).collect();
+            Neighbours { nodes, reach: 1, leaders: Vec::new(), fixed }
         }
 
         fn block(&self) -> Tensor<f64, 2> {

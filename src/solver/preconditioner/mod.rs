@@ -39,10 +39,12 @@ pub trait DiagonalBlocks {
 pub struct Neighbours {
     /// Index of each node; 0 along axes that do not exist.
     pub nodes: Vec<[u32; 3]>,
-    /// Along any axis, the largest difference of the indices of two nodes that share an entry, or more.
+    /// Along any axis, the largest difference of the indices of two nodes that share an entry, or more, if no node follows others.
     pub reach: u32,
-    /// Which unknowns are prescribed, node after node.
-    pub prescribed: Vec<bool>,
+    /// The nodes that each node follows, as far as it does.
+    pub leaders: Vec<Vec<usize>>,
+    /// Which values are no unknowns, node after node: prescribed ones, and those that follow others.
+    pub fixed: Vec<bool>,
 }
 
 /// What makes approximate inverses of the tangents of a step: `apply` of one is z = M⁻¹ r. A positive factor does not matter.

@@ -7,10 +7,16 @@ use std::collections::HashMap;
 pub struct LocalForm {
     /// Cells along each axis; 0 along axes that do not exist.
     pub grid: [u32; 3],
+    /// Whether outer nodes follow inner ones, on coarser grids too.
+    pub aggregated: bool,
+    /// The degree of the B-splines whose outer coefficients follow others; else 0 or 1.
+    pub degree: u32,
     /// Index of each node.
     pub nodes: Vec<[u32; 3]>,
-    /// Which unknowns are prescribed, node after node.
+    /// Which values are prescribed, node after node.
     pub prescribed: Vec<bool>,
+    /// Which values follow others ([`aggregation`](crate::aggregation)) and are no unknowns, node after node.
+    pub follows: Vec<bool>,
     /// B of each node, D×D, column by column.
     pub blocks: Vec<f64>,
     /// Index of each cell with something in it.

@@ -2,9 +2,11 @@
 
 use super::chebyshev::largest;
 use super::form::{Bend, LocalForm};
+use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::LinearOperator;
 use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
 use nalgebra::DMatrix;
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// The middle of a stencil, and a neighbour that is not there.
@@ -16,9 +18,11 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Level<const D: usize> {
     /// Of each node of the finer level, where it lies on this one: nodes and weights.
     above: Vec<Vec<(u32, f64)>>,
-    /// Unknowns of the finer level that take no part.
-    held_above: Vec<bool>,
+    /// Values of the finer level that are no unknowns.
+    fixed_above: Vec<bool>,
     held: Vec<bool>,
+    /// Outer nodes, which follow others.
+    followers: Followers<D>,
     /// The neighbours of each node, and the entries.
     neighbours: Vec<[u32; 27]>,
     entries: Vec<[Tensor<f64, D>; 27]>,
@@ -29,7 +33,21 @@ pub(super) struct Level<const D: usize> {
 }
 
 impl<const D: usize> LinearOperator for Level<D> {
+    /// Eᵀ K E x
     fn apply(&self, x: &[f64], y: &mut [f64]) {
+        let mut extended = Cow::Borrowed(x);
+        if !self.followers.is_empty() {
+            self.followers.extend::<f64>(bytemuck::cast_slice_mut(extended.to_mut()));
+        }
+        self.multiply(&extended, y);
+        self.followers.restrict::<f64>(bytemuck::cast_slice_mut(y));
+        y.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(y, _)| *y = 0.0);
+    }
+}
+
+impl<const D: usize> Level<D> {
+    /// K x
+    fn multiply(&self, x: &[f64], y: &mut [f64]) {
         for ((entries, neighbours), y) in self.entries.iter().zip(&self.neighbours).zip(y.chunks_exact_mut(D)) {
             let mut sum = Vector::<f64, D>::zeros();
             for (entry, &node) in entries.iter().zip(neighbours) {
@@ -96,7 +114,7 @@ impl<const D: usize> Level<D> {
             held: Self::held(form, &above, next.nodes.len()),
             neighbours: neighbours.collect(),
             entries: vec![[Tensor::zeros(); 27]; next.nodes.len()],
-            held_above: form.prescribed.clone(),
+            fixed_above: form.prescribed.iter().zip(&form.follows).map(|(held, follows)| *held || *follows).collect(),
             above,
             ..Self::default()
         };
@@ -105,9 +123,11 @@ impl<const D: usize> Level<D> {
             level.add_cell(form, cell, &next, at, &numbers);
         }
         level.add_bends(form, &mut next, &numbers);
-        level.hold_empty();
         level.add_nodes(form, &mut next);
+        level.follow(form, &mut next);
+        level.hold_empty(&next);
         level.hold(&next.bends);
+        level.invert_blocks(&next);
         next.prescribed.clone_from(&level.held);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
         (level, next)
@@ -209,33 +229,83 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// Holds the nodes of no cell: what finer nodes have of one there has hardly mass and no stiffness.
-    fn hold_empty(&mut self) {
-        for (held, row) in self.held.chunks_exact_mut(D).zip(&self.entries) {
-            held.iter_mut().enumerate().for_each(|(i, held)| *held |= row[MIDDLE][(i, i)] == 0.0);
+    /// Lets outer nodes follow others, as far as nothing holds them.
+    fn follow(&mut self, form: &LocalForm, next: &mut LocalForm) {
+        (next.aggregated, next.follows) = (form.aggregated, vec![false; D * next.nodes.len()]);
+        if !form.aggregated {
+            return;
+        }
+        let cells = next.cells.iter().copied().zip(next.filled.iter().copied()).collect();
+        let occupied = Occupied { dimension: D, grid: next.grid, nodes: &next.nodes, cells };
+        let extension = Extension::new(Pieces::LINEAR, &occupied);
+        let held = self.held.iter().enumerate().filter(|(_, held)| **held).map(|(k, _)| (k / D, k % D));
+        self.followers = Followers::new(extension.into(), held);
+        for (outer, follows, _) in self.followers.rows() {
+            next.follows[outer * D..(outer + 1) * D].copy_from_slice(&follows);
         }
     }
 
-    /// The identity's row and column where nothing moves; inverts the blocks.
+    /// Holds unknowns that no cell reaches: what finer nodes have of one there has hardly mass and no stiffness.
+    fn hold_empty(&mut self, next: &LocalForm) {
+        for (k, held) in self.held.iter_mut().enumerate() {
+            *held |= !next.follows[k] && self.entries[k / D][MIDDLE][(k % D, k % D)] == 0.0;
+        }
+    }
+
+    /// Nothing in the rows and columns of what is held.
     fn hold(&mut self, bends: &[Bend]) {
-        let Self { entries, neighbours, held, inverse: inverses, far, .. } = self;
+        let Self { entries, neighbours, held, far, .. } = self;
         let outer = bends.iter().flat_map(|bend| {
             let [a, _, c] = bend.nodes.map(|node| node as usize * D);
             (0..D).map(move |i| (a + i, c + i, bend.stiffness))
         });
         far.extend(outer.filter(|&(a, c, _)| !held[a] && !held[c]));
         for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
-            for (entry, &mut other) in row.iter_mut().zip(neighbours) {
+            for (entry, &mut other) in row.iter_mut().zip(neighbours).filter(|(_, other)| **other != NONE) {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
-                    if held[node * D + i] || (other != NONE && held[other as usize * D + j]) {
-                        entry[(i, j)] = f64::from(other as usize == node && i == j);
+                    if held[node * D + i] || held[other as usize * D + j] {
+                        entry[(i, j)] = 0.0;
                     }
                 }
             }
-            let inverse = inverse(&row[MIDDLE]);
-            let usable = inverse.iter().all(|x| x.is_finite());
-            inverses.push(if usable { inverse } else { Tensor::identity() });
         }
+    }
+
+    /// The inverse diagonal blocks of Eᵀ K E, with the identity at values that are no unknowns.
+    fn invert_blocks(&mut self, next: &LocalForm) {
+        let mut blocks: Vec<Tensor<f64, D>> = self.entries.iter().map(|row| row[MIDDLE]).collect();
+        // Of each node, the nodes that follow it.
+        let mut of_leader: Vec<Vec<(usize, [bool; D], f64)>> = vec![Vec::new(); blocks.len()];
+        for (outer, follows, leaders) in self.followers.rows() {
+            leaders.for_each(|(leader, weight)| of_leader[leader].push((outer, follows, weight)));
+        }
+        for (leader, own) in of_leader.into_iter().enumerate().filter(|(_, own)| !own.is_empty()) {
+            let all: Vec<_> = own.into_iter().chain([(leader, [true; D], 1.0)]).collect();
+            blocks[leader] = Tensor::zeros();
+            for &(a, of_a, weight_a) in &all {
+                for &(b, of_b, weight_b) in &all {
+                    let entry = self.entry(&next.nodes, a, b) * (weight_a * weight_b);
+                    blocks[leader] += Tensor::from_fn(|i, j| if of_a[i] && of_b[j] { entry[(i, j)] } else { 0.0 });
+                }
+            }
+        }
+        for (k, fixed) in self.held.iter().zip(&next.follows).map(|(held, follows)| *held || *follows).enumerate() {
+            let (block, i) = (&mut blocks[k / D], k % D);
+            if fixed {
+                block.row_mut(i).fill(0.0);
+                block.column_mut(i).fill(0.0);
+                block[(i, i)] = 1.0;
+            }
+        }
+        let usable =
+            |inverse: Tensor<f64, D>| if inverse.iter().all(|x| x.is_finite()) { inverse } else { Tensor::identity() };
+        self.inverse = blocks.iter().map(|block| usable(inverse(block))).collect();
+    }
+
+    /// The entry of two nodes, zero where they are no neighbours.
+    fn entry(&self, nodes: &[[u32; 3]], from: usize, to: usize) -> Tensor<f64, D> {
+        let beside = (0..3).all(|k| nodes[from][k].abs_diff(nodes[to][k]) <= 1);
+        if beside { self.entries[from][place(nodes[from], nodes[to])] } else { Tensor::zeros() }
     }
 
     /// The whole matrix, column by column.
@@ -247,6 +317,10 @@ impl<const D: usize> Level<D> {
             unit[k] = 1.0;
             self.apply(&unit, column.as_mut_slice());
             unit[k] = 0.0;
+            // Values that are no unknowns have the identity's rows.
+            if column.iter().all(|entry| *entry == 0.0) {
+                column[k] = 1.0;
+            }
         }
         matrix
     }
@@ -259,25 +333,27 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// Pᵀ r
+    /// Eᵀ Pᵀ r
     pub fn up(&self, r: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; D * self.neighbours.len()];
         for (fine, list) in self.above.iter().enumerate() {
             for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.held_above[fine * D + i]) {
+                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
                     out[coarse as usize * D + i] += weight * r[fine * D + i];
                 }
             }
         }
+        self.followers.restrict::<f64>(bytemuck::cast_slice_mut(&mut out));
         out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
         out
     }
 
-    /// x += P y
-    pub fn down(&self, y: &[f64], x: &mut [f64]) {
+    /// x += P E y
+    pub fn down(&self, mut y: Vec<f64>, x: &mut [f64]) {
+        self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
         for (fine, list) in self.above.iter().enumerate() {
             for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.held_above[fine * D + i]) {
+                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
                     x[fine * D + i] += weight * y[coarse as usize * D + i];
                 }
             }

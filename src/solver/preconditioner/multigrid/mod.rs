@@ -2,11 +2,13 @@
 //!
 //! The finest level is the tangent itself, known by its product. Coarser ones are hat functions on grids of twice the spacing each, with the
 //! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils; second
-//! differences that something holds are held on each of them. Motions go down by linear interpolation of nodal values, forces go up by its
+//! differences that something holds are held on each of them. Outer
+//! nodes follow inner ones, as those of the finest level do. Motions go down by linear interpolation of nodal values, forces go up by its
 //! transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the same before and after, so that the whole is symmetric where the
 //! tangent is.
 
 mod chebyshev;
+mod filter;
 mod form;
 mod level;
 
@@ -16,6 +18,7 @@ use super::{BlockJacobi, Preconditioner};
 use crate::solver::vector::Entry;
 use crate::solver::{LinearOperator, Linearization};
 use chebyshev::{chebyshev, largest};
+use filter::Filter;
 use level::Level;
 use nalgebra::{DVector, Dyn, LU};
 
@@ -27,6 +30,8 @@ const MOST: usize = 2000;
 #[derive(Clone, Debug, Default)]
 pub struct Multigrid<const D: usize> {
     blocks: BlockJacobi<D>,
+    /// Of cubic B-splines.
+    filter: Option<Filter>,
     /// What the tangent was divided by that the levels are made from.
     scale: f64,
     largest: f64,
@@ -46,7 +51,9 @@ pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
 impl<const D: usize> Multigrid<D> {
     /// The levels of a tangent.
     fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
-        self.largest = largest(fine, &|r, z| self.blocks.apply(r, z), self.blocks.len());
+        self.filter =
+            form.as_ref().filter(|form| form.degree == 3).map(|form| Filter::new::<D>(form, self.blocks.inverses()));
+        self.largest = largest(fine, &|r, z| self.smooth(r, z), self.blocks.len());
         let Some(mut form) = form else { return };
         loop {
             let (level, next) = Level::<D>::of(&form);
@@ -60,6 +67,14 @@ impl<const D: usize> Multigrid<D> {
             if last {
                 return;
             }
+        }
+    }
+
+    /// z = M r of the finest smoother.
+    fn smooth(&self, r: &[f64], z: &mut [f64]) {
+        self.blocks.apply(r, z);
+        if let Some(filter) = &self.filter {
+            filter.add::<D>(r, z);
         }
     }
 
@@ -87,7 +102,7 @@ impl<const D: usize> Multigrid<D> {
         let mut r = vec![0.0; b.len()];
         operator.apply(x, &mut r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
-        level.down(&self.coarse(to, &level.up(&r)), x);
+        level.down(self.coarse(to, &level.up(&r)), x);
     }
 }
 
@@ -113,7 +128,7 @@ impl<S: Entry, const D: usize> LinearOperator<S> for Cycle<'_, D, S> {
         let b: Vec<f64> = r.iter().map(|r| r.value()).collect();
         let mut x = vec![0.0; b.len()];
         let (fine, levels) = (&self.tangent, self.levels);
-        let jacobi = |r: &[f64], z: &mut [f64]| levels.blocks.apply(r, z);
+        let jacobi = |r: &[f64], z: &mut [f64]| levels.smooth(r, z);
         chebyshev(fine, &jacobi, levels.largest, &b, &mut x, true);
         levels.correct(0, fine, &b, &mut x);
         chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);

@@ -12,7 +12,7 @@ use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::material::{Law, Material};
-use bfree::mechanics::sweep::Supports;
+use bfree::mechanics::sweep::{Points, Supports};
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::particles::Body;
 use bfree::plan::Plan;
@@ -115,7 +115,7 @@ fn product<const D: usize, L: Law>(
     let mut turns = [before, &after].into_iter().cycle();
     let shape_functions = best(6, || {
         let positions = turns.next().unwrap_or(before);
-        spare = Supports::renewed(spare.take(), shape, grid, positions, None, Precision::Double, &pool).ok().map(|(supports, _)| supports);
+        spare = Supports::renewed(spare.take(), shape, grid, &Points::at(positions), Precision::Double, &pool).ok().map(|(supports, _)| supports);
     });
     let times = |s: f64| format!("{:.1}", s / seconds);
     let floor = (work.useful / peak).max(work.bytes / copy);

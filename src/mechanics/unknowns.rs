@@ -1,0 +1,199 @@
+//! Which nodal values are unknowns: those that are neither prescribed nor follow others.
+
+use crate::aggregation::{Extension, Followers, Occupied, Pieces};
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::sweep::{Quadratic, Supports};
+use crate::particles::Particles;
+use crate::pooled::{Element, Pooled};
+use crate::scalar::Real;
+use crate::tensor::{Tensor, Vector};
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The extension E of the bodies in a grid, by the volume that particles have now.
+pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
+    let grid = supports.grid();
+    let mut volumes: BTreeMap<[u32; D], f64> = BTreeMap::new();
+    for p in (0..particles.len()).filter(|&p| particles.is_solid(p)) {
+        let cell = |k: usize| {
+            let axis = grid.axis(k);
+            pieces.cell(axis.local(particles.position[p][k]).unwrap_or(0.0), axis.cells)
+        };
+        *volumes.entry(std::array::from_fn(cell)).or_insert(0.0) += particles.present_volume(p);
+    }
+    let share = |(cell, volume): (&[u32; D], &f64)| {
+        let whole: f64 = (0..D).map(|k| grid.spacing * pieces.within(cell[k], grid.cells[k])).product();
+        (padded(*cell), volume / whole)
+    };
+    let nodes: Vec<[u32; 3]> = supports.active().ids().iter().map(|&id| padded(grid.index(id))).collect();
+    let cells = volumes.iter().map(share).collect();
+    Extension::new(pieces, &Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells })
+}
+
+/// An index of three axes.
+pub(crate) fn padded<const D: usize>(index: [u32; D]) -> [u32; 3] {
+    std::array::from_fn(|k| index.get(k).copied().unwrap_or(0))
+}
+
+/// The unknowns among the nodal values of a step. Fields have an entry for every active node. Entries that are no unknowns mean nothing
+/// where a field is read, and are zero in forces.
+#[derive(Clone, Debug)]
+pub(crate) struct Unknowns<'a, const D: usize> {
+    pub prescribed: &'a [PrescribedDof],
+    pub followers: Followers<D>,
+}
+
+/// The function with which an unknown of a node acts at a particle, for each component: N and ∇N of the node, and of those that follow it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Function<const D: usize> {
+    pub value: [f64; D],
+    pub gradient: [Vector<f64, D>; D],
+}
+
+impl<const D: usize> Function<D> {
+    fn of_all(n: f64, grad_n: Vector<f64, D>) -> Self {
+        Self { value: [n; D], gradient: [grad_n; D] }
+    }
+}
+
+impl<'a, const D: usize> Unknowns<'a, D> {
+    pub fn new(supports: &Supports<D>, prescribed: &'a [PrescribedDof]) -> Self {
+        let extension = supports.extension().cloned().unwrap_or_default();
+        Self {
+            prescribed,
+            followers: Followers::new(extension, prescribed.iter().map(|dof| (dof.node, dof.component))),
+        }
+    }
+
+    /// E û
+    pub fn extended<'b, T: Real>(&self, field: &'b [Vector<T, D>]) -> Cow<'b, [Vector<T, D>]> {
+        let mut field = Cow::Borrowed(field);
+        if !self.followers.is_empty() {
+            self.followers.extend(field.to_mut());
+        }
+        field
+    }
+
+    /// As [`Self::extended`], in memory of a pool; `None` where every node is an unknown.
+    pub fn extended_in<T: Real>(&self, supports: &Supports<D>, field: &[Vector<T, D>]) -> Option<Pooled<Vector<T, D>>>
+    where
+        Vector<T, D>: Element,
+    {
+        (!self.followers.is_empty()).then(|| {
+            let mut field = supports.pool().collect(field.iter().copied());
+            self.followers.extend(&mut field);
+            field
+        })
+    }
+
+    /// Sets what is prescribed to zero.
+    pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
+        for dof in self.prescribed {
+            field[dof.node][dof.component] = T::zero();
+        }
+    }
+
+    /// Which values are prescribed, node after node.
+    pub fn prescribed_mask(&self, nodes: usize) -> Vec<bool> {
+        let mut mask = vec![false; D * nodes];
+        self.prescribed.iter().for_each(|dof| mask[dof.node * D + dof.component] = true);
+        mask
+    }
+
+    /// Which values follow others, node after node.
+    pub fn following_mask(&self, nodes: usize) -> Vec<bool> {
+        let mut mask = vec![false; D * nodes];
+        for (outer, follows, _) in self.followers.rows() {
+            mask[outer * D..(outer + 1) * D].copy_from_slice(&follows);
+        }
+        mask
+    }
+
+    /// The functions of all nodes that act at a particle.
+    pub fn functions(&self, supports: &Supports<D>, particle: usize) -> Vec<(usize, Function<D>)> {
+        let mut all: Vec<_> =
+            supports.of(particle).map(|(node, n, grad_n)| (node, Function::of_all(n, grad_n))).collect();
+        for (node, n, grad_n) in supports.of(particle) {
+            let Some((follows, leaders)) = self.followers.row(node) else { continue };
+            let mut add = |node: usize, factor: f64, components: [bool; D]| {
+                let place = all.iter().position(|(one, _)| *one == node).unwrap_or_else(|| {
+                    all.push((node, Function::of_all(0.0, Vector::zeros())));
+                    all.len() - 1
+                });
+                for i in (0..D).filter(|&i| components[i]) {
+                    all[place].1.value[i] += factor * n;
+                    all[place].1.gradient[i] += grad_n * factor;
+                }
+            };
+            add(node, -1.0, follows);
+            leaders.for_each(|(leader, weight)| add(leader, weight, follows));
+        }
+        all
+    }
+
+    /// Eᵀ B E of blocks B that nodes have for themselves, on the diagonal.
+    pub fn restrict_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
+        for (outer, follows, leaders) in self.followers.rows() {
+            let own = blocks[outer];
+            let moved = Tensor::from_fn(|i, k| if follows[i] && follows[k] { own[(i, k)] } else { 0.0 });
+            blocks[outer] -= moved;
+            leaders.for_each(|(leader, weight)| blocks[leader] += moved * (weight * weight));
+        }
+    }
+
+    /// Whether each particle is reached by a node that follows.
+    pub fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
+        let mut outer: Pooled<Vector<f64, D>> = supports.field();
+        self.followers.rows().for_each(|(node, ..)| outer[node].fill(1.0));
+        let mut reached = vec![false; supports.particles()];
+        let sees = |_: usize, n: Vector<f64, D>, grad_n: Tensor<f64, D>| n.iter().chain(&grad_n).any(|x| *x != 0.0);
+        supports.each_particle(&outer, sees, |p, is| reached[p] = is);
+        reached
+    }
+
+    /// Adds what following nodes change in the diagonal blocks of a quadratic form at one particle.
+    pub fn add_followers(
+        &self,
+        supports: &Supports<D>,
+        particle: usize,
+        form: &Quadratic,
+        lane: usize,
+        blocks: &mut [Tensor<f64, D>],
+    ) {
+        for (node, function) in self.functions(supports, particle) {
+            for i in 0..D {
+                let whole = form.block(lane, function.value[i], &function.gradient[i]);
+                (0..D).for_each(|k| blocks[node][(i, k)] += whole[(i, k)]);
+            }
+        }
+        for (node, n, grad_n) in supports.of(particle) {
+            blocks[node] -= form.block(lane, n, &grad_n);
+        }
+    }
+
+    /// The identity's row and column at values that are no unknowns; and nothing beside the diagonal where followers of a node have other
+    /// functions for each component.
+    pub fn finish_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
+        for node in self.uncoupled() {
+            blocks[node] = Tensor::from_diagonal(&blocks[node].diagonal());
+        }
+        let following = self
+            .followers
+            .rows()
+            .flat_map(|(outer, follows, _)| (0..D).filter(move |&i| follows[i]).map(move |i| (outer, i)));
+        for (node, i) in self.prescribed.iter().map(|dof| (dof.node, dof.component)).chain(following) {
+            for k in 0..D {
+                blocks[node][(i, k)] = 0.0;
+                blocks[node][(k, i)] = 0.0;
+            }
+            blocks[node][(i, i)] = 1.0;
+        }
+    }
+
+    /// The nodes whose components have different functions.
+    pub fn uncoupled(&self) -> BTreeSet<usize> {
+        let apart = |follows: &[bool; D]| follows.iter().any(|one| *one != follows[0]);
+        let rows = self.followers.rows().filter(|(_, follows, _)| apart(follows));
+        rows.flat_map(|(_, _, leaders)| leaders.map(|(leader, _)| leader)).collect()
+    }
+}
