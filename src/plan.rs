@@ -10,7 +10,7 @@ use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms, frozen_rows};
 use crate::mechanics::transfer::Projection;
 use crate::particles::{Body, Particles};
-use crate::simulation::Simulation;
+use crate::simulation::{Sharing, Simulation};
 use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
@@ -134,6 +134,8 @@ pub struct Plan {
     pub arrays: Vec<ArrayUse>,
     /// What was assumed about loaded surfaces.
     pub surfaces: Vec<SurfaceUse>,
+    /// Bodies that share nodes at the start, in words.
+    pub sharing: Vec<String>,
 }
 
 impl Plan {
@@ -160,6 +162,7 @@ impl Plan {
             terms: terms(simulation, &supports),
             arrays: arrays(simulation, &supports, nodes.len()),
             surfaces: SurfaceUse::of(simulation),
+            sharing: sharing(simulation, &supports),
         })
     }
 
@@ -187,6 +190,21 @@ impl Plan {
         let needed = self.bytes();
         if needed <= memory { Ok(()) } else { Err(TooLarge { needed, memory }) }
     }
+}
+
+/// Bodies that share nodes, and how far apart they are.
+fn sharing<const D: usize, L: Law, A: ShapeFunction>(
+    simulation: &Simulation<D, L, A>,
+    supports: &Supports<D>,
+) -> Vec<String> {
+    let said = |one: &Sharing| {
+        let [a, b] = one.bodies.map(|body| &simulation.bodies[body as usize].name);
+        let gap = one.gap.map_or_else(|| "more than 4".to_owned(), |gap| format!("{:.2}", gap.max(0.0)));
+        format!(
+            "{a:?} and {b:?} share nodes at the start, at a gap of {gap} spacings: they move as one there, and will not separate"
+        )
+    };
+    simulation.sharing(supports).iter().map(said).collect()
 }
 
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
@@ -321,6 +339,9 @@ impl Display for Plan {
         }
         for surface in &self.surfaces {
             writeln!(f, "  surface: {surface}")?;
+        }
+        for bodies in &self.sharing {
+            writeln!(f, "contact       {bodies}")?;
         }
         write!(f, "memory        {} at most at one time", BinaryBytes(self.bytes()))?;
         for array in &self.arrays {
