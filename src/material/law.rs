@@ -396,7 +396,7 @@ pub fn poissons_ratio<L: Law>(law: &L) -> f64 {
 ///     }
 /// }
 ///
-/// assert_eq!(stiffness_at_rest(&FromEnergy(Wrong)), [-2.0, -2.0]);
+/// assert!(stiffness_at_rest(&FromEnergy(Wrong)).iter().all(|stiffness| (stiffness + 2.0).abs() < 1e-12));
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
 pub fn stiffness_at_rest<L: Law>(law: &L) -> [f64; 2] {
