@@ -11,7 +11,7 @@ use crate::mechanics::terms::{Given, Terms, frozen_rows};
 use crate::mechanics::transfer::Projection;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
-use crate::simulation::Simulation;
+use crate::simulation::{Sharing, Simulation};
 use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
@@ -135,6 +135,8 @@ pub struct Plan {
     pub arrays: Vec<ArrayUse>,
     /// What was assumed about loaded surfaces.
     pub surfaces: Vec<SurfaceUse>,
+    /// Bodies that share nodes at the start, in words.
+    pub sharing: Vec<String>,
 }
 
 impl Plan {
@@ -160,6 +162,7 @@ impl Plan {
             terms: terms(simulation, &supports),
             arrays: arrays(simulation, &supports, nodes.len()),
             surfaces: SurfaceUse::of(simulation),
+            sharing: sharing(simulation, &supports),
         })
     }
 
@@ -194,6 +197,21 @@ fn unknowns<const D: usize>(supports: &Supports<D>, prescribed: &[PrescribedDof]
     let unknowns = Unknowns::new(supports, prescribed);
     let follow: usize = unknowns.following_mask(supports.nodes()).into_iter().map(usize::from).sum();
     D * supports.nodes() - prescribed.len() - follow
+}
+
+/// Bodies that share nodes, and how far apart they are.
+fn sharing<const D: usize, L: Law, A: ShapeFunction>(
+    simulation: &Simulation<D, L, A>,
+    supports: &Supports<D>,
+) -> Vec<String> {
+    let said = |one: &Sharing| {
+        let [a, b] = one.bodies.map(|body| &simulation.bodies[body as usize].name);
+        let gap = one.gap.map_or_else(|| "more than 4".to_owned(), |gap| format!("{:.2}", gap.max(0.0)));
+        format!(
+            "{a:?} and {b:?} share nodes at the start, at a gap of {gap} spacings: they move as one there, and will not separate"
+        )
+    };
+    simulation.sharing(supports).iter().map(said).collect()
 }
 
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
@@ -341,6 +359,9 @@ impl Display for Plan {
         }
         for surface in &self.surfaces {
             writeln!(f, "  surface: {surface}")?;
+        }
+        for bodies in &self.sharing {
+            writeln!(f, "contact       {bodies}")?;
         }
         write!(f, "memory        {} at most at one time", BinaryBytes(self.bytes()))?;
         for array in &self.arrays {

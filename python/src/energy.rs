@@ -218,6 +218,20 @@ pub fn det<'py>(a: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     sum.ok_or_else(|| PyValueError::new_err("no determinant"))
 }
 
+/// The error of an energy's call; that of a function of NumPy that needs numbers says what to take in its place.
+fn explained(py: Python<'_>, error: PyErr) -> PyErr {
+    if !error.value(py).to_string().contains("Cannot cast ufunc") {
+        return error;
+    }
+    let clear = PyTypeError::new_err(format!(
+        "np.linalg needs numbers, and the strain of an energy has no value: take bfree.det(E) in place of np.linalg.det(E), and write other \
+         functions of np.linalg by arithmetic ({})",
+        error.value(py)
+    ));
+    clear.set_cause(py, Some(error));
+    clear
+}
+
 /// What an energy does to its strain.
 #[derive(Clone, Debug)]
 pub struct Recorded {
@@ -244,7 +258,7 @@ impl Recorded {
             strain.push(row);
         }
         let array = py.import("numpy")?.call_method1("array", (strain,))?;
-        let result = energy.call1((array,))?;
+        let result = energy.call1((array,)).map_err(|error| explained(py, error))?;
         let number = match result.extract::<Operand<'_>>() {
             Ok(Operand::Recorded(number)) => number,
             _ => {

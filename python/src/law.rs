@@ -1,10 +1,13 @@
 //! The law of a body: one of the shipped ones, or that of an energy in Python.
 
 use crate::energy::Recorded;
-use bfree::material::{FromEnergy, Material};
+use bfree::material::{FromEnergy, Material, stiffness_at_rest};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use verification::check_material;
+
+/// A stiffness below zero by less than this share of the largest is none.
+const ROUNDING: f64 = 1e-9;
 
 /// Failed checks that an error lists.
 const SHOWN: usize = 8;
@@ -30,6 +33,13 @@ impl Law {
                 let more = failures.len() - first.len();
                 let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
                 return Err(PyValueError::new_err(format!("{message}{}{more}", first.concat())));
+            }
+            let [least, largest] = stiffness_at_rest(&law);
+            if least < -ROUNDING * largest.abs().max(least.abs()) {
+                return Err(PyValueError::new_err(format!(
+                    "the energy has a negative stiffness at rest: the stiffnesses of unit strains lie between {least:.3e} and {largest:.3e}, \
+                     and a body with one below zero collapses by itself; change the sign of that part of the energy"
+                )));
             }
         }
         Ok(Self { law })

@@ -140,6 +140,9 @@ def test_an_energy_in_python_is_the_law_it_writes_down():
         (lambda E: 1.0, TypeError, "returned 1.0"),
         (lambda E: E, TypeError, "one number"),
         (lambda E: E[0, 3], IndexError, "out of bounds"),
+        (lambda E: -np.sum(E * E), ValueError, "negative stiffness"),
+        (lambda E: np.trace(E) ** 2 - np.sum(E * E), ValueError, "negative stiffness"),
+        (lambda E: np.linalg.det(E), TypeError, "bfree.det"),
     ],
 )
 def test_energies_that_are_none(energy, error, words):

@@ -20,7 +20,7 @@ use std::io::{self, Read, Write};
 const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
 
 /// Version of the format.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// Bytes of a header, at most: a scene has at most a quarter of that.
 const MAX_HEADER: u32 = 64 << 20;
@@ -234,9 +234,9 @@ mod tests {
     #[test]
     fn another_version_is_named() {
         let mut bytes = written(&[3]);
-        bytes[8] = 7;
+        bytes[8] = 200;
         let said = parsed(&bytes).unwrap_err().to_string();
-        assert!(said.contains(&format!("version 7, this program reads version {VERSION}")), "{said}");
+        assert!(said.contains(&format!("version 200, this program reads version {VERSION}")), "{said}");
         assert!(matches!(parsed(b"{\"grid\": {}}, and so on"), Err(Damage::Foreign)));
     }
 

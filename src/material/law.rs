@@ -3,6 +3,7 @@
 use super::{ClosedTangent, Material, VolumeResponse, embed};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, outer, symmetric};
+use nalgebra::SMatrix;
 use num_dual::Dual;
 
 /// What a particle remembers of a law from step to step: one number, by name.
@@ -356,6 +357,77 @@ impl<E: Elastic> Law for E {
     }
 }
 
+/// The largest Poisson's ratio of the body at rest, ℂ₁₁₂₂/(ℂ₁₁₁₁ + ℂ₁₁₂₂) over the axes; ν of isotropic laws.
+///
+/// ```
+/// use bfree::material::{Lame, NeoHookean, poissons_ratio};
+///
+/// let law = NeoHookean::logarithmic(Lame::from_young_poisson(100.0, 0.45)?);
+/// assert!((poissons_ratio(&law) - 0.45).abs() < 1e-12);
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+pub fn poissons_ratio<L: Law>(law: &L) -> f64 {
+    let of = |k: usize| {
+        let stress = stress_along(law, k);
+        let across = (0..3).filter(|&i| i != k).map(|i| stress[(i, i)]).fold(f64::NEG_INFINITY, f64::max);
+        across / (across + stress[(k, k)])
+    };
+    of(0).max(of(1)).max(of(2))
+}
+
+/// The least and the largest stiffness of the body at rest: of the eigenvalues of ℂ for strains of size 1. The least is below zero where the
+/// body gives way by itself.
+///
+/// ```
+/// use bfree::material::{Energy, FromEnergy, Lame, NeoHookean, stiffness_at_rest};
+/// use bfree::scalar::Real;
+/// use bfree::tensor::{Tensor, contract};
+///
+/// // 2G in shear, 3Λ + 2G under pressure.
+/// let [least, largest] = stiffness_at_rest(&NeoHookean::logarithmic(Lame::new(1.0, 2.0)?));
+/// assert!((least - 4.0).abs() < 1e-12 && (largest - 7.0).abs() < 1e-12);
+///
+/// /// W = −E:E
+/// struct Wrong;
+///
+/// impl Energy for Wrong {
+///     fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
+///         -contract(e, e)
+///     }
+/// }
+///
+/// assert!(stiffness_at_rest(&FromEnergy(Wrong)).iter().all(|stiffness| (stiffness + 2.0).abs() < 1e-12));
+/// # Ok::<(), bfree::material::LameError>(())
+/// ```
+pub fn stiffness_at_rest<L: Law>(law: &L) -> [f64; 2] {
+    // An orthonormal basis of the symmetric strains.
+    let basis = |k: usize| {
+        let (i, j) = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)][k];
+        let mut strain = Tensor::<f64, 3>::zeros();
+        (strain[(i, j)], strain[(j, i)]) = if i == j { (1.0, 1.0) } else { (0.5_f64.sqrt(), 0.5_f64.sqrt()) };
+        strain
+    };
+    let mut stiffness = SMatrix::<f64, 6, 6>::zeros();
+    for column in 0..6 {
+        let stress = stress_of(law, &basis(column));
+        (0..6).for_each(|row| stiffness[(row, column)] = stress.dot(&basis(row)));
+    }
+    let values = ((stiffness + stiffness.transpose()) * 0.5).symmetric_eigenvalues();
+    [values.min(), values.max()]
+}
+
+/// ℂ : X of the body at rest.
+fn stress_of<L: Law>(law: &L, strain: &Tensor<f64, 3>) -> Tensor<f64, 3> {
+    let rest = Deformation::<f64, 3>::new(Tensor::zeros());
+    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
+    law.elasticity(&rest, &Start { dt: 0.0, memory: &memory }, strain)
+}
+
+/// ℂ : e_k ⊗ e_k of the body at rest.
+fn stress_along<L: Law>(law: &L, k: usize) -> Tensor<f64, 3> {
+    stress_of(law, &Tensor::from_fn(|i, j| if i == k && j == k { 1.0 } else { 0.0 }))
+}
+
 /// The largest modulus of pressure waves along an axis of the body at rest, ℂ₁₁₁₁; Λ + 2G of isotropic laws.
 ///
 /// ```
@@ -366,10 +438,6 @@ impl<E: Elastic> Law for E {
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
 pub fn p_wave_modulus<L: Law>(law: &L) -> f64 {
-    let rest = Deformation::<f64, 3>::new(Tensor::zeros());
-    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
-    let start = Start { dt: 0.0, memory: &memory };
-    let along =
-        |k| law.elasticity(&rest, &start, &Tensor::from_fn(|i, j| if i == k && j == k { 1.0 } else { 0.0 }))[(k, k)];
+    let along = |k| stress_along(law, k)[(k, k)];
     along(0).max(along(1)).max(along(2))
 }

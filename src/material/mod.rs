@@ -34,7 +34,9 @@ pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;
 pub use lame::{Lame, LameError, LameParameters};
-pub use law::{DISSIPATED, Elastic, Law, PLASTIC_STRAIN, Remembered, Start, p_wave_modulus};
+pub use law::{
+    DISSIPATED, Elastic, Law, PLASTIC_STRAIN, Remembered, Start, p_wave_modulus, poissons_ratio, stiffness_at_rest,
+};
 pub(crate) use list::LawVisitor;
 pub use list::{Listed, Material, Parameters};
 pub use mooney_rivlin::{MooneyRivlin, MooneyRivlinParameters};

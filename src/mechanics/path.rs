@@ -89,6 +89,17 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         self.path.load + (self.length - moved.sum::<f64>()) / self.path.weight
     }
 
+    /// The cosine of the angle between φ − φ_n and d; 1 where nothing moves.
+    pub fn straight(&self, phi: &[Vector<f64, D>]) -> f64 {
+        let (mut along, mut squares) = (0.0, 0.0);
+        for ((phi, before), d) in phi.iter().zip(&self.before).zip(&self.direction) {
+            let moved = phi - before;
+            along += d.dot(&moved);
+            squares += moved.norm_squared();
+        }
+        if squares > 0.0 { along / squares.sqrt() } else { 1.0 }
+    }
+
     /// f′(λ)
     fn slope(&self, load: f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         // Not Δλ of the last step, which may be next to nothing where the path turns.

@@ -24,7 +24,11 @@ pub struct Energies {
     pub total: f64,
     /// What damping, flow and relaxation have taken since the start.
     pub dissipated: f64,
-    /// total − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
+    /// Of it, what flow and relaxation have.
+    pub by_laws: f64,
+    /// total₀, less what was dissipated and the work that was done before the reference was taken.
+    pub initial: f64,
+    /// total + dissipated − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
     pub balance: f64,
 }
 
@@ -53,9 +57,11 @@ impl Energies {
         reference: &Reference<D>,
     ) -> Self {
         let (kinetic, strain) = (simulation.particles.kinetic_energy(), simulation.strain_energy());
-        let dissipated = simulation.dissipated + simulation.dissipated_by_laws();
-        let (external, total) = (simulation.external_work, kinetic + strain);
-        Self { kinetic, strain, external, dissipated, total, balance: total + dissipated - reference.energy - external }
+        let by_laws = simulation.dissipated_by_laws();
+        let dissipated = simulation.dissipated + by_laws;
+        let (external, total, initial) = (simulation.external_work, kinetic + strain, reference.energy);
+        let balance = total + dissipated - initial - external;
+        Self { kinetic, strain, external, dissipated, by_laws, initial, total, balance }
     }
 }
 

@@ -13,12 +13,15 @@
 //!
 //! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have as many digits as it takes to read the same bits back.
 
+pub mod contact;
 mod csv;
 mod earlier;
 mod error;
 mod fields;
 pub(crate) mod files;
 pub mod history;
+mod losses;
+pub(crate) mod path;
 pub mod plot;
 pub mod probes;
 pub mod progress;

@@ -3,6 +3,7 @@
 use super::earlier::remove_later_files;
 use super::files::{Stream, Written};
 use super::history::{Cost, Energies, History};
+use super::losses::Cause;
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
 use super::reactions::Reactions;
@@ -251,6 +252,8 @@ impl<const D: usize> Recorder<D> {
             step: number,
             energies,
             moves,
+            cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.renewed),
+            lumped: simulation.settings.lumping >= 1.0,
             cost,
             failed,
             error,
@@ -260,6 +263,12 @@ impl<const D: usize> Recorder<D> {
             krylov_limit,
         };
         self.watch.see(&seen).iter().for_each(|warning| self.progress.warn(warning));
+        let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
+        self.watch.see_contact(&seen, &step.sharing, &names).iter().for_each(|warning| self.progress.warn(warning));
+        if simulation.settings.scheme.follows_path() {
+            let found = self.watch.see_path(&seen, simulation, &self.reference, step.straight);
+            found.iter().for_each(|warning| self.progress.warn(warning));
+        }
         let Cost { newton, krylov, .. } = cost;
         self.progress.show(time, Shown { step: number, newton, krylov, balance: moves.then_some(energies.balance) });
         Ok(())
@@ -285,9 +294,11 @@ impl<const D: usize> Recorder<D> {
         }
         self.flush()?;
         let (counts, time, seconds) = (self.counts, simulation.clock.time(), self.seconds_so_far());
+        self.watch.end(time, counts.steps).into_iter().for_each(|warning| self.progress.warn(warning));
         self.progress.finish();
         let energies = Energies::of(simulation, &self.reference);
-        let report = Report { asked, outcome, time, energies, counts, seconds, warnings: self.watch.warnings() };
+        let (warnings, contact) = (self.watch.warnings(), self.watch.contacts());
+        let report = Report { asked, outcome, time, energies, counts, seconds, warnings, contact };
         report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         let particles = &simulation.particles;
         Ok(Summary {
@@ -296,6 +307,8 @@ impl<const D: usize> Recorder<D> {
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
             krylov: simulation.krylov().0,
+            contact: self.watch.contacts().to_vec(),
+            warnings: self.watch.warnings().to_vec(),
             momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
             counts,
             seconds,

@@ -1,6 +1,7 @@
 //! `report.json`: what was asked for, how it ended, what it cost, and what Newton's method did in every step.
 
 use super::OutputError;
+use super::contact::Contact;
 use super::files::{Stream, Written, write_atomically};
 use super::history::Energies;
 use super::warnings::Warning;
@@ -298,6 +299,8 @@ pub(crate) struct Report<'a> {
     pub seconds: Seconds,
     /// What was warned of.
     pub warnings: &'a [Warning],
+    /// Bodies that shared nodes.
+    pub contact: &'a [Contact],
 }
 
 impl Report<'_> {
@@ -319,7 +322,7 @@ impl Report<'_> {
     }
 
     fn head(&self) -> Value {
-        let Energies { kinetic, strain, external, dissipated, total, balance } = self.energies;
+        let Energies { kinetic, strain, external, dissipated, by_laws, initial, total, balance } = self.energies;
         let seconds = self.seconds.named().chain([("total", self.seconds.total)]);
         let seconds: Map<_, _> = seconds.map(|(name, x)| (name.to_owned(), json!(Number(x)))).collect();
         let (outcome, message) = self.outcome.words(self.time);
@@ -328,9 +331,11 @@ impl Report<'_> {
             "time": Number(self.time),
             "energies": {
                 "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
-                "dissipated": Number(dissipated), "total": Number(total), "balance": Number(balance),
+                "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws), "initial": Number(initial),
+                "total": Number(total), "balance": Number(balance),
             },
             "counts": self.counts, "seconds": seconds, "warnings": self.warnings,
+            "contact": self.contact,
         });
         if let Outcome::Failed(error) = self.outcome {
             head["failed_attempts"] = json!(AttemptLine::all(&error.failed));
@@ -352,6 +357,8 @@ mod tests {
             strain: 0.1,
             external: 0.0,
             dissipated: 0.0,
+            by_laws: 0.0,
+            initial: 0.0,
             total: f64::INFINITY,
             balance: 0.0,
         };
@@ -364,6 +371,7 @@ mod tests {
             counts: Counts::default(),
             seconds: Seconds::default(),
             warnings: &[],
+            contact: &[],
         };
         for lines in [&[][..], &["[1.0,1e-9]"], &["[1.0,1e-9]", "[]", "[2.5]"]] {
             let mut log = NewtonLog::open(directory.path().join("newton.jsonl"), None)?;

@@ -1,7 +1,9 @@
 //! The text printed at the end of a run.
 
+use super::contact::Contact;
 use super::history::Energies;
 use super::report::{Counts, Seconds};
+use super::warnings::Warning;
 use crate::solver::Krylov;
 use std::fmt::{Display, Formatter, Result};
 
@@ -21,6 +23,10 @@ pub struct Summary {
     pub momentum_scale: f64,
     /// What solved the linear systems.
     pub krylov: Krylov,
+    /// Bodies that shared nodes.
+    pub contact: Vec<Contact>,
+    /// What was warned of.
+    pub warnings: Vec<Warning>,
     /// What was done.
     pub counts: Counts,
     /// How long it took.
@@ -37,10 +43,13 @@ impl Display for Summary {
             counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.failed_attempts
         )?;
         if self.moves {
+            let Energies { kinetic, strain, total, external, dissipated, by_laws, initial, balance } = energies;
+            writeln!(f, "energy    kinetic {kinetic:.6e}, strain {strain:.6e}, total {total:.6e}")?;
+            let (error, size) = if *balance > 0.0 { ("+ created", *balance) } else { ("- lost", -balance) };
             writeln!(
                 f,
-                "energy    kinetic {:.6e}, strain {:.6e}, total {:.6e}, external work {:.6e}, balance {:.3e}",
-                energies.kinetic, energies.strain, energies.total, energies.external, energies.balance
+                "balance   total {total:.6e} = initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws \
+                 {by_laws:.6e}) {error} {size:.3e}"
             )?;
             writeln!(
                 f,
@@ -48,7 +57,13 @@ impl Display for Summary {
                 self.momentum_change, self.momentum_scale
             )?;
         } else {
-            writeln!(f, "energy    strain {:.6e}, external work {:.6e}", energies.strain, energies.external)?;
+            let Energies { strain, external, dissipated, by_laws, initial, balance, .. } = energies;
+            let (error, size) = if *balance > 0.0 { ("+", *balance) } else { ("-", -balance) };
+            writeln!(
+                f,
+                "energy    strain {strain:.6e} = initial {initial:.6e} + external work {external:.6e} - dissipated {dissipated:.6e} (by laws \
+                 {by_laws:.6e}) {error} rest of the load steps {size:.3e}"
+            )?;
         }
         writeln!(
             f,
@@ -57,6 +72,12 @@ impl Display for Summary {
             counts.max_newton_iterations,
             mean(counts.krylov_iterations - counts.failed_krylov_iterations)
         )?;
+        for contact in &self.contact {
+            writeln!(f, "contact   {contact}")?;
+        }
+        for Warning { time, step, message, .. } in &self.warnings {
+            writeln!(f, "warned    t = {time}, step {step}: {message}")?;
+        }
         write!(f, "seconds  ")?;
         for (k, (name, x)) in seconds.named().enumerate() {
             write!(f, "{} {} {x:.2}", if k == 0 { "" } else { "," }, name.replace('_', " "))?;

@@ -1,13 +1,18 @@
 //! What the one who waits should know before the end: each kind once, with time and value.
 
+use super::Reference;
+use super::contact::{Contact, Contacts};
 use super::history::{Cost, Energies};
+use super::losses::{Cause, Losses};
+use super::path::{Event, Followed};
+use crate::simulation::{Sharing, Simulation};
 use serde::{Deserialize, Serialize};
 
-/// Energy created, as a part of the largest energy so far, above which there is a warning.
+/// Energy created, as a part of the largest total energy so far, above which there is a warning.
 const CREATED: f64 = 0.01;
 
-/// Energy lost, likewise: an impact of the paper's bodies, a few cells wide, takes a fifth.
-const LOST: f64 = 0.3;
+/// Energy lost, likewise.
+const LOST: f64 = 0.02;
 
 /// Steps over which the usual number of iterations is averaged.
 const MEMORY: u64 = 50;
@@ -24,7 +29,7 @@ const CLIMB: (f64, f64) = (5.0, 100.0);
 pub enum Kind {
     /// With inertia, the balance of energy is positive.
     EnergyCreated,
-    /// With inertia, the balance of energy is far below zero.
+    /// With inertia, the balance of energy is below zero.
     EnergyLost,
     /// A step was taken with less than its nominal length, because a longer one failed.
     StepHalved,
@@ -38,6 +43,14 @@ pub enum Kind {
     KrylovLimited,
     /// Linear systems are left unsolved because their residual no longer falls.
     KrylovStagnated,
+    /// Two bodies share nodes and are pulled apart.
+    BodiesStick,
+    /// Along a path of equilibria, the load has turned.
+    PathTurned,
+    /// A path has bent sharply from one step to the next.
+    PathBent,
+    /// A path goes back the way that it came.
+    PathReturned,
 }
 
 /// A warning.
@@ -58,8 +71,13 @@ pub struct Warning {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Watch {
-    /// The most energy so far, counted without sign.
-    most_energy: f64,
+    losses: Losses,
+    /// Steps on end after which the loss was too large.
+    losing: u64,
+    contacts: Contacts,
+    path: Followed,
+    /// Whether the mass is lumped in full.
+    lumped: bool,
     /// The usual number of Krylov iterations.
     usual_krylov: f64,
     /// Steps seen.
@@ -75,6 +93,10 @@ pub(crate) struct Watched {
     pub energies: Energies,
     /// Whether there is inertia: load steps take work from loads that are there at once.
     pub moves: bool,
+    /// What happened in it that may lose energy.
+    pub cause: Cause,
+    /// Whether the mass is lumped in full.
+    pub lumped: bool,
     pub cost: Cost,
     /// Attempts before it that failed for another reason than their error.
     pub failed: usize,
@@ -98,41 +120,54 @@ impl Watch {
     /// Looks at a step; what is new.
     pub(crate) fn see(&mut self, step: &Watched) -> &[Warning] {
         let known = self.warnings.len();
-        let Watched { energies, cost, failed, error, newton_limit, .. } = *step;
-        let Energies { kinetic, strain, external, balance, .. } = energies;
-        let energy = kinetic.abs() + strain.abs() + external.abs();
-        if energy.is_finite() {
-            self.most_energy = self.most_energy.max(energy);
-        }
-        if step.moves && balance > CREATED * self.most_energy {
-            let part = 100.0 * balance / self.most_energy;
-            self.warn(step, Kind::EnergyCreated, || {
-                format!("energy was created: the balance is {balance:+.3e}, {part:.1} % of the most energy so far")
-            });
-        }
-        if step.moves && -balance > LOST * self.most_energy {
-            let part = -100.0 * balance / self.most_energy;
-            self.warn(step, Kind::EnergyLost, || {
+        self.see_energy(step);
+        self.see_step(step);
+        self.see_solver(step);
+        &self.warnings[known..]
+    }
+
+    /// What of energy is created or lost.
+    fn see_energy(&mut self, step: &Watched) {
+        self.losses.add(&step.energies, step.cause);
+        self.lumped = step.lumped;
+        let (part, balance) = (-self.losses.part(), step.energies.balance);
+        if step.moves && part > CREATED {
+            self.warn(step, Kind::EnergyCreated, |_| {
+                let part = 100.0 * part;
                 format!(
-                    "energy was lost, beyond what damping and laws took: the balance is {balance:+.3e}, {part:.1} % of the most energy so far; \
-                     shorten time.step or grid.spacing, or tighten time.adaptive.tolerance"
+                    "energy was created: the balance is {balance:+.3e}, {part:.1} % of the largest total energy so far"
                 )
             });
         }
+        self.losing = if step.moves && -part > LOST { self.losing + 1 } else { 0 };
+        // In the first steps from rest there is next to no energy.
+        if self.losing >= USUAL_AFTER {
+            self.warn(step, Kind::EnergyLost, |watch| watch.losses.says(step.lumped));
+        }
+    }
+
+    /// Steps that were halved, or should have been.
+    fn see_step(&mut self, step: &Watched) {
+        let Watched { cost, failed, error, .. } = *step;
         if failed > 0 {
             let dt = cost.dt;
-            self.warn(step, Kind::StepHalved, || {
+            self.warn(step, Kind::StepHalved, |_| {
                 format!("the step had to be halved {failed} times, to dt = {dt:.3e}; report.json says why")
             });
         }
         if let Some((error, tolerance)) = error.filter(|(error, tolerance)| error > tolerance) {
-            self.warn(step, Kind::StepInaccurate, || {
+            self.warn(step, Kind::StepInaccurate, |_| {
                 let dt = cost.dt;
                 format!("a step of dt = {dt:.3e} errs by {error:.2e} grid spacings, {tolerance:.2e} are allowed, and time.max_halvings is reached")
             });
         }
+    }
+
+    /// Iterations of Newton's method and of the linear solver.
+    fn see_solver(&mut self, step: &Watched) {
+        let Watched { cost, newton_limit, limited, stagnated, krylov_limit, .. } = *step;
         if 2 * cost.newton > newton_limit && newton_limit > 1 {
-            self.warn(step, Kind::NewtonClimbs, || {
+            self.warn(step, Kind::NewtonClimbs, |_| {
                 format!(
                     "Newton's method took {} of {newton_limit} allowed iterations, where a few are usual: shorten time.step, or raise \
                      solver.newton.max_iterations",
@@ -142,16 +177,15 @@ impl Watch {
         }
         let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
         if self.seen >= USUAL_AFTER && krylov > CLIMB.0 * usual && krylov > CLIMB.1 {
-            self.warn(step, Kind::KrylovClimbs, || {
+            self.warn(step, Kind::KrylovClimbs, |_| {
                 format!(
                     "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
                      ghost_stiffness, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
                 )
             });
         }
-        let Watched { limited, stagnated, krylov_limit, .. } = *step;
         if limited > 0 {
-            self.warn(step, Kind::KrylovLimited, || {
+            self.warn(step, Kind::KrylovLimited, |_| {
                 format!(
                     "{limited} linear systems of a step were left unsolved after the {krylov_limit} iterations allowed: they are badly \
                      conditioned; raise solver.krylov.max_iterations, shorten time.step, or give cut cells a ghost_stiffness"
@@ -159,7 +193,7 @@ impl Watch {
             });
         }
         if stagnated > 0 {
-            self.warn(step, Kind::KrylovStagnated, || {
+            self.warn(step, Kind::KrylovStagnated, |_| {
                 format!(
                     "{stagnated} linear systems of a step were left unsolved because their residual no longer fell: they are nearly \
                      singular, or GMRES restarts too early; hold bodies that can move freely, or raise solver.krylov.method.gmres.restart"
@@ -168,13 +202,76 @@ impl Watch {
         }
         self.seen += 1;
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
+    }
+
+    /// Looks at the bodies that share nodes after a step; a sentence for each two that stick together from now on.
+    pub(crate) fn see_contact(&mut self, step: &Watched, sharing: &[Sharing], names: &[&str]) -> &[Warning] {
+        let known = self.warnings.len();
+        let Watched { time, cost, step: number, .. } = *step;
+        for message in self.contacts.see(time, cost.dt, number == 1, sharing, names) {
+            self.warnings.push(Warning { kind: Kind::BodiesStick, time, step: number, message });
+        }
         &self.warnings[known..]
     }
 
-    fn warn(&mut self, step: &Watched, kind: Kind, message: impl FnOnce() -> String) {
+    /// Looks at a step along a path of equilibria, whose displacement has the cosine `straight` to that of the step before.
+    pub(crate) fn see_path<const D: usize, L, A>(
+        &mut self,
+        step: &Watched,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        straight: Option<f64>,
+    ) -> &[Warning] {
+        let known = self.warnings.len();
+        for event in self.path.see(simulation, reference, straight) {
+            match event {
+                Event::Turned(load) => self.warn(step, Kind::PathTurned, |_| {
+                    format!(
+                        "the load turns at {load:.6e}, a limit point: the stiffness along the path changes its sign there, and under a load \
+                         that is kept, bodies are unstable until it turns again"
+                    )
+                }),
+                Event::Bent(angle) => self.warn(step, Kind::PathBent, |_| {
+                    format!(
+                        "the path of equilibria bends by {angle:.0} degrees from one step to the next: it may have gone to another branch; \
+                         shorten time.step and compare"
+                    )
+                }),
+                Event::Returned(load) => self.warn(step, Kind::PathReturned, |_| {
+                    format!(
+                        "the path of equilibria goes back the way that it came, and is at the load {load:.6e} again: what follows is \
+                         nothing new; shorten time.step, or give the body a small imperfection where it may buckle"
+                    )
+                }),
+            }
+        }
+        &self.warnings[known..]
+    }
+
+    /// Bodies that shared nodes.
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        self.contacts.all()
+    }
+
+    /// The run is over after a step, the `number`th, that ended at `time`: a loss is told as large as it became. What is new.
+    pub(crate) fn end(&mut self, time: f64, number: u64) -> Option<&Warning> {
+        let told = self.warnings.iter().position(|warning| warning.kind == Kind::EnergyLost);
+        let first = told.map(|told| self.warnings[told].time);
+        if self.losing == 0 || first == Some(time) {
+            return None;
+        }
+        let since = first.map_or_else(String::new, |first| format!("; more than {} % since t = {first}", 100.0 * LOST));
+        let message = format!("{}{since}", self.losses.says(self.lumped));
+        told.into_iter().for_each(|told| drop(self.warnings.remove(told)));
+        self.warnings.push(Warning { kind: Kind::EnergyLost, time, step: number, message });
+        self.warnings.last()
+    }
+
+    fn warn(&mut self, step: &Watched, kind: Kind, message: impl FnOnce(&Self) -> String) {
         if self.warnings.iter().all(|warning| warning.kind != kind) {
             let Watched { time, step, .. } = *step;
-            self.warnings.push(Warning { kind, time, step, message: message() });
+            let message = message(self);
+            self.warnings.push(Warning { kind, time, step, message });
         }
     }
 }
@@ -184,14 +281,24 @@ mod tests {
     use super::*;
 
     fn step(number: u64) -> Watched {
-        let energies =
-            Energies { kinetic: 2.0, strain: 1.0, external: -1.0, dissipated: 0.0, total: 3.0, balance: -0.5 };
+        let energies = Energies {
+            kinetic: 2.0,
+            strain: 2.0,
+            external: -9.0,
+            dissipated: 0.0,
+            by_laws: 0.0,
+            initial: 4.0,
+            total: 4.0,
+            balance: -0.07,
+        };
         let cost = Cost { dt: 0.1, newton: 3, krylov: 30, yielding: 0.0 };
         Watched {
             time: 0.1 * number as f64,
             step: number,
             energies,
             moves: true,
+            cause: Cause::Wall,
+            lumped: true,
             cost,
             failed: 0,
             error: None,
@@ -214,9 +321,19 @@ mod tests {
         assert_eq!((warning.kind, warning.step, warning.time), (Kind::EnergyCreated, 21, 2.1));
         assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
         assert!(watch.see(&balance(3.0)).is_empty(), "once");
-        assert!(watch.see(&balance(-1.19)).is_empty(), "30 % of 4 are not reached");
-        assert!(watch.see(&Watched { moves: false, ..balance(-1.3) }).is_empty(), "without inertia");
-        assert!(watch.see(&balance(-1.3)).iter().any(|warning| warning.message.contains("-1.300e0, 32.5 %")));
+        assert!(watch.see(&balance(-0.079)).is_empty(), "2 % of 4 are not reached: work does not count");
+        assert!(watch.see(&Watched { moves: false, ..balance(-0.1) }).is_empty(), "without inertia");
+        let words = [
+            "1.000e-1, 2.5 % of the largest total energy 4.000e0",
+            "a body meets a wall (impact)",
+            "shorten time.step",
+        ];
+        for step in 1..USUAL_AFTER {
+            assert!(watch.see(&balance(-0.1)).is_empty(), "{step} steps may be a start from rest");
+        }
+        assert!(
+            watch.see(&balance(-0.1)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word)))
+        );
         let halved = Watched { failed: 2, ..step(22) };
         assert!(watch.see(&halved).iter().any(|warning| warning.message.contains("halved 2 times, to dt = 1.000e-1")));
         let inaccurate = Watched { error: Some((2e-3, 1e-3)), ..step(22) };
@@ -227,8 +344,8 @@ mod tests {
         assert!(watch.see(&newton).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
-        // 30 steps of 30 before, and that of 150
-        let words = ["180 iterations in a step; 34", "ghost_stiffness", "multigrid"];
+        // 39 steps of 30 before, and that of 150
+        let words = ["180 iterations in a step; 33", "ghost_stiffness", "multigrid"];
         assert!(watch.see(&krylov(180)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let limited = Watched { limited: 2, ..step(25) };
         assert!(watch.see(&limited).iter().any(
@@ -238,9 +355,32 @@ mod tests {
         assert!(watch.see(&stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
         assert!(watch.see(&stagnated).is_empty() && watch.see(&limited).is_empty(), "once");
         assert_eq!(watch.warnings().len(), 8);
+        // At the end it is told as large as it became.
+        watch.see(&balance(-0.2));
+        let told = watch.end(3.0, 30).map(|warning| (warning.kind, warning.time, warning.message.clone()));
+        let Some((Kind::EnergyLost, 3.0, message)) = told else { panic!("{told:?}") };
+        assert!(message.contains("2.000e-1, 5.0 %") && message.ends_with("more than 2 % since t = 2.1"), "{message}");
+        assert_eq!(watch.end(3.0, 30), None, "once");
         // what it knows survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
+    }
+
+    #[test]
+    fn a_short_run_tells_at_its_end_what_it_lost_and_a_long_one_where() {
+        let lost = |x: f64, cause| Watched { energies: Energies { balance: -x, ..step(0).energies }, cause, ..step(1) };
+        let mut watch = Watch::default();
+        assert!(watch.see(&lost(0.3, Cause::Bodies)).is_empty() && watch.see(&lost(0.4, Cause::NewGrid)).is_empty());
+        let told = watch.end(0.2, 2).map(|warning| (warning.kind, warning.step, warning.message.clone()));
+        let Some((Kind::EnergyLost, 2, message)) = told else { panic!("{told:?}") };
+        assert!(
+            message.contains("75 % of it in steps in which bodies share nodes")
+                && message.contains("25 % of it in other"),
+            "{message}"
+        );
+        let mut watch = Watch::default();
+        watch.see(&lost(0.07, Cause::Step));
+        assert_eq!(watch.end(0.1, 1), None, "less than 2 %");
     }
 
     #[test]
@@ -251,6 +391,8 @@ mod tests {
             strain: f64::INFINITY,
             external: 0.0,
             dissipated: 0.0,
+            by_laws: 0.0,
+            initial: 0.0,
             total: f64::NAN,
             balance: f64::NAN,
         };

@@ -163,7 +163,8 @@ impl Run {
         }
         let probes = bound_probes(scene, &simulation);
         probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
-        scene.warnings(&simulation).iter().for_each(|text| self.say("warning", text));
+        let warnings = scene.warnings(&simulation);
+        warnings.iter().for_each(|text| self.say("warning", text));
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let identity = Identity::new(settings.clone(), &simulation.particles);
         let mut asked = Map::new();
@@ -177,6 +178,7 @@ impl Run {
         asked.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
         let (preconditioner, why) = simulation.preconditioner();
         asked.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
+        asked.insert("scene_warnings".to_owned(), json!(warnings));
         asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
         asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
         let output = OutputSettings {
@@ -250,7 +252,8 @@ impl Run {
         };
         let summary = recorder.finish(&simulation, &asked, outcome).map_err(Failure::run)?;
         if !self.quiet {
-            print(format_args!("{summary}\nresults   {}", directory.display()))?;
+            let again: String = warnings.iter().map(|text| format!("\nwarned    {text}")).collect();
+            print(format_args!("{summary}{again}\nresults   {}", directory.display()))?;
         }
         if self.plot {
             let drawn = plot_run(&directory).map_err(Failure::run)?;

@@ -4,11 +4,12 @@ use super::body::Body;
 use super::shape::Shape as Drawn;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
+use crate::material::{Law, Material, poissons_ratio};
 use crate::mechanics::loads::SurfaceLoad;
 use crate::mechanics::loads::{Pressing, Selection};
 use crate::shape::{EDGE, Fill, Intersection, Shape, around};
 use crate::simulation::Simulation;
-use crate::tensor::Vector;
+use crate::tensor::{Deformation, Tensor, Vector};
 use std::collections::BTreeSet;
 
 /// Particles nearer to each other, relative to the spacing, lie at one place.
@@ -30,6 +31,9 @@ const CELLS: f64 = 2.0;
 /// How well a thickness is known, which is twice a depth of particles that need not lie in the middle: no body of two cells is named.
 const ABOUT: f64 = 0.95;
 
+/// Poisson's ratio from which on a body whose change of volume is not averaged is said to lock.
+const LOCKS: f64 = 0.45;
+
 /// Bodies of a scene, as they were built.
 struct Bodies<'a, const D: usize> {
     simulation: &'a Simulation<D>,
@@ -41,7 +45,7 @@ struct Bodies<'a, const D: usize> {
 
 impl Scene {
     /// What may be wrong with a simulation of this scene: bodies that overlap, particles at one place, bodies too thin for the grid or of
-    /// another volume than their shape, prescribed regions without nodes, tractions on surfaces of pixels. Of bodies that are unions
+    /// another volume than their shape, bodies that lock, prescribed regions without nodes, tractions on surfaces of pixels. Of bodies that are unions
     /// the thickness is that of one part.
     ///
     /// ```
@@ -67,6 +71,7 @@ impl Scene {
             .collect();
         all.extend(bodies.coincident());
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
+        all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));
         let filled = self.filled_otherwise(simulation);
         all.extend(filled.into_iter().filter_map(|(number, body)| missed(number, &body)));
         let prescribed = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
@@ -196,6 +201,30 @@ impl<const D: usize> Bodies<'_, D> {
                 across / h
             )
         })
+    }
+
+    /// A body that hardly changes its volume, or flows without changing it, and does not average its dilatation. In uniaxial strain nothing
+    /// locks.
+    fn locks(&self, number: usize) -> Option<String> {
+        let body = self.simulation.bodies.get(number).filter(|body| D > 1 && !body.averages())?;
+        // To the last digits of ν = 0.45 as it is given.
+        let (poisson, flows) = (poissons_ratio(&body.law), matches!(body.law, Material::VonMises(_)));
+        if poisson < LOCKS - 1e-9 && !flows {
+            return None;
+        }
+        let why = if flows { "flows without a change of volume" } else { "hardly changes its volume" };
+        let cure = match body.law.volumetric(&Deformation::new(Tensor::<f64, 1>::zeros())) {
+            Some(_) => format!("bodies[{number}].volumetric = \"mean_dilatation\" cures it"),
+            None => {
+                "its law knows no \"volumetric\": \"mean_dilatation\"; take \"neo_hookean\" with that, or a finer grid"
+                    .to_owned()
+            }
+        };
+        let name = &self.scene[number].name;
+        Some(format!(
+            "body {name:?} {why} (Poisson's ratio {poisson:.6}), and its change of volume is not averaged: it may lock, too stiff by some \
+             percent or by a half, with wrong pressures; {cure}"
+        ))
     }
 
     fn extent(&self, own: &[usize], k: usize) -> f64 {

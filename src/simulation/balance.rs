@@ -23,6 +23,8 @@ pub(super) struct Balance<'a, const D: usize, L> {
     pub newton: NewtonReport,
     /// The time in whose place the loads acted at t_n, and act now.
     pub loads: [f64; 2],
+    /// On a path, the cosine of the angle between Δφ and that of the last step.
+    pub straight: Option<f64>,
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -50,6 +52,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
+        let mut straight = None;
         let newton = match kept.filter(|_| scheme.follows_path()) {
             None => newton(&equilibrium, &mut *preconditioner, x, settings, supports.pool())
                 .map_err(|error| self.explained(error, &equilibrium, supports))?,
@@ -59,6 +62,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 let path = OnPath::new(self.path, &start, &force, &kept.rate, dt)?;
                 let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
                 to = path.load(&phi);
+                straight = Some(path.straight(&phi));
                 if path.ends(to)? {
                     return Err(StepError::PathEnds { load: to });
                 }
@@ -67,7 +71,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             }
         };
         equilibrium.unknowns.followers.extend(&mut phi);
-        Ok(Balance { equilibrium, phi, newton, loads: [from, to] })
+        Ok(Balance { equilibrium, phi, newton, loads: [from, to], straight })
     }
 
     /// The Δφ that Newton's method starts from.

@@ -8,12 +8,14 @@ mod report;
 mod settings;
 mod start;
 mod step;
+mod touching;
 mod work;
 
 pub use borne::Borne;
 pub use coming::Coming;
 pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
+pub use touching::Sharing;
 
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;

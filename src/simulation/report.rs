@@ -1,5 +1,6 @@
 //! What a step did, or why it failed.
 
+use super::Sharing;
 use crate::causes;
 use crate::mechanics::check::CheckError;
 use crate::mechanics::residual::Inadmissible;
@@ -36,6 +37,12 @@ pub struct StepReport<const D: usize> {
     pub error: Option<f64>,
     /// Whether the grid was new.
     pub renewed: bool,
+    /// Whether a body feels a wall or a prescribed region that no body felt in the first step.
+    pub feels_wall: bool,
+    /// Bodies that share nodes.
+    pub sharing: Vec<Sharing>,
+    /// On a path of equilibria, the cosine of the angle between Δφ and that of the step before; `None` of the first step on a grid.
+    pub straight: Option<f64>,
     /// Share of the volume of bodies with a plastic law that has flowed in it.
     pub yielding: f64,
     /// Seconds, and passes over the particles, by phase.

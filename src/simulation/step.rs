@@ -63,7 +63,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
-        let Balance { equilibrium, phi, newton, loads: [from, to] } =
+        let Balance { equilibrium, phi, newton, loads: [from, to], straight } =
             self.balance(&supports, &nodal, &prescribed, kept.as_ref())?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &phi)?;
@@ -98,6 +98,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if scheme.follows_path() {
             self.path = self.path.after(to, &dphi, dt);
         }
+        let (feels_wall, sharing) = (self.feels_wall(&prescribed), self.sharing(&supports));
         let passes = supports.passes();
         self.keep(next, supports, strain, &prescribed, borne);
         watch.lap(Phase::Update, passes);
@@ -112,6 +113,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             reactions,
             error,
             renewed,
+            feels_wall,
+            sharing,
+            straight,
             yielding,
             seconds: *watch,
             failed: Vec::new(),

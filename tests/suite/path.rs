@@ -1,6 +1,8 @@
 //! A path of equilibria with two turning points (the study `robust` compares it with its closed form): Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid joint.
 
 use crate::support::{Failure, scene};
+use bfree::output::warnings::Kind;
+use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::simulation::Simulation;
 
 const LENGTH: f64 = 10.0;
@@ -46,6 +48,32 @@ fn a_load_is_followed_down_and_up_again() -> Result<(), Failure> {
     // What the load has done, up and down, is stored: by the trapezoidal rule.
     let (work, stored) = (simulation.external_work, simulation.strain_energy() + simulation.dissipated);
     assert!((work / stored - 1.0).abs() < 0.01, "{work} {stored}");
+    Ok(())
+}
+
+#[test]
+fn a_load_that_turns_is_told() -> Result<(), Failure> {
+    let mut simulation = toggle(&[])?;
+    let directory = tempfile::tempdir()?;
+    let settings = OutputSettings {
+        directory: directory.path().to_owned(),
+        fields: Vec::new(),
+        snapshot_every: None,
+        probes: Vec::new(),
+        end_time: 0.3,
+        audience: Audience::Nobody,
+    };
+    let reference = Reference::of(&simulation);
+    let (mut recorder, mut largest) = (Recorder::start(settings, &simulation, reference)?, 0.0_f64);
+    while simulation.clock.time() < 0.3 {
+        let step = simulation.advance()?;
+        largest = largest.max(simulation.path.load);
+        recorder.record(&simulation, &step)?;
+    }
+    let summary = recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
+    let [turned] = &summary.warnings[..] else { return Err(format!("{:?}", summary.warnings).into()) };
+    assert_eq!(turned.kind, Kind::PathTurned);
+    assert!(turned.message.contains(&format!("{largest:.6e}, a limit point")), "{} {largest}", turned.message);
     Ok(())
 }
 

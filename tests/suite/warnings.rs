@@ -123,6 +123,34 @@ fn a_prescribed_region_between_nodes_is_named() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failure> {
+    let nowhere = Path::new(".");
+    let of = |material: Value, more: Value| {
+        let mut body =
+            json!({"name": "a", "shape": {"box": {"min": [1, 1], "max": [4, 4]}}, "density": 1, "material": material});
+        if let (Some(body), Value::Object(more)) = (body.as_object_mut(), more) {
+            body.extend(more);
+        }
+        warnings(json!([body]), json!({}), nowhere)
+    };
+    let rubber = |poisson: f64| json!({"neo_hookean": {"young": 100, "poisson": poisson}});
+    let mean = json!({"volumetric": "mean_dilatation"});
+    let cure = "bodies[0].volumetric = \"mean_dilatation\"";
+    assert_one(&of(rubber(0.4999), json!({}))?, &["\"a\" hardly changes its volume", "0.499900", cure]);
+    assert_one(&of(rubber(0.45), json!({}))?, &["0.450000"]);
+    for (material, more) in [(rubber(0.449), json!({})), (rubber(0.4999), mean.clone())] {
+        assert_eq!(of(material, more)?, Vec::<String>::new());
+    }
+    let metal = json!({"von_mises": {"elastic": {"young": 100, "poisson": 0.3}, "yield_stress": {"initial": 1}}});
+    assert_one(&of(metal.clone(), json!({}))?, &["flows without a change of volume", "0.300000", cure]);
+    assert_eq!(of(metal, mean)?, Vec::<String>::new());
+    // A law without a volumetric part has another cure.
+    let other = json!({"st_venant_kirchhoff": {"young": 100, "poisson": 0.49}});
+    assert_one(&of(other, json!({}))?, &["0.490000", "take \"neo_hookean\" with that"]);
+    Ok(())
+}
+
+#[test]
 fn shipped_scenes_have_nothing_to_warn_of() -> Result<(), Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     for entry in std::fs::read_dir(&folder)? {

@@ -2,7 +2,7 @@
 
 use super::{program, rebound, report, scene};
 use crate::support::Failure;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 #[test]
 fn check_says_how_far_apart_bodies_feel_each_other() -> Result<(), Failure> {
@@ -167,5 +167,106 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     let output = program().arg("check").arg(scene("compaction.json")).output()?;
     let text = String::from_utf8(output.stdout)?;
     assert!(text.contains("solver        GMRES(30): it was asked for"), "{text}");
+    Ok(())
+}
+
+/// Runs a scene that is given as text; what it printed, on standard output and standard error, and its report.
+fn ran(text: &Value) -> Result<(String, String, Value), Failure> {
+    let directory = tempfile::tempdir()?;
+    let (path, out) = (directory.path().join("scene.json"), directory.path().join("out"));
+    std::fs::write(&path, text.to_string())?;
+    let output = program().arg("run").arg(&path).arg("--out").arg(&out).output()?;
+    let [said, warned] = [output.stdout, output.stderr].map(String::from_utf8);
+    let (said, warned) = (said?, warned?);
+    assert!(output.status.success(), "{warned}");
+    Ok((said, warned, report(&out)?))
+}
+
+#[test]
+fn a_ring_that_bounces_says_how_much_energy_it_lost_and_where() -> Result<(), Failure> {
+    let disc = |radius: f64| json!({"ball": {"center": [1, 1], "radius": radius}});
+    let (_, warned, report) = ran(&json!({
+        "grid": {"size": [2, 2], "spacing": 0.1}, "time": {"step": 0.005, "end": 0.6}, "output": {},
+        "bodies": [{"name": "ring", "density": 1000, "shape": {"difference": {"of": disc(0.5), "minus": disc(0.25)}},
+                    "material": {"neo_hookean": {"young": 1e5, "poisson": 0.3}}}],
+        "boundary": {"bottom": "sliding"}, "gravity": {"acceleration": [0, -9.81]}
+    }))?;
+    assert!(warned.contains("energy was lost") && warned.contains("a body meets a wall (impact)"), "{warned}");
+    let [lost] = report["warnings"].as_array().map_or(&[][..], Vec::as_slice) else { panic!("{report}") };
+    assert_eq!(lost["kind"], "energy_lost");
+    // As large as it became, beside the largest energy without the work of the weight.
+    let balance = report["energies"]["balance"].as_f64().ok_or("no balance")?;
+    let message = lost["message"].as_str().unwrap_or_default();
+    assert!(message.contains(&format!("{:.3e}", -balance)) && message.contains("shorten time.step"), "{message}");
+    Ok(())
+}
+
+/// Two blocks, the upper one above `gap`, that are thrown apart or at each other.
+fn blocks(gap: f64, apart: f64) -> Value {
+    let block = |name: &str, y: f64, v: f64| {
+        json!({"name": name, "density": 1, "velocity": [0, v], "shape": {"box": {"min": [2, y], "max": [6, y + 2.0]}},
+               "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
+    };
+    json!({"grid": {"size": [8, 10], "spacing": 0.5}, "time": {"step": 0.02, "end": 0.6}, "output": {},
+           "bodies": [block("lower", 2.0, -apart), block("upper", 4.0 + gap, apart)]})
+}
+
+#[test]
+fn bodies_that_are_glued_say_so() -> Result<(), Failure> {
+    let (said, warned, report) = ran(&blocks(0.0, 0.5))?;
+    let words = [
+        "\"lower\" and \"upper\" share nodes since the start and are pulled apart",
+        "0.00 spacings",
+        "will not separate",
+    ];
+    assert!(words.iter().all(|word| warned.contains(word)), "{warned}");
+    assert!(said.contains("contact   \"lower\" and \"upper\" share nodes since t = 0"), "{said}");
+    let contact = &report["contact"][0];
+    assert_eq!(
+        (&contact["bodies"][1], &contact["from_start"], &contact["until"]),
+        (&"upper".into(), &true.into(), &Value::Null)
+    );
+    assert!(contact["pulled_apart"].as_f64().is_some_and(|time| time < 0.1), "{report}");
+    // Pressed together, they are in contact and nothing is wrong with it.
+    let mut pressed = blocks(0.0, -0.5);
+    pressed["time"]["end"] = 0.2.into();
+    let (_, warned, report) = ran(&pressed)?;
+    assert!(!warned.contains("pulled apart") && report["contact"][0]["pulled_apart"].is_null(), "{warned}");
+    // Far apart, they share nothing.
+    let (said, _, report) = ran(&blocks(3.0, 0.1))?;
+    assert!(!said.contains("contact") && report["contact"] == json!([]), "{said}");
+    Ok(())
+}
+
+#[test]
+fn check_says_which_bodies_are_glued_from_the_start() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let path = directory.path().join("scene.json");
+    for (gap, glued) in [(0.0, true), (3.0, false)] {
+        std::fs::write(&path, blocks(gap, 0.0).to_string())?;
+        let output = program().arg("check").arg(&path).output()?;
+        let said = String::from_utf8(output.stdout)?;
+        let words = "\"lower\" and \"upper\" share nodes at the start, at a gap of 0.00 spacings";
+        assert!(output.status.success() && said.contains(words) == glued, "{said}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_summary_of_a_plastic_block_balances_its_energy_and_repeats_what_it_warned_of() -> Result<(), Failure> {
+    let (said, _, report) = ran(&json!({
+        "grid": {"size": [4, 3], "spacing": 0.5}, "time": {"step": 0.1, "end": 1, "inertia": "none"}, "output": {},
+        "bodies": [{"name": "block", "density": 1, "shape": {"box": {"min": [0, 0], "max": [2, 2]}},
+                    "material": {"von_mises": {"elastic": {"young": 100, "poisson": 0.3}, "yield_stress": {"initial": 0.1, "linear": 10}}}}],
+        "boundary": {"left": "sliding", "bottom": "sliding"},
+        "tractions": [{"body": "block", "region": {"half_space": {"point": [2, 0], "normal": [-1, 0]}}, "traction": [0.4, 0],
+                       "curve": [[0, 0], [1, 1]]}]
+    }))?;
+    let energy = |name: &str| report["energies"][name].as_f64().ok_or(name.to_owned());
+    let (strain, work, laws) = (energy("strain")?, energy("external")?, energy("dissipated_by_laws")?);
+    assert!(laws > 5.0 * strain && (work / (strain + laws) - 1.0).abs() < 0.02, "{strain} {work} {laws}");
+    assert!(said.contains(&format!("(by laws {laws:.6e})")), "{said}");
+    assert!(said.contains("warned    body \"block\" flows without a change of volume"), "{said}");
+    assert!(report["scene_warnings"][0].as_str().is_some_and(|text| text.contains("mean_dilatation")), "{report}");
     Ok(())
 }

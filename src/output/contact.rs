@@ -1,0 +1,141 @@
+//! Bodies that share nodes: since when, until when, how far apart, and whether they are pulled apart.
+
+use crate::simulation::Sharing;
+use serde::{Deserialize, Serialize};
+
+/// Bodies that met during the run, and whose gap has grown by so much since (in spacings), are pulled apart.
+const OPENED: f64 = 0.1;
+
+/// Two bodies that share nodes, or did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// Their names.
+    pub bodies: [String; 2],
+    /// The time since when they share nodes; that of the start, if they did in the first step.
+    pub since: f64,
+    /// Whether they share nodes since the start of the run.
+    pub from_start: bool,
+    /// The time since when they share none any more; `None` while they do.
+    pub until: Option<f64>,
+    /// The distance of their surfaces where they are nearest, in grid spacings: when they began to share nodes, and in the last step in which
+    /// they did; below zero where they overlap. `None` from four spacings on.
+    pub gap: [Option<f64>; 2],
+    /// The time at which they were pulled apart for the first time, and did not separate.
+    pub pulled_apart: Option<f64>,
+}
+
+/// All contacts of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct Contacts(Vec<Contact>);
+
+impl Contacts {
+    /// All so far.
+    pub fn all(&self) -> &[Contact] {
+        &self.0
+    }
+
+    /// Takes note of a step that ended at `time`, the first of the run or a later one; a sentence for each two bodies that are pulled apart
+    /// now for the first time.
+    pub fn see(&mut self, time: f64, dt: f64, first: bool, sharing: &[Sharing], names: &[&str]) -> Vec<String> {
+        let named = |sharing: &Sharing| sharing.bodies.map(|body| names[body as usize].to_owned());
+        for contact in self.0.iter_mut().filter(|contact| contact.until.is_none()) {
+            if !sharing.iter().any(|one| named(one) == contact.bodies) {
+                contact.until = Some(time);
+            }
+        }
+        let mut said = Vec::new();
+        for one in sharing {
+            let (bodies, gap) = (named(one), one.gap);
+            let known = self.0.iter().position(|contact| contact.until.is_none() && contact.bodies == bodies);
+            let at = known.unwrap_or(self.0.len());
+            if known.is_none() {
+                let since = if first { time - dt } else { time };
+                let gap = [gap; 2];
+                self.0.push(Contact { bodies, since, from_start: first, until: None, gap, pulled_apart: None });
+            }
+            let contact = &mut self.0[at];
+            contact.gap[1] = gap;
+            if contact.pulled_apart.is_none() && contact.is_pulled(one) {
+                contact.pulled_apart = Some(time);
+                said.push(contact.pulled_says(one));
+            }
+        }
+        said
+    }
+}
+
+impl Contact {
+    /// Whether a step pulls them apart: against a tension, if they share nodes since the start; or beyond the gap at which they met.
+    fn is_pulled(&self, now: &Sharing) -> bool {
+        let opened = self.gap[0].zip(now.gap).is_some_and(|(met, gap)| gap > met + OPENED);
+        if self.from_start { now.tension.is_some() } else { opened }
+    }
+
+    fn pulled_says(&self, now: &Sharing) -> String {
+        let [a, b] = &self.bodies;
+        let since = if self.from_start { "the start".to_owned() } else { format!("t = {}", self.since) };
+        let tension = now.tension.map_or_else(String::new, |tension| format!(" and a tension of {tension:.3e}"));
+        format!(
+            "bodies {a:?} and {b:?} share nodes since {since} and are pulled apart, at a gap of {}{tension}: while they share nodes they \
+             move as one there, and will not separate; if they are not meant to be bonded, start them farther apart than `bfree check` \
+             says that bodies feel each other, or lower grid.spacing",
+            spacings(now.gap)
+        )
+    }
+}
+
+/// A gap in words.
+fn spacings(gap: Option<f64>) -> String {
+    gap.map_or_else(|| "more than four spacings".to_owned(), |gap| format!("{:.2} spacings", gap.max(0.0)))
+}
+
+impl std::fmt::Display for Contact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { bodies: [a, b], since, until, gap: [_, gap], pulled_apart, .. } = self;
+        let gap = spacings(*gap);
+        match until {
+            None => write!(f, "{a:?} and {b:?} share nodes since t = {since}, at a gap of {gap}")?,
+            Some(until) => {
+                write!(f, "{a:?} and {b:?} shared nodes from t = {since} to {until}, at last at a gap of {gap}")?
+            }
+        }
+        match pulled_apart {
+            Some(time) => write!(f, "; pulled apart at t = {time}, they stuck together"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_that_meet_and_leave_are_no_warning_and_bodies_that_are_held_are() {
+        let sharing = |gap: f64, tension: Option<f64>| [Sharing { bodies: [0, 1], gap: Some(gap), tension }];
+        let names = ["a", "b"];
+        let mut contacts = Contacts::default();
+        assert!(contacts.see(0.1, 0.1, true, &[], &names).is_empty() && contacts.all().is_empty());
+        for (time, gap, tension) in [(0.2, 1.5, None), (0.3, 0.5, None), (0.4, 1.4, Some(1.0)), (0.5, 1.59, Some(1.0))]
+        {
+            assert!(contacts.see(time, 0.1, false, &sharing(gap, tension), &names).is_empty(), "{time}");
+        }
+        let said = contacts.see(0.6, 0.1, false, &sharing(1.7, None), &names);
+        assert!(
+            matches!(&said[..], [one] if one.contains("since t = 0.2") && one.contains("1.70 spacings")),
+            "{said:?}"
+        );
+        assert!(contacts.see(0.7, 0.1, false, &sharing(1.9, None), &names).is_empty(), "once");
+        assert!(contacts.see(0.8, 0.1, false, &[], &names).is_empty());
+        let [contact] = contacts.all() else { panic!("one: {contacts:?}") };
+        assert_eq!((contact.until, contact.pulled_apart, contact.gap), (Some(0.8), Some(0.6), [Some(1.5), Some(1.9)]));
+        // Since the start, a tension suffices.
+        let mut bonded = Contacts::default();
+        assert!(bonded.see(0.1, 0.1, true, &sharing(0.0, None), &names).is_empty());
+        let said = bonded.see(0.2, 0.1, false, &sharing(0.01, Some(2.0)), &names);
+        assert!(matches!(&said[..], [one] if one.contains("since the start") && one.contains("2.000e0")), "{said:?}");
+        assert_eq!(bonded.all()[0].since, 0.0);
+    }
+}

@@ -1,0 +1,108 @@
+//! Where a run loses energy beyond what damping and laws take: step by step, by what happened in the step.
+
+use super::history::Energies;
+use serde::{Deserialize, Serialize};
+
+/// What happened in a step that may lose energy; the first that applies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Cause {
+    /// A body feels a wall that it has come to.
+    Wall,
+    /// Bodies share nodes.
+    Bodies,
+    /// The grid is new.
+    NewGrid,
+    /// None of these.
+    Step,
+}
+
+impl Cause {
+    const ALL: [Self; 4] = [Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
+
+    /// What happened in a step.
+    pub fn of(feels_wall: bool, shares: bool, renewed: bool) -> Self {
+        match (feels_wall, shares, renewed) {
+            (true, ..) => Self::Wall,
+            (_, true, _) => Self::Bodies,
+            (.., true) => Self::NewGrid,
+            _ => Self::Step,
+        }
+    }
+
+    /// Steps of this kind, in words.
+    fn steps(self) -> &'static str {
+        match self {
+            Self::Wall => "steps in which a body meets a wall (impact)",
+            Self::Bodies => "steps in which bodies share nodes (impact, or sticking)",
+            Self::NewGrid => "other steps with a new grid",
+            Self::Step => "steps without contact on a grid that is kept",
+        }
+    }
+
+    /// What keeps more energy there.
+    fn cure(self, lumped: bool) -> &'static str {
+        match (self, lumped) {
+            (Self::Wall | Self::Bodies, true) => {
+                "shorten time.step, with which the loss falls; a smaller time.lumping keeps more energy only where bodies meet at less than \
+                 about a tenth of their speed of sound"
+            }
+            (Self::Wall | Self::Bodies, false) => {
+                "shorten time.step, with which the loss falls; time.lumping = 1 keeps more energy where bodies meet at more than about a \
+                 tenth of their speed of sound"
+            }
+            (Self::NewGrid, _) => {
+                "keep the grid where bodies are free: \"grid\": {\"renewed\": {\"strain\": 0.1}}, or \"never\""
+            }
+            (Self::Step, _) => "shorten time.step, or give time.adaptive a tolerance",
+        }
+    }
+}
+
+/// What was lost so far, and where.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Losses {
+    /// The balance of energy after the last step.
+    balance: f64,
+    /// What the balance has fallen by, by [`Cause`].
+    by_cause: [f64; Cause::ALL.len()],
+    /// The largest energy so far: kinetic, strain, and what was dissipated.
+    largest: f64,
+}
+
+impl Losses {
+    /// Adds a step.
+    pub fn add(&mut self, energies: &Energies, cause: Cause) {
+        let Energies { kinetic, strain, dissipated, balance, .. } = *energies;
+        let energy = kinetic.abs() + strain.abs() + dissipated.abs();
+        if energy.is_finite() && balance.is_finite() {
+            self.largest = self.largest.max(energy);
+            self.by_cause[cause as usize] += self.balance - balance;
+            self.balance = balance;
+        }
+    }
+
+    /// The loss as a part of the largest energy so far.
+    pub fn part(&self) -> f64 {
+        if self.largest > 0.0 { -self.balance / self.largest } else { 0.0 }
+    }
+
+    /// Where it was lost, and what to do. `lumped`: whether the mass is lumped in full.
+    pub fn says(&self, lumped: bool) -> String {
+        let lost: f64 = self.by_cause.iter().filter(|&&lost| lost > 0.0).sum();
+        let mut causes: Vec<_> =
+            Cause::ALL.into_iter().zip(self.by_cause).filter(|(_, by)| *by > 0.05 * lost).collect();
+        causes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let shares: Vec<_> =
+            causes.iter().map(|(cause, by)| format!("{:.0} % of it in {}", 100.0 * by / lost, cause.steps())).collect();
+        let cure = causes.first().map_or("", |(cause, _)| cause.cure(lumped));
+        format!(
+            "energy was lost, beyond what damping and laws took: {:.3e}, {:.1} % of the largest total energy {:.3e}; {}: {cure}",
+            -self.balance,
+            100.0 * self.part(),
+            self.largest,
+            shares.join(", ")
+        )
+    }
+}

@@ -1,0 +1,152 @@
+//! What a path of equilibria does that nobody asked for: its load turns, it bends sharply, it returns the way it came.
+
+use super::Reference;
+use crate::simulation::Simulation;
+use serde::{Deserialize, Serialize};
+
+/// The least cosine of the angle between two steps of a path that goes on.
+const BENT: f64 = 0.5;
+
+/// A path that has gone so far from its turning point, relative to the whole, is compared with the way there.
+const AWAY: f64 = 0.05;
+
+/// A path that returns is nearer to the way there than this, relative to the distance from the turning point. Beyond a limit point, the
+/// other side at the same load is twice as far.
+const SAME: f64 = 0.2;
+
+/// Where a path is: the load, and numbers by which states are told apart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Point {
+    load: f64,
+    /// Σ V₀ u and Σ V₀ u ⊗ (X − X̄)/L, in one list (length times volume).
+    moments: Vec<f64>,
+}
+
+impl Point {
+    fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
+        let particles = &simulation.particles;
+        let first = |p: usize| &reference.position[particles.id[p] as usize];
+        let all = || 0..particles.len();
+        let volume: f64 = particles.volume.iter().sum();
+        let mut middle = vec![0.0; D];
+        all().for_each(|p| (0..D).for_each(|k| middle[k] += particles.volume[p] * first(p)[k] / volume));
+        let mut moments = vec![0.0; D * (D + 1)];
+        let mut length: f64 = 0.0;
+        for p in all() {
+            let (u, arm) = (particles.position[p] - first(p), |k: usize| first(p)[k] - middle[k]);
+            for i in 0..D {
+                let of = particles.volume[p] * u[i];
+                moments[i] += of;
+                (0..D).for_each(|k| moments[D * (k + 1) + i] += of * arm(k));
+                length = length.max(arm(i).abs());
+            }
+        }
+        moments.iter_mut().skip(D).for_each(|moment| *moment /= length.max(f64::MIN_POSITIVE));
+        Self { load: simulation.path.load, moments }
+    }
+
+    fn distance(&self, other: &[f64]) -> f64 {
+        self.moments.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// A path so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Followed {
+    points: Vec<Point>,
+    /// The last point before the load turned.
+    turn: Option<usize>,
+}
+
+/// What a path has done in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Event {
+    /// The load turned at this λ.
+    Turned(f64),
+    /// It turned by this angle (degrees) from one step to the next.
+    Bent(f64),
+    /// It is back on the way that it came, at this λ.
+    Returned(f64),
+}
+
+impl Followed {
+    /// Adds a step, whose displacement has the cosine `straight` to that of the step before.
+    pub fn see<const D: usize, L, A>(
+        &mut self,
+        simulation: &Simulation<D, L, A>,
+        reference: &Reference<D>,
+        straight: Option<f64>,
+    ) -> Vec<Event> {
+        self.add(Point::of(simulation, reference), straight)
+    }
+
+    fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
+        let mut events = Vec::new();
+        if let Some(cosine) = straight.filter(|&cosine| cosine < BENT) {
+            events.push(Event::Bent(cosine.clamp(-1.0, 1.0).acos().to_degrees()));
+        }
+        if let [.., before, last] = &self.points[..]
+            && (last.load - before.load) * (point.load - last.load) < 0.0
+        {
+            events.push(Event::Turned(last.load));
+            self.turn = Some(self.points.len() - 1);
+        }
+        if self.turn.is_some_and(|turn| self.returns(turn, &point)) {
+            events.push(Event::Returned(point.load));
+        }
+        self.points.push(point);
+        events
+    }
+
+    /// Whether a point lies on the way to the turning point.
+    fn returns(&self, turn: usize, point: &Point) -> bool {
+        let origin = vec![0.0; point.moments.len()];
+        let scale = self.points.iter().map(|one| one.distance(&origin)).fold(0.0, f64::max);
+        let away = point.distance(&self.points[turn].moments);
+        let near = |ends: &[Point]| {
+            let [from, to] = ends else { return false };
+            let part = (point.load - from.load) / (to.load - from.load);
+            let between: Vec<f64> = from.moments.iter().zip(&to.moments).map(|(a, b)| a + part * (b - a)).collect();
+            (0.0..=1.0).contains(&part) && point.distance(&between) < SAME * away
+        };
+        away > AWAY * scale && self.points[..=turn].windows(2).any(near)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(path: impl Fn(f64) -> (f64, f64), end: u32) -> Vec<Event> {
+        let mut followed = Followed::default();
+        let point = |step| {
+            let (load, u) = path(0.1 * f64::from(step));
+            Point { load, moments: vec![u] }
+        };
+        (0..=end).flat_map(|step| followed.add(point(step), None)).collect()
+    }
+
+    #[test]
+    fn a_limit_point_turns_and_does_not_return() {
+        // λ = 3u − u³ about its two limit points.
+        let events = told(|s| (3.0 * (s - 2.0) - (s - 2.0).powi(3) + 3.0, s), 40);
+        assert!(matches!(events[..], [Event::Turned(_), Event::Turned(_)]), "{events:?}");
+    }
+
+    #[test]
+    fn a_path_that_goes_back_is_told_to_return() {
+        let back = |s: f64| if s < 2.05 { s } else { 4.0 - s };
+        let events = told(|s| (back(s).powi(2), back(s)), 30);
+        assert_eq!(events[0], Event::Turned(4.0));
+        assert!(events[1..].iter().all(|event| matches!(event, Event::Returned(_))) && events.len() > 5, "{events:?}");
+    }
+
+    #[test]
+    fn a_sharp_bend_is_told_with_its_angle() {
+        let point = Point { load: 1.0, moments: vec![1.0] };
+        let events = Followed::default().add(point, Some(0.0));
+        assert!(matches!(events[..], [Event::Bent(angle)] if (angle - 90.0).abs() < 1e-12), "{events:?}");
+    }
+}

@@ -1,0 +1,187 @@
+//! What bodies feel in a step beside themselves: walls that they have come to, and each other.
+
+use super::Simulation;
+use crate::approximation::ShapeFunction;
+use crate::grid::{Grid, indices};
+use crate::material::{Law, admissible, p_wave_modulus, piola};
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::sweep::Supports;
+use crate::tensor::{Deformation, Tensor, Vector};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Below this |N| a particle has no part in a node.
+const NO_PART: f64 = 1e-9;
+
+/// Cells over which the gap between two bodies is searched.
+const FARTHEST: u64 = 4;
+
+/// The mean normal stress across an interface is a tension above this share of the mean stress there.
+const TENSION: f64 = 0.1;
+
+/// The strain below which a stress counts as none.
+const NO_STRAIN: f64 = 1e-6;
+
+/// The distance of two bodies' middles at their interface, in spacings, below which the interface has no one direction.
+const ENCLOSED: f64 = 0.25;
+
+/// Two bodies that share nodes, at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sharing {
+    /// Their numbers, the lower one first.
+    pub bodies: [u32; 2],
+    /// The distance between their surfaces where they are nearest, in grid spacings: that of the two nearest particles less half of
+    /// both widths. `None` from four spacings on.
+    pub gap: Option<f64>,
+    /// The mean normal stress between them where it is a tension (force per area): the shared nodes hold the bodies together. `None` under
+    /// pressure, at rest, and where one body encloses the other.
+    pub tension: Option<f64>,
+}
+
+/// The particles of two bodies that share nodes, of each body.
+type Interface = [BTreeSet<usize>; 2];
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Bodies that share nodes, two by two.
+    ///
+    /// ```
+    /// use bfree::mechanics::sweep::Supports;
+    ///
+    /// // Two discs that are two spacings apart; then beside each other.
+    /// let scene = bfree::scene::read_file("scenes/collision.json".as_ref(), &[])?;
+    /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
+    /// let shared = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
+    ///     Ok(of.sharing(&Supports::new(&of.approximation, &of.grid, &of.particles.position)?.0))
+    /// };
+    /// assert!(shared(&simulation)?.is_empty());
+    /// let particles = &mut simulation.particles;
+    /// particles.position.iter_mut().zip(&particles.body).filter(|(_, body)| **body == 1).for_each(|(x, _)| x[0] -= 2.0);
+    /// let found = shared(&simulation)?;
+    /// assert_eq!((found.len(), found[0].bodies, found[0].tension), (1, [0, 1], None));
+    /// assert!(found[0].gap.is_some_and(|gap| gap.abs() < 1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
+        let interfaces = self.interfaces(supports);
+        let of = |(bodies, sides): (&[u32; 2], &Interface)| Sharing {
+            bodies: *bodies,
+            gap: self.gap(sides),
+            tension: self.tension(*bodies, sides),
+        };
+        interfaces.iter().map(of).collect()
+    }
+
+    /// Whether a prescribed condition that no body felt in the first step has nodes in this one.
+    pub(super) fn feels_wall(&self, prescribed: &[PrescribedDof]) -> bool {
+        let begins = self.clock.steps() == 0;
+        !begins && prescribed.iter().any(|dof| !self.held.contains(&dof.owner))
+    }
+
+    /// The particles that have a part in nodes of another body, by pairs of bodies.
+    fn interfaces(&self, supports: &Supports<D>) -> BTreeMap<[u32; 2], Interface> {
+        let mut found: BTreeMap<[u32; 2], Interface> = BTreeMap::new();
+        if self.bodies.len() < 2 {
+            return found;
+        }
+        let particles = &self.particles;
+        let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
+        let nodes = |p: usize| supports.of(p).filter(|(_, n, _)| n.abs() > NO_PART).map(|(node, ..)| node);
+        let mut first = vec![u32::MAX; supports.nodes()];
+        let mut several: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
+        for p in solid() {
+            let own = particles.body[p];
+            for node in nodes(p) {
+                if first[node] == u32::MAX {
+                    first[node] = own;
+                } else if first[node] != own {
+                    several.entry(node).or_insert_with(|| BTreeSet::from([first[node]])).insert(own);
+                }
+            }
+        }
+        if several.is_empty() {
+            return found;
+        }
+        for p in solid() {
+            let own = particles.body[p];
+            for other in nodes(p).filter_map(|node| several.get(&node)).flatten().filter(|other| **other != own) {
+                let (bodies, side) = ([own.min(*other), own.max(*other)], usize::from(own > *other));
+                found.entry(bodies).or_default()[side].insert(p);
+            }
+        }
+        found
+    }
+
+    /// The least distance between particles of both sides, less half of their widths, in spacings.
+    fn gap(&self, [one, other]: &Interface) -> Option<f64> {
+        let (grid, particles) = (&self.grid, &self.particles);
+        let mut cells: HashMap<u64, Vec<usize>> = HashMap::new();
+        for &p in other {
+            if let Some(cell) = grid.cell(&particles.position[p]) {
+                cells.entry(grid.id(cell)).or_default().push(p);
+            }
+        }
+        let width = |p: usize| particles.present_volume(p).powf(1.0 / D as f64);
+        let mut least = f64::INFINITY;
+        for ring in 0..=FARTHEST {
+            for &p in one {
+                let x = &particles.position[p];
+                let around = grid.cell(x).into_iter().flat_map(|cell| ring_of(cell, ring, grid));
+                for &q in around.filter_map(|cell| cells.get(&cell)).flatten() {
+                    let apart = (particles.position[q] - x).norm() - 0.5 * (width(p) + width(q));
+                    least = least.min(apart / grid.spacing);
+                }
+            }
+            // Particles of farther rings are farther apart; half of their widths is less than a spacing.
+            if least + 1.0 <= ring as f64 {
+                break;
+            }
+        }
+        Some(least).filter(|gap| gap.is_finite())
+    }
+
+    /// The mean of n·σ·n over the particles of both sides, n leading from the one to the other, where it is a tension.
+    fn tension(&self, bodies: [u32; 2], sides: &Interface) -> Option<f64> {
+        let (particles, h) = (&self.particles, self.grid.spacing);
+        let middle = |side: &BTreeSet<usize>| {
+            let volume: f64 = side.iter().map(|&p| particles.volume[p]).sum();
+            side.iter().map(|&p| particles.position[p] * particles.volume[p]).sum::<Vector<f64, D>>() / volume
+        };
+        let across = middle(&sides[1]) - middle(&sides[0]);
+        let n = Some(across).filter(|across| across.norm() > ENCLOSED * h)?.normalize();
+        let (mut volume, mut normal, mut squares) = (0.0, 0.0, 0.0);
+        for &p in sides.iter().flatten() {
+            let stress = self.cauchy_stress(p)?;
+            volume += particles.volume[p];
+            normal += particles.volume[p] * n.dot(&(stress * n));
+            squares += particles.volume[p] * stress.norm_squared();
+        }
+        let (normal, mean) = (normal / volume, (squares / volume).sqrt());
+        let softer = bodies.map(|body| p_wave_modulus(&self.bodies[body as usize].law));
+        let some = NO_STRAIN * softer[0].min(softer[1]);
+        Some(normal).filter(|&normal| normal > TENSION * mean && normal > some)
+    }
+
+    /// σ in the plane or the line of the scene; `None` where det F ≤ 0.
+    fn cauchy_stress(&self, p: usize) -> Option<Tensor<f64, D>> {
+        let particles = &self.particles;
+        let body = &self.bodies[particles.body[p] as usize];
+        let h = particles.displacement_gradient[p];
+        let at = admissible(h).ok()?;
+        let stress = piola(&body.law, &at.f, &at, &particles.start(p, 0.0)) * at.f.transpose() / at.jacobian;
+        let [_, mean] = body.averaged(particles.dilatation(p), Deformation::new(h).j);
+        Some(stress + Tensor::<f64, D>::identity() * mean)
+    }
+}
+
+/// The ids of the cells that lie `ring` cells away, the corners of that square or cube included.
+fn ring_of<const D: usize>(cell: [u32; D], ring: u64, grid: &Grid<D>) -> impl Iterator<Item = u64> {
+    let by = move |offset: [u64; D]| {
+        let far = offset.iter().any(|&k| k == 0 || k == 2 * ring);
+        let mut at = [0; D];
+        for k in 0..D {
+            let index = (u64::from(cell[k]) + offset[k]).checked_sub(ring)?;
+            at[k] = u32::try_from(index).ok().filter(|&index| index < grid.cells[k])?;
+        }
+        far.then(|| grid.id(at))
+    };
+    indices([2 * ring + 1; D]).filter_map(by)
+}
