@@ -116,13 +116,18 @@ pub struct Mark {
 }
 
 impl Mark {
-    /// Whether the files in `directory` still hold what they held then.
+    /// Whether the files in `directory` that grow still hold what they held then.
     ///
     /// # Errors
     /// One of them is gone, shorter, or another.
     pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
         self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
+    }
+
+    /// Snapshots written until then that are not in `directory` any more. Nothing that follows needs them.
+    pub fn missing(&self, directory: &Path) -> Vec<PathBuf> {
+        self.snapshots.map_or_else(Vec::new, |snapshots| snapshots.missing(directory))
     }
 }
 
@@ -211,6 +216,12 @@ impl<const D: usize> Recorder<D> {
         let snapshots = self.snapshots.as_ref().map(Snapshots::mark);
         let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
         Ok(Mark { files, snapshots, watch, counts, seconds })
+    }
+
+    /// Counts the seconds in which the simulation was built, before the recorder was there.
+    pub fn count_set_up(&mut self, seconds: f64) {
+        self.seconds.set_up += seconds;
+        self.seconds.total += seconds;
     }
 
     fn seconds_so_far(&self) -> Seconds {

@@ -137,7 +137,7 @@ impl Counts {
     }
 }
 
-/// Seconds, summed over all steps.
+/// Seconds of a run, those of steps summed over all of them.
 ///
 /// ```
 /// use bfree::output::report::Seconds;
@@ -158,7 +158,10 @@ impl Counts {
 pub struct Seconds {
     /// Of each of [`Phase::ALL`].
     pub phases: [f64; Phase::ALL.len()],
-    /// Since the start, output and failed attempts included.
+    /// Before the first step: reading the scene, filling bodies with particles.
+    #[serde(default)]
+    pub set_up: f64,
+    /// Of the whole run: set-up, steps, failed attempts, output.
     pub total: f64,
 }
 
@@ -178,10 +181,11 @@ impl Seconds {
         self.phases.iter_mut().zip(watch.seconds()).for_each(|(sum, seconds)| *sum += seconds);
     }
 
-    /// The phases by name, and what is in none of them.
+    /// The set-up, the phases by name, and what is in none of them.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        let other = self.total - self.phases.iter().sum::<f64>();
-        Phase::ALL.iter().map(|phase| phase.1).zip(self.phases).chain([("other", other.max(0.0))])
+        let other = self.total - self.set_up - self.phases.iter().sum::<f64>();
+        let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
+        std::iter::once(("set_up", self.set_up)).chain(phases).chain([("other", other.max(0.0))])
     }
 }
 
