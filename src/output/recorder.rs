@@ -298,9 +298,10 @@ impl<const D: usize> Recorder<D> {
         let (counts, time, seconds) = (self.counts, simulation.clock.time(), self.seconds_so_far());
         self.progress.finish();
         let energies = Energies::of(simulation, &self.reference);
-        let report = Report { asked, outcome, time, energies, counts, seconds, warnings: self.watch.warnings() };
-        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         let particles = &simulation.particles;
+        let mass = particles.mass.iter().sum();
+        let report = Report { asked, outcome, time, mass, energies, counts, seconds, warnings: self.watch.warnings() };
+        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         Ok(Summary {
             time,
             moves: simulation.settings.scheme.has_inertia(),

@@ -294,6 +294,8 @@ pub(crate) struct Report<'a> {
     pub outcome: Outcome<'a>,
     /// Time reached.
     pub time: f64,
+    /// Mass of all bodies.
+    pub mass: f64,
     /// Energies at the end.
     pub energies: Energies,
     /// What was done.
@@ -329,7 +331,7 @@ impl Report<'_> {
         let (outcome, message) = self.outcome.words(self.time);
         let mut head = json!({
             "program": concat!("bfree ", env!("CARGO_PKG_VERSION")), "outcome": outcome, "message": message,
-            "time": Number(self.time),
+            "time": Number(self.time), "mass": Number(self.mass),
             "energies": {
                 "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
                 "dissipated": Number(dissipated), "total": Number(total), "balance": Number(balance),
@@ -364,6 +366,7 @@ mod tests {
             asked: &Map::from_iter([("settings".to_owned(), settings.clone())]),
             outcome: Outcome::Finished,
             time: 0.1 + 0.2,
+            mass: 1.0,
             energies,
             counts: Counts::default(),
             seconds: Seconds::default(),

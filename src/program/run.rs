@@ -4,7 +4,7 @@ use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
-use bfree::output::plot::plot_run;
+use bfree::output::plot::{Look, plot_run};
 use bfree::output::{Audience, Held, Outcome, OutputSettings, Recorder, Reference, foreign, held};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
@@ -276,7 +276,7 @@ impl Run {
             print(format_args!("{summary}\nresults   {}", directory.display()))?;
         }
         if self.plot {
-            let drawn = plot_run(&directory).map_err(Failure::run)?;
+            let drawn = plot_run(&directory, &Look::default()).map_err(Failure::run)?;
             if let (false, Some(page)) = (self.quiet, drawn.last()) {
                 print(format_args!("pictures  {}", page.display()))?;
             }
