@@ -138,7 +138,7 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
     // No picture of what is gone stays beside it.
-    assert_eq!((drawn, pictures(&out)?), (15, 0));
+    assert_eq!((drawn, pictures(&out)?), (13, 0));
     // Nor is what a run did not write taken for its own.
     let own = folder.path().join("own");
     std::fs::create_dir(&own)?;
