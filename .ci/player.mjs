@@ -12,15 +12,22 @@ assert.equal(run.times.length, Number(snapshots));
 
 const drawn = [];
 const uploads = [];
+const frames_of_particles = [];
+// What the pen does, in its order.
+const strokes = [];
 const gl = new Proxy({}, {
   get: (_, name) => {
     if (name === "bufferData") return (_target, data) => uploads.push(data.slice());
+    if (name === "scissor") return (...frame) => frames_of_particles.push(frame);
     if (name === "drawArrays") return (_kind, _first, count) => drawn.push(count);
     if (name === "getProgramParameter") return () => true;
     return name === name.toUpperCase() ? name : () => ({});
   },
 });
-const pen = new Proxy({}, { get: (_, name) => (name === "createLinearGradient" ? () => ({ addColorStop() {} }) : () => {}), set: () => true });
+const pen = new Proxy({}, {
+  get: (_, name) => (name === "createLinearGradient" ? () => ({ addColorStop() {} }) : (...where) => strokes.push([name, ...where])),
+  set: () => true,
+});
 const texts = { snapshots: JSON.stringify(run), numbers: script('<script type="text/plain" id="numbers"') };
 const elements = {};
 const element = (id) => elements[id] ??= {
@@ -39,6 +46,15 @@ const code = page.split("<script>").at(-1).split("</script>")[0];
 vm.runInNewContext(code, world);
 draw();
 assert.ok(element("field").options.length >= 2, "fields to choose from");
+// Grid and particles stay inside one frame.
+const [left, top, wide, tall] = strokes.find(([name]) => name === "rect").slice(1);
+const names = strokes.map(([name]) => name);
+assert.ok(names.indexOf("clip") >= 0 && names.indexOf("clip") < names.indexOf("lineTo"), "lines are clipped");
+assert.deepEqual(frames_of_particles[0], [left, 560 - top - tall, wide, tall]);
+assert.ok(left + wide < 960 - 100, "the frame leaves room for the colour bar");
+// Where there is a stress, it is what is shown first.
+const first = element("field").options[element("field").value];
+if (run.dimension > 1 && run.channels.some((c) => c.field === "stress")) assert.match(first, /von Mises|plastic/);
 assert.ok(drawn.length === 3 && drawn.every((count) => count === run.shown), `${drawn}`);
 const shades = () => uploads.filter((data) => data.constructor.name === "Float32Array").at(-1);
 element("field").options.forEach((label, k) => {

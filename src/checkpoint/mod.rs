@@ -277,6 +277,8 @@ pub struct Restored {
     place: (usize, u64),
     /// Where the files ended.
     pub mark: Mark,
+    /// Snapshots written before it that are not there any more.
+    pub missing: Vec<PathBuf>,
     /// Checkpoints that would have been newer, or cannot be read.
     pub unusable: Vec<Unusable>,
     /// The program that wrote it, if it was another version: the bits may differ then.
@@ -319,7 +321,8 @@ pub fn restore<const D: usize, L, A>(
         match files.and_then(|()| state::restore(simulation, clock, &arrays)) {
             Ok(()) => {
                 let other_program = (program != PROGRAM).then_some(program);
-                return Ok(Restored { path, place: (slot, clock.steps()), mark, unusable, other_program });
+                let missing = mark.missing(directory);
+                return Ok(Restored { path, place: (slot, clock.steps()), mark, missing, unusable, other_program });
             }
             Err(reason) => unusable.push(Unusable { path, reason }),
         }
@@ -352,11 +355,6 @@ pub fn unfinished(directory: &Path) -> Option<Unfinished> {
         Some(Unfinished { path, steps: content.clock.steps() })
     });
     readable.max_by_key(|one| one.steps).filter(|_| !over)
-}
-
-/// Whether `directory` holds a run that came to its end.
-pub fn ended(directory: &Path) -> bool {
-    outcome(directory).is_some_and(|outcome| outcome == "finished")
 }
 
 /// What the report of the run in `directory` says of its end.

@@ -6,11 +6,14 @@ use super::snapshots::{SERIES, SnapshotMark};
 use super::{Mark, OutputError};
 use serde_json::Value;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+/// The table with a row for every step.
+const HISTORY: &str = "history.csv";
+
 /// The files of a run, beside its snapshots and its pictures.
-const FILES: [&str; 6] = ["history.csv", "reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
+const FILES: [&str; 6] = [HISTORY, "reactions.csv", "probes.csv", "newton.jsonl", "report.json", SERIES];
 
 /// Whether a run may write a file of this name.
 fn is_output(name: &str) -> bool {
@@ -35,18 +38,70 @@ fn is_output(name: &str) -> bool {
 /// ```
 pub fn foreign(directory: &Path) -> Option<PathBuf> {
     let mut start = Vec::new();
-    let begin = File::open(directory.join("history.csv")).and_then(|file| file.take(10).read_to_end(&mut start));
+    let begin = File::open(directory.join(HISTORY)).and_then(|file| file.take(10).read_to_end(&mut start));
     // Of a run that died at once, the history has no line.
-    let report = std::fs::read(directory.join("report.json")).unwrap_or_default();
-    let report: Value = serde_json::from_slice(&report).unwrap_or_default();
-    let of_ours = report["program"].as_str().is_some_and(|program| program.starts_with("bfree "));
-    if of_ours || (begin.is_ok() && b"step,time,".starts_with(&start)) {
+    if report(directory).is_some() || (begin.is_ok() && b"step,time,".starts_with(&start)) {
         return None;
     }
     let mut names: Vec<_> =
         std::fs::read_dir(directory).ok()?.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
     names.sort();
     names.iter().find(|name| name.to_str().is_some_and(is_output)).map(|name| directory.join(name))
+}
+
+/// The report of a run of this program.
+fn report(directory: &Path) -> Option<Value> {
+    let report: Value = serde_json::from_slice(&std::fs::read(directory.join("report.json")).ok()?).ok()?;
+    report["program"].as_str().is_some_and(|program| program.starts_with("bfree ")).then_some(report)
+}
+
+/// The results of an earlier run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Held {
+    /// Steps that it took.
+    pub steps: u64,
+    /// Time that it reached.
+    pub time: f64,
+    /// How it ended, in a word: `finished`, `interrupted` or `failed`. A run that was killed, or whose disk was full, says nothing.
+    pub outcome: Option<String>,
+}
+
+/// The results in a directory that a new run there would replace. A run without a step has none, unless it ended as asked.
+///
+/// ```
+/// use bfree::output::{Held, held};
+///
+/// let folder = tempfile::tempdir()?;
+/// let history = folder.path().join("history.csv");
+/// std::fs::write(&history, "step,time,dt\n0,0,0\n")?;
+/// assert_eq!(held(folder.path()), None);
+/// // A killed run may leave a part of a line.
+/// std::fs::write(&history, "step,time,dt\n0,0,0\n1,0.5,0.5\n2,1")?;
+/// assert_eq!(held(folder.path()), Some(Held { steps: 1, time: 0.5, outcome: None }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn held(directory: &Path) -> Option<Held> {
+    let report = report(directory).unwrap_or_default();
+    let outcome = report["outcome"].as_str().map(str::to_owned);
+    let reported = || Some((report["counts"]["steps"].as_u64()?, report["time"].as_f64()?));
+    let (steps, time) = last_row(&directory.join(HISTORY)).or_else(reported)?;
+    let finished = outcome.as_deref() == Some("finished");
+    (steps > 0 || finished).then_some(Held { steps, time, outcome })
+}
+
+/// Step and time in the last whole row of a history.
+fn last_row(history: &Path) -> Option<(u64, f64)> {
+    // A row is much shorter.
+    const TAIL: u64 = 1 << 16;
+    let mut file = File::open(history).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL))).ok()?;
+    let mut tail = Vec::new();
+    file.take(TAIL).read_to_end(&mut tail).ok()?;
+    let tail = String::from_utf8_lossy(&tail);
+    let (whole, _) = tail.rsplit_once('\n')?;
+    let mut cells = whole.lines().next_back()?.split(',');
+    Some((cells.next()?.parse().ok()?, cells.next()?.parse().ok()?))
 }
 
 /// Removes what an earlier run left under the names this one may use and will not continue from `mark`, so that no file of it is

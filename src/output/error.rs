@@ -93,12 +93,6 @@ pub enum OutputError {
         /// The file.
         path: PathBuf,
     },
-    /// A snapshot is gone.
-    #[error("the snapshot {} is not there any more", path.display())]
-    Gone {
-        /// The file.
-        path: PathBuf,
-    },
     /// The reference belongs to another set of particles.
     #[error("the reference state has {reference} particles, the simulation {particles}")]
     Reference {

@@ -35,7 +35,7 @@ mod summary;
 pub mod vtu;
 pub mod warnings;
 
-pub use earlier::foreign;
+pub use earlier::{Held, foreign, held};
 pub use error::OutputError;
 pub use probes::{Place, Probe, nearest};
 pub use progress::Audience;

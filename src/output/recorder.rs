@@ -117,13 +117,18 @@ pub struct Mark {
 }
 
 impl Mark {
-    /// Whether the files in `directory` still hold what they held then.
+    /// Whether the files in `directory` that grow still hold what they held then.
     ///
     /// # Errors
     /// One of them is gone, shorter, or another.
     pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
         self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
+    }
+
+    /// Snapshots written until then that are not in `directory` any more. Nothing that follows needs them.
+    pub fn missing(&self, directory: &Path) -> Vec<PathBuf> {
+        self.snapshots.map_or_else(Vec::new, |snapshots| snapshots.missing(directory))
     }
 }
 
@@ -214,6 +219,12 @@ impl<const D: usize> Recorder<D> {
         Ok(Mark { files, snapshots, watch, counts, seconds })
     }
 
+    /// Counts the seconds in which the simulation was built, before the recorder was there.
+    pub fn count_set_up(&mut self, seconds: f64) {
+        self.seconds.set_up += seconds;
+        self.seconds.total += seconds;
+    }
+
     fn seconds_so_far(&self) -> Seconds {
         Seconds { total: self.seconds.total + self.since.elapsed().as_secs_f64(), ..self.seconds }
     }
@@ -297,10 +308,11 @@ impl<const D: usize> Recorder<D> {
         self.watch.end(time, counts.steps).into_iter().for_each(|warning| self.progress.warn(warning));
         self.progress.finish();
         let energies = Energies::of(simulation, &self.reference);
-        let (warnings, contact) = (self.watch.warnings(), self.watch.contacts());
-        let report = Report { asked, outcome, time, energies, counts, seconds, warnings, contact };
-        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         let particles = &simulation.particles;
+        let mass = particles.mass.iter().sum();
+        let (warnings, contact) = (self.watch.warnings(), self.watch.contacts());
+        let report = Report { asked, outcome, time, mass, energies, counts, seconds, warnings, contact };
+        report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         Ok(Summary {
             time,
             moves: simulation.settings.scheme.has_inertia(),

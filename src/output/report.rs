@@ -138,7 +138,7 @@ impl Counts {
     }
 }
 
-/// Seconds, summed over all steps.
+/// Seconds of a run, those of steps summed over all of them.
 ///
 /// ```
 /// use bfree::output::report::Seconds;
@@ -159,7 +159,10 @@ impl Counts {
 pub struct Seconds {
     /// Of each of [`Phase::ALL`].
     pub phases: [f64; Phase::ALL.len()],
-    /// Since the start, output and failed attempts included.
+    /// Before the first step: reading the scene, filling bodies with particles.
+    #[serde(default)]
+    pub set_up: f64,
+    /// Of the whole run: set-up, steps, failed attempts, output.
     pub total: f64,
 }
 
@@ -179,10 +182,11 @@ impl Seconds {
         self.phases.iter_mut().zip(watch.seconds()).for_each(|(sum, seconds)| *sum += seconds);
     }
 
-    /// The phases by name, and what is in none of them.
+    /// The set-up, the phases by name, and what is in none of them.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        let other = self.total - self.phases.iter().sum::<f64>();
-        Phase::ALL.iter().map(|phase| phase.1).zip(self.phases).chain([("other", other.max(0.0))])
+        let other = self.total - self.set_up - self.phases.iter().sum::<f64>();
+        let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
+        std::iter::once(("set_up", self.set_up)).chain(phases).chain([("other", other.max(0.0))])
     }
 }
 
@@ -291,6 +295,8 @@ pub(crate) struct Report<'a> {
     pub outcome: Outcome<'a>,
     /// Time reached.
     pub time: f64,
+    /// Mass of all bodies.
+    pub mass: f64,
     /// Energies at the end.
     pub energies: Energies,
     /// What was done.
@@ -328,7 +334,7 @@ impl Report<'_> {
         let (outcome, message) = self.outcome.words(self.time);
         let mut head = json!({
             "program": concat!("bfree ", env!("CARGO_PKG_VERSION")), "outcome": outcome, "message": message,
-            "time": Number(self.time),
+            "time": Number(self.time), "mass": Number(self.mass),
             "energies": {
                 "kinetic": Number(kinetic), "strain": Number(strain), "external": Number(external),
                 "dissipated": Number(dissipated), "dissipated_by_laws": Number(by_laws), "initial": Number(initial),
@@ -367,6 +373,7 @@ mod tests {
             asked: &Map::from_iter([("settings".to_owned(), settings.clone())]),
             outcome: Outcome::Finished,
             time: 0.1 + 0.2,
+            mass: 1.0,
             energies,
             counts: Counts::default(),
             seconds: Seconds::default(),

@@ -42,14 +42,18 @@ fn name(number: usize) -> String {
 }
 
 impl SnapshotMark {
-    /// Whether the series in `directory` still holds all of them.
+    /// Whether the series in `directory` still lists all of them.
     pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         // Nothing is written before the first snapshot.
         if self.written > 0 {
             first_entries(&directory.join(SERIES), self.written)?;
         }
-        let gone = (0..self.written).map(|number| directory.join(name(number))).find(|path| !path.is_file());
-        gone.map_or(Ok(()), |path| Err(OutputError::Gone { path }))
+        Ok(())
+    }
+
+    /// Those of the snapshots that are not in `directory`.
+    pub(crate) fn missing(&self, directory: &Path) -> Vec<PathBuf> {
+        (0..self.written).map(|number| directory.join(name(number))).filter(|path| !path.is_file()).collect()
     }
 
     /// Whether a file of this name is a snapshot, and one written later.

@@ -49,10 +49,11 @@ pub struct New {
 
 /// A file that cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}", path.display())]
-struct Refused {
-    path: PathBuf,
-    source: std::io::Error,
+enum Refused {
+    #[error("{} exists and stays as it is: name another file (bfree new PROBLEM FILE), or remove it", .0.display())]
+    Exists(PathBuf),
+    #[error("cannot write {}", path.display())]
+    System { path: PathBuf, source: std::io::Error },
 }
 
 impl New {
@@ -114,11 +115,11 @@ fn explained(text: &str) -> Result<String, Failure> {
 
 /// Writes a file that is not there yet.
 fn create(path: &Path, content: &str) -> Result<(), Failure> {
-    let refused = |source: std::io::Error| {
-        let there = source.kind() == ErrorKind::AlreadyExists;
-        let error = Refused { path: path.to_owned(), source };
-        if there { Failure::scene(error) } else { Failure::run(error) }
+    let path = path.to_owned();
+    let refused = |source: std::io::Error| match source.kind() {
+        ErrorKind::AlreadyExists => Failure::scene(Refused::Exists(path.clone())),
+        _ => Failure::run(Refused::System { path: path.clone(), source }),
     };
-    let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(refused)?;
+    let mut file = OpenOptions::new().write(true).create_new(true).open(&path).map_err(refused)?;
     file.write_all(content.as_bytes()).map_err(refused)
 }

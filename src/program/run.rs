@@ -4,8 +4,8 @@ use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
 use super::{Failure, INTERRUPTED, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
-use bfree::output::plot::plot_run;
-use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, foreign};
+use bfree::output::plot::{Look, plot_run};
+use bfree::output::{Audience, Held, Outcome, OutputSettings, Recorder, Reference, foreign, held};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
@@ -15,12 +15,14 @@ use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
+use std::ffi::OsStr;
 use std::fs::{File, TryLockError, create_dir_all};
 use std::io::ErrorKind;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// `bfree run`.
 #[derive(Args)]
@@ -84,7 +86,7 @@ enum Form {
 
 /// Another run is in the way.
 #[derive(Debug, thiserror::Error)]
-#[error("{} holds {why}", directory.display())]
+#[error("{} holds {why}write elsewhere by --out {}", directory.display(), free(directory).display())]
 struct WouldBeLost {
     directory: PathBuf,
     why: Lost,
@@ -93,17 +95,37 @@ struct WouldBeLost {
 #[derive(Debug, thiserror::Error)]
 enum Lost {
     #[error(
-        "a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, or write \
-         elsewhere by --out", .0.steps, .0.path.display()
+        "a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, or ",
+        .0.steps, .0.path.display()
     )]
     Unfinished(Unfinished),
-    #[error("the results of a run: give them up by --discard, or write elsewhere by --out")]
-    Ended,
-    #[error("a run that another program is just writing: write elsewhere by --out")]
+    #[error("the results of a run that {}, {} steps until t = {}: give them up by --discard, or ", ended(.0), .0.steps, .0.time)]
+    Results(Held),
+    #[error("a run that another program is just writing: ")]
     Alive,
-    #[error("{}, which no run wrote and a run would replace: move it, or write elsewhere by --out", .0.display())]
+    #[error("{}, which no run wrote and a run would replace: move it, or ", .0.display())]
     Foreign(PathBuf),
 }
+
+/// How an earlier run ended, in words.
+fn ended(held: &Held) -> String {
+    held.outcome.clone().unwrap_or_else(|| "did not end and left no checkpoint that can be read".to_owned())
+}
+
+/// The first numbered directory beside `directory` that is not there yet.
+fn free(directory: &Path) -> PathBuf {
+    let numbered = |number: u32| {
+        let mut name = directory.file_name().unwrap_or(OsStr::new("results")).to_owned();
+        name.push(format!("-{number}"));
+        directory.with_file_name(name)
+    };
+    (2..u32::MAX).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| numbered(u32::MAX))
+}
+
+/// A scene whose file has no name but its ending.
+#[derive(Debug, thiserror::Error)]
+#[error("the name of the scene file {} gives no name for the directory of results: rename the file, or give --out DIR", .0.display())]
+struct Nameless(PathBuf);
 
 /// A checkpoint behind the end.
 #[derive(Debug, thiserror::Error)]
@@ -130,6 +152,7 @@ impl Run {
 
     /// Runs the scene.
     pub fn execute(&self) -> Result<(), Failure> {
+        let start = Instant::now();
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {
             scene.time =
@@ -140,13 +163,13 @@ impl Run {
             parallel::use_threads(threads).map_err(Failure::run)?;
         }
         match scene.dimension() {
-            1 => self.execute_in::<1>(&scene),
-            2 => self.execute_in::<2>(&scene),
-            _ => self.execute_in::<3>(&scene),
+            1 => self.execute_in::<1>(&scene, start),
+            2 => self.execute_in::<2>(&scene, start),
+            _ => self.execute_in::<3>(&scene, start),
         }
     }
 
-    fn execute_in<const D: usize>(&self, scene: &Scene) -> Result<(), Failure> {
+    fn execute_in<const D: usize>(&self, scene: &Scene, start: Instant) -> Result<(), Failure> {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.scene.plan(&simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
@@ -155,9 +178,7 @@ impl Run {
         let mut last = self.steps.map_or(until, |steps| steps.min(until));
         // A shortened step is one more.
         let mut shortens = self.steps.is_none_or(|steps| steps > until);
-        let directory = self.out.clone().unwrap_or_else(|| {
-            Path::new("out").join(self.scene.scene.file_stem().unwrap_or(self.scene.scene.as_os_str()))
-        });
+        let directory = self.directory()?;
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
             self.say("accuracy", &format!("accuracy {set}"));
         }
@@ -198,6 +219,7 @@ impl Run {
             true => Some(self.restore(&directory, &identity, &mut simulation, end)?),
             false => self.begin(&directory).map(|()| None)?,
         };
+        let set_up = start.elapsed().as_secs_f64();
         let mut recorder = match &restored {
             // What cannot be continued is left as it is.
             Some(restored) => {
@@ -205,6 +227,7 @@ impl Run {
             }
             None => Recorder::start(output, &simulation, reference).map_err(Failure::run)?,
         };
+        recorder.count_set_up(set_up);
         let mut checkpoints = scene.output.checkpoint.map(|every| {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
@@ -256,7 +279,7 @@ impl Run {
             print(format_args!("{summary}{again}\nresults   {}", directory.display()))?;
         }
         if self.plot {
-            let drawn = plot_run(&directory).map_err(Failure::run)?;
+            let drawn = plot_run(&directory, &Look::default()).map_err(Failure::run)?;
             if let (false, Some(page)) = (self.quiet, drawn.last()) {
                 print(format_args!("pictures  {}", page.display()))?;
             }
@@ -279,7 +302,20 @@ impl Run {
         }
     }
 
-    /// Makes room for a new run; one that could be continued is lost only on request.
+    /// The directory of the results.
+    fn directory(&self) -> Result<PathBuf, Failure> {
+        let scene = &self.scene.scene;
+        let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
+        // `out/..` is where the program runs.
+        let nameless = stem.chars().all(|letter| letter == '.') || stem == ".json";
+        match &self.out {
+            Some(out) => Ok(out.clone()),
+            None if nameless => Err(Failure::scene(Nameless(scene.clone()))),
+            None => Ok(Path::new("out").join(scene.file_stem().unwrap_or_default())),
+        }
+    }
+
+    /// Makes room for a new run; results of an earlier one are lost only on request.
     fn begin(&self, directory: &Path) -> Result<(), Failure> {
         let lost = |why| Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why }));
         if let Some(path) = foreign(directory) {
@@ -287,8 +323,10 @@ impl Run {
         }
         match checkpoint::unfinished(directory) {
             Some(found) if !self.discard => lost(Lost::Unfinished(found)),
-            None if !self.discard && checkpoint::ended(directory) => lost(Lost::Ended),
-            _ => checkpoint::forget(directory).map_err(Failure::run),
+            _ => match held(directory) {
+                Some(found) if !self.discard => lost(Lost::Results(found)),
+                _ => checkpoint::forget(directory).map_err(Failure::run),
+            },
         }
     }
 
@@ -323,6 +361,11 @@ impl Run {
         }
         let unusable = restored.unusable.iter();
         unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
+        if !restored.missing.is_empty() {
+            let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
+            let text = "these snapshots of the run are not there any more, and its pictures leave them out";
+            self.say("warning", &format!("{text}: {}", missing.join(", ")));
+        }
         if let Some(program) = &restored.other_program {
             self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
         }

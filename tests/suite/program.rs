@@ -123,7 +123,11 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     let drawn = pictures(&out)?;
     let history = std::fs::read(out.join("history.csv"))?;
     let (code, text) = told(&["--set", "time.step=0.01"], &out)?;
-    assert!(code == Some(2) && text.contains("holds the results of a run") && text.contains("--discard"), "{text}");
+    assert!(
+        code == Some(2) && text.contains("holds the results of a run that finished, 2 steps until t = 0.1"),
+        "{text}"
+    );
+    assert!(text.contains("--discard"), "{text}");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
     // What a link leads to is somebody else's.
     let foreign = folder.path().join("foreign");
@@ -134,7 +138,7 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
     // No picture of what is gone stays beside it.
-    assert_eq!((drawn, pictures(&out)?), (15, 0));
+    assert_eq!((drawn, pictures(&out)?), (13, 0));
     // Nor is what a run did not write taken for its own.
     let own = folder.path().join("own");
     std::fs::create_dir(&own)?;
@@ -152,19 +156,83 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     Ok(())
 }
 
+/// A run of many steps without a checkpoint, in `directory`, of which at least five are written.
+#[cfg(unix)]
+fn long_run(directory: &Path) -> Result<std::process::Child, Failure> {
+    let mut run = program();
+    run.arg("run").arg(scene("rebound.json")).arg("--out").arg(directory).args(["--until", "1e6", "--quiet"]);
+    let run = run.stderr(Stdio::null()).spawn()?;
+    let (history, start) = (directory.join("history.csv"), Instant::now());
+    while std::fs::read_to_string(&history).map_or(0, |text| text.lines().count()) < 7 {
+        assert!(start.elapsed() < Duration::from_secs(60), "no step");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(run)
+}
+
+#[cfg(unix)]
+#[test]
+fn steps_of_a_killed_run_without_a_checkpoint_are_lost_on_request_only() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let out = folder.path().join("run");
+    let files = |directory: &Path| -> Result<Vec<(PathBuf, Vec<u8>)>, Failure> {
+        let paths: Vec<PathBuf> =
+            std::fs::read_dir(directory)?.map(|entry| Ok(entry?.path())).collect::<Result<_, Failure>>()?;
+        paths.into_iter().map(|path| Ok((path.clone(), std::fs::read(path)?))).collect()
+    };
+    let mut run = long_run(&out)?;
+    run.kill()?;
+    run.wait()?;
+    let before = files(&out)?;
+    let history = std::fs::read_to_string(out.join("history.csv"))?;
+    let (whole, _) = history.rsplit_once('\n').ok_or("no row")?;
+    let row: Vec<&str> = whole.lines().next_back().ok_or("no row")?.split(',').collect();
+    let (code, text) = told(&[], &out)?;
+    assert!(code == Some(2) && text.contains(&format!("{} steps until t = {}", row[0], row[1])), "{text}");
+    // A newcomer is told both ways out, and the second works as it stands.
+    let free = folder.path().join("run-2");
+    assert!(text.contains("--discard") && text.contains(&format!("--out {}", free.display())), "{text}");
+    assert!(files(&out)? == before, "a refusal changes nothing");
+    assert_eq!(told(&[], &free)?.0, Some(0));
+    assert!(told(&[], &out)?.1.contains("run-3"));
+    assert_eq!(told(&["--discard"], &out)?.0, Some(0));
+    // The steps of a run that failed are results; a run that failed in its first step has none.
+    for (key, lost) in [("boundary={}", true), ("solver.newton.max_iterations=1", false)] {
+        let failed = folder.path().join(key);
+        let fails = ["--quiet", "--set", key, "--set", "time.max_halvings=1"];
+        assert_eq!(rebound(&failed, &fails)?.status.code(), Some(1), "{key}");
+        assert_eq!(report(&failed)?["counts"]["steps"].as_u64() > Some(0), lost, "{key}");
+        let (code, text) = told(&[], &failed)?;
+        assert_eq!(code == Some(2) && text.contains("of a run that failed"), lost, "{key}: {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_scene_file_without_a_name_does_not_write_where_the_program_runs() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    for name in ["...json", "....json", "..json", ".json"] {
+        std::fs::copy(scene("rebound.json"), folder.path().join(name))?;
+        let run = |arguments: &[&str]| {
+            program().args(["run", name, "--steps", "1", "--quiet"]).args(arguments).current_dir(&folder).output()
+        };
+        let output = run(&[])?;
+        let text = String::from_utf8(output.stderr)?;
+        assert!(output.status.code() == Some(2) && text.contains(name) && text.contains("--out DIR"), "{text}");
+        let out = name.replace('.', "_");
+        assert!(run(&["--out", &out])?.status.success());
+        std::fs::remove_dir_all(folder.path().join(out))?;
+        std::fs::remove_file(folder.path().join(name))?;
+    }
+    assert_eq!(std::fs::read_dir(&folder)?.count(), 0);
+    Ok(())
+}
+
 #[cfg(unix)]
 #[test]
 fn two_runs_share_no_directory_and_a_batch_system_may_end_one() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    let mut first = program();
-    first.arg("run").arg(scene("rebound.json")).arg("--out").arg(directory.path()).args(["--until", "1e6", "--quiet"]);
-    let mut first = first.spawn()?;
-    let history = directory.path().join("history.csv");
-    let start = Instant::now();
-    while std::fs::read_to_string(&history).map_or(0, |text| text.lines().count()) < 5 {
-        assert!(start.elapsed() < Duration::from_secs(60), "no step");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let mut first = long_run(directory.path())?;
     for argument in [&[][..], &["--discard"], &["--restart"]] {
         let (code, text) = told(argument, directory.path())?;
         assert!(code == Some(2) && text.contains("another program is just writing"), "{argument:?}: {text}");
@@ -227,9 +295,10 @@ fn a_new_scene_is_checked_runs_and_is_never_overwritten() -> Result<(), Failure>
         assert_eq!(report(&out)?["counts"]["steps"], 3);
         let (code, text) = new(&[problem])?;
         assert!(
-            code == Some(2) && text.contains(&format!("cannot write {problem}.json")) && text.contains("exists"),
+            code == Some(2) && text.contains(&format!("error: {problem}.json exists and stays as it is")),
             "{text}"
         );
+        assert!(text.contains("bfree new PROBLEM FILE") && !text.contains("os error"), "{text}");
         assert_eq!(std::fs::read_to_string(&file)?, scene);
     }
     let (code, text) = new(&["rebund"])?;

@@ -1,4 +1,5 @@
-//! The tutorials, as a reader does them: the commands of a page in an empty folder, and what it says comes out.
+//! The tutorials, as a reader does them: the commands of all pages, one after the other, in one folder that is empty at first. The
+//! numbers that a page shows come out.
 
 use crate::manual::{Page, in_repository};
 use crate::support::Failure;
@@ -70,14 +71,14 @@ fn value(table: &str, column: &str, time: f64) -> Option<f64> {
     row[of].as_ref().ok().copied()
 }
 
-/// Does a tutorial, and compares what comes out, which is returned, with what it says and with the known answers.
-fn tutorial<const ROWS: usize>(name: &str) -> Result<[f64; ROWS], Failure> {
-    let (file, folder) = (in_repository(&format!("docs/src/tutorial/{name}.md")), tempfile::tempdir()?);
-    follow(&Page::read(&file)?, folder.path())?;
+/// Does a page in `folder`, and compares what comes out, which is returned, with what it says and with the known answers.
+fn tutorial<const ROWS: usize>(name: &str, folder: &Path) -> Result<[f64; ROWS], Failure> {
+    let file = in_repository(&format!("docs/src/tutorial/{name}.md"));
+    follow(&Page::read(&file)?, folder)?;
     let claims = claims(&std::fs::read_to_string(&file)?)?;
     let mut values = Vec::new();
     for Claim { file, column, time, known, found, error } in claims {
-        let table = std::fs::read_to_string(folder.path().join(&file))?;
+        let table = std::fs::read_to_string(folder.join(&file))?;
         let came_out = value(&table, &column, time).ok_or_else(|| format!("{file}: no {column} at {time}"))?;
         let what = format!("{file}, {column} at t = {time}: {came_out}; {known} is known, the text says {found}");
         assert!((came_out - found).abs() <= ROUNDED * known.abs(), "{what}");
@@ -88,37 +89,50 @@ fn tutorial<const ROWS: usize>(name: &str) -> Result<[f64; ROWS], Failure> {
 }
 
 #[test]
-fn a_beam_bends_as_the_elastica() -> Result<(), Failure> {
-    tutorial::<4>("beam").map(drop)
-}
-
-#[test]
-fn cook_s_membrane_nears_the_elements() -> Result<(), Failure> {
-    let [_, fine, finer, locked, free] = tutorial("membrane")?;
+fn a_reader_does_all_pages_in_one_folder() -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let folder = folder.path();
+    let overview = std::fs::read_to_string(in_repository("docs/src/tutorial.md"))?;
+    let pages: Vec<&str> = overview.split("](tutorial/").skip(1).filter_map(|rest| rest.split(".md").next()).collect();
+    assert_eq!(pages, ["beam", "membrane", "ring", "rebound", "plasticity", "own_law"]);
+    tutorial::<4>("beam", folder)?;
+    let [_, fine, finer, locked, free] = tutorial("membrane", folder)?;
     // Of first order: extrapolated to h = 0, as the text does.
     let extrapolated = 2.0 * finer - fine;
     assert!((extrapolated / 14.505 - 1.0).abs() < 1e-3, "{extrapolated}");
-    // What the mean dilatation leaves of the error.
+    // The rest of the error with a mean dilatation.
     assert!((12.135 - free) < 0.3 * (12.135 - locked), "{locked} {free}");
-    Ok(())
-}
-
-#[test]
-fn a_ring_under_pressure_nears_lame() -> Result<(), Failure> {
-    tutorial::<4>("ring").map(drop)
-}
-
-#[test]
-fn a_cylinder_rebounds() -> Result<(), Failure> {
-    tutorial::<4>("rebound").map(drop)
-}
-
-#[test]
-fn metals_flow_as_known() -> Result<(), Failure> {
-    let [_, _, coarse, fine, ..] = tutorial::<7>("plasticity")?;
+    tutorial::<4>("ring", folder)?;
+    tutorial::<4>("rebound", folder)?;
+    let [_, _, coarse, fine, ..] = tutorial::<7>("plasticity", folder)?;
     // Of first order, as the text says.
     let extrapolated = 2.0 * fine - coarse;
     assert!((extrapolated / 7.01 - 1.0).abs() < 0.005, "{extrapolated}");
+    Ok(())
+}
+
+/// Directories that the commands of a text write into: those of `--out`, and else that of the scene.
+fn written(text: &str) -> Vec<String> {
+    let runs = text.lines().filter_map(|line| line.split_once("bfree run ")).map(|(_, arguments)| arguments);
+    let directory = |arguments: &str| match arguments.split_once("--out ") {
+        Some((_, rest)) => rest.split(['`', ' ']).next().unwrap_or_default().to_owned(),
+        None => format!("out/{}", arguments.split(".json").next().unwrap_or_default()),
+    };
+    runs.filter(|arguments| !arguments.contains("--discard")).map(directory).collect()
+}
+
+/// Those that the suite does not run, too.
+#[test]
+fn no_two_commands_of_the_tutorial_write_into_one_directory() -> Result<(), Failure> {
+    let mut seen: Vec<String> = Vec::new();
+    for entry in std::fs::read_dir(in_repository("docs/src/tutorial"))? {
+        let written = written(&std::fs::read_to_string(entry?.path())?);
+        for directory in written {
+            assert!(!seen.contains(&directory), "{directory} is written twice");
+            seen.push(directory);
+        }
+    }
+    assert!(seen.len() > 10, "{seen:?}");
     Ok(())
 }
 

@@ -1,171 +1,172 @@
 //! Lines against time, in panels one above the other.
 
-use super::{PlotError, draw_error};
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use super::axes::{Axes, BELOW, LABEL, Ticks, range};
+use super::palette::{BLACK, Color, GREY};
+use super::svg::{Anchor, Point, Svg, shortened, width};
 
-/// Width of a figure, in SVG units.
-const WIDTH: u32 = 900;
-
-/// Width of a letter of a legend, at most; letters of a name, at most; height of its line.
-const LEGEND: (u32, usize, i32) = (8, 30, 17);
+/// Width of a figure, in SVG units; of a name beside a curve, at most; height of its line.
+const WIDTH: f64 = 900.0;
+/// See [`WIDTH`].
+const LEGEND: (f64, f64) = (250.0, 17.0);
 
 /// Above so many points, a line is thinned to the extremes of as many intervals.
 const INTERVALS: usize = 1500;
 
-/// Font of titles and labels.
-pub(super) const TITLE: (&str, u32) = ("sans-serif", 20);
-/// See [`TITLE`].
-pub(super) const LABEL: (&str, u32) = ("sans-serif", 14);
+/// Height of letters of a title and of the line below it.
+const TITLE: (f64, f64) = (19.0, 13.0);
 
 /// A line with its place in the legend.
 pub(super) struct Line {
     /// Name; lines without one are not in the legend.
     pub label: String,
     /// Colour.
-    pub color: RGBColor,
+    pub color: Color,
     /// Points.
-    pub points: Vec<(f64, f64)>,
+    pub points: Vec<Point>,
 }
 
 /// One pair of axes.
 pub(super) struct Panel {
-    /// Label of the level axis.
-    pub x: &'static str,
-    /// Numbers at it, at most.
-    pub x_labels: usize,
-    /// Label of the upright axis.
+    /// Name of the level axis, and whether it has whole numbers alone.
+    pub x: (&'static str, bool),
+    /// Name of the upright axis.
     pub y: String,
+    /// A line of text above it; none if it is empty.
+    pub caption: String,
     /// The lines.
     pub lines: Vec<Line>,
     /// Height in parts of the sum over all panels.
-    pub share: u32,
+    pub share: f64,
+}
+
+impl Panel {
+    /// A panel over time.
+    pub(super) fn over_time(y: &str, lines: Vec<Line>) -> Self {
+        Self { x: ("time", false), y: y.to_owned(), caption: String::new(), lines, share: 1.0 }
+    }
+
+    /// The largest size of a finite value.
+    pub(super) fn size(&self) -> f64 {
+        let values = self.lines.iter().flat_map(|line| &line.points).map(|point| point.1.abs());
+        values.filter(|size| size.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// Lines with a name; none where one line is called what its axis is.
+    fn named(&self) -> Vec<&Line> {
+        let named: Vec<&Line> = self.lines.iter().filter(|line| !line.label.is_empty()).collect();
+        let same = self.lines.len() == 1 && named.iter().all(|line| line.label == self.y);
+        if same { vec![] } else { named }
+    }
+}
+
+/// What a picture shows, and of which run.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Heading {
+    pub what: String,
+    pub run: String,
+}
+
+impl Heading {
+    /// The room that it takes.
+    pub(super) const HEIGHT: f64 = 56.0;
+
+    /// Draws it in the middle of a picture so wide.
+    pub(super) fn draw(&self, svg: &mut Svg, wide: f64) {
+        let most = wide - 20.0;
+        let lines = [(&self.what, TITLE.0, 26.0, BLACK), (&self.run, TITLE.1, 45.0, GREY)];
+        for (text, size, base, color) in lines {
+            svg.text((wide / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, most));
+        }
+    }
 }
 
 /// The figure as SVG, so many units high.
-pub(super) fn draw(name: &'static str, title: &str, height: u32, panels: &[Panel]) -> Result<String, PlotError> {
-    let fail = draw_error(name);
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| fail(&e))?;
-        let mut rest = root.titled(title, TITLE).map_err(|e| fail(&e))?;
-        let mut shares: u32 = panels.iter().map(|panel| panel.share).sum();
-        for panel in panels {
-            let height = rest.dim_in_pixel().1 * panel.share / shares.max(1);
-            let (area, below) = rest.split_vertically(height);
-            draw_panel(&area, panel).map_err(|e| fail(&*e))?;
-            rest = below;
-            shares -= panel.share;
+pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
+    let mut svg = Svg::new(WIDTH, height);
+    heading.draw(&mut svg, WIDTH);
+    let mut top = Heading::HEIGHT;
+    let spans = |panel: &Panel| {
+        let points = || panel.lines.iter().flat_map(|line| &line.points);
+        (range(points().map(|point| point.0), 0.0), range(points().map(|point| point.1), 0.06))
+    };
+    let shares: f64 = panels.iter().map(|panel| panel.share).sum();
+    let captions = panels.iter().filter(|panel| !panel.caption.is_empty()).count() as f64 * 20.0;
+    let between = 14.0 + BELOW.0;
+    let free = height - top - captions - between * panels.len() as f64 - BELOW.1;
+    let tall = |panel: &Panel| free * panel.share / shares;
+    let ticks = |panel: &Panel| {
+        let (x, y) = spans(panel);
+        (Ticks::new(x, 10, panel.x.1), Ticks::new(y, ((tall(panel) / 30.0) as usize).clamp(1, 6), false))
+    };
+    // All panels have the margins that the widest numbers and names need.
+    let left = panels.iter().map(|panel| Axes::left(&ticks(panel).1)).fold(0.0, f64::max);
+    let names = panels.iter().flat_map(Panel::named).map(|line| width(&name(line), LABEL));
+    let right = names.fold(0.0, f64::max) + 28.0;
+    for (number, panel) in panels.iter().enumerate() {
+        if !panel.caption.is_empty() {
+            let caption = shortened(&panel.caption, LABEL, WIDTH - left - 10.0);
+            svg.text((left, top + 12.0), Anchor::Start, LABEL, GREY, &caption);
+            top += 20.0;
         }
-        root.present().map_err(|e| fail(&e))?;
+        let (x, y) = spans(panel);
+        let size = (WIDTH - left - right, tall(panel));
+        let axes = Axes { corner: (left, top), size, x, y };
+        let (level, upright) = ticks(panel);
+        let last = number + 1 == panels.len();
+        axes.draw(&mut svg, [&level, &upright], [if last { panel.x.0 } else { "" }, &fitting(&panel.y, size.1)], true);
+        for line in &panel.lines {
+            let thickness = if line.label.is_empty() { 0.8 } else { 1.8 };
+            svg.line(thinned(&line.points).into_iter().map(|point| axes.place(point)), line.color, thickness);
+        }
+        legend(&mut svg, &axes, &panel.named());
+        top += size.1 + between;
     }
-    Ok(svg)
+    svg.finish()
 }
 
-fn draw_panel(area: &DrawingArea<SVGBackend<'_>, Shift>, panel: &Panel) -> Result<(), Box<dyn std::error::Error>> {
-    let points = || panel.lines.iter().flat_map(|line| &line.points);
-    let (x, y) = (range(points().map(|point| point.0), 0.0), range(points().map(|point| point.1), 0.06));
-    // One line that is called what its axis is needs no legend.
-    let named: Vec<&Line> = panel.lines.iter().filter(|line| !line.label.is_empty()).collect();
-    let named = if panel.lines.len() == 1 && named.iter().all(|line| line.label == panel.y) { vec![] } else { named };
-    let letters = named.iter().map(|line| shortened(&line.label).chars().count() as u32).max();
-    let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .margin_right(24 + LEGEND.0 * letters.unwrap_or(0))
-        .x_label_area_size(42)
-        .y_label_area_size(86)
-        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(BLACK.mix(0.12))
-        .x_desc(panel.x)
-        .y_desc(&panel.y)
-        .label_style(LABEL)
-        .axis_desc_style(LABEL)
-        .x_label_formatter(&|at| tick(*at, x))
-        .y_label_formatter(&|at| tick(*at, y))
-        .x_labels(panel.x_labels)
-        .y_labels(6)
-        .draw()?;
-    for line in &panel.lines {
-        let width = if line.label.is_empty() { 1 } else { 2 };
-        chart.draw_series(LineSeries::new(thinned(&line.points), line.color.stroke_width(width)))?;
-    }
-    // Names stand where their curves end, from top to bottom, as far apart as letters need.
-    let base = area.get_base_pixel();
-    let end = |line: &&Line| thinned(&line.points).last().map_or(0, |point| chart.backend_coord(point).1 - base.1);
-    let mut ends: Vec<(i32, &Line)> = named.iter().map(|line| (end(line), *line)).collect();
-    ends.sort_by_key(|(height, _)| *height);
-    let heights = apart(ends.iter().map(|(height, _)| *height).collect(), area.dim_in_pixel().1 as i32 - 42);
-    let right = chart.backend_coord(&(x.1, y.0)).0 - base.0;
+/// A name that fits beside an axis so high, with the power of ten that may follow it.
+fn fitting(name: &str, height: f64) -> String {
+    shortened(name, LABEL, height - 60.0)
+}
+
+fn name(line: &Line) -> String {
+    shortened(&line.label, LABEL, LEGEND.0)
+}
+
+/// Names stand where their curves end, from top to bottom, as far apart as letters need.
+fn legend(svg: &mut Svg, axes: &Axes, named: &[&Line]) {
+    let end = |line: &&&Line| thinned(&line.points).last().map_or(axes.corner.1, |point| axes.place(*point).1);
+    let mut ends: Vec<(f64, &Line)> = named.iter().map(|line| (end(&line), *line)).collect();
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let heights = apart(ends.iter().map(|(height, _)| *height).collect(), axes.corner.1 + axes.size.1);
     for ((_, line), height) in ends.iter().zip(heights) {
-        let style = LABEL.into_font().color(&line.color);
-        area.draw(&Text::new(shortened(&line.label), (right + 8, height - LEGEND.2 / 2), style))?;
+        let at = (axes.corner.0 + axes.size.0 + 8.0, height + 0.35 * LABEL);
+        svg.text(at, Anchor::Start, LABEL, line.color, &name(line));
     }
-    Ok(())
-}
-
-/// A name that leaves room for the curves.
-fn shortened(name: &str) -> String {
-    let short: String = name.chars().take(LEGEND.1 - 1).collect();
-    if name.chars().count() > LEGEND.1 { format!("{short}…") } else { name.to_owned() }
 }
 
 /// Heights in ascending order, moved until lines of text fit between them, none below `lowest` as long as there is room above.
-fn apart(mut heights: Vec<i32>, lowest: i32) -> Vec<i32> {
+fn apart(mut heights: Vec<f64>, lowest: f64) -> Vec<f64> {
     for k in 1..heights.len() {
-        heights[k] = heights[k].max(heights[k - 1] + LEGEND.2);
+        heights[k] = heights[k].max(heights[k - 1] + LEGEND.1);
     }
-    let mut below = lowest + LEGEND.2;
+    let mut below = lowest + LEGEND.1;
     for height in heights.iter_mut().rev() {
-        *height = (*height).min(below - LEGEND.2);
+        *height = height.min(below - LEGEND.1);
         below = *height;
     }
     heights
 }
 
-/// The range of the finite values, `padding` wider at either end, and never so narrow that axes could not be labelled.
-pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f64) {
-    let drawable = values.filter(|x| x.abs() < 1e100);
-    let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (x.min(a), x.max(b)));
-    if low > high {
-        return (0.0, 1.0);
-    }
-    let least = 1e-6 * low.abs().max(high.abs());
-    match high - low {
-        span if span < 1e-100 && least < 1e-100 => (low - 1.0, high + 1.0),
-        // What does not vary is shown as such, not as its round-off.
-        span if span <= least => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
-        span => (low - padding * span, high + padding * span),
-    }
-}
-
-/// A number at an axis that shows `range`, without the round-off of its place.
-pub(super) fn tick(x: f64, range: (f64, f64)) -> String {
-    if x.abs() < 1e-9 * (range.1 - range.0) { "0".to_owned() } else { rounded(x) }
-}
-
-/// A number with at most ten digits.
-pub(super) fn rounded(x: f64) -> String {
-    let rounded: f64 = format!("{x:.9e}").parse().unwrap_or(x);
-    match rounded.abs() {
-        0.0 => "0".to_owned(),
-        size if (1e-3..1e6).contains(&size) => format!("{rounded}"),
-        _ => format!("{rounded:e}"),
-    }
-}
-
 /// The finite points; if they are many, only the lowest and the highest of each interval, in their order: no peak is lost.
-fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+fn thinned(points: &[Point]) -> Vec<Point> {
     let drawable: Vec<_> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.abs() < 1e100).collect();
     if drawable.len() <= 2 * INTERVALS {
         return drawable;
     }
-    let mut kept: Vec<(f64, f64)> = Vec::with_capacity(2 * INTERVALS);
+    let mut kept: Vec<Point> = Vec::with_capacity(2 * INTERVALS);
     for interval in drawable.chunks(drawable.len().div_ceil(INTERVALS)) {
-        let by_height = |a: &&(f64, f64), b: &&(f64, f64)| f64::total_cmp(&a.1, &b.1);
+        let by_height = |a: &&Point, b: &&Point| f64::total_cmp(&a.1, &b.1);
         let extremes = interval.iter().min_by(by_height).into_iter().chain(interval.iter().max_by(by_height));
         let start = kept.len();
         kept.extend(extremes);
@@ -177,10 +178,12 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::plot::PlotError;
+    use crate::output::plot::png::texts;
 
     #[test]
     fn thinning_keeps_a_lone_peak_and_the_order() {
-        let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        let mut points: Vec<Point> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[54_321].1 = 7.0;
         points[77_777].1 = f64::NAN;
         let kept = thinned(&points);
@@ -190,31 +193,51 @@ mod tests {
 
     #[test]
     fn names_that_would_cover_each_other_move_apart() {
-        assert_eq!(apart(vec![10, 100, 103, 104, 300], 400), [10, 100, 117, 134, 300]);
-        assert_eq!(apart(vec![10, 395, 398], 400), [10, 383, 400]);
-        assert!(apart(vec![], 400).is_empty());
-        assert_eq!(shortened(&"ä".repeat(40)).chars().count(), 30);
+        assert_eq!(apart(vec![10.0, 100.0, 103.0, 104.0, 300.0], 400.0), [10.0, 100.0, 117.0, 134.0, 300.0]);
+        assert_eq!(apart(vec![10.0, 395.0, 398.0], 400.0), [10.0, 383.0, 400.0]);
+        assert!(apart(vec![], 400.0).is_empty());
+    }
+
+    fn line(label: &str, high: f64) -> Line {
+        Line { label: label.to_owned(), color: BLACK, points: vec![(0.0, 0.0), (1.0, high)] }
     }
 
     #[test]
-    fn a_name_cannot_break_the_picture() -> Result<(), PlotError> {
-        let line = |label: &str| Line { label: label.to_owned(), color: BLACK, points: vec![(0.0, 0.0), (1.0, 1.0)] };
-        let lines = vec![line("</text><script>&"), line("x")];
-        let panel = Panel { x: "time", x_labels: 5, y: "<script>\"&".to_owned(), lines, share: 1 };
-        let svg = draw("names", "<script>", 300, &[panel])?;
-        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;"), "{svg}");
-        Ok(())
+    fn a_name_cannot_break_the_picture() {
+        let panel = Panel::over_time("<script>\"&", vec![line("</text><script>&", 1.0), line("x", 2.0)]);
+        let svg = draw(&Heading { what: "<script>".into(), run: "\u{1}".into() }, 300.0, &[panel]);
+        assert!(!svg.contains("<script>") && svg.contains("&lt;script&gt;") && !svg.contains('\u{1}'), "{svg}");
+    }
+
+    /// Frames, as left and right ends of their upper sides.
+    fn frames(svg: &str) -> Vec<(f64, f64)> {
+        let corners = svg.split("<polyline points=\"").skip(1).filter_map(|rest| {
+            let points: Vec<&str> = rest.split('"').next()?.split_whitespace().collect();
+            let x = |k: usize| -> Option<f64> { points.get(k)?.split(',').next()?.parse().ok() };
+            (points.len() == 5 && points[0] == points[4]).then_some((x(0)?, x(2)?))
+        });
+        corners.collect()
     }
 
     #[test]
-    fn ranges_can_always_be_labelled() {
-        for values in [&[][..], &[f64::NAN], &[0.0, 0.0], &[1.0, 1.0 + 1e-15], &[-3e-14, 2e-14], &[f64::MAX, 1.0]] {
-            let (low, high) = range(values.iter().copied(), 0.05);
-            assert!(high - low > 1e-7 * low.abs().max(high.abs()), "{values:?}: {low}, {high}");
+    fn panels_have_one_width_and_no_text_is_cut_or_covered() -> Result<(), PlotError> {
+        let long = "W".repeat(60);
+        let narrow =
+            Panel { caption: long.clone(), share: 0.4, ..Panel::over_time("balance", vec![line("balance", 1e-7)]) };
+        let wide = Panel::over_time(&long, vec![line(&long, 3e9), line("total − initial − external work", 3e9)]);
+        let svg = draw(&Heading { what: long.clone(), run: long }, 400.0, &[wide, narrow]);
+        let found = frames(&svg);
+        assert!(found.len() == 2 && found[0] == found[1], "{found:?}");
+        let (size, texts) = texts(&svg)?;
+        assert!(texts.len() > 15, "{}", texts.len());
+        for (k, (text, one)) in texts.iter().enumerate() {
+            assert!(
+                one.left >= 0.0 && one.top >= 0.0 && one.right <= size.0 && one.bottom <= size.1,
+                "{text}: {one:?}"
+            );
+            let covered = texts[..k].iter().find(|(_, other)| one.covers(other));
+            assert!(covered.is_none(), "{text} covers {covered:?}");
         }
-        let labels = [0.30000000000000004, -2e-14, 0.0, 250.0].map(rounded);
-        assert_eq!(labels, ["0.3", "-2e-14", "0", "250"]);
-        // what plotters makes of 0 among ticks of 0.05, and the same number where it counts
-        assert_eq!([tick(2.8e-17, (-0.2, 0.0)), tick(2.8e-17, (0.0, 1e-16))], ["0", "2.8e-17"]);
+        Ok(())
     }
 }

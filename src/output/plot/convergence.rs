@@ -1,6 +1,7 @@
 //! How the residual falls in Newton's method: a sample of all steps, and the step with the most iterations.
 
-use super::chart::{Line, Panel, rounded};
+use super::axes::rounded;
+use super::chart::{Line, Panel};
 use super::{PlotError, palette};
 use serde::Deserialize;
 use serde_json::Value;
@@ -41,9 +42,8 @@ pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<P
     }
     let label = format!("t = {}: the most iterations", rounded(worst.time));
     lines.push(Line { label, color: palette::VERMILLION, points: fall(worst) });
-    // Whole iterations only.
-    let x_labels = worst.newton_residuals.len().clamp(2, 12);
-    Ok(Some(Panel { x: "Newton iteration", x_labels, y: "log10 of |R| / |R_0|".to_owned(), lines, share: 1 }))
+    let panel = Panel::over_time("log₁₀ |R| / |R₀|", lines);
+    Ok(Some(Panel { x: ("Newton iteration", true), ..panel }))
 }
 
 /// The steps of a run that goes on or was killed; its last line may break off.

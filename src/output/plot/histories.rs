@@ -7,26 +7,43 @@ use super::{PlotError, palette};
 /// Panels of a picture, at most.
 const MOST: usize = 8;
 
+/// A value is round-off below this part of the scale of its quantity.
+pub(super) const ROUND_OFF: f64 = 1e-12;
+
 /// Colours of components; a tensor has more than there are colours, and its last ones look like its first.
-const COLORS: [plotters::style::RGBColor; 6] =
+const COLORS: [palette::Color; 6] =
     [palette::BLUE, palette::VERMILLION, palette::GREEN, palette::PURPLE, palette::SKY, palette::BLACK];
 
 /// A panel for each name that begins columns of `table`, in its order; the first [`MOST`] of them, and how many there are.
-pub(super) fn panels(table: &Columns) -> Result<(Vec<Panel>, usize), PlotError> {
+///
+/// Panels in which everything is 0, up to the round-off of the largest panel of the same `quantity`, are left out. Their names come last.
+pub(super) fn panels(
+    table: &Columns,
+    quantity: impl Fn(&str) -> String,
+) -> Result<(Vec<Panel>, usize, Vec<String>), PlotError> {
     let mut panels: Vec<Panel> = Vec::new();
     for column in table.names().iter().filter(|column| *column != "time") {
         let (name, component) = split(column);
         if panels.last().is_none_or(|panel| panel.y != name) {
-            panels.push(Panel { x: "time", x_labels: 10, y: name.to_owned(), lines: Vec::new(), share: 1 });
+            panels.push(Panel::over_time(name, Vec::new()));
         }
         if let Some(panel) = panels.last_mut() {
             let color = COLORS[panel.lines.len() % COLORS.len()];
             panel.lines.push(Line { label: component.to_owned(), color, points: table.pairs("time", column)? });
         }
     }
-    let there = panels.len();
-    panels.truncate(MOST);
-    Ok((panels, there))
+    let largest = |of: &Panel| {
+        let same = panels.iter().filter(|panel| quantity(&panel.y) == quantity(&of.y));
+        same.map(Panel::size).fold(0.0, f64::max)
+    };
+    let nothing: Vec<bool> = panels.iter().map(|panel| panel.size() <= ROUND_OFF * largest(panel)).collect();
+    let (mut shown, mut left_out) = (Vec::new(), Vec::new());
+    for (panel, nothing) in panels.into_iter().zip(nothing) {
+        if nothing { left_out.push(panel.y) } else { shown.push(panel) }
+    }
+    let there = shown.len();
+    shown.truncate(MOST);
+    Ok((shown, there, left_out))
 }
 
 /// A column's name and its component; the name again if it has none.
@@ -42,12 +59,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn components_share_a_panel() -> Result<(), Box<dyn std::error::Error>> {
+    fn components_share_a_panel_and_none_shows_round_off() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("probes.csv");
-        std::fs::write(&path, "time,tip_x,tip_y,mid_point,s_xx,s_xy\n0,1,2,3,4,5\n1,2,NaN,4,5,6\n")?;
-        let (panels, there) = panels(&Columns::read(path)?)?;
-        assert_eq!(there, 3);
+        let rows =
+            "time,tip_x,tip_y,mid_point,s_xx,s_xy,still_x,still_y\n0,1,2,3,4,5,0,0\n1,2,NaN,4,5,6,1e-15,-2e-16\n";
+        std::fs::write(&path, rows)?;
+        let quantity = |name: &str| if name == "s" { "stress" } else { "displacement" }.to_owned();
+        let (panels, there, left_out) = panels(&Columns::read(path)?, quantity)?;
+        assert_eq!((there, left_out), (3, vec!["still".to_owned()]));
         let shown: Vec<_> = panels.iter().map(|panel| (panel.y.as_str(), panel.lines.len())).collect();
         assert_eq!(shown, [("tip", 2), ("mid_point", 1), ("s", 2)]);
         assert_eq!(panels[2].lines[1].label, "xy");

@@ -2,24 +2,33 @@
 //! the last snapshot; and all of them with the numbers of the run and a player of its snapshots on one page, `report.html`, that
 //! opens anywhere.
 //!
-//! Everything is drawn as SVG; the PNG beside it is made from the SVG with an embedded DejaVu Sans, so that no fonts need to be installed.
+//! Everything is drawn as SVG, with axes and names that are measured in the font; the PNG beside it is made from the SVG with an embedded DejaVu Sans, so that no fonts need to be installed.
 
+mod axes;
 mod chart;
+mod colouring;
 mod convergence;
 mod histories;
 mod html;
+mod neighbours;
 mod palette;
 mod particles;
 mod player;
 pub mod png;
 mod series;
+mod svg;
 mod table;
+mod view;
+
+pub use view::View;
 
 use super::files::write_atomically;
 use super::vtu::Snapshot;
 use super::{OutputError, vtu};
 use crate::mechanics::schemes::Parameters;
-use chart::{Line, Panel};
+use chart::{Heading, Line, Panel};
+use colouring::Colouring;
+use histories::ROUND_OFF;
 use player::Recording;
 use serde::Deserialize;
 use serde_json::Value;
@@ -73,7 +82,15 @@ pub enum PlotError {
         /// The directory.
         directory: PathBuf,
     },
-    /// The drawing library refused.
+    /// Snapshots do not hold the field asked for.
+    #[error("the snapshots hold no field {field:?}; they hold {there}; the key output.fields says what a run writes")]
+    Field {
+        /// The field.
+        field: String,
+        /// Those there are.
+        there: String,
+    },
+    /// The renderer refused.
     #[error("cannot draw {name}: {reason}")]
     Draw {
         /// The picture.
@@ -90,10 +107,38 @@ pub enum PlotError {
 const PICTURES: [&str; 7] = ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "particles"];
 
 /// Height of a picture, in SVG units.
-const HEIGHT: u32 = 640;
+const HEIGHT: f64 = 640.0;
 
 /// The page.
 const PAGE: &str = "report.html";
+
+/// How particles are drawn, and into which files.
+///
+/// ```
+/// use bfree::output::plot::Look;
+///
+/// // Whatever is not said is chosen: von Mises' stress, the plane of the motion, the last snapshot.
+/// let look = Look { field: Some("stress_xx".into()), view: Some("30,20".parse()?), ..Look::default() };
+/// assert_eq!(look.formats, ["svg", "png"]);
+/// # Ok::<(), String>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// The field that colours them: its name, `stress_xx` for a component, `von_mises` where there is a stress.
+    pub field: Option<String>,
+    /// From where they are seen.
+    pub view: Option<View>,
+    /// The time of the picture: the nearest snapshot is drawn.
+    pub time: Option<f64>,
+    /// Formats of the pictures: `svg`, `png`.
+    pub formats: Vec<&'static str>,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { field: None, view: None, time: None, formats: vec!["svg", "png"] }
+    }
+}
 
 /// Whether a file of this name is one that [`plot_run`] writes.
 pub(crate) fn is_picture(file: &str) -> bool {
@@ -103,10 +148,11 @@ pub(crate) fn is_picture(file: &str) -> bool {
 
 /// Draws what is in the directory of a run, as `.svg` and `.png`, into the same directory: `energies`, `momentum`, `iterations`,
 /// `convergence` once there are steps, `probes` and `reactions` of a run that has them, and `particles` if there are snapshots; and
-/// writes `report.html`, with all of them in it, and a player of the snapshots. Returns the files written.
+/// writes `report.html`, with all of them in it, and a player of the snapshots. A picture in which all values are round-off is left out.
+/// Returns the files written.
 ///
 /// ```
-/// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::plot_run};
+/// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::{Look, plot_run}};
 ///
 /// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
 /// let (mut simulation, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
@@ -118,7 +164,7 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// recorder.record(&simulation, &step)?;
 /// recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
 /// // The page holds the pictures themselves: it opens wherever it is taken.
-/// let written = plot_run(folder.path())?;
+/// let written = plot_run(folder.path(), &Look::default())?;
 /// assert!(written.contains(&folder.path().join("energies.svg")));
 /// let page = std::fs::read_to_string(folder.path().join("report.html"))?;
 /// assert!(page.contains("<svg") && !page.contains("src=\"energies"));
@@ -126,71 +172,28 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// ```
 ///
 /// # Errors
-/// `history.csv` is missing or damaged, or another table, the report or a snapshot is damaged; the system refuses.
-pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
-    let history = Columns::read(directory.join("history.csv"))?;
+/// `history.csv` is missing or damaged, or another table, the report or a snapshot is damaged; the snapshots do not hold the field of the
+/// look; the system refuses.
+pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
     let report = report(directory)?;
-    let line = |column: &'static str, label: &str, color| -> Result<Line, PlotError> {
-        Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
-    };
-    let panel = |y: &str, lines, share| Panel { x: "time", x_labels: 10, y: y.to_owned(), lines, share };
-    // Load steps have no momentum, and their work is done by loads that are there at once: the balance says nothing.
-    let moves = moves(report.as_ref());
-    let mut energies =
-        vec![line("strain", "strain", palette::VERMILLION)?, line("external", "external work", palette::GREEN)?];
-    if moves {
-        energies.extend([line("total", "total", palette::BLACK)?, line("kinetic", "kinetic", palette::BLUE)?]);
-    }
-    let mut energies = vec![panel("energy", energies, 3)];
-    if moves {
-        let balance = line("balance", "total - initial - external work", palette::PURPLE)?;
-        energies.push(panel("balance", vec![balance], 2));
-    }
-    let axes = [
-        ("momentum_x", "x", palette::BLUE),
-        ("momentum_y", "y", palette::VERMILLION),
-        ("momentum_z", "z", palette::GREEN),
-    ];
-    let axes = axes.into_iter().filter(|(column, ..)| history.has(column));
-    let momentum: Vec<Line> =
-        axes.map(|(column, label, color)| line(column, label, color)).collect::<Result<_, _>>()?;
-    // The first row is the state before the first step.
-    let of_steps = |line: Line| Line { points: line.points.into_iter().skip(1).collect(), ..line };
-    let newton = vec![of_steps(line("newton", "Newton", palette::BLUE)?)];
-    let krylov = vec![of_steps(line("krylov", "Krylov", palette::VERMILLION)?)];
-
-    let mut pictures = vec![("energies", chart::draw("energies", "Energy", HEIGHT, &energies)?)];
-    if moves {
-        pictures.push(("momentum", chart::draw("momentum", "Momentum", HEIGHT, &[panel("momentum", momentum, 1)])?));
-    }
-    for name in ["probes", "reactions"] {
-        let path = directory.join(format!("{name}.csv"));
-        if !path.is_file() {
-            continue;
-        }
-        let (panels, there) = histories::panels(&Columns::read(path)?)?;
-        let title = if panels.len() < there {
-            format!("{name}: the first {} of {there}", panels.len())
-        } else {
-            name.to_owned()
-        };
-        pictures.push((name, chart::draw(name, &title, 60 + 210 * panels.len() as u32, &panels)?));
-    }
-    let iterations = [panel("Newton", newton, 1), panel("Krylov", krylov, 1)];
-    pictures.push(("iterations", chart::draw("iterations", "Iterations per step", HEIGHT, &iterations)?));
-    if let Some(panel) = convergence::panel(report.as_ref(), directory)? {
-        let title = "Convergence of Newton's method";
-        pictures.push(("convergence", chart::draw("convergence", title, HEIGHT, &[panel])?));
-    }
+    let pictures = charts(directory, report.as_ref())?;
     let snapshots = series::files(directory)?;
     let mut played = None;
     // Not on the page: the player shows it.
     let mut last = None;
-    if let (Some(recording), Some(path)) = (Recording::read(&snapshots)?, snapshots.last()) {
-        let snapshot = Snapshot::read(path)?;
-        let view = series::view(snapshot.background.dimension, recording.motion());
-        last = Some(("particles", particles::draw("particles", &snapshot, view, None)?));
-        played = Some(recording.page(view));
+    if let Some(recording) = Recording::read(&snapshots)? {
+        let snapshot = at_time(directory, &snapshots, look.time)?;
+        let (dimension, moves) = (snapshot.background.dimension, recording.motion());
+        let plane = series::view(dimension, moves);
+        let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
+        let scene = particles::Scene {
+            directions: view::Directions::new(look.view, dimension, plane),
+            bounds: recording.bounds(),
+            span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
+            run: run_of(report.as_ref()),
+        };
+        last = Some(("particles", particles::draw(&snapshot, &scene, colouring.as_ref())));
+        played = Some(recording.page(plane));
     }
     let mut written = Vec::new();
     let mut keep = |file: &str, content: &[u8]| -> Result<(), PlotError> {
@@ -200,38 +203,159 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
         Ok(())
     };
     for (name, svg) in pictures.iter().chain(&last) {
-        keep(&format!("{name}.svg"), svg.as_bytes())?;
-        keep(&format!("{name}.png"), &png::from_svg(name, svg)?)?;
+        for &format in &look.formats {
+            let file = format!("{name}.{format}");
+            if format == "png" { keep(&file, &png::from_svg(name, svg)?)? } else { keep(&file, svg.as_bytes())? }
+        }
     }
     keep(PAGE, html::page(report.as_ref(), played.as_ref(), &pictures).as_bytes())?;
     Ok(written)
+}
+
+/// The title of a run's scene.
+fn run_of(report: Option<&Value>) -> String {
+    report.and_then(|report| report["settings"]["title"].as_str()).unwrap_or_default().to_owned()
+}
+
+/// The snapshot nearest to a time, or the last.
+fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, PlotError> {
+    let mut nearest: Option<Snapshot> = None;
+    for path in snapshots.iter().rev() {
+        let snapshot = Snapshot::read(path)?;
+        let Some(time) = time else { return Ok(snapshot) };
+        let far = |one: &Snapshot| (one.time - time).abs();
+        if nearest.as_ref().is_some_and(|best| far(best) <= far(&snapshot)) {
+            break;
+        }
+        nearest = Some(snapshot);
+    }
+    nearest.ok_or(PlotError::NoSnapshots { directory: directory.to_owned() })
+}
+
+/// The pictures of numbers over time, with their names.
+fn charts(directory: &Path, report: Option<&Value>) -> Result<Vec<(&'static str, String)>, PlotError> {
+    let history = Columns::read(directory.join("history.csv"))?;
+    let run = run_of(report);
+    let heading = |what: &str| Heading { what: what.to_owned(), run: run.clone() };
+    let mut pictures =
+        vec![("energies", chart::draw(&heading("Energies"), HEIGHT, &energies(&history, moves(report))?))];
+    if let Some(panel) = momentum(&history, report)? {
+        pictures.push(("momentum", chart::draw(&heading("Momentum"), HEIGHT, &[panel])));
+    }
+    for (name, title) in [("probes", "Probes"), ("reactions", "Reactions: forces of walls and regions on the bodies")] {
+        let path = directory.join(format!("{name}.csv"));
+        if !path.is_file() {
+            continue;
+        }
+        let (panels, there, left_out) =
+            histories::panels(&Columns::read(path)?, |panel| quantity(report, name, panel))?;
+        if panels.is_empty() {
+            continue;
+        }
+        let more =
+            if panels.len() < there { format!(", the first {} of {there}", panels.len()) } else { String::new() };
+        let zero = if left_out.is_empty() { String::new() } else { format!("; zero: {}", left_out.join(", ")) };
+        let height = 110.0 + 190.0 * panels.len() as f64;
+        pictures.push((name, chart::draw(&heading(&format!("{title}{more}{zero}")), height, &panels)));
+    }
+    // The first row is the state before the first step.
+    let count = |column: &str, name: &str, color| -> Result<Panel, PlotError> {
+        let points = history.pairs("time", column)?.into_iter().skip(1).collect();
+        Ok(Panel::over_time(name, vec![Line { label: name.to_owned(), color, points }]))
+    };
+    let iterations = [count("newton", "Newton", palette::BLUE)?, count("krylov", "Krylov", palette::VERMILLION)?];
+    pictures.push(("iterations", chart::draw(&heading("Iterations in each step"), HEIGHT, &iterations)));
+    if let Some(panel) = convergence::panel(report, directory)? {
+        pictures.push(("convergence", chart::draw(&heading("Convergence of Newton's method"), HEIGHT, &[panel])));
+    }
+    Ok(pictures)
+}
+
+/// A column of the history as a line.
+fn column(history: &Columns, column: &str, label: &str, color: palette::Color) -> Result<Line, PlotError> {
+    Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
+}
+
+/// Energies, and their balance where there is inertia: loads of load steps are there at once, and a balance says nothing of their work.
+fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
+    let mut lines = vec![
+        column(history, "strain", "strain", palette::VERMILLION)?,
+        column(history, "external", "external work", palette::GREEN)?,
+    ];
+    if history.has("dissipated") {
+        let dissipated = column(history, "dissipated", "dissipated", palette::SKY)?;
+        lines.extend(dissipated.points.iter().any(|point| point.1 != 0.0).then_some(dissipated));
+    }
+    if !moves {
+        return Ok(vec![Panel::over_time("energy", lines)]);
+    }
+    lines.push(column(history, "total", "total", palette::BLACK)?);
+    lines.push(column(history, "kinetic", "kinetic", palette::BLUE)?);
+    let energies = Panel { share: 3.0, ..Panel::over_time("energy", lines) };
+    let balance = Panel::over_time("balance", vec![column(history, "balance", "balance", palette::PURPLE)?]);
+    let caption = "balance: total + dissipated − initial energy − external work".to_owned();
+    if balance.size() <= ROUND_OFF * energies.size() {
+        let caption = format!("{caption}, at most {:.0e}", balance.size());
+        return Ok(vec![Panel { caption, ..energies }]);
+    }
+    Ok(vec![energies, Panel { caption, share: 2.0, ..balance }])
+}
+
+/// The momentum of a run with inertia; nothing if it is round-off of its scale, |p| ≤ √(2 M K) with the mass M and the largest kinetic energy K.
+fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, PlotError> {
+    if !moves(report) {
+        return Ok(None);
+    }
+    let axes = [
+        ("momentum_x", "x", palette::BLUE),
+        ("momentum_y", "y", palette::VERMILLION),
+        ("momentum_z", "z", palette::GREEN),
+    ];
+    let axes = axes.into_iter().filter(|(column, ..)| history.has(column));
+    let lines = axes.map(|(name, label, color)| column(history, name, label, color)).collect::<Result<Vec<_>, _>>()?;
+    let panel = Panel::over_time("momentum", lines);
+    let kinetic = Panel::over_time("", vec![column(history, "kinetic", "", palette::BLUE)?]).size();
+    let mass = report.and_then(|report| report["mass"].as_f64()).unwrap_or(0.0);
+    Ok(Some(panel).filter(|panel| panel.size() > ROUND_OFF * (2.0 * mass * kinetic).sqrt()))
+}
+
+/// What a panel of probes or reactions shows; panels of one quantity have one scale.
+fn quantity(report: Option<&Value>, table: &str, panel: &str) -> String {
+    if table == "reactions" {
+        return if panel.ends_with("_torque") { "torque" } else { "force" }.to_owned();
+    }
+    let probes = report.and_then(|report| report["settings"]["output"]["probes"].as_array());
+    let probe = probes.into_iter().flatten().find(|probe| probe["name"] == panel);
+    // A probe that is not known has a scale of its own.
+    probe.and_then(|probe| probe["field"].as_str()).unwrap_or(panel).to_owned()
 }
 
 /// Draws all snapshots of a run into the directory `frames`, which is made, as `frame_0000.png` and on: a movie for whatever
 /// encoder there is. All have the same axes and the same colours. Returns the files written.
 ///
 /// # Errors
-/// There are no snapshots, or one is damaged; the system refuses.
-pub fn plot_frames(directory: &Path, frames: &Path) -> Result<Vec<PathBuf>, PlotError> {
+/// There are no snapshots, one is damaged, or they do not hold the field of the look; the system refuses.
+pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
     let snapshots = series::files(directory)?;
-    let Some(first) = snapshots.first() else {
+    let Some(recording) = Recording::read(&snapshots)? else {
         return Err(PlotError::NoSnapshots { directory: directory.to_owned() });
     };
     std::fs::create_dir_all(frames).map_err(OutputError::io("create", frames))?;
-    let first = Snapshot::read(first)?;
-    let (mut motion, mut range) = ([0.0_f64; 3], (f64::INFINITY, f64::NEG_INFINITY));
+    let (mut span, mut dimension) = ((f64::INFINITY, f64::NEG_INFINITY), 2);
     for path in &snapshots {
         let snapshot = Snapshot::read(path)?;
-        for (x, start) in snapshot.points.iter().zip(&first.points) {
-            motion = std::array::from_fn(|axis| motion[axis].max((x[axis] - start[axis]).abs()));
-        }
-        let (low, high) = particles::extremes(&snapshot);
-        range = (range.0.min(low), range.1.max(high));
+        let colouring = Colouring::chosen(&snapshot, look.field.as_deref())?;
+        let (low, high) = colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes);
+        span = (span.0.min(low), span.1.max(high));
+        dimension = snapshot.background.dimension;
     }
-    let view = series::view(first.background.dimension, motion);
+    let directions = view::Directions::new(look.view, dimension, series::view(dimension, recording.motion()));
+    let run = run_of(report(directory)?.as_ref());
+    let scene = particles::Scene { directions, bounds: recording.bounds(), span, run };
     let mut written = Vec::new();
     for (number, path) in snapshots.iter().enumerate() {
-        let svg = particles::draw("a frame", &Snapshot::read(path)?, view, Some(range))?;
+        let snapshot = Snapshot::read(path)?;
+        let svg = particles::draw(&snapshot, &scene, Colouring::chosen(&snapshot, look.field.as_deref())?.as_ref());
         let (png, path) = (png::from_svg("a frame", &svg)?, frames.join(format!("frame_{number:04}.png")));
         write_atomically(&path, |file| file.write_all(&png))?;
         written.push(path);
@@ -255,7 +379,28 @@ fn report(directory: &Path) -> Result<Option<Value>, PlotError> {
     }
 }
 
-/// The drawing library's error, whatever its type.
-fn draw_error(name: &'static str) -> impl Fn(&dyn std::error::Error) -> PlotError {
-    move |error| PlotError::Draw { name, reason: error.to_string() }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn no_panel_shows_round_off() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("history.csv");
+        let table = |momentum: f64, balance: f64| -> Result<Columns, Box<dyn std::error::Error>> {
+            let header = "step,time,kinetic,strain,external,total,balance,momentum_x\n0,0,2,0,0,2,0,0\n";
+            std::fs::write(&path, format!("{header}1,1,1,1,0,2,{balance},{momentum}\n"))?;
+            Ok(Columns::read(path.clone())?)
+        };
+        // Bodies of mass 4 that move with an energy of 2 have a momentum of up to 4.
+        let report = json!({ "mass": 4.0 });
+        let momentum = |history: &Columns| momentum(history, Some(&report)).map(|panel| panel.is_some());
+        let (round_off, real) = (table(-1e-15, 3e-16)?, table(1e-9, 1e-9)?);
+        assert_eq!((momentum(&round_off)?, momentum(&real)?), (false, true));
+        // The balance is told in words.
+        assert_eq!((energies(&round_off, true)?.len(), energies(&real, true)?.len()), (1, 2));
+        assert!(energies(&round_off, true)?[0].caption.ends_with("at most 3e-16"));
+        Ok(())
+    }
 }

@@ -1,14 +1,29 @@
 //! Colours that remain distinct to colour-blind readers.
 
-use plotters::style::RGBColor;
+use std::fmt::{Display, Formatter, Result};
+
+/// Red, green and blue; written as SVG does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Color(u8, u8, u8);
+
+impl Display for Color {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
 
 // Okabe and Ito, "Color Universal Design", 2008.
-pub(super) const BLACK: RGBColor = RGBColor(0, 0, 0);
-pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
-pub(super) const SKY: RGBColor = RGBColor(86, 180, 233);
-pub(super) const VERMILLION: RGBColor = RGBColor(213, 94, 0);
-pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
-pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
+pub(super) const BLACK: Color = Color(0, 0, 0);
+pub(super) const BLUE: Color = Color(0, 114, 178);
+pub(super) const SKY: Color = Color(86, 180, 233);
+pub(super) const VERMILLION: Color = Color(213, 94, 0);
+pub(super) const GREEN: Color = Color(0, 158, 115);
+pub(super) const PURPLE: Color = Color(204, 121, 167);
+
+/// Frames and what is beside them; lines of a grid.
+pub(super) const GREY: Color = Color(70, 70, 70);
+/// See [`GREY`].
+pub(super) const LIGHT: Color = Color(222, 222, 222);
 
 /// Viridis (Smith, van der Walt; CC0), every eighth of its range.
 pub(super) const VIRIDIS: [[f64; 3]; 9] = [
@@ -23,12 +38,12 @@ pub(super) const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// The colour of `x` in [0, 1]; what lies outside gets the colour of the end, NaN that of 0.
-pub(super) fn viridis(x: f64) -> RGBColor {
+/// The colour of `x` in [0, 1]; a value outside gets the colour of the end, NaN that of 0.
+pub(super) fn viridis(x: f64) -> Color {
     let last = VIRIDIS.len() - 1;
     let place = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) * last as f64 };
     let piece = (place as usize).min(last - 1);
     let weight = place - piece as f64;
     let mix = |k: usize| (VIRIDIS[piece][k] * (1.0 - weight) + VIRIDIS[piece + 1][k] * weight).round() as u8;
-    RGBColor(mix(0), mix(1), mix(2))
+    Color(mix(0), mix(1), mix(2))
 }

@@ -1,217 +1,366 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
-use super::chart::{LABEL, TITLE, range, rounded, tick};
-use super::palette::{BLUE, viridis};
-use super::{PlotError, draw_error};
-use crate::output::vtu::{Array, Snapshot, Values};
-use plotters::prelude::*;
+use super::axes::{Axes, BELOW, LABEL, Ticks, range};
+use super::chart::Heading;
+use super::colouring::Colouring;
+use super::neighbours::Neighbours;
+use super::palette::{BLACK, BLUE, Color, GREY, LIGHT, viridis};
+use super::svg::{Anchor, Point, Svg, width};
+use super::view::{Directions, dot};
+use crate::output::vtu::Snapshot;
 
-/// The longer side of the drawing of the box, and the least the shorter one may have.
-const SIDE: (f64, f64) = (760.0, 160.0);
-
-/// Width of the labels at the left, height of those below and of the title, width of the colour bar.
-const MARGINS: (u32, u32, u32, u32) = (76, 52, 40, 150);
+/// The largest width and height of the drawing, and the least of both.
+const MOST: (f64, f64, f64) = (760.0, 620.0, 160.0);
 
 /// Grid lines beyond so many along an axis would be a grey area.
-const MAX_LINES: u32 = 200;
+const MAX_LINES: f64 = 100.0;
 
-/// More particles than this are drawn in part, evenly thinned.
-const MAX_DRAWN: usize = 50_000;
+/// More particles than this are drawn in part, evenly thinned; more than the other number as discs, not as cells.
+const MAX_DRAWN: (usize, usize) = (50_000, 20_000);
 
-/// The picture as SVG, with the axes `view` to the right and up; colours span `extremes`, or those there are.
-///
-/// In one dimension the field is drawn over x. The field is the first of the snapshot that is not the body: in one dimension its
-/// first component, otherwise the length of a vector, the Frobenius norm of a tensor.
-pub(super) fn draw(
-    name: &'static str,
-    snapshot: &Snapshot,
-    view: [usize; 2],
-    extremes: Option<(f64, f64)>,
-) -> Result<String, PlotError> {
-    let mut svg = String::new();
-    draw_on(&mut svg, snapshot, view, extremes).map_err(|error| draw_error(name)(&*error))?;
-    Ok(svg)
+/// The radius of a disc over the distance of neighbours: it has the area of a lattice's square.
+const RADIUS: f64 = 0.56;
+
+/// What all pictures of a run have in common.
+pub(super) struct Scene {
+    /// From where it is seen.
+    pub directions: Directions,
+    /// Lower and upper corner of the box around all particles at all times.
+    pub bounds: [[f64; 3]; 2],
+    /// What the colours span.
+    pub span: (f64, f64),
+    /// The run.
+    pub run: String,
 }
 
-/// The least and the largest value of the field that is drawn; those of none are ∞ and −∞.
-pub(super) fn extremes(snapshot: &Snapshot) -> (f64, f64) {
-    let values = colouring(snapshot).map(|(_, values)| values).unwrap_or_default();
-    let finite = values.into_iter().filter(|x| x.is_finite());
-    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-}
-
-/// The name of a field, and one number a particle.
-fn colouring(snapshot: &Snapshot) -> Option<(String, Vec<f64>)> {
-    fn float(array: &Array) -> Option<(String, &[String], Vec<f64>)> {
-        match &array.values {
-            Values::Float(values) => Some((array.name.replace('_', " "), &array.components, values.clone())),
-            Values::Index(_) => None,
-        }
-    }
-    let (name, components, values) = snapshot.arrays.iter().find_map(float)?;
-    let (width, component) = (components.len(), components.first()?);
-    // The off-diagonal components of a symmetric tensor count twice.
-    let weight = |k: usize| if width == 6 && k >= 3 { 2.0 } else { 1.0 };
-    let size = |tuple: &[f64]| tuple.iter().enumerate().map(|(k, x)| weight(k) * x * x).sum::<f64>().sqrt();
-    match width {
-        1 => Some((name, values)),
-        _ if snapshot.background.dimension == 1 => Some((
-            format!("{name} {component}"),
-            values.chunks(width).filter_map(|tuple| tuple.first().copied()).collect(),
-        )),
-        _ => Some((format!("|{name}|"), values.chunks(width).map(size).collect())),
-    }
-}
-
-fn draw_on(
-    svg: &mut String,
-    snapshot: &Snapshot,
-    [right, up]: [usize; 2],
-    span: Option<(f64, f64)>,
-) -> Result<(), Box<dyn std::error::Error>> {
-    let background = &snapshot.background;
-    let colouring = colouring(snapshot);
-    let values = |p: usize| colouring.as_ref().and_then(|(_, values)| values.get(p).copied());
-    let span = span.unwrap_or_else(|| extremes(snapshot));
-    let (low, high) = range([span.0, span.1].into_iter(), 0.0);
-    let label = colouring.as_ref().map_or("", |(name, _)| name);
-
-    // In one dimension the field itself goes up.
-    let up = (background.dimension > 1).then_some(up);
-    let extent = |axis: usize| {
-        let start = background.origin[axis];
-        (start, start + background.spacing * f64::from(background.cells[axis]))
-    };
-    let (mut x, mut y) = (extent(right), up.map_or_else(|| range([low, high].into_iter(), 0.05), extent));
-    let scale = match up {
-        Some(_) => SIDE.0 / (x.1 - x.0).max(y.1 - y.0),
-        None => SIDE.0 / (x.1 - x.0),
-    };
-    // A slender box gets air on both sides rather than another scale.
-    let widened = |range: (f64, f64)| {
-        let length = (range.1 - range.0) * scale;
-        let air = 0.5 * (SIDE.1 - length).max(0.0) / scale;
-        ((range.0 - air, range.1 + air), length.max(SIDE.1))
-    };
-    let (width, height);
-    (x, width) = widened(x);
-    (y, height) = if up.is_some() { widened(y) } else { (y, SIDE.0 / 2.0) };
-    let (left, below, above, bar) = MARGINS;
-    let size = (left + width as u32 + 20 + bar, above + height as u32 + below + 10);
-
-    let root = SVGBackend::with_string(svg, size).into_drawing_area();
-    root.fill(&WHITE)?;
-    let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
+/// The picture as SVG. In one dimension the field is drawn over x.
+pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colouring>) -> String {
+    let low_high = range([scene.span.0, scene.span.1].into_iter(), 0.0);
+    let label = colouring.map_or("particles", |one| &one.label);
+    let stride = snapshot.points.len().div_ceil(MAX_DRAWN.0).max(1);
     let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
-    let rest = root.titled(&format!("t = {}{part}", rounded(snapshot.time)), TITLE)?;
-    let (main, side) = rest.split_horizontally(left + width as u32 + 20);
+    let first = label.chars().next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    let rest: String = label.chars().skip(1).collect();
+    let what = format!("{first}{rest}, t = {}{part}", super::axes::rounded(snapshot.time));
+    let heading = Heading { what, run: scene.run.clone() };
+    let ids: Vec<usize> = (0..snapshot.points.len()).step_by(stride).collect();
+    if snapshot.background.dimension == 1 {
+        return over_x(snapshot, scene, &heading, &ids, colouring);
+    }
+    let (mut x, mut y) = scene.window(snapshot);
+    let scale = (MOST.0 / (x.1 - x.0)).min(MOST.1 / (y.1 - y.0));
+    let size = (widened(&mut x, scale), widened(&mut y, scale));
+    let flat = scene.directions.plane();
+    let ticks = [Ticks::new(x, (size.0 / 80.0) as usize, false), Ticks::new(y, (size.1 / 60.0) as usize, false)];
+    let left = if flat.is_some() { Axes::left(&ticks[1]) } else { 50.0 };
+    let bar = Ticks::new(low_high, (size.1 / 60.0) as usize, false);
+    let beside = if colouring.is_some() { 24.0 + 16.0 + 10.0 + bar.width() + 2.0 * LABEL + 8.0 } else { 20.0 };
+    let wide = left + size.0 + beside;
+    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + BELOW.0 + BELOW.1 + 8.0);
+    heading.draw(&mut svg, wide);
+    let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
+    match flat {
+        Some([right, up]) => {
+            grid(&mut svg, snapshot, &axes, [right, up], scale);
+            let names = ["x", "y", "z"];
+            axes.draw(&mut svg, [&ticks[0], &ticks[1]], [names[right], names[up]], false);
+        }
+        None => edges(&mut svg, scene, &axes),
+    }
+    let color = |p: usize| {
+        let value = colouring.and_then(|one| one.values.get(p).copied());
+        value.map_or(BLUE, |value| viridis((value - low_high.0) / (low_high.1 - low_high.0)))
+    };
+    bodies(&mut svg, snapshot, scene, &axes, &ids, &color);
+    if colouring.is_some() {
+        colour_bar(&mut svg, &axes, low_high, &bar, label);
+    }
+    svg.finish()
+}
 
-    let mut chart = ChartBuilder::on(&main)
-        .margin_right(20)
-        .margin_top(10)
-        .margin_left(6)
-        .x_label_area_size(below)
-        .y_label_area_size(left - 6)
-        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-    // Over the background grid, lines at the labels would only confuse.
-    let grey = BLACK.mix(0.15);
-    let mesh = if up.is_some() { TRANSPARENT } else { grey };
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(mesh)
-        .x_desc(["x", "y", "z"][right])
-        .y_desc(up.map_or(label, |axis| ["x", "y", "z"][axis]))
-        .label_style(LABEL)
-        .axis_desc_style(LABEL)
-        .x_label_formatter(&|at| tick(*at, x))
-        .y_label_formatter(&|at| tick(*at, y))
-        .draw()?;
-    if let Some(up) = up {
-        let (wide, tall) = (extent(right), extent(up));
-        let node = |axis: usize, k: u32| background.origin[axis] + background.spacing * f64::from(k);
-        if background.cells[right] <= MAX_LINES && background.cells[up] <= MAX_LINES {
-            let upright = (0..=background.cells[right]).map(|k| [(node(right, k), tall.0), (node(right, k), tall.1)]);
-            let level = (0..=background.cells[up]).map(|k| [(wide.0, node(up, k)), (wide.1, node(up, k))]);
-            chart.draw_series(upright.chain(level).map(|line| PathElement::new(line, grey)))?;
+/// Makes a range at least so wide that it fills the least size of a drawing; its length in the picture.
+fn widened(range: &mut (f64, f64), scale: f64) -> f64 {
+    let length = (range.1 - range.0) * scale;
+    let air = 0.5 * (MOST.2 - length).max(0.0) / scale;
+    *range = (range.0 - air, range.1 + air);
+    length.max(MOST.2)
+}
+
+impl Scene {
+    /// Corners of the box.
+    fn corner(&self, number: usize) -> [f64; 3] {
+        std::array::from_fn(|k| self.bounds[number >> k & 1][k])
+    }
+
+    /// What the picture spans to the right and up: the box and a cell around it, but in a plane nothing beyond the grid.
+    fn window(&self, snapshot: &Snapshot) -> ((f64, f64), (f64, f64)) {
+        let grid = &snapshot.background;
+        let corners = (0..8).map(|number| self.directions.project(&self.corner(number)));
+        let (mut x, mut y) = ((f64::INFINITY, f64::NEG_INFINITY), (f64::INFINITY, f64::NEG_INFINITY));
+        for (right, up) in corners {
+            x = (x.0.min(right), x.1.max(right));
+            y = (y.0.min(up), y.1.max(up));
+        }
+        let plane = self.directions.plane();
+        // Discs at a wall reach beyond it.
+        let beyond = if grid.dimension == 3 { 0.5 * grid.spacing } else { 0.0 };
+        let wider = |(low, high): (f64, f64), place: usize| {
+            let around = (low - grid.spacing, high + grid.spacing);
+            let Some(axis) = plane.map(|plane| plane[place]) else { return around };
+            let start = grid.origin[axis] - beyond;
+            let end = grid.origin[axis] + grid.spacing * f64::from(grid.cells[axis]) + beyond;
+            (around.0.max(start).min(low), around.1.min(end).max(high))
+        };
+        (wider(x, 0), wider(y, 1))
+    }
+}
+
+/// The lines of the grid, as long as they are no grey area.
+fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scale: f64) {
+    let (spacing, origin) = (snapshot.background.spacing, snapshot.background.origin);
+    if axes.size.0.max(axes.size.1) / (spacing * scale) > MAX_LINES {
+        return;
+    }
+    let inside = |(low, high): (f64, f64), axis: usize| {
+        let cell = move |x: f64| (x - origin[axis]) / spacing;
+        let (first, last) = ((cell(low) - 1e-9).ceil().max(0.0), (cell(high) + 1e-9).floor());
+        let last = last.min(f64::from(snapshot.background.cells[axis]));
+        (first as i64..=last as i64).map(move |k| origin[axis] + spacing * k as f64)
+    };
+    for x in inside(axes.x, plane[0]) {
+        svg.line([axes.place((x, axes.y.0)), axes.place((x, axes.y.1))], LIGHT, 0.8);
+    }
+    for y in inside(axes.y, plane[1]) {
+        svg.line([axes.place((axes.x.0, y)), axes.place((axes.x.1, y))], LIGHT, 0.8);
+    }
+}
+
+/// The edges of the box behind the particles, and the coordinates along one edge of each axis, at the outline.
+fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
+    let place = |number: usize| axes.place(scene.directions.project(&scene.corner(number)));
+    let nearest = (0..8).max_by(|&a, &b| {
+        let depth = |number: usize| dot(&scene.directions.toward, &scene.corner(number));
+        depth(a).total_cmp(&depth(b))
+    });
+    let (mut names, mut numbers) = (Vec::new(), Vec::new());
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let starts = || (0..8).filter(|number| number >> axis & 1 == 0);
+        let end = |start: usize| start | 1 << axis;
+        for start in starts().filter(|&start| Some(start) != nearest && Some(end(start)) != nearest) {
+            svg.line([place(start), place(end(start))], LIGHT, 1.0);
+        }
+        // The lowest of the edges that run level, the one at the left of those that run up.
+        let run = |start: usize| (place(end(start)).0 - place(start).0, place(end(start)).1 - place(start).1);
+        let left = run(0).1.abs() > run(0).0.abs();
+        let outward = |start: &usize| {
+            let (a, b) = (place(*start), place(end(*start)));
+            if left { -(a.0 + b.0) } else { a.1 + b.1 }
+        };
+        let Some(start) = starts().max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
+        let (from, to) = (place(start), place(end(start)));
+        svg.line([from, to], GREY, 1.0);
+        let ends = (scene.bounds[0][axis], scene.bounds[1][axis]);
+        let length = (to.0 - from.0).hypot(to.1 - from.1);
+        let ticks = Ticks::new(ends, ((length / 45.0) as usize).max(2), false);
+        let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
+        let far = if left { ticks.width() + 12.0 } else { 24.0 };
+        names.push(Beside { point: at(0.5), left, far, color: BLACK, text: ticks.name(name) });
+        numbers.extend(ticks.at.iter().map(|&x| {
+            let point = at((x - ends.0) / (ends.1 - ends.0));
+            Beside { point, left, far: 5.0, color: GREY, text: ticks.label(x) }
+        }));
+    }
+    // Where edges meet, a number would cover another: it is left out.
+    let mut drawn: Vec<Beside> = Vec::new();
+    for text in names.into_iter().chain(numbers) {
+        if drawn.iter().all(|other| !text.covers(other)) {
+            text.draw(svg);
+            drawn.push(text);
         }
     }
-    let least = if up.is_some() { 1.5 } else { 3.0 };
-    let radius = (0.22 * background.spacing * scale).clamp(least, 6.0) as i32;
-    // The nearest to the eye last: to the right × up = towards it.
-    let mut order: Vec<usize> = (0..snapshot.points.len()).step_by(stride).collect();
-    if let (Some(up), 3) = (up, background.dimension) {
-        let axis = 3 - right - up;
-        let sign = if up == right + 1 { 1.0 } else { -1.0 };
-        order.sort_by(|&a, &b| f64::total_cmp(&(sign * snapshot.points[a][axis]), &(sign * snapshot.points[b][axis])));
-    }
-    let dots = order.into_iter().filter_map(|p| {
-        let point = &snapshot.points[p];
-        let value = values(p);
-        let color = value.map_or(BLUE, |value| viridis((value - low) / (high - low)));
-        let upright = up.map_or(value, |axis| Some(point[axis]))?;
-        (point[right].is_finite() && upright.is_finite())
-            .then(|| Circle::new((point[right], upright), radius, color.filled()))
-    });
-    chart.draw_series(dots)?;
+}
 
-    if up.is_some() && colouring.is_some() {
-        let mut chart = ChartBuilder::on(&side)
-            .margin_top(10)
-            .margin_bottom(below)
-            .margin_right(24)
-            .right_y_label_area_size(98)
-            .build_cartesian_2d(0.0..1.0, low..high)?;
-        let steps = 128;
-        let at = |k: i32| low + (high - low) * f64::from(k) / f64::from(steps);
-        chart.draw_series((0..steps).map(|k| {
-            let color = viridis((f64::from(k) + 0.5) / f64::from(steps));
-            Rectangle::new([(0.0, at(k)), (1.0, at(k + 1))], color.filled())
-        }))?;
-        chart
-            .configure_mesh()
-            .disable_mesh()
-            .disable_x_axis()
-            .y_desc(label)
-            .label_style(LABEL)
-            .axis_desc_style(LABEL)
-            .y_label_formatter(&|at| tick(*at, (low, high)))
-            .draw()?;
+/// A text below a point, or at its left, so far away.
+struct Beside {
+    point: Point,
+    left: bool,
+    far: f64,
+    color: Color,
+    text: String,
+}
+
+impl Beside {
+    /// Left and right end, upper and lower end; letters and the space between lines.
+    fn extent(&self) -> [f64; 4] {
+        let ((x, y), wide) = (self.point, width(&self.text, LABEL));
+        match self.left {
+            true => [x - self.far - wide, x - self.far, y - 0.8 * LABEL, y + 0.8 * LABEL],
+            false => [x - wide / 2.0, x + wide / 2.0, y + self.far - 4.0, y + self.far + LABEL + 2.0],
+        }
     }
-    root.present()?;
-    Ok(())
+
+    fn covers(&self, other: &Self) -> bool {
+        let ([a, b, c, d], [e, f, g, h]) = (self.extent(), other.extent());
+        a < f + 3.0 && e < b + 3.0 && c < h && g < d
+    }
+
+    fn draw(&self, svg: &mut Svg) {
+        let (x, y) = self.point;
+        match self.left {
+            true => svg.text((x - self.far, y + 0.35 * LABEL), Anchor::End, LABEL, self.color, &self.text),
+            false => svg.text((x, y + self.far + 10.0), Anchor::Middle, LABEL, self.color, &self.text),
+        }
+    }
+}
+
+/// The particles: cells in the plane, discs in space, the nearest to the eye last.
+fn bodies(
+    svg: &mut Svg,
+    snapshot: &Snapshot,
+    scene: &Scene,
+    axes: &Axes,
+    ids: &[usize],
+    color: &dyn Fn(usize) -> Color,
+) {
+    let neighbours = Neighbours::new(snapshot, ids);
+    let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
+    let mut order: Vec<usize> = (0..ids.len()).filter(|&k| finite(&ids[k])).collect();
+    if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_DRAWN.1 {
+        for k in order {
+            let cell = neighbours.cell(ids[k]);
+            svg.polygon(cell.into_iter().map(|[x, y]| axes.place((x, y))), color(ids[k]));
+        }
+        return;
+    }
+    let depth = |k: usize| dot(&scene.directions.toward, &snapshot.points[ids[k]]);
+    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+    let scale = axes.size.0 / (axes.x.1 - axes.x.0);
+    for k in order {
+        let at = axes.place(scene.directions.project(&snapshot.points[ids[k]]));
+        let rim = if snapshot.background.dimension == 3 { GREY } else { color(ids[k]) };
+        svg.disc(at, (RADIUS * neighbours.diameter(ids[k]) * scale).max(0.7), color(ids[k]), rim);
+    }
+}
+
+/// The bar that explains the colours, at the right of the drawing.
+fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks, label: &str) {
+    const STEPS: usize = 128;
+    let (left, top, tall) = (axes.corner.0 + axes.size.0 + 24.0, axes.corner.1, axes.size.1);
+    let height = |part: f64| top + tall * (1.0 - part);
+    for k in 0..STEPS {
+        let (from, to) = (k as f64 / STEPS as f64, (k + 1) as f64 / STEPS as f64);
+        let corners =
+            [(left, height(from)), (left + 16.0, height(from)), (left + 16.0, height(to)), (left, height(to))];
+        svg.polygon(corners, viridis((from + to) / 2.0));
+    }
+    for &at in &ticks.at {
+        let y = height((at - low) / (high - low));
+        svg.line([(left + 16.0, y), (left + 21.0, y)], GREY, 1.0);
+        svg.text((left + 25.0, y + 0.35 * LABEL), Anchor::Start, LABEL, BLACK, &ticks.label(at));
+    }
+    let at = (left + 25.0 + ticks.width() + 20.0, top + tall / 2.0);
+    let name = ticks.name(label);
+    // Of a bar that is shorter than its name, the heading says the name.
+    let name = if width(&name, LABEL) > tall { ticks.name("") } else { name };
+    svg.text(at, Anchor::Upright, LABEL, BLACK, &name);
+}
+
+/// In one dimension: the field over x.
+fn over_x(
+    snapshot: &Snapshot,
+    scene: &Scene,
+    heading: &Heading,
+    ids: &[usize],
+    colouring: Option<&Colouring>,
+) -> String {
+    let (x, _) = scene.window(snapshot);
+    let y = range([scene.span.0, scene.span.1].into_iter(), 0.05);
+    let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
+    let (left, size) = (Axes::left(&ticks[1]), (MOST.0, MOST.0 / 2.0));
+    let wide = left + size.0 + 24.0;
+    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + BELOW.0 + BELOW.1 + 8.0);
+    heading.draw(&mut svg, wide);
+    let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
+    let label = colouring.map_or("", |one| &one.label);
+    axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
+    for &p in ids {
+        let value = colouring.and_then(|one| one.values.get(p).copied()).unwrap_or(0.0);
+        let at = (snapshot.points[p][0], value);
+        if at.0.is_finite() && at.1.is_finite() {
+            svg.disc(axes.place(at), 2.5, BLUE, BLUE);
+        }
+    }
+    svg.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::vtu::Background;
+    use crate::output::plot::PlotError;
+    use crate::output::plot::png::texts;
+    use crate::output::plot::view::View;
+    use crate::output::vtu::{Array, Background, Values};
 
-    /// Two particles in a box of 2 cells along each axis, with a scalar.
-    fn snapshot(dimension: u32, values: [f64; 2]) -> Snapshot {
-        let array =
-            Array { name: "von_mises".into(), components: vec!["".into()], values: Values::Float(values.into()) };
-        let background = Background { dimension, origin: [0.0; 3], spacing: 1.0, cells: [2; 3] };
-        Snapshot { time: 0.0, background, points: vec![[0.5, 0.5, 0.25], [1.5, 0.5, 1.75]], arrays: vec![array] }
+    /// A lattice of particles in a grid of 4 cells along each axis, from a coordinate on, with a stress that grows with their number.
+    fn lattice(dimension: u32, from: f64) -> Snapshot {
+        let count = 4_usize.pow(dimension);
+        let place = |p: usize| {
+            let axis = |k: u32| if k < dimension { from + 0.75 + 0.5 * (p / 4_usize.pow(k) % 4) as f64 } else { 0.0 };
+            [axis(0), axis(1), axis(2)]
+        };
+        let values = Values::Float((0..count).map(|p| 1e7 * p as f64).collect());
+        let array = Array { name: "von_mises".into(), components: vec!["".into()], values };
+        let background = Background { dimension, origin: [from; 3], spacing: 1.0, cells: [4; 3] };
+        Snapshot { time: 0.1 + 0.2, background, points: (0..count).map(place).collect(), arrays: vec![array] }
+    }
+
+    fn picture(snapshot: &Snapshot, view: Option<View>) -> Result<String, PlotError> {
+        let colouring = Colouring::chosen(snapshot, None)?;
+        let end = |start: f64, pick: fn(f64, f64) -> f64| -> [f64; 3] {
+            std::array::from_fn(|axis| snapshot.points.iter().map(|x| x[axis]).fold(start, pick))
+        };
+        let scene = Scene {
+            directions: Directions::new(view, snapshot.background.dimension, [0, 1]),
+            bounds: [end(f64::INFINITY, f64::min), end(f64::NEG_INFINITY, f64::max)],
+            span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
+            run: "A scene with a title".into(),
+        };
+        Ok(draw(snapshot, &scene, colouring.as_ref()))
+    }
+
+    #[test]
+    fn no_text_of_a_picture_is_cut_or_covers_another() -> Result<(), PlotError> {
+        let views = ["xy", "zy", "30,20", "-60,35", "xz,120,-40"].map(|view| view.parse().ok());
+        for (dimension, view, from) in [(1, None, 0.0), (2, None, -1e4), (3, None, 0.0)]
+            .into_iter()
+            .chain(views.into_iter().map(|view| (3, view, 100.0)))
+        {
+            let svg = picture(&lattice(dimension, from), view)?;
+            let (size, texts) = texts(&svg)?;
+            assert!(texts.len() > 8 && texts.iter().any(|(text, _)| text == "Von Mises stress, t = 0.3"), "{texts:?}");
+            for (k, (text, one)) in texts.iter().enumerate() {
+                let inside = one.left >= 0.0 && one.top >= 0.0 && one.right <= size.0 && one.bottom <= size.1;
+                assert!(inside, "{dimension}, {view:?}: {text}: {one:?} in {size:?}");
+                let covered = texts[..k].iter().find(|(_, other)| one.covers(other));
+                assert!(covered.is_none(), "{dimension}, {view:?}: {text} covers {covered:?}");
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_body_in_the_plane_is_filled_with_cells_and_one_in_space_with_discs() -> Result<(), PlotError> {
+        let count = |svg: &str, kind: &str| svg.matches(kind).count();
+        let (plane, space) = (picture(&lattice(2, 0.0), None)?, picture(&lattice(3, 0.0), None)?);
+        // And the pieces of the colour bar.
+        assert_eq!((count(&plane, "<polygon"), count(&plane, "<circle")), (16 + 128, 0));
+        assert_eq!((count(&space, "<polygon"), count(&space, "<circle")), (128, 64));
+        Ok(())
     }
 
     #[test]
     fn colours_of_a_movie_are_not_widened_by_a_frame_in_which_nothing_varies() {
-        assert_eq!(extremes(&snapshot(2, [3.0, 3.0])), (3.0, 3.0));
-        assert_eq!(extremes(&snapshot(2, [f64::NAN, 3.0])), (3.0, 3.0));
-    }
-
-    #[test]
-    fn a_body_is_drawn_on_the_plane_of_its_motion() -> Result<(), PlotError> {
-        let drawn = |view| draw("particles", &snapshot(3, [0.0, 1.0]), view, None);
-        // Seen along y, the particles are at other heights; seen along z, at the same.
-        let heights = |svg: &str| {
-            let circles =
-                svg.split("<circle ").skip(1).filter_map(|circle| circle.split("cy=\"").nth(1)?.split('"').next());
-            circles.map(str::to_owned).collect::<Vec<_>>()
-        };
-        let (level, upright) = (heights(&drawn([0, 1])?), heights(&drawn([0, 2])?));
-        assert!(level.len() == 2 && level[0] == level[1] && upright[0] != upright[1], "{level:?} {upright:?}");
-        Ok(())
+        let extremes = |values: &[f64]| Colouring { label: String::new(), values: values.to_vec() }.extremes();
+        assert_eq!((extremes(&[3.0, 3.0]), extremes(&[f64::NAN, 3.0])), ((3.0, 3.0), (3.0, 3.0)));
     }
 }

@@ -33,6 +33,14 @@
       const weight = (k) => (parts.length === 6 && k > 2 ? 2 : 1);
       const size = (frame, p) => Math.sqrt(parts.reduce((sum, c, k) => sum + weight(k) * value(c, frame, p) ** 2, 0));
       choices.push({ label: `|${name}|`, at: size });
+      if (name === "stress") {
+        const mises = (frame, p) => {
+          const [x, y, z, ...shear] = parts.map((c) => value(c, frame, p));
+          const direct = (x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2;
+          return Math.sqrt(direct / 2 + 3 * shear.reduce((sum, s) => sum + s * s, 0));
+        };
+        choices.push({ label: "von Mises stress", at: mises });
+      }
     }
     for (const c of parts) {
       const there = parts.length === 1 || c.start !== null || c.low !== 0;
@@ -150,11 +158,21 @@
   // The system's numbers go to 65535, ours to 65534.
   const spans = (channels) => channels.map((c) => ((c.high - c.low) * 65535) / STEPS);
 
+  // Nothing of the scene is drawn outside: left, top, width and height.
+  const frame = () => flat
+    ? [size.left, 0, size.width - size.bar - size.left, size.height - size.below]
+    : [0, 0, size.width - size.bar, size.height];
+
   function drawParticles() {
     const ratio = $("scene").width / size.width;
     gl.viewport(0, 0, $("scene").width, $("scene").height);
     gl.clearColor(1, 1, 1, 1);
+    gl.disable(gl.SCISSOR_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    // From below, in pixels of the device.
+    const [x, y, wide, tall] = frame();
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(...[x, size.height - y - tall, wide, tall].map((length) => Math.round(length * ratio)));
     const { right, up, toward } = axes();
     set("right", ...right);
     set("up", ...up);
@@ -225,6 +243,10 @@
       pen.stroke();
     };
     const end = run.origin.map((x, k) => x + run.cell * run.cells[k]);
+    pen.save();
+    pen.beginPath();
+    pen.rect(...frame());
+    pen.clip();
     if (!flat) {
       pen.strokeStyle = "rgba(0,0,0,.25)";
       for (let corner = 0; corner < 8; corner++) {
@@ -241,6 +263,7 @@
         pen.textAlign = "center";
         pen.fillText(name, foot[0] + 38 * now.right[k], foot[1] - 38 * now.up[k]);
       });
+      pen.restore();
       return;
     }
     const [edge, floor] = [size.left, size.height - size.below];
@@ -248,10 +271,6 @@
       ? centre[0] - view.pan[0] + (px - (size.left + size.width - size.bar) / 2) / view.zoom
       : centre[1] - view.pan[1] - (px - (size.height - size.below) / 2) / view.zoom);
     const [x0, x1, y0, y1] = [world(edge, 0), world(size.width - size.bar, 0), world(floor, 1), world(0, 1)];
-    pen.save();
-    pen.beginPath();
-    pen.rect(edge, 0, size.width - size.bar - edge, floor);
-    pen.clip();
     if (!lift) {
       // The grid, as long as its lines are not a grey area.
       pen.strokeStyle = "rgba(0,0,0,.10)";
@@ -379,8 +398,10 @@
   }
 
   choices.forEach((choice, k) => $("field").add(new Option(choice.label, k)));
-  // The first field that was written and is more than where the particles went.
-  state.choice = Math.max(0, choices.findIndex((choice) => !choice.label.includes("displacement")));
+  // A field worth a look, or the first that was written and is more than where the particles went.
+  const worth = ["plastic strain", "von Mises stress"].map((label) => choices.findIndex((choice) => choice.label === label));
+  const other = choices.findIndex((choice) => !choice.label.includes("displacement"));
+  state.choice = (run.dimension > 1 ? worth.find((k) => k >= 0) : undefined) ?? Math.max(0, other);
   $("field").value = state.choice;
   $("field").onchange = () => { state.choice = Number($("field").value); colour(); };
   $("now").onchange = colour;

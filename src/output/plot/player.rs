@@ -1,13 +1,14 @@
 //! The snapshots of a run for `player.js`, which shows them on the page: one block of 16-bit numbers, and where what begins in it.
 
 use super::PlotError;
+use super::colouring::words;
+use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
 use super::series::damaged;
 use crate::output::vtu::{Array, Background, Snapshot, Values};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
-use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 /// The most numbers on a page: 20 MB, and 27 MB as base64.
@@ -68,6 +69,8 @@ pub(super) struct Recording {
     particles: usize,
     /// Particles shown.
     shown: usize,
+    /// Lower and upper corner of a box around all particles in these snapshots.
+    bounds: [[f64; 3]; 2],
     /// Positions in the first snapshot, the distances of neighbours there, displacements since, then what was written.
     channels: Vec<Channel>,
 }
@@ -89,6 +92,7 @@ impl Recording {
             snapshots: files.len(),
             particles,
             shown: ids.len(),
+            bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             channels: channels(&first, &ids),
         };
         for k in 0..snapshots {
@@ -101,6 +105,12 @@ impl Recording {
                 return Err(damaged(path, "it has other particles or fields than the first"));
             }
             recording.times.push(snapshot.time);
+            for (axis, x) in
+                snapshot.points.iter().flat_map(|point| point.iter().enumerate()).filter(|(_, x)| x.is_finite())
+            {
+                recording.bounds[0][axis] = recording.bounds[0][axis].min(*x);
+                recording.bounds[1][axis] = recording.bounds[1][axis].max(*x);
+            }
             let (_, moving) = recording.channels.split_at_mut(RESTING);
             let (displacements, written) = moving.split_at_mut(3);
             for (axis, channel) in displacements.iter_mut().enumerate() {
@@ -121,6 +131,13 @@ impl Recording {
     pub(super) fn motion(&self) -> [f64; 3] {
         let largest = |channel: &Channel| channel.values.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
         std::array::from_fn(|axis| self.channels.get(RESTING + axis).map_or(0.0, largest))
+    }
+
+    /// Lower and upper corner of a box around all particles at all times.
+    pub(super) fn bounds(&self) -> [[f64; 3]; 2] {
+        let [low, high] = self.bounds;
+        // There may be no particle with a place.
+        if low[0] <= high[0] { [low, high] } else { [self.background.origin; 2] }
     }
 
     /// For `player.js`, with the axes of the picture.
@@ -175,15 +192,12 @@ fn number(array: &Array, place: usize) -> f64 {
 
 /// The channels of a run that begins with `first`; positions are there, all others empty.
 fn channels(first: &Snapshot, ids: &[usize]) -> Vec<Channel> {
-    let channel = |field: &str, component: &str, values| Channel {
-        field: field.replace('_', " "),
-        component: component.to_owned(),
-        values,
-    };
+    let channel =
+        |field: &str, component: &str, values| Channel { field: words(field), component: component.to_owned(), values };
     let rest = AXES.iter().enumerate().map(|(axis, name)| {
         channel("position at the start", name, ids.iter().map(|&p| first.points[p][axis]).collect())
     });
-    let distances = channel("distance of neighbours", "", distances(first, ids));
+    let distances = channel("distance of neighbours", "", Neighbours::new(first, ids).distances(ids));
     let displacement = AXES.iter().map(|name| channel("displacement", name, Vec::new()));
     let coloured = first.arrays.iter().filter(|array| is_coloured(array));
     let written = coloured.flat_map(|array| array.components.iter().map(|name| channel(&array.name, name, Vec::new())));
@@ -196,35 +210,6 @@ fn sample(count: usize, most: usize) -> Vec<usize> {
     let part = most as f64 / count.max(1) as f64;
     let kept = |id: &usize| f64::from((*id as u32).wrapping_mul(2_654_435_769)) < part * 2_f64.powi(32);
     (0..count).filter(|id| part >= 1.0 || kept(id)).collect()
-}
-
-/// How far the neighbours of each of `ids` are, two along each axis as on a lattice; of those that are few of many, or alone, what is
-/// the mean.
-fn distances(snapshot: &Snapshot, ids: &[usize]) -> Vec<f64> {
-    let Background { dimension, origin, spacing, .. } = snapshot.background;
-    let bin = |x: &[f64; 3], side: f64| [0, 1, 2].map(|k| ((x[k] - origin[k]) / side).floor() as i64);
-    // The side of a particle's part of the cells that hold any.
-    let cells: HashSet<_> = snapshot.points.iter().map(|x| bin(x, spacing)).collect();
-    let part = cells.len() as f64 / ids.len().max(1) as f64;
-    let mean = spacing * part.powf(1.0 / f64::from(dimension));
-    if ids.len() < snapshot.points.len() {
-        return vec![mean; ids.len()];
-    }
-    let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-    ids.iter().for_each(|&p| bins.entry(bin(&snapshot.points[p], 2.0 * mean)).or_default().push(p));
-    let nearest = |&p: &usize| {
-        let x = &snapshot.points[p];
-        let [i, j, k] = bin(x, 2.0 * mean);
-        let around = (-1..=1).flat_map(|c| (-1..=1).flat_map(move |b| (-1..=1).map(move |a| [i + a, j + b, k + c])));
-        let others = around.filter_map(|bin| bins.get(&bin)).flatten().filter(|&&q| q != p);
-        let square = |&q: &usize| (0..3).map(|k| (snapshot.points[q][k] - x[k]).powi(2)).sum::<f64>();
-        let mut squares: Vec<f64> = others.map(square).collect();
-        squares.sort_by(f64::total_cmp);
-        squares.truncate(2 * dimension as usize);
-        let sum: f64 = squares.iter().map(|square| square.sqrt()).sum();
-        if sum > 0.0 { sum / squares.len() as f64 } else { mean }
-    };
-    ids.iter().map(nearest).collect()
 }
 
 /// `x` in steps of (high − low)/65534.
@@ -244,18 +229,6 @@ mod tests {
             assert!((back(quantized(x, low, high)) - x).abs() <= 0.5001 * (high - low) / 65534.0, "{x}");
         }
         assert_eq!([f64::NAN, f64::INFINITY].map(|x| quantized(x, low, high)), [NONE; 2]);
-    }
-
-    #[test]
-    fn neighbours_are_found_at_their_distance() {
-        let background = Background { dimension: 2, origin: [0.0; 3], spacing: 1.0, cells: [9, 9, 0] };
-        let points = vec![[0.2, 0.2, 0.0], [0.8, 0.2, 0.0], [1.1, 0.2, 0.0], [7.5, 7.5, 0.0]];
-        let snapshot = Snapshot { time: 0.0, background, points, arrays: vec![] };
-        let found = distances(&snapshot, &[0, 1, 2, 3]);
-        // 4 points in 3 cells, the last one alone
-        let wanted = [0.75, 0.45, 0.6, 0.75_f64.sqrt()];
-        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
-        assert_eq!(distances(&snapshot, &[0, 2]), [1.5_f64.sqrt(); 2]);
     }
 
     #[test]

@@ -24,11 +24,7 @@ const FAMILY: &str = "DejaVu Sans";
 /// An SVG that cannot be read or drawn.
 pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
     let fail = |reason: String| PlotError::Draw { name, reason };
-    let mut options = usvg::Options::default();
-    let fonts = options.fontdb_mut();
-    fonts.load_font_data(dejavu::sans::regular().to_vec());
-    fonts.set_sans_serif_family(FAMILY);
-    let tree = usvg::Tree::from_str(svg, &options).map_err(|error| fail(error.to_string()))?;
+    let tree = tree(name, svg)?;
     let size = tree.size().to_int_size();
     let pixels = |length: u32| (length as f32 * SCALE) as u32;
     let (width, height) = (pixels(size.width()), pixels(size.height()));
@@ -36,4 +32,48 @@ pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
     pixmap.fill(tiny_skia::Color::WHITE);
     resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixmap.as_mut());
     pixmap.encode_png().map_err(|error| fail(error.to_string()))
+}
+
+fn tree(name: &'static str, svg: &str) -> Result<usvg::Tree, PlotError> {
+    let mut options = usvg::Options::default();
+    let fonts = options.fontdb_mut();
+    fonts.load_font_data(dejavu::sans::regular().to_vec());
+    fonts.set_sans_serif_family(FAMILY);
+    usvg::Tree::from_str(svg, &options).map_err(|error| PlotError::Draw { name, reason: error.to_string() })
+}
+
+/// Where a text is drawn.
+#[cfg(test)]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    pub left: f64,
+    pub top: f64,
+    pub right: f64,
+    pub bottom: f64,
+}
+
+#[cfg(test)]
+impl Extent {
+    /// Whether two texts have a part of the picture in common.
+    pub(super) fn covers(&self, other: &Self) -> bool {
+        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
+    }
+}
+
+/// The size of a picture, and its texts.
+#[cfg(test)]
+pub(super) fn texts(svg: &str) -> Result<((f64, f64), Vec<(String, Extent)>), PlotError> {
+    let tree = tree("texts", svg)?;
+    let text = |node: &usvg::Node| match node {
+        usvg::Node::Text(text) => {
+            let (chunks, extent) = (text.chunks(), text.abs_bounding_box());
+            let [left, top, right, bottom] =
+                [extent.left(), extent.top(), extent.right(), extent.bottom()].map(f64::from);
+            let letters = chunks.iter().map(usvg::TextChunk::text).collect();
+            Some((letters, Extent { left, top, right, bottom }))
+        }
+        _ => None,
+    };
+    let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
+    Ok((size, tree.root().children().iter().filter_map(text).collect()))
 }

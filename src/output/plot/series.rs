@@ -5,14 +5,17 @@ use crate::output::snapshots::SERIES;
 use crate::output::vtu::ReadError;
 use std::path::{Path, PathBuf};
 
-/// The files of the series, in the order of time; none if there is no series.
+/// The files of the series that are there, in the order of time; none if there is no series.
 pub(super) fn files(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let path = directory.join(SERIES);
     match std::fs::read_to_string(&path) {
         Ok(series) => {
             let names = series.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
             let files: Vec<_> = names.map(|name| directory.join(name)).collect();
-            if files.is_empty() { Err(damaged(&path, "the series lists no file")) } else { Ok(files) }
+            if files.is_empty() {
+                return Err(damaged(&path, "the series lists no file"));
+            }
+            Ok(files.into_iter().filter(|file| file.is_file()).collect())
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
         Err(source) => Err(PlotError::Read { path, source }),
@@ -59,7 +62,9 @@ mod tests {
         std::fs::write(folder.path().join(SERIES), "<VTKFile>")?;
         assert!(files(folder.path()).is_err());
         std::fs::write(folder.path().join(SERIES), r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
-        assert_eq!(files(folder.path())?, ["a.vtu", "b.vtu"].map(|name| folder.path().join(name)));
+        assert!(files(folder.path())?.is_empty());
+        std::fs::write(folder.path().join("b.vtu"), "")?;
+        assert_eq!(files(folder.path())?, [folder.path().join("b.vtu")]);
         Ok(())
     }
 }

@@ -66,6 +66,43 @@ fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
 }
 
 #[test]
+fn a_picture_shows_what_is_asked_for() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    assert!(rebound(directory.path(), &["--until", "2", "--quiet"])?.status.success());
+    let plot = |arguments: &[&str]| program().arg("plot").arg(directory.path()).args(arguments).output();
+    let output = plot(&["--field", "stress_xx", "--time", "0.7", "--format", "svg"])?;
+    assert!(output.status.success(), "{}", String::from_utf8(output.stderr)?);
+    let drawn = String::from_utf8(output.stdout)?;
+    assert!(drawn.contains("particles.svg") && !drawn.contains(".png"), "{drawn}");
+    let picture = || std::fs::read_to_string(directory.path().join("particles.svg"));
+    // Snapshots are 0.5 apart.
+    assert!(picture()?.contains(">Stress xx, t = 0.5<"), "{}", picture()?);
+    assert!(plot(&[])?.status.success());
+    assert!(picture()?.contains(">Von Mises stress, t = 2<"));
+    let output = plot(&["--field", "stress_xq"])?;
+    let text = String::from_utf8(output.stderr)?;
+    assert!(output.status.code() == Some(2) && text.contains("\"stress_xq\"") && text.contains("stress_xy"), "{text}");
+    assert_eq!(plot(&["--view", "xx"])?.status.code(), Some(2));
+    Ok(())
+}
+
+#[test]
+fn seconds_of_set_up_are_told_apart() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    // 45,000 particles are made, and no step is taken.
+    let output = rebound(directory.path(), &["--steps", "0", "--set", "grid.spacing=0.025"])?;
+    let summary = String::from_utf8(output.stdout)?;
+    assert!(summary.contains("seconds   set up "), "{summary}");
+    let report = report(directory.path())?;
+    let seconds = report["seconds"].as_object().ok_or("no seconds")?;
+    let of = |name: &str| seconds[name].as_f64().unwrap_or(f64::NAN);
+    let sum: f64 = seconds.keys().filter(|name| *name != "total").map(|name| of(name)).sum();
+    assert!(of("set_up") > 0.0 && (sum / of("total") - 1.0).abs() < 1e-9, "{seconds:?}");
+    assert_eq!([of("shape_functions"), of("projection"), of("newton"), of("update")], [0.0; 4]);
+    Ok(())
+}
+
+#[test]
 fn a_failed_run_reports_every_attempt_and_its_work() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
     // One iteration never suffices, and the step is halved twice.

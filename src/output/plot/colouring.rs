@@ -1,0 +1,156 @@
+//! The field that colours particles: by its name, or one worth a look.
+
+use super::PlotError;
+use crate::output::vtu::{Array, Snapshot, Values};
+
+/// One number a particle.
+#[derive(Clone, Debug)]
+pub(super) struct Colouring {
+    /// The name of the field, for people.
+    pub label: String,
+    /// Its values.
+    pub values: Vec<f64>,
+}
+
+impl Colouring {
+    /// Least and largest finite value; of none ∞ and −∞.
+    pub(super) fn extremes(&self) -> (f64, f64) {
+        let finite = self.values.iter().filter(|x| x.is_finite());
+        finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
+    }
+
+    /// The field called `field`: one of a snapshot, a component of it such as `stress_xx`, or von Mises' equivalent where there is a
+    /// stress. Of a vector the length, of a tensor the Frobenius norm. `None` if the snapshot holds none of that name.
+    pub(super) fn of(snapshot: &Snapshot, field: &str) -> Option<Self> {
+        let array = |name: &str| snapshot.arrays.iter().find(|array| array.name == name);
+        let label = words(field);
+        if let Some(array) = array(field) {
+            let label = if array.components.len() > 1 { format!("|{label}|") } else { label };
+            return Some(Self { label, values: tuples(array, size) });
+        }
+        if field == "von_mises" {
+            let values = match (array("stress"), array("principal_stress")) {
+                (Some(stress), _) => tuples(stress, von_mises),
+                (None, Some(principal)) => tuples(principal, von_mises),
+                _ => return None,
+            };
+            return Some(Self { label, values });
+        }
+        let (name, component) = field.rsplit_once('_')?;
+        let array = array(name)?;
+        let place = array.components.iter().position(|one| one == component)?;
+        Some(Self { label, values: tuples(array, |tuple| tuple[place]) })
+    }
+
+    /// The field asked for; or without one the plastic strain, von Mises' stress, or else the first that was written. In one
+    /// dimension, where the field goes up, it is the first component of the first field.
+    ///
+    /// # Errors
+    /// The snapshot holds no such field.
+    pub(super) fn chosen(snapshot: &Snapshot, asked: Option<&str>) -> Result<Option<Self>, PlotError> {
+        if let Some(field) = asked {
+            let unknown = || PlotError::Field { field: field.to_owned(), there: names(snapshot).join(", ") };
+            return Self::of(snapshot, field).map(Some).ok_or_else(unknown);
+        }
+        let floats = || snapshot.arrays.iter().filter(|array| matches!(array.values, Values::Float(_)));
+        if snapshot.background.dimension == 1 {
+            return Ok(floats().find_map(|array| Self::of(snapshot, &component(array, 0))));
+        }
+        let worth = ["plastic_strain", "von_mises"].iter().find_map(|field| Self::of(snapshot, field));
+        Ok(worth.or_else(|| floats().find_map(|array| Self::of(snapshot, &array.name))))
+    }
+}
+
+/// All names that [`Colouring::of`] knows.
+fn names(snapshot: &Snapshot) -> Vec<String> {
+    let of_array = |array: &Array| {
+        let components = (0..array.components.len()).map(|k| component(array, k)).collect::<Vec<_>>();
+        if components.len() > 1 { [vec![array.name.clone()], components].concat() } else { components }
+    };
+    let mut names: Vec<String> = snapshot.arrays.iter().flat_map(of_array).collect();
+    if Colouring::of(snapshot, "von_mises").is_some() && !names.iter().any(|name| name == "von_mises") {
+        names.push("von_mises".to_owned());
+    }
+    names
+}
+
+/// The name of a component of a field.
+fn component(array: &Array, place: usize) -> String {
+    match array.components.get(place).filter(|component| !component.is_empty()) {
+        Some(component) => format!("{}_{component}", array.name),
+        None => array.name.clone(),
+    }
+}
+
+/// A name as people write it.
+pub(super) fn words(name: &str) -> String {
+    if name == "von_mises" { "von Mises stress".to_owned() } else { name.replace('_', " ") }
+}
+
+/// A number of each particle's tuple.
+fn tuples(array: &Array, of: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    let width = array.components.len().max(1);
+    match &array.values {
+        Values::Float(values) => values.chunks_exact(width).map(of).collect(),
+        Values::Index(values) => values.iter().map(|&x| f64::from(x)).collect(),
+    }
+}
+
+/// The length of a vector, the Frobenius norm of a tensor; a number is itself.
+fn size(tuple: &[f64]) -> f64 {
+    if let [x] = tuple {
+        return *x;
+    }
+    // The off-diagonal components of a symmetric tensor count twice.
+    let weight = |k: usize| if tuple.len() == 6 && k >= 3 { 2.0 } else { 1.0 };
+    tuple.iter().enumerate().map(|(k, x)| weight(k) * x * x).sum::<f64>().sqrt()
+}
+
+/// √(3/2 s:s) of σ = (xx, yy, zz, xy, yz, xz), or of its principal values.
+fn von_mises(stress: &[f64]) -> f64 {
+    let mean = stress.iter().take(3).sum::<f64>() / 3.0;
+    let direct: f64 = stress.iter().take(3).map(|x| (x - mean).powi(2)).sum();
+    let shear: f64 = stress.iter().skip(3).map(|x| x * x).sum();
+    (1.5 * (direct + 2.0 * shear)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::vtu::Background;
+
+    fn snapshot(dimension: u32, arrays: &[(&str, &[&str], &[f64])]) -> Snapshot {
+        let array = |(name, components, values): &(&str, &[&str], &[f64])| Array {
+            name: (*name).to_owned(),
+            components: components.iter().map(|name| (*name).to_owned()).collect(),
+            values: Values::Float(values.to_vec()),
+        };
+        let background = Background { dimension, origin: [0.0; 3], spacing: 1.0, cells: [2; 3] };
+        Snapshot { time: 0.0, background, points: vec![[0.5; 3]], arrays: arrays.iter().map(array).collect() }
+    }
+
+    #[test]
+    fn a_field_worth_colouring_is_found_and_any_can_be_asked_for() -> Result<(), PlotError> {
+        let stress: (&str, &[&str], &[f64]) =
+            ("stress", &["xx", "yy", "zz", "xy", "yz", "xz"], &[5.0, 2.0, 2.0, 4.0, 0.0, 0.0]);
+        let displacement: (&str, &[&str], &[f64]) = ("displacement", &["x", "y", "z"], &[3.0, -4.0, 0.0]);
+        let plane = snapshot(2, &[displacement, stress]);
+        let found = |snapshot: &Snapshot, field| -> Result<_, PlotError> {
+            Ok(Colouring::chosen(snapshot, field)?.map(|one| (one.label, one.values)))
+        };
+        // In shear and tension: √(σ² + 3 τ²).
+        let mises = (9.0_f64 + 48.0).sqrt();
+        assert_eq!(found(&plane, None)?, Some(("von Mises stress".into(), vec![mises])));
+        assert_eq!(found(&plane, Some("stress_xx"))?, Some(("stress xx".into(), vec![5.0])));
+        assert_eq!(found(&plane, Some("displacement"))?, Some(("|displacement|".into(), vec![5.0])));
+        assert_eq!(found(&plane, Some("displacement_y"))?, Some(("displacement y".into(), vec![-4.0])));
+        assert_eq!(found(&snapshot(1, &[displacement, stress]), None)?, Some(("displacement x".into(), vec![3.0])));
+        assert_eq!(found(&snapshot(2, &[]), None)?, None);
+        let error = Colouring::chosen(&plane, Some("stres")).map(drop).unwrap_err().to_string();
+        assert!(
+            error.contains("\"stres\"") && error.contains("displacement_x") && error.contains("von_mises"),
+            "{error}"
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! The particles near a particle: how far they are, and the cell between them.
+
+use crate::output::vtu::{Background, Snapshot};
+use std::collections::{HashMap, HashSet};
+
+/// Corners of the polygon that a cell begins with.
+const CORNERS: usize = 16;
+
+/// Particles by the cubes they lie in.
+pub(super) struct Neighbours<'a> {
+    snapshot: &'a Snapshot,
+    /// Mean distance of neighbours.
+    mean: f64,
+    /// Of a side of twice the mean distance.
+    cubes: HashMap<[i64; 3], Vec<usize>>,
+}
+
+fn cube(snapshot: &Snapshot, x: &[f64; 3], side: f64) -> [i64; 3] {
+    let Background { origin, .. } = snapshot.background;
+    [0, 1, 2].map(|k| ((x[k] - origin[k]) / side).floor() as i64)
+}
+
+impl<'a> Neighbours<'a> {
+    /// Of those particles of a snapshot that are in `ids`.
+    pub(super) fn new(snapshot: &'a Snapshot, ids: &[usize]) -> Self {
+        let Background { dimension, spacing, .. } = snapshot.background;
+        // The side of a particle's part of the cells that hold any.
+        let cells: HashSet<_> = snapshot.points.iter().map(|x| cube(snapshot, x, spacing)).collect();
+        let part = cells.len() as f64 / ids.len().max(1) as f64;
+        let mean = spacing * part.powf(1.0 / f64::from(dimension));
+        let mut cubes: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+        for &p in ids {
+            cubes.entry(cube(snapshot, &snapshot.points[p], 2.0 * mean)).or_default().push(p);
+        }
+        Self { snapshot, mean, cubes }
+    }
+
+    fn around(&self, p: usize) -> impl Iterator<Item = usize> + '_ {
+        let [i, j, k] = cube(self.snapshot, &self.snapshot.points[p], 2.0 * self.mean);
+        let cubes =
+            (-1..=1).flat_map(move |c| (-1..=1).flat_map(move |b| (-1..=1).map(move |a| [i + a, j + b, k + c])));
+        cubes.filter_map(|cube| self.cubes.get(&cube)).flatten().copied().filter(move |&q| q != p)
+    }
+
+    /// How far the neighbours of `p` are, two along each axis as on a lattice; of one that is alone, what is the mean.
+    pub(super) fn distance(&self, p: usize) -> f64 {
+        let points = &self.snapshot.points;
+        let square = |q: usize| (0..3).map(|k| (points[q][k] - points[p][k]).powi(2)).sum::<f64>();
+        let mut squares: Vec<f64> = self.around(p).map(square).collect();
+        squares.sort_by(f64::total_cmp);
+        squares.truncate(2 * self.snapshot.background.dimension as usize);
+        let sum: f64 = squares.iter().map(|square| square.sqrt()).sum();
+        if sum > 0.0 { sum / squares.len() as f64 } else { self.mean }
+    }
+
+    /// The diameter of `p` in space: the distance of neighbours, but not the one that is larger at a surface.
+    pub(super) fn diameter(&self, p: usize) -> f64 {
+        self.distance(p).min(1.1 * self.mean)
+    }
+
+    /// How far neighbours are; where only few of many particles are shown, the mean for all of them.
+    pub(super) fn distances(&self, ids: &[usize]) -> Vec<f64> {
+        let all = ids.len() == self.snapshot.points.len();
+        ids.iter().map(|&p| if all { self.distance(p) } else { self.mean }).collect()
+    }
+
+    /// In the plane, the points that are nearer to `p` than to any other particle: a polygon. At the surface of
+    /// a body, where a neighbour has no counterpart at the other side, the cell ends as far out as it does inwards.
+    pub(super) fn cell(&self, p: usize) -> Vec<[f64; 2]> {
+        let points = &self.snapshot.points;
+        let [x, y, _] = points[p];
+        let distance = self.distance(p);
+        let reach = self.mean.max(distance);
+        let around: Vec<[f64; 2]> = self.around(p).map(|q| [points[q][0] - x, points[q][1] - y]).collect();
+        let length = |v: &[f64; 2]| v[0].hypot(v[1]);
+        // Bisectors: of the neighbours, and of those that are missing where there is none less than 60° off the opposite direction.
+        let mut towards: Vec<[f64; 2]> = around.iter().copied().filter(|v| length(v) < 2.0 * reach).collect();
+        let missing = |v: &[f64; 2]| {
+            let along = |other: &[f64; 2]| other[0] * v[0] + other[1] * v[1];
+            around.iter().all(|other| along(other) <= 0.5 * length(other) * length(v))
+        };
+        let surface: Vec<[f64; 2]> = towards.iter().map(|v| v.map(|x| -x)).filter(missing).collect();
+        // The corners of a lattice's cells are 0.71 of a distance away.
+        let radius = if surface.is_empty() { reach } else { 0.8 * distance };
+        towards.extend(surface);
+        let corner = |k: usize| {
+            let angle = (k as f64 + 0.5) * std::f64::consts::TAU / CORNERS as f64;
+            [x + radius * angle.cos(), y + radius * angle.sin()]
+        };
+        let whole: Vec<[f64; 2]> = (0..CORNERS).map(corner).collect();
+        // > 0 of points that are nearer to the neighbour.
+        let beyond = |[u, v]: [f64; 2]| move |at: &[f64; 2]| (at[0] - x - u / 2.0) * u + (at[1] - y - v / 2.0) * v;
+        towards.into_iter().fold(whole, |polygon, v| cut(&polygon, beyond(v)))
+    }
+}
+
+/// The part of a convex polygon where `beyond`, which is linear, is not positive.
+fn cut(polygon: &[[f64; 2]], beyond: impl Fn(&[f64; 2]) -> f64) -> Vec<[f64; 2]> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (k, from) in polygon.iter().enumerate() {
+        let to = &polygon[(k + 1) % polygon.len()];
+        let (a, b) = (beyond(from), beyond(to));
+        if a <= 0.0 {
+            kept.push(*from);
+        }
+        if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
+            let part = a / (a - b);
+            kept.push([0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis])));
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn snapshot(points: Vec<[f64; 3]>) -> Snapshot {
+        let background = Background { dimension: 2, origin: [0.0; 3], spacing: 1.0, cells: [9, 9, 0] };
+        Snapshot { time: 0.0, background, points, arrays: vec![] }
+    }
+
+    #[test]
+    fn neighbours_are_found_at_their_distance() {
+        let snapshot = snapshot(vec![[0.2, 0.2, 0.0], [0.8, 0.2, 0.0], [1.1, 0.2, 0.0], [7.5, 7.5, 0.0]]);
+        let distances = |ids: &[usize]| Neighbours::new(&snapshot, ids).distances(ids);
+        let found = distances(&[0, 1, 2, 3]);
+        // 4 points in 3 cells, the last one alone
+        let wanted = [0.75, 0.45, 0.6, 0.75_f64.sqrt()];
+        assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert_eq!(distances(&[0, 2]), [1.5_f64.sqrt(); 2]);
+    }
+
+    #[test]
+    fn cells_fill_a_lattice_without_gaps_or_overlap() {
+        let points = (0..36).map(|k| [0.25 + 0.5 * f64::from(k % 6), 0.25 + 0.5 * f64::from(k / 6), 0.0]).collect();
+        let snapshot = snapshot(points);
+        let ids: Vec<usize> = (0..36).collect();
+        let neighbours = Neighbours::new(&snapshot, &ids);
+        let area = |p: usize| {
+            let cell = neighbours.cell(p);
+            let next = cell.iter().cycle().skip(1);
+            cell.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - a[1] * b[0])).sum::<f64>()
+        };
+        // The squares of the lattice, inside, at an edge and in a corner.
+        for p in [14, 3, 0] {
+            assert!((area(p) - 0.25).abs() < 1e-12, "{p}: {}", area(p));
+        }
+    }
+}

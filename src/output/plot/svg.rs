@@ -1,0 +1,118 @@
+//! The few elements of SVG that pictures need, with coordinates to a hundredth of a unit.
+
+use super::palette::Color;
+use skrifa::instance::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider};
+use std::fmt::Write as _;
+
+/// A point of a picture: to the right and down from its upper left corner.
+pub(super) type Point = (f64, f64);
+
+/// Where a text has its point.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+    /// In the middle, and the text runs upwards.
+    Upright,
+}
+
+/// A picture that grows.
+pub(super) struct Svg {
+    size: Point,
+    body: String,
+}
+
+impl Svg {
+    /// A white picture, so wide and so high.
+    pub(super) fn new(width: f64, height: f64) -> Self {
+        Self { size: (width, height), body: String::new() }
+    }
+
+    /// A line through `points`.
+    pub(super) fn line(&mut self, points: impl IntoIterator<Item = Point>, color: Color, width: f64) {
+        let points = listed(points);
+        self.push(format_args!(
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"/>"
+        ));
+    }
+
+    /// A polygon, filled; its rim has the same colour, so that neighbours leave no seam.
+    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: Color) {
+        let points = listed(points);
+        self.push(format_args!(
+            "<polygon points=\"{points}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.5\"/>"
+        ));
+    }
+
+    /// A disc, and its rim.
+    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: Color, rim: Color) {
+        self.push(format_args!(
+            "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{color}\" stroke=\"{rim}\" stroke-width=\"0.4\"/>"
+        ));
+    }
+
+    /// A text of letters `size` high. A point is on its base line.
+    pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: Color, text: &str) {
+        let (place, turned) = match anchor {
+            Anchor::Start => ("start", String::new()),
+            Anchor::Middle => ("middle", String::new()),
+            Anchor::End => ("end", String::new()),
+            Anchor::Upright => ("middle", format!(" transform=\"rotate(-90 {x:.2} {y:.2})\"")),
+        };
+        let text = escaped(text);
+        self.push(format_args!(
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size}\" text-anchor=\"{place}\" fill=\"{color}\"{turned}>{text}</text>"
+        ));
+    }
+
+    fn push(&mut self, element: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.body, "{element}");
+    }
+
+    /// The file.
+    pub(super) fn finish(self) -> String {
+        let ((width, height), body) = (self.size, self.body);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" \
+             font-family=\"DejaVu Sans, Verdana, sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{body}</svg>\n"
+        )
+    }
+}
+
+fn listed(points: impl IntoIterator<Item = Point>) -> String {
+    let mut list = String::new();
+    for (x, y) in points {
+        // Writing to a string cannot fail.
+        let _ = write!(list, "{x:.2},{y:.2} ");
+    }
+    list
+}
+
+/// A text in XML; control characters, which XML does not know, are left out.
+fn escaped(text: &str) -> String {
+    let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// Width of a text of letters `size` high, in the font of the pictures.
+pub(super) fn width(text: &str, size: f64) -> f64 {
+    let Ok(font) = FontRef::new(dejavu::sans::regular()) else { return size * text.chars().count() as f64 };
+    let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
+    let letters = font.charmap();
+    let width = |letter: char| letters.map(letter).and_then(|glyph| metrics.advance_width(glyph));
+    // A letter that the font lacks is at most as wide as it is high.
+    text.chars().map(|letter| width(letter).map_or(size, f64::from)).sum()
+}
+
+/// As much of the beginning of a text as is at most `most` wide.
+pub(super) fn shortened(text: &str, size: f64, most: f64) -> String {
+    if width(text, size) <= most {
+        return text.to_owned();
+    }
+    let mut short: String = text.to_owned();
+    while short.pop().is_some() && width(&short, size) + size > most {}
+    short + "…"
+}

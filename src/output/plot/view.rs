@@ -1,0 +1,111 @@
+//! From where particles are seen.
+
+use std::str::FromStr;
+
+/// A direction of sight. Written `xy`, `30,20` or `xz,30,20`: the plane of the picture, then the angles in degrees by which the eye moves
+/// from the front of this plane to the right and up.
+///
+/// ```
+/// use bfree::output::plot::View;
+///
+/// let view: View = "xz,30,20".parse()?;
+/// assert_eq!(view, View { plane: Some([0, 2]), azimuth: 30.0, elevation: 20.0 });
+/// assert!("xx".parse::<View>().is_err() && "30".parse::<View>().is_err());
+/// # Ok::<(), String>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Axes to the right and up; without them, the plane of the largest motion.
+    pub plane: Option<[usize; 2]>,
+    /// Degrees to the right.
+    pub azimuth: f64,
+    /// Degrees up.
+    pub elevation: f64,
+}
+
+impl FromStr for View {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("{text:?} is no view: give a plane, two angles in degrees, or both, as xy, 30,20 or xz,30,20");
+        let axis = |letter: char| "xyz".find(letter);
+        let parts: Vec<&str> = text.split(',').collect();
+        let angle = |text: &str| text.parse().ok().filter(|angle: &f64| angle.abs() <= 360.0).ok_or_else(wrong);
+        let plane = |text: &str| match text.chars().map(axis).collect::<Vec<_>>()[..] {
+            [Some(right), Some(up)] if right != up => Ok(Some([right, up])),
+            _ => Err(wrong()),
+        };
+        match parts[..] {
+            [one] => Ok(Self { plane: plane(one)?, azimuth: 0.0, elevation: 0.0 }),
+            [a, e] => Ok(Self { plane: None, azimuth: angle(a)?, elevation: angle(e)? }),
+            [p, a, e] => Ok(Self { plane: plane(p)?, azimuth: angle(a)?, elevation: angle(e)? }),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// Unit vectors of a picture: to the right, up, and towards the eye.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directions {
+    pub right: [f64; 3],
+    pub up: [f64; 3],
+    pub toward: [f64; 3],
+}
+
+impl Directions {
+    /// Those of a view of a body in so many dimensions, whose motion is best seen on the plane `moves`. Without a view, the eye in three
+    /// dimensions is in front, to the right and above.
+    pub(super) fn new(view: Option<View>, dimension: u32, moves: [usize; 2]) -> Self {
+        let standard = if dimension == 3 { (30.0, 20.0) } else { (0.0, 0.0) };
+        let view = view.unwrap_or(View { plane: None, azimuth: standard.0, elevation: standard.1 });
+        let [right, up] =
+            view.plane.unwrap_or(moves).map(|axis| std::array::from_fn(|k| f64::from(u8::from(k == axis))));
+        let toward = cross(right, up);
+        let ((sa, ca), (se, ce)) = (view.azimuth.to_radians().sin_cos(), view.elevation.to_radians().sin_cos());
+        let level = sum(ca, toward, sa, right);
+        Self { right: sum(ca, right, -sa, toward), up: sum(ce, up, -se, level), toward: sum(ce, level, se, up) }
+    }
+
+    /// Where a point lies in the picture.
+    pub(super) fn project(&self, x: &[f64; 3]) -> (f64, f64) {
+        (dot(&self.right, x), dot(&self.up, x))
+    }
+
+    /// The names of the axes to the right and up, if the picture lies in a plane of two axes.
+    pub(super) fn plane(&self) -> Option<[usize; 2]> {
+        let axis = |direction: &[f64; 3]| direction.iter().position(|x| (x - 1.0).abs() < 1e-12);
+        Some([axis(&self.right)?, axis(&self.up)?])
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(super) fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn sum(s: f64, a: [f64; 3], t: f64, b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| s * a[k] + t * b[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_eye_moves_to_the_right_and_up() -> Result<(), String> {
+        let of = |text: &str| -> Result<Directions, String> { Ok(Directions::new(Some(text.parse()?), 3, [0, 1])) };
+        assert_eq!((of("zy")?.plane(), of("0,0")?.plane(), of("30,0")?.plane()), (Some([2, 1]), Some([0, 1]), None));
+        // From the right, x comes towards the eye; from above, y does.
+        for (view, towards) in [("90,0", [1.0, 0.0, 0.0]), ("0,90", [0.0, 1.0, 0.0])] {
+            let directions = of(view)?;
+            assert!(dot(&directions.toward, &towards) > 1.0 - 1e-12, "{view}: {directions:?}");
+            let [a, b, c] = [directions.right, directions.up, directions.toward];
+            assert!(dot(&a, &b).abs() + dot(&b, &c).abs() + dot(&c, &a).abs() < 1e-12);
+        }
+        Ok(())
+    }
+}
