@@ -94,6 +94,7 @@ studies!(
     operator,
     patch,
     balance,
+    symmetry,
     digits,
     memory,
     extremes,
