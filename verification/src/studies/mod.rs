@@ -104,6 +104,7 @@ studies!(
     riemann,
     compaction,
     column,
+    loads,
     locking,
     expansion,
     robust,
