@@ -319,6 +319,19 @@ mod tests {
         assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
     }
 
+    /// What failed in whole steps is not tried in one of them again.
+    #[test]
+    fn the_way_to_an_end_between_steps_is_as_short_as_the_coming_step() {
+        let mut clock = Clock::new(1.0, 3);
+        assert!(clock.halve() && clock.halve());
+        clock.advance();
+        // 0.85 is left, in quarters of it.
+        let last = clock.to(1.1).unwrap();
+        assert_eq!((last.step(), last.time()), (0.25 * (1.1 - 0.25), 0.25));
+        // Where less is left than the coming step, all of it.
+        assert_eq!(clock.to(0.4).unwrap().step(), 0.4 - 0.25);
+    }
+
     #[test]
     fn the_limit_on_halvings_holds() {
         let mut clock = Clock::new(1.0, 2);

@@ -1,6 +1,7 @@
 //! Drucker and Prager's criterion: soils, with cohesion, friction, and a dilatancy of their own.
 
 use super::hencky::Radial;
+use super::plastic::round_off;
 use super::{Criterion, Hardening, Lame, LameParameters, Returned};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
@@ -148,7 +149,8 @@ impl Criterion for DruckerPrager {
         // √J₂ = ‖dev τ‖/√2
         let root_j2 = d * lit(SQRT_2 * shear);
         let excess = root_j2 + elastic.p * lit(*eta);
-        if excess.value() <= xi * cohesion.strength(before.value()) {
+        let beyond = excess.value() - xi * cohesion.strength(before.value());
+        if beyond <= round_off(shear + bulk * eta, d.value() + v.value().abs(), before.value()) {
             return Returned::elastic(solid, v, before.value());
         }
         let (gamma, w) = cohesion.solve(excess, shear + bulk * eta * eta_bar, *xi, before);

@@ -56,6 +56,15 @@ impl<T: Real> Returned<T> {
     }
 }
 
+/// Roundings in a trial strain.
+const ROUNDINGS: f64 = 1024.0;
+
+/// Round-off of a stress in units of the modulus, at an elastic strain `d` after the plastic strain `before`: a state that has flowed lies on the
+/// yield surface, and whether it flows on must not depend on its last bits.
+pub(super) fn round_off(modulus: f64, d: f64, before: f64) -> f64 {
+    ROUNDINGS * f64::EPSILON * modulus * (d + before)
+}
+
 /// An elastoplastic solid, isotropic, with the elastic energy W = K/2 (tr ε)² + G dev ε : dev ε in the logarithmic elastic strain ε = ½ ln(F C_p⁻¹ Fᵀ).
 ///
 /// A step freezes C_p⁻¹, takes the trial strain, and flows by the exponential map (Simo, Comput. Methods Appl. Mech. Eng. 99, 1992;

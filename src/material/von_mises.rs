@@ -1,6 +1,7 @@
 //! Von Mises' criterion with isotropic hardening, associated: metals.
 
 use super::hencky::Radial;
+use super::plastic::round_off;
 use super::{Criterion, Hardening, Lame, LameParameters, Returned};
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -56,7 +57,8 @@ impl Criterion for VonMises {
     fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
         let (shear, p_n) = (solid.shear, T::lit(before));
         let trial = d * T::lit(6.0_f64.sqrt() * shear);
-        if trial.value() <= self.yield_stress.strength(before) {
+        let beyond = trial.value() - self.yield_stress.strength(before);
+        if beyond <= round_off(3.0 * shear, d.value(), before) {
             return Returned::elastic(solid, v, before);
         }
         let (delta, compliance) = self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n);

@@ -18,8 +18,9 @@ pub enum Fill {
     /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout boxes have half the
     /// size; but for shapes of triangles, the particles of a cut cell are instead points that integrate products of polynomials of the
     /// shape functions' degree p over what of it lies in the shape: up to (p + 1)^D of linear functions, of cubic ones and of LME (p = 3),
-    /// and as many in each half, quarter or eighth of a cell of quadratic ones; where no such points are found, as above. A surface that is loaded then has two points for each side
-    /// in half a cell, and three in 3D.
+    /// and as many in each half, quarter or eighth of a cell of quadratic ones; where no such points are found, as above. A part that is a box
+    /// itself has Gauss's points, as many as a whole cell. A surface that is loaded then has two points for each side in half a cell, and
+    /// three in 3D.
     #[default]
     Cut,
     /// Those that lie in the shape, each for its whole box.
@@ -151,7 +152,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
     // As its pieces are below: cells beside each other must agree on which of them is whole.
     let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
-    let integrated = |lower: Vector<f64, D>, degree: u32| shape.quadrature(&lower, &size, h, degree);
+    let integrated = |lower: Vector<f64, D>, degree: u32| shape.quadrature(&lower, &size, h, degree, how.per_axis);
     let is_full = |cell: [u64; D]| {
         let lowers = indices([u64::from(how.pieces()); D]).map(|i| {
             let within = |k: usize| i[k] as f64 / f64::from(how.pieces());
@@ -311,18 +312,23 @@ impl<const D: usize> Seeds<D> {
         self.seeds.push(Seed { position: moment / volume, volume });
     }
 
-    /// The seeds with each sliver joined to the nearest other one of its cell or of the cells beside it, volume and first moments kept.
+    /// The seeds with each sliver joined to the nearest other one of its cell or of the cells beside it, volume and first moments kept. Places
+    /// before any is joined decide which is nearest, so that the order of cells does not.
     fn joined(mut self) -> Vec<Seed<D>> {
         let mut gone = vec![false; if self.slivers.is_empty() { 0 } else { self.seeds.len() }];
         self.slivers.iter().for_each(|&(_, sliver)| gone[sliver] = true);
-        for (cell, sliver) in std::mem::take(&mut self.slivers) {
-            let small = self.seeds[sliver];
-            let far = |i: usize| (self.seeds[i].position - small.position).norm_squared();
+        let nearest = |&(cell, sliver): &(u64, usize)| {
+            let far = |i: usize| (self.seeds[i].position - self.seeds[sliver].position).norm_squared();
             let near = self.beside(cell).filter(|&i| !gone[i]).min_by(|&a, &b| far(a).total_cmp(&far(b)));
+            (sliver, near)
+        };
+        let joins: Vec<(usize, Option<usize>)> = self.slivers.iter().map(nearest).collect();
+        for (sliver, near) in joins {
             let Some(near) = near else {
                 gone[sliver] = false;
                 continue;
             };
+            let small = self.seeds[sliver];
             let Seed { position, volume } = &mut self.seeds[near];
             let sum = *volume + small.volume;
             *position = (*position * *volume + small.position * small.volume) / sum;

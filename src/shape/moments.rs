@@ -21,17 +21,20 @@ impl<const D: usize> Piece<D> {
     /// Gauss's points in it.
     fn points(&self, rules: &Rules) -> Vec<Seed<D>> {
         match &self.extent {
-            Extent::Box(edges) => {
-                let along = &rules.of_box;
-                let point = |i: [u64; D]| {
-                    let at = i.map(|i| along[i as usize]);
-                    let position = Vector::from_fn(|k, _| self.centroid[k] + (at[k].0 - 0.5) * edges[k]);
-                    Seed { position, volume: at.iter().fold(self.volume, |volume, (_, weight)| volume * weight) }
-                };
-                indices([along.len() as u64; D]).map(point).collect()
-            }
+            Extent::Box(_) => self.in_box(&rules.of_box),
             Extent::Simplex(simplex) => in_simplex(&simplex[..=D], self.volume, &rules.of_simplex),
         }
+    }
+
+    /// The points of a rule along each axis of the box around it.
+    pub(super) fn in_box(&self, along: &[(f64, f64)]) -> Vec<Seed<D>> {
+        let [low, high] = self.bounds();
+        let point = |i: [u64; D]| {
+            let at = i.map(|i| along[i as usize]);
+            let position = Vector::from_fn(|k, _| self.centroid[k] + (at[k].0 - 0.5) * (high[k] - low[k]));
+            Seed { position, volume: at.iter().fold(self.volume, |volume, (_, weight)| volume * weight) }
+        };
+        indices([along.len() as u64; D]).map(point).collect()
     }
 
     /// Its place for each of a cube: equal volumes have equal volumes.
@@ -55,6 +58,22 @@ impl<const D: usize> Piece<D> {
             }
         }
     }
+}
+
+/// The box around some pieces.
+fn bounds<const D: usize>(pieces: &[Piece<D>]) -> [Vector<f64, D>; 2] {
+    let nothing: [Vector<f64, D>; 2] = [f64::INFINITY, f64::NEG_INFINITY].map(Vector::repeat);
+    let around =
+        |[low, high]: [Vector<f64, D>; 2], [lower, upper]: [Vector<f64, D>; 2]| [low.inf(&lower), high.sup(&upper)];
+    pieces.iter().map(Piece::bounds).fold(nothing, around)
+}
+
+/// The box that these pieces fill, if they do: they do not overlap, so that they fill the box around them if they have its volume.
+pub(super) fn whole_box<const D: usize>(pieces: &[Piece<D>]) -> Option<Piece<D>> {
+    let [low, high] = bounds(pieces);
+    let (edges, volume) = (high - low, pieces.iter().map(|piece| piece.volume).sum::<f64>());
+    let fills = (edges.product() - volume).abs() <= MET * volume;
+    fills.then(|| Piece { volume: edges.product(), centroid: (low + high) * 0.5, extent: Extent::Box(edges) })
 }
 
 /// Gauss's points along an axis of a piece, for products of polynomials of a degree.
@@ -104,11 +123,7 @@ pub(super) struct Legendre<const D: usize> {
 
 impl<const D: usize> Legendre<D> {
     pub(super) fn new(around: &[Piece<D>], degree: u32) -> Self {
-        let nothing: [Vector<f64, D>; 2] = [f64::INFINITY, f64::NEG_INFINITY].map(Vector::repeat);
-        let [low, high] = around
-            .iter()
-            .map(Piece::bounds)
-            .fold(nothing, |[low, high], [lower, upper]| [low.inf(&lower), high.sup(&upper)]);
+        let [low, high] = bounds(around);
         Self { middle: (low + high) * 0.5, half: (high - low) * 0.5, degree }
     }
 
@@ -157,9 +172,6 @@ impl<const D: usize> Legendre<D> {
 /// As many points in the pieces as there are products of polynomials, at most, with volumes > 0 that have the moments of all and of the gaps;
 /// `None` if none are found.
 pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree: u32) -> Option<Vec<Seed<D>>> {
-    if let ([whole @ Piece { extent: Extent::Box(_), .. }], []) = (pieces, gaps) {
-        return Some(whole.points(&Rules::new::<D>(degree)));
-    }
     let legendre = Legendre::new(pieces, degree);
     let moments = legendre.moments(pieces, gaps);
     let volume = moments[0];

@@ -8,7 +8,7 @@
 
 use super::cut::{End, Facet, Piece, around};
 use super::fill::THIN;
-use super::moments::{few, in_simplex};
+use super::moments::{few, in_simplex, whole_box};
 use super::{EDGE, Layout, Seed, Shape};
 use crate::grid::indices;
 use crate::tensor::{Tensor, Vector};
@@ -26,13 +26,15 @@ const IN_GAP: u32 = 3;
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate over what lies in the box every product of polynomials of this degree along each axis; `None`
     /// where the surface is one of triangles, of which only volumes and centroids are known, and where no such points are found. Of a part
-    /// that is thin it is one point.
+    /// that is thin it is one point, and of a part that is a box itself these are Gauss's, `per_axis` along an axis or as many as the degree
+    /// needs.
     pub(super) fn quadrature(
         &self,
         lower: &Vector<f64, D>,
         edges: &Vector<f64, D>,
         spacing: f64,
         degree: u32,
+        per_axis: u32,
     ) -> Option<Vec<Seed<D>>> {
         if !self.has_planes(lower, edges) {
             return None;
@@ -41,7 +43,10 @@ impl<const D: usize> Shape<D> {
         let sum = |volume: f64, piece: &Piece<D>| volume + piece.volume;
         let (flat, gap) = (pieces.iter().fold(0.0, sum), gaps.iter().map(|gap| gap.volume).sum::<f64>());
         if flat + gap >= THIN * edges.product() {
-            return few(&pieces, &gaps, degree);
+            return match whole_box(&pieces).filter(|_| gaps.is_empty()) {
+                Some(part) => Some(part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1)))),
+                None => few(&pieces, &gaps, degree),
+            };
         }
         // It is joined to what is beside it.
         let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();
@@ -196,7 +201,7 @@ mod tests {
         for i in indices([boxes; D]) {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * edges[k]);
             let (all, gaps) = shape.pieces_and_gaps(&lower, &edges, edges[0]);
-            let few = shape.quadrature(&lower, &edges, edges[0], degree).unwrap();
+            let few = shape.quadrature(&lower, &edges, edges[0], degree, 1).unwrap();
             let volume: f64 = few.iter().map(|point| point.volume).sum();
             if volume < THIN * edges.product() {
                 continue;
@@ -236,7 +241,7 @@ mod tests {
         let points = |mirror: [u64; 3]| {
             let seen = |x: &Vector<f64, 3>| Vector::from_fn(|k, _| if mirror[k] > 0 { 1.0 - x[k] } else { x[k] });
             let ball: Shape<3> = Ball { center: seen(&center), radius: 0.9 }.into();
-            let points = ball.quadrature(&Vector::zeros(), &edges, 1.0, 3).unwrap();
+            let points = ball.quadrature(&Vector::zeros(), &edges, 1.0, 3, 1).unwrap();
             points.into_iter().map(|point| (seen(&point.position), point.volume)).collect::<Vec<_>>()
         };
         let first = points([0; 3]);
@@ -262,7 +267,7 @@ mod tests {
     fn sums(shape: &Shape<3>, boxes: u64, f: impl Fn(&Vector<f64, 3>) -> f64) -> f64 {
         let edges = Vector::repeat((boxes as f64).recip());
         let lowers = indices([boxes; 3]).map(|i| Vector::from_fn(|k, _| i[k] as f64 * edges[k]));
-        let points = lowers.flat_map(|lower| shape.quadrature(&lower, &edges, edges[0], 3).unwrap());
+        let points = lowers.flat_map(|lower| shape.quadrature(&lower, &edges, edges[0], 3, 2).unwrap());
         points.map(|point| point.volume * f(&point.position)).sum()
     }
 

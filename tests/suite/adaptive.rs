@@ -93,6 +93,23 @@ fn a_step_that_errs_too_much_is_taken_back_and_the_next_ones_grow_when_they_may(
     Ok(())
 }
 
+/// Up to the turning point errors fall, and a step that is allowed stays so: none that has grown is taken back. A quarter of 0.1 errs 0.58 of this
+/// tolerance at first, so that twice its length errs 4.6 times the tolerance.
+#[test]
+fn a_step_that_errs_more_than_an_eighth_of_the_tolerance_does_not_grow() -> Result<(), Failure> {
+    let tolerance = 1e-9;
+    let mut simulation = bar(0.1)?;
+    simulation.settings.error_tolerance = Some(tolerance);
+    let first = simulation.advance()?;
+    let share = first.error.ok_or("no error")? / tolerance;
+    assert!((0.2..0.9).contains(&share) && first.dt == 0.025, "{share} in {}", first.dt);
+    while simulation.clock.time() < 0.45 {
+        let report = simulation.advance()?;
+        assert!(report.failed.is_empty(), "taken back after {}: {:?}", simulation.clock.time(), report.failed);
+    }
+    Ok(())
+}
+
 /// An impact needs short steps, the flight before it none.
 #[test]
 fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failure> {

@@ -1,7 +1,9 @@
 //! How far apart the surfaces of two bodies are when they begin to feel each other: the table of `docs/src/limits.md`, measured.
 
-use crate::support::Failure;
+use crate::support::{Failure, restored};
 use bfree::scene;
+use bfree::simulation::Simulation;
+use serde_json::json;
 
 /// Two bars of 8 cells, 5 cells apart at the start, run into each other at half a cell in a unit of time each. How far apart they are
 /// when the first hundredth of their kinetic energy is gone, in cells; `place` shifts both along the grid.
@@ -48,5 +50,33 @@ fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
         rows += 1;
     }
     assert_eq!(rows, 6);
+    Ok(())
+}
+
+/// Two blocks, one on the other, without inertia: they are bonded from the start, and a restart does not take them for bodies that have met.
+#[test]
+fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
+    let block = |name: &str, low: f64| {
+        json!({ "name": name, "shape": { "box": { "min": [0.5, low], "max": [1.25, low + 0.5] } }, "density": 1,
+                "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } })
+    };
+    let scene = json!({
+        "grid": { "size": [2, 1.5], "spacing": 0.25 },
+        "approximation": "linear",
+        "time": { "step": 0.25, "end": 1, "inertia": "none" },
+        "bodies": [block("lower", 0.0), block("upper", 0.5)],
+        "boundary": { "bottom": "fixed" },
+        "gravity": { "acceleration": [0, -20], "curve": [[0, 0], [1, 1]] }
+    });
+    let start: Simulation<2> = scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
+    let mut simulation = start.clone();
+    simulation.advance()?;
+    assert_eq!(simulation.joined, [[0, 1]].into());
+    let mut continued = restored(&simulation, &start)?;
+    assert_eq!(continued.joined, simulation.joined);
+    for _ in 0..2 {
+        assert!(!simulation.advance()?.renewed && !continued.advance()?.renewed);
+    }
+    assert_eq!(continued.particles, simulation.particles);
     Ok(())
 }

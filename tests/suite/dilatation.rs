@@ -194,6 +194,23 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
     Ok(())
 }
 
+/// On a grid that is kept and was new when θ was no longer 1: particles may be put elsewhere in memory between two steps.
+#[test]
+fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
+    let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.05}"#])?;
+    let mut renewed = 0;
+    while renewed < 2 || simulation.kept.is_none() {
+        renewed += u32::from(simulation.advance()?.renewed);
+        assert!(simulation.clock.time() < 0.8, "no second grid that is kept");
+    }
+    let mut other = simulation.clone();
+    let order: Vec<u32> = (0..other.particles.len() as u32).rev().collect();
+    other.rearrange(&order);
+    assert!(!simulation.advance()?.renewed && !other.advance()?.renewed);
+    assert_eq!(simulation.particles.by_id(), other.particles.by_id());
+    Ok(())
+}
+
 /// Against nine-node elements with three volumes each, 32 × 32 of them: see the study `locking`, which does it in full.
 #[test]
 fn a_membrane_that_keeps_its_volume_does_not_lock() -> Result<(), Failure> {

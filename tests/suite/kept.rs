@@ -4,6 +4,7 @@ use crate::support::{Failure, scene};
 use bfree::mechanics::kept::Renewal;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
+use serde_json::json;
 use std::num::NonZeroU64;
 
 const BEAM: &str = "elastica.json";
@@ -357,5 +358,33 @@ fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
     }
     // More than two turns.
     assert!(simulation.clock.time() > 4.0 * std::f64::consts::PI);
+    Ok(())
+}
+
+/// One block stands on the floor, another falls on it beside: from then on the floor is a contact, and the grid is renewed, so that the block may
+/// leave again.
+#[test]
+fn a_wall_that_is_met_holds_nobody_from_the_start() -> Result<(), Failure> {
+    let block = |name: &str, min: [f64; 2], speed: f64| {
+        json!({ "name": name, "shape": { "box": { "min": min, "max": [min[0] + 0.5, min[1] + 0.5] } }, "density": 1,
+                "velocity": [0, speed], "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } })
+    };
+    let scene = json!({
+        "grid": { "size": [3, 1.5], "spacing": 0.25, "renewed": "never" },
+        "approximation": "linear",
+        "time": { "step": 0.02, "end": 1 },
+        "bodies": [block("resting", [0.25, 0.0], 0.0), block("falling", [2.0, 0.5], -2.0)],
+        "boundary": { "bottom": "fixed" }
+    });
+    let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
+    assert!(simulation.advance()?.renewed);
+    assert!(simulation.held.contains(&0));
+    let mut met = false;
+    while simulation.clock.time() < 0.4 {
+        let renewed = simulation.advance()?.renewed;
+        assert!(renewed == met, "at {}", simulation.clock.time());
+        met = simulation.kept.is_none();
+    }
+    assert!(met && simulation.held.is_empty(), "{:?}", simulation.held);
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! What the tests of whole runs share.
 
+use bfree::checkpoint::{Checkpoints, Identity, restore};
 use bfree::material::{Lame, Law, Material, NonPositiveJacobian, Start, admissible};
+use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, identity};
@@ -13,6 +15,27 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let overrides = overrides.iter().map(|text| text.parse()).collect::<Result<Vec<scene::Override>, _>>()?;
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
+}
+
+/// What `start` becomes by the checkpoint of a simulation that began as it does.
+pub fn restored<const D: usize>(simulation: &Simulation<D>, start: &Simulation<D>) -> Result<Simulation<D>, Failure> {
+    let folder = tempfile::tempdir()?;
+    let identity = Identity::new(serde_json::Value::Null, &start.particles);
+    let settings = OutputSettings {
+        directory: folder.path().to_owned(),
+        fields: vec![],
+        snapshot_every: None,
+        probes: vec![],
+        end_time: 1.0,
+        audience: Audience::Nobody,
+    };
+    let mut recorder = Recorder::start(settings, start, Reference::of(start))?;
+    let mut checkpoints =
+        Checkpoints::new(folder.path().to_owned(), identity.clone(), serde_json::Value::Null, 1.0, None);
+    checkpoints.write(simulation, &mut recorder)?;
+    let mut continued = start.clone();
+    restore(folder.path(), &identity, &mut continued)?;
+    Ok(continued)
 }
 
 /// The shipped laws whose tangent has a closed form: it is these that vector lanes freeze.

@@ -41,6 +41,8 @@ pub mod shipped;
 pub mod start;
 #[cfg(feature = "studies")]
 pub mod studies;
+#[cfg(feature = "studies")]
+pub mod symmetry;
 pub mod table;
 
 pub use check::{check_approximation, check_material, check_material_from, check_tangent};

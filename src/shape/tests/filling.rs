@@ -256,12 +256,66 @@ fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
         let halves = indices([2 * u64::from(cells); 2]).flat_map(|i| {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * half[k]);
             // Of one of them no points are found.
-            plate.quadrature(&lower, &half, h, 3).unwrap_or_else(|| {
+            plate.quadrature(&lower, &half, h, 3, 2).unwrap_or_else(|| {
                 let (volume, position) = plate.part(&lower, &half, h);
                 vec![Seed { position, volume }]
             })
         });
         let exact: f64 = halves.map(|seed| seed.volume * square(seed.position[0]) * square(seed.position[1])).sum();
         assert!((found / exact - 1.0).abs() < 1e-5, "{cells}: {found} {exact}");
+    }
+}
+
+/// A box off the lines of the grid, whose cut cells are boxes: Gauss's points of each, as many as in a full cell, symmetric, with all moments.
+#[test]
+fn parts_of_cells_that_are_boxes_have_gauss_points() {
+    fn check<const D: usize>() {
+        let (low, high, cells) = (0.03, 0.96, 4_u32);
+        let grid = Grid { origin: Vector::zeros(), spacing: 0.25, cells: [cells; D] };
+        let cube: Shape<D> = Block { min: Vector::repeat(low), max: Vector::repeat(high) }.into();
+        let mirrored: Shape<D> = Block { min: Vector::repeat(1.0 - high), max: Vector::repeat(1.0 - low) }.into();
+        for degree in [1, 3] {
+            let how = Filling { per_axis: 2, layout: Layout::Gauss, degree, ..Filling::default() };
+            let seeds = fill(&grid, &cube, how).unwrap();
+            assert_eq!(seeds.len(), (2 * cells as usize).pow(D as u32), "{D}, {degree}");
+            // ∫ Π x_k^{n_k} dV; two points an axis are exact up to the third power.
+            for powers in indices([4; D]) {
+                let found: f64 = seeds
+                    .iter()
+                    .map(|seed| (0..D).fold(seed.volume, |all, k| all * seed.position[k].powi(powers[k] as i32)))
+                    .sum();
+                let along = |n: u64| (high.powi(n as i32 + 1) - low.powi(n as i32 + 1)) / (n + 1) as f64;
+                let exact: f64 = powers.iter().map(|&n| along(n)).product();
+                assert!((found / exact - 1.0).abs() < 1e-13, "{D}, {degree}, {powers:?}: {found} {exact}");
+            }
+            let images = fill(&grid, &mirrored, how).unwrap();
+            for seed in &seeds {
+                let image = seed.position.map(|x| 1.0 - x);
+                let same = |other: &&Seed<D>| (other.position - image).amax() < 1e-15;
+                let other = images.iter().find(same).unwrap();
+                assert!((other.volume / seed.volume - 1.0).abs() < 1e-13, "{D}, {degree}");
+            }
+        }
+    }
+    check::<1>();
+    check::<2>();
+    check::<3>();
+}
+
+/// Slivers between two larger parts: which one each joins does not depend on the order of cells, so that a mirrored solid has mirrored particles.
+#[test]
+fn mirrored_solids_have_mirrored_particles_where_slivers_join() {
+    let (h, cells) = (0.2, [7, 8]);
+    let grid = Grid { origin: Vector::zeros(), spacing: h, cells };
+    // Found by the study `symmetry`: two slivers beside each other.
+    let (x, y, radius) = (0.925_633_645_731_744_6, 0.8, 0.368_439_178_269_088_41);
+    let how = Filling { per_axis: 2, ..Filling::default() };
+    let seeds = |x: f64| fill(&grid, &ball([x, y], radius), how).unwrap();
+    let (one, other) = (seeds(x), seeds(1.4 - x));
+    assert_eq!(one.len(), other.len());
+    for seed in &one {
+        let image = Vector::from([1.4 - seed.position[0], seed.position[1]]);
+        let apart = other.iter().map(|of| (of.position - image).amax()).fold(f64::INFINITY, f64::min);
+        assert!(apart < 1e-12, "{} at {}", apart, seed.position);
     }
 }

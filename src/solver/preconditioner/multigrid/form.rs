@@ -86,3 +86,21 @@ impl LocalForm {
         of_coarse
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A full cell and a quarter of the next one, in cells twice as large: 0.625 of one, its centroid at (1·0.5 + ¼·1.125)/1.25 of the fine cells.
+    #[test]
+    fn coarse_cells_have_the_centroid_of_what_is_in_them() {
+        let mut fine = LocalForm { grid: [2, 0, 0], ..LocalForm::default() };
+        fine.push_cell([0, 0, 0], 1);
+        fine.push_cell([1, 0, 0], 1);
+        (fine.centres, fine.filled) = (vec![[0.5, 0.0, 0.0], [1.125, 0.0, 0.0]], vec![1.0, 0.25]);
+        let mut coarse = LocalForm::default();
+        assert_eq!(fine.add_cells_to::<1>(&mut coarse), [0, 0]);
+        assert_eq!(coarse.filled, [0.625]);
+        assert!((coarse.centres[0][0] - 0.5 * (0.5 + 0.25 * 1.125) / 1.25).abs() < 1e-15, "{:?}", coarse.centres);
+    }
+}

@@ -46,11 +46,15 @@ const FLOWS: Check = Check::Test("flow::");
 const MEMORY: Check = Check::Study("memory");
 const SOLVER: Check = Check::Unit("solver::");
 const SOLIDS: Check = Check::Unit("shape::");
+const CLOCKS: Check = Check::Unit("clock::");
+const ADAPTS: Check = Check::Test("adaptive::");
+const BONDS: Check = Check::Test("contact::");
 
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS,
+    LAWS, GHOSTS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS, CLOCKS, ADAPTS,
+    BONDS,
 ];
 
 /// What is to become of a patch.
@@ -153,6 +157,9 @@ const MOMENTS: &str = "src/shape/moments.rs";
 const LAYOUT: &str = "src/shape/layout.rs";
 const SURFACE: &str = "src/scene/filling.rs";
 const NOT_A_KNOT: &str = "src/approximation/not_a_knot.rs";
+const STATE: &str = "src/checkpoint/state.rs";
+const CLOCK: &str = "src/clock.rs";
+const LOCAL_FORM: &str = "src/solver/preconditioner/multigrid/form.rs";
 
 use Fate::{Equivalent, Killed};
 
@@ -1004,4 +1011,32 @@ pub(super) const PATCHES: &[Patch] = &[
         "*fitted += slope * x",
         "*fitted += slope * (0.9 * x)",
         Killed(&[TRANSFERS], &[DYNAMICS])),
+    patch("a restart forgets which bodies are bonded", STATE,
+        "of(JOINED).chunks_exact(2)",
+        "of(\"\").chunks_exact(2)",
+        Killed(&[BONDS], &[KEPT])),
+    patch("dilatations of a kept grid stay where particles were", KEPT_GRID,
+        "self.dilatation = order.iter().map(|&from| self.dilatation[from as usize]).collect();",
+        "{}",
+        Killed(&[CELLS], &[KEPT])),
+    patch("the way to an end between steps in one step", CLOCK,
+        "level.unwrap_or(self.max_halvings)",
+        "0",
+        Killed(&[CLOCKS], &[KEPT])),
+    patch("steps that err a tenth too much to double do", STEP,
+        "error <= ROOM * most",
+        "error <= 8.0 * ROOM * most",
+        Killed(&[ADAPTS], &[DYNAMICS])),
+    patch("centroids of coarse cells a tenth off", LOCAL_FORM,
+        "share * 0.5 * self.centres[cell][k]",
+        "share * 0.55 * self.centres[cell][k]",
+        Killed(&[SOLVER], &[KEPT])),
+    patch("a wall that is met holds as if from the start", STEP_KEEP,
+        "held.retain(|one| !comes.contains(one));",
+        "{}",
+        Killed(&[KEPT], &[DYNAMICS])),
+    patch("parts of cells that are boxes by least squares", QUADRATURE,
+        "whole_box(&pieces).filter(|_| gaps.is_empty())",
+        "whole_box(&pieces).filter(|_| gaps.len() == usize::MAX)",
+        Killed(&[SOLIDS], &[PATCH])),
 ];
