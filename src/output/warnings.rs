@@ -253,16 +253,16 @@ impl Watch {
         self.contacts.all()
     }
 
-    /// The run is over after a step, the `number`th, that ended at `time`: a loss is told as large as it became. What is new.
+    /// The run is over after a step, the `number`th, that ended at `time`: a loss is told again, as large as it became. What is new.
     pub(crate) fn end(&mut self, time: f64, number: u64) -> Option<&Warning> {
-        let told = self.warnings.iter().position(|warning| warning.kind == Kind::EnergyLost);
-        let first = told.map(|told| self.warnings[told].time);
-        if self.losing == 0 || first == Some(time) {
+        let mut told =
+            self.warnings.iter().filter(|warning| warning.kind == Kind::EnergyLost).map(|warning| warning.time);
+        let first = told.next();
+        if self.losing == 0 || told.next().or(first) == Some(time) {
             return None;
         }
         let since = first.map_or_else(String::new, |first| format!("; more than {} % since t = {first}", 100.0 * LOST));
         let message = format!("{}{since}", self.losses.says(self.lumped));
-        told.into_iter().for_each(|told| drop(self.warnings.remove(told)));
         self.warnings.push(Warning { kind: Kind::EnergyLost, time, step: number, message });
         self.warnings.last()
     }
