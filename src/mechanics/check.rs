@@ -174,7 +174,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         let follows = self.unknowns.following_mask(blocks.len());
         let held = |node: usize, i: usize| prescribed[node * D + i] || follows[node * D + i];
         let uncoupled = self.unknowns.uncoupled();
-        for node in (0..blocks.len()).step_by(blocks.len().div_ceil(BLOCKS).max(1)) {
+        let spread = (0..blocks.len()).step_by(blocks.len().div_ceil(BLOCKS).max(1));
+        let leaders: Vec<usize> =
+            self.unknowns.followers.rows().filter_map(|(_, _, mut leaders)| Some(leaders.next()?.0)).collect();
+        let followed = leaders.iter().copied().step_by(leaders.len().div_ceil(BLOCKS).max(1));
+        for node in spread.chain(followed) {
             for i in (0..D).filter(|&i| !held(node, i)) {
                 let (mut unit, mut out) = (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
                 unit[node][i] = 1.0;
@@ -191,7 +195,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 }
 
-/// Nodes whose blocks are compared.
+/// Nodes whose blocks are compared, and as many that others follow.
 const BLOCKS: usize = 4;
 
 fn norm<const D: usize>(a: &[Vector<f64, D>]) -> f64 {

@@ -99,7 +99,8 @@ fn one_of<T: Clone>(random: &mut Random, list: &[T]) -> T {
     list[(random.between(0.0, list.len() as f64) as usize).min(last)].clone()
 }
 
-/// Of halves those whose functions at a wall are the mirrored ones: smooth ones are one-sided there.
+/// Of halves those whose functions at a wall are the mirrored ones. All others are one-sided there: coefficients beyond a wall continue the
+/// field linearly, where a plane of symmetry would mirror it. So halves agree with the whole only as far as the grid resolves them.
 fn family(random: &mut Random, half: bool) -> (&'static str, Value) {
     let lme = |gamma: f64| json!({ "lme": { "gamma": gamma } });
     let bspline = |degree: u32| json!({ "bspline": { "degree": degree } });
@@ -111,7 +112,7 @@ fn family(random: &mut Random, half: bool) -> (&'static str, Value) {
         ("LME 3", lme(3.0)),
         ("LME 1.4", lme(1.4)),
     ];
-    one_of(random, if half { &families[..2] } else { &families })
+    one_of(random, if half { &families[..1] } else { &families })
 }
 
 fn law(random: &mut Random, half: bool) -> Law {

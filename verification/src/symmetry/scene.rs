@@ -221,6 +221,8 @@ impl Scene {
         self.write_load(&mut scene, &ramp, thickness, &in_space);
         if let Some(ghost) = self.ghost {
             scene["ghost_stiffness"] = json!(ghost);
+            // Without inertia nothing else holds nodes with little of a body.
+            scene["aggregation"] = json!(ghost == 0.0 && !inertia);
         }
         if let (Some(rate), true) = (self.blend, inertia) {
             scene["transfer"] = json!({ "blend": { "rate": rate / units.time, "order": 2 } });

@@ -37,6 +37,7 @@ const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
 const GHOSTS: Check = Check::Test("ghost::");
 const LEVELS: Check = Check::Test("multigrid::");
+const FOLLOWS: Check = Check::Test("aggregation::");
 const PATHS: Check = Check::Test("path::");
 const KEPT: Check = Check::Test("kept::");
 const CARRIES: Check = Check::Test("carried::");
@@ -53,7 +54,7 @@ const BONDS: Check = Check::Test("contact::");
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS, CLOCKS, ADAPTS,
+    LAWS, GHOSTS, FOLLOWS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS, CLOCKS, ADAPTS,
     BONDS,
 ];
 
@@ -87,7 +88,6 @@ const fn patch(
 }
 
 const PARTICLE: &str = "src/mechanics/point.rs";
-const RESIDUAL: &str = "src/mechanics/residual.rs";
 const PRODUCT: &str = "src/mechanics/tangent.rs";
 const NODAL: &str = "src/mechanics/transfer/nodal.rs";
 const UPDATE: &str = "src/mechanics/transfer/update.rs";
@@ -97,6 +97,9 @@ const TERMS: &str = "src/mechanics/terms/mod.rs";
 const INERTIA: &str = "src/mechanics/terms/inertia.rs";
 const STRESS: &str = "src/mechanics/terms/stress.rs";
 const PATH: &str = "src/mechanics/path.rs";
+const UNKNOWNS: &str = "src/mechanics/unknowns.rs";
+const AGGREGATION: &str = "src/aggregation.rs";
+const COLUMNS: &str = "src/mechanics/sweep/columns.rs";
 const AFFINE: &str = "src/mechanics/affine.rs";
 const KEPT_GRID: &str = "src/mechanics/kept.rs";
 const CARRIED: &str = "src/mechanics/terms/carried_over.rs";
@@ -303,8 +306,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "f * point.force.map(T::lit)",
         Killed(&[TANGENT], &[DYNAMICS])),
     patch("sign of the pressure's diagonal blocks", PRESSURE,
-        "outer(w, &g) - outer(&g, w)",
-        "outer(&g, w) - outer(w, &g)",
+        "w[i] * g[k] - g[i] * w[k]",
+        "g[i] * w[k] - w[i] * g[k]",
         Killed(&[TANGENT], &[POINTS])),
     patch("1/F for its transpose in the pressure's tangent", PRESSURE,
         "f_inv_t * (identity::<f64, D>() + h_n).transpose()",
@@ -318,7 +321,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "w * contract(a, &l) - a * (l.transpose() * w)",
         "w * contract(a, &l)",
         Killed(&[TANGENT], &[DYNAMICS])),
-    patch("prescribed values not cleared", RESIDUAL,
+    patch("prescribed values not cleared", UNKNOWNS,
         "field[dof.node][dof.component] = T::zero();",
         "let _ = dof;",
         Killed(&[DYNAMICS, TANGENT], &[POINTS])),
@@ -364,9 +367,25 @@ pub(super) const PATCHES: &[Patch] = &[
         "{}",
         Killed(&[DYNAMICS], &[TANGENT])),
     patch("prescribed rows left in the product", PRODUCT,
-        "out[dof.node][dof.component] = X::zero();",
-        "let _ = dof;",
+        "self.unknowns.clear_prescribed(out);",
+        "let _ = &out;",
         Killed(&[TANGENT], &[POINTS])),
+    patch("a product whose forces stay at nodes that follow", PRODUCT,
+        "self.unknowns.followers.restrict(out);",
+        "let _ = &out;",
+        Killed(&[FOLLOWS], &[POINTS])),
+    patch("diagonal blocks without what followers add", PRODUCT,
+        "self.add_followers(&quadratic, &mut blocks);",
+        "let _ = &quadratic;",
+        Killed(&[FOLLOWS], &[POINTS])),
+    patch("outer nodes follow as if they were a node nearer", AGGREGATION,
+        "(at - l) as f64 / (k - l) as f64",
+        "(at - l - 1) as f64 / (k - l) as f64",
+        Killed(&[FOLLOWS], &[POINTS])),
+    patch("loads of uGIMP by its own functions", COLUMNS,
+        "{ other } else { product }",
+        "{ let _ = other; product } else { product }",
+        Killed(&[FOLLOWS], &[POINTS])),
     patch("diagonal blocks without what acts at particles", PRODUCT,
         "all.iter().for_each(|add| add(group, form))",
         "()",
@@ -484,8 +503,8 @@ pub(super) const PATCHES: &[Patch] = &[
         "0.0 * impulse",
         Killed(&[LOADS], &[DYNAMICS])),
     patch("loads at t = 0 push the wrong way at first", NODAL,
-        "-r / m",
-        "r / m",
+        "|(a, r)| *a = -r",
+        "|(a, r)| *a = *r",
         Killed(&[LOADS], &[DYNAMICS])),
     patch("smoothing by a share of the step, not at a rate", SMOOTHING,
         "-(-self.rate * dt).exp_m1()",
