@@ -41,7 +41,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     /// use bfree::mechanics::sweep::Supports;
     ///
-    /// let mut simulation = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
+    /// let asked = ["aggregation=true".parse()?];
+    /// let mut simulation = bfree::scene::read_file("scenes/cook.json".as_ref(), &asked)?.build::<2>("scenes".as_ref())?;
     /// let followers = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
     ///     let (supports, _) = Supports::new(&of.approximation, &of.grid, &of.particles.position)?;
     ///     Ok(of.aggregated(supports).extension().map_or(0, |extension| extension.len()))

@@ -60,9 +60,13 @@ impl Extent {
     }
 }
 
+/// Width and height in pixels.
+#[cfg(test)]
+type Size = (f64, f64);
+
 /// The size of a picture, and its texts.
 #[cfg(test)]
-pub(super) fn texts(svg: &str) -> Result<((f64, f64), Vec<(String, Extent)>), PlotError> {
+pub(super) fn texts(svg: &str) -> Result<(Size, Vec<(String, Extent)>), PlotError> {
     let tree = tree("texts", svg)?;
     let text = |node: &usvg::Node| match node {
         usvg::Node::Text(text) => {

@@ -308,7 +308,7 @@ fn mirrored_solids_have_mirrored_particles_where_slivers_join() {
     let (h, cells) = (0.2, [7, 8]);
     let grid = Grid { origin: Vector::zeros(), spacing: h, cells };
     // Found by the study `symmetry`: two slivers beside each other.
-    let (x, y, radius) = (0.925_633_645_731_744_6, 0.8, 0.368_439_178_269_088_41);
+    let (x, y, radius) = (0.925_633_645_731_744_6, 0.8, 0.368_439_178_269_088_4);
     let how = Filling { per_axis: 2, ..Filling::default() };
     let seeds = |x: f64| fill(&grid, &ball([x, y], radius), how).unwrap();
     let (one, other) = (seeds(x), seeds(1.4 - x));
