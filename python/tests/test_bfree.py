@@ -141,7 +141,6 @@ def test_an_energy_in_python_is_the_law_it_writes_down():
         (lambda E: E, TypeError, "one number"),
         (lambda E: E[0, 3], IndexError, "out of bounds"),
         (lambda E: -np.sum(E * E), ValueError, "negative stiffness"),
-        (lambda E: 0.5 * np.trace(E) ** 2 - np.sum(E * E), ValueError, "negative stiffness"),
         (lambda E: np.linalg.det(E), TypeError, "bfree.det"),
     ],
 )
