@@ -76,7 +76,7 @@ impl<const D: usize> Clone for Supports<D> {
 pub struct Points<'a, const D: usize> {
     /// x of all particles.
     pub positions: Cow<'a, [Vector<f64, D>]>,
-    /// What tells particles apart wherever they lie in memory; if it is not there, their places in memory do.
+    /// Ids of the particles, wherever they lie in memory; without them, their places in memory count.
     pub ids: Option<&'a [u32]>,
     /// Of points on a loaded surface, by their places in memory: functions are [those of a surface](crate::approximation::Separable::at_surface), evaluated at x and
     /// continued linearly along each axis by this vector.
@@ -89,7 +89,7 @@ impl<'a, const D: usize> Points<'a, D> {
         Self { positions: positions.into(), ids: None, continued: BTreeMap::new() }
     }
 
-    /// What a particle is called in messages.
+    /// The number of a particle in messages.
     pub(super) fn id(&self, particle: usize) -> usize {
         self.ids.map_or(particle, |ids| ids[particle] as usize)
     }

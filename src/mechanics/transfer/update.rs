@@ -129,7 +129,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let mut by_forces = self.delta_velocity.clone();
         unknowns.followers.extend(&mut self.delta_velocity);
         unknowns.followers.extend(&mut self.delta_acceleration);
-        // What a wall changes in followers of its nodes is its impulse, too.
+        // The change of followers of a wall node is an impulse of the wall, too.
         by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
             *before = (after - *before) * m;
         });
