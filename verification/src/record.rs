@@ -216,7 +216,10 @@ fn place(text: &str, name: &str) -> io::Result<Range<usize>> {
 }
 
 /// The text with another passage of this name.
-fn replaced(text: &str, name: &str, by: &str) -> io::Result<String> {
+///
+/// # Errors
+/// As for [`passage`].
+pub fn replaced(text: &str, name: &str, by: &str) -> io::Result<String> {
     let place = place(text, name)?;
     Ok([&text[..place.start], by, &text[place.end..]].concat())
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use verification::record::{Finding, LAST_RUN, LIMITS, Run, passage};
+use verification::record::{Finding, LAST_RUN, LIMITS, Run, passage, replaced};
 use verification::report::Listed;
 use verification::studies::Outcome;
 use verification::{Bound, Report, known};
@@ -20,8 +20,13 @@ fn repository() -> PathBuf {
 
 #[test]
 fn the_manual_lists_the_known_failures() -> io::Result<()> {
-    let (text, asked) = (written(&repository(), LIMITS)?, known::markdown());
-    assert!(text == asked, "between the lines `{}` {} must say\n\n{asked}", LIMITS.1, LIMITS.0);
+    let asked = known::markdown();
+    if std::env::var_os("BFREE_WRITE_KNOWN").is_some() {
+        let path = repository().join(LIMITS.0);
+        fs::write(&path, replaced(&fs::read_to_string(&path)?, LIMITS.1, &asked)?)?;
+    }
+    let same = written(&repository(), LIMITS)? == asked;
+    assert!(same, "renew {}: BFREE_WRITE_KNOWN=1 cargo test --release -p verification --test record", LIMITS.0);
     Ok(())
 }
 
