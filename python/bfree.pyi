@@ -95,7 +95,7 @@ class Simulation(Iterator[Step]):
 
     @property
     def dissipated(self) -> float:
-        """Energy that damping and ghost stiffness have taken since the start."""
+        """Energy that damping has taken since the start."""
 
     @property
     def momentum(self) -> NDArray[np.float64]:
@@ -115,7 +115,7 @@ class Simulation(Iterator[Step]):
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which of their components are solved for, (n, D)."""
+        """Which of their components are solved for, (n, D): those that are neither prescribed nor follow other nodes."""
 
     @property
     def prescribed(self) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ use std::sync::Arc;
 const SAME: f64 = 1e-6;
 
 /// How many cells away an outer node looks for a good cell. Polynomials grow with the distance; a node that finds none is an unknown.
-const FURTHEST: i64 = 4;
+const FURTHEST: i64 = 6;
 
 /// Axes of fewer cells have no room for two ends at which functions curve.
 const ROOM: i64 = 4;
@@ -53,6 +53,17 @@ impl Pieces {
     /// The knot cell along an axis of `cells` cells, at `local` spacings from its first node.
     pub(crate) fn cell(self, local: f64, cells: u32) -> u32 {
         if self.degree.is_multiple_of(2) { (local + 0.5) as u32 } else { (local as u32).min(cells.saturating_sub(1)) }
+    }
+
+    /// The knot cells that a length along an axis overlaps, and which part of it lies in each; in spacings from the first node.
+    pub(crate) fn overlaps(self, middle: f64, length: f64, cells: u32) -> Vec<(u32, f64)> {
+        let (from, to) = ((middle - 0.5 * length).max(0.0), (middle + 0.5 * length).min(f64::from(cells)));
+        if from >= to {
+            return vec![(self.cell(middle, cells), 1.0)];
+        }
+        let begin = |cell: u32| f64::from(cell) - if self.degree.is_multiple_of(2) { 0.5 } else { 0.0 };
+        let part = |cell: u32| (to.min(begin(cell + 1)) - from.max(begin(cell))).max(0.0) / (to - from);
+        (self.cell(from, cells)..=self.cell(to, cells)).map(|cell| (cell, part(cell))).collect()
     }
 
     /// The share of a knot cell that lies within the grid along an axis: a cell of even degree is halved by a wall.
@@ -438,10 +449,10 @@ impl Bodies {
                 }
                 // All cells whose centres are so near have been seen.
                 if found.0 <= (2 * reach - 1).pow(2) {
-                    return found.1;
+                    break;
                 }
             }
-            Vec::new()
+            found.1
         };
         let pieces: HashSet<usize> = nearest(&|_| true).into_iter().map(|cell| self.piece[cell]).collect();
         let mut cells = nearest(&|cell| good.contains(&cell) && pieces.contains(&self.piece[cell]));

@@ -42,12 +42,6 @@ impl<L: Law> Body<L> {
         self.law.volumetric(&Deformation::new(Tensor::<T, 1>::from_element(change)))
     }
 
-    /// The stiffness at rest of what a mean dilatation takes from the particles, U''(1); 0 of a body whose dilatation is pointwise.
-    pub(crate) fn mean_stiffness(&self) -> f64 {
-        let response = Some(0.0).filter(|_| self.averages()).and_then(|rest| self.response(rest));
-        response.map_or(0.0, |of| of.stiffness)
-    }
-
     /// What the mean dilatation 1 + `change` adds to the energy per reference volume, U(θ) − U(J), and to each normal component of Cauchy's
     /// stress, U'(θ) − U'(J), of a particle of volume ratio 1 + `j`; zeros of a body whose dilatation is pointwise.
     pub(crate) fn averaged(&self, change: f64, j: f64) -> [f64; 2] {

@@ -228,7 +228,6 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         loads,
         scheme,
         lumping: settings.lumping,
-        ghost: if settings.aggregation { 0.0 } else { settings.ghost },
         averages,
         renews: simulation.may_renew(),
     });

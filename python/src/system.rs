@@ -56,6 +56,11 @@ impl<const D: usize> System for Coming<D, BodyLaw, Approximation> {
         for dof in Coming::prescribed(self) {
             free[dof.node * D + dof.component] = false;
         }
+        // Those that follow others are no unknowns either.
+        let equilibrium = self.equilibrium();
+        for &outer in equilibrium.step.supports.extension().iter().flat_map(|extension| extension.outer()) {
+            free[outer as usize * D..(outer as usize + 1) * D].fill(false);
+        }
         free
     }
 

@@ -76,17 +76,14 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
             blocks.iter_mut().zip(&out).for_each(|(block, out)| (0..D).for_each(|i| block[(i, k)] = out[i].value()));
         }
-        self.terms.iter().for_each(|term| term.add_bends(&mut form.bends));
         form.blocks = bytemuck::cast_slice(&blocks).to_vec();
         form
     }
 
-    /// Nodes share an entry at a particle, or where second differences are held, and so do those that they follow.
+    /// Nodes share an entry at a particle, and so do those that they follow.
     pub(super) fn joined(&self) -> Neighbours {
-        let mut bends = Vec::new();
-        self.terms.iter().for_each(|term| term.add_bends(&mut bends));
         let further = self.terms.iter().map(|term| term.reach()).max().unwrap_or(0);
-        let reach = (self.supports.reach() + further).max(if bends.is_empty() { 0 } else { 2 });
+        let reach = self.supports.reach() + further;
         let mut leaders = vec![Vec::new(); self.supports.nodes()];
         for (outer, _, row) in self.unknowns.followers.rows() {
             leaders[outer] = row.map(|(leader, _)| leader).collect();

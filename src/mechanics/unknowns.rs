@@ -1,25 +1,39 @@
 //! Which nodal values are unknowns: those that are neither prescribed nor follow others.
 
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
+use crate::grid::indices;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::{Quadratic, Supports};
 use crate::particles::Particles;
 use crate::pooled::{Element, Pooled};
 use crate::scalar::Real;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Tensor, Vector, identity};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The extension E of the bodies in a grid, by the volume that particles have now.
+/// The most cells along an axis that a particle fills: one that is drawn out further tells nothing of the cells between.
+const LONGEST: f64 = 2.0;
+
+/// The extension E of the bodies in a grid, by the volume that particles have now. A particle fills the cells that its domain overlaps, as
+/// far as particles lie in them: so the share of a cell goes on as particles move from one to the next.
 pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
     let grid = supports.grid();
-    let mut volumes: BTreeMap<[u32; D], f64> = BTreeMap::new();
-    for p in (0..particles.len()).filter(|&p| particles.is_solid(p)) {
-        let cell = |k: usize| {
-            let axis = grid.axis(k);
-            pieces.cell(axis.local(particles.position[p][k]).unwrap_or(0.0), axis.cells)
-        };
-        *volumes.entry(std::array::from_fn(cell)).or_insert(0.0) += particles.present_volume(p);
+    let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
+    let local = |p: usize, k: usize| grid.axis(k).local(particles.position[p][k]).unwrap_or(0.0);
+    let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
+    let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
+    for p in solid() {
+        // A cube of the particle's volume at rest, as long along each axis as the ellipsoid is that a ball in it becomes.
+        let f = identity::<f64, D>() + particles.displacement_gradient[p];
+        let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
+        let length = |k: usize| (side * f.row(k).norm()).min(LONGEST);
+        let along: [_; D] = std::array::from_fn(|k| pieces.overlaps(local(p, k), length(k), grid.cells[k]));
+        for which in indices::<D>(std::array::from_fn(|k| along[k].len() as u64)) {
+            let parts: [(u32, f64); D] = std::array::from_fn(|k| along[k][which[k] as usize]);
+            if let Some(volume) = volumes.get_mut(&parts.map(|(cell, _)| cell)) {
+                *volume += particles.present_volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
+            }
+        }
     }
     let share = |(cell, volume): (&[u32; D], &f64)| {
         let whole: f64 = (0..D).map(|k| grid.spacing * pieces.within(cell[k], grid.cells[k])).product();

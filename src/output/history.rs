@@ -117,7 +117,7 @@ impl History {
         kept: Option<Written>,
     ) -> Result<Self, OutputError> {
         let moves = simulation.settings.scheme.has_inertia();
-        let dissipates = simulation.damps() || simulation.remembers(DISSIPATED);
+        let dissipates = simulation.loads.damping.is_some() || simulation.remembers(DISSIPATED);
         let (follows_path, yields) = (simulation.settings.scheme.follows_path(), simulation.remembers(PLASTIC_STRAIN));
         let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
         columns.extend(follows_path.then(|| "load".into()));

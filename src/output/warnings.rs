@@ -180,7 +180,7 @@ impl Watch {
             self.warn(step, Kind::KrylovClimbs, |_| {
                 format!(
                     "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
-                     ghost_stiffness, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
+                     aggregation = true, long steps and fine grids by solver.krylov.preconditioner = \"multigrid\""
                 )
             });
         }
@@ -188,7 +188,7 @@ impl Watch {
             self.warn(step, Kind::KrylovLimited, |_| {
                 format!(
                     "{limited} linear systems of a step were left unsolved after the {krylov_limit} iterations allowed: they are badly \
-                     conditioned; raise solver.krylov.max_iterations, shorten time.step, or give cut cells a ghost_stiffness"
+                     conditioned; raise solver.krylov.max_iterations, shorten time.step, or set aggregation = true for cut cells"
                 )
             });
         }
@@ -345,7 +345,7 @@ mod tests {
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
         // 39 steps of 30 before, and that of 150
-        let words = ["180 iterations in a step; 33", "ghost_stiffness", "multigrid"];
+        let words = ["180 iterations in a step; 33", "aggregation", "multigrid"];
         assert!(watch.see(&krylov(180)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let limited = Watched { limited: 2, ..step(25) };
         assert!(watch.see(&limited).iter().any(

@@ -49,9 +49,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// γ of the ghost stiffness where it is needed.
-const GHOST: f64 = 1e-3;
-
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -86,14 +83,12 @@ pub struct Scene {
     /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
-    /// Whether nodes with little of a body follow well-supported nodes (extended B-splines), in place of the ghost stiffness. Such nodes are
-    /// no unknowns: they continue the polynomial of the nearest well-filled cell. Loads on surfaces then act through functions that balance
-    /// the internal force. Default: false.
-    #[serde(default)]
-    pub aggregation: bool,
-    /// Ghost stiffness γ (no unit), 0 to 1: stabilises nodes with little of a body. Second differences of the motion between such nodes are
-    /// penalised by this share of the body's stiffness; momentum and uniform strains stay exact. Default: 0.001 without inertia, in steps of
-    /// Courant numbers above 10, and where the surface of a shape is loaded; else, and with `aggregation`, 0.
+    /// Whether nodes with little of a body follow well-supported nodes (extended B-splines). Such nodes are no unknowns: they continue the
+    /// polynomial of the nearest well-filled cell. Loads on surfaces then act through functions that balance the internal force. Default:
+    /// true without inertia, where the surface of a shape is loaded, and in steps of one length at Courant numbers above 10; else false.
+    pub aggregation: Option<bool>,
+    /// No longer used, and read for one release: aggregation has replaced the ghost stiffness. Where `aggregation` is not given, 0 means
+    /// false, and more than 0 true.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
@@ -195,8 +190,6 @@ impl Scene {
         }
         if let Some(ghost) = self.ghost_stiffness {
             problems.between("ghost_stiffness", ghost, 0.0, 1.0);
-            let allowed = "aggregation is true, in place of the ghost stiffness: remove one of the two";
-            problems.require(!(self.aggregation && ghost > 0.0), "ghost_stiffness", ghost, allowed);
         }
         if let Some(gravity) = &self.gravity {
             gravity.check(&mut problems, dimension);
@@ -243,13 +236,14 @@ impl Scene {
         problems
     }
 
-    /// γ of the ghost stiffness. In shorter steps, mass holds what stiffness does not; but for nodes that see more of a loaded surface
-    /// than of the particles below it.
-    fn ghost(&self) -> f64 {
+    /// Whether nodes with little of a body follow others. In shorter steps, mass holds what stiffness does not; but for nodes that see more of
+    /// a loaded surface than of the particles below it.
+    fn aggregates(&self) -> bool {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
-        let needed = self.courant() > LONG_STEPS || loads.into_iter().any(|load| load.surface.is_none());
-        self.ghost_stiffness.unwrap_or(if needed && !self.aggregation { GHOST } else { 0.0 })
+        let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
+        let needed = long_steps || loads.into_iter().any(|load| load.surface.is_none());
+        self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
     /// The largest Courant number, that of waves of pressure; infinite without inertia.
@@ -347,7 +341,7 @@ impl Scene {
         if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
         }
-        self.ghost_stiffness = Some(self.ghost());
+        self.aggregation = Some(self.aggregates());
         self.output.fields = Some(self.fields());
         self
     }

@@ -69,6 +69,13 @@ impl Scene {
             .flat_map(|a| (0..a).map(move |b| (b, a)))
             .filter_map(|(a, b)| bodies.overlap(a, b))
             .collect();
+        all.extend(self.ghost_stiffness.map(|factor| {
+            format!(
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {} here. Remove the key; the next \
+                 release refuses it",
+                self.aggregates()
+            )
+        }));
         all.extend(bodies.coincident());
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));

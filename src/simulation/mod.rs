@@ -22,7 +22,7 @@ use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, p_wave_modulus};
 use crate::mechanics::kept::Kept;
-use crate::mechanics::loads::{Loads, SurfacePoint};
+use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
 use crate::mechanics::schemes::{Alphas, LONG_STEPS};
@@ -72,7 +72,7 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub clock: Clock,
     /// Work of gravity, tractions, pressure and moving walls since the start.
     pub external_work: f64,
-    /// Energy that damping and ghost stiffness have taken since the start.
+    /// Energy that damping has taken since the start.
     pub dissipated: f64,
     /// Where on its path it is, for a scheme that follows one.
     pub path: Path,
@@ -193,14 +193,6 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
-    /// Whether a term of the residual takes energy on purpose: damping, ghost stiffness, or ties of nodes that a load reaches beyond its
-    /// body.
-    pub(crate) fn damps(&self) -> bool {
-        let on_surface = |point: &SurfacePoint<D>| !self.particles.is_solid(point.particle);
-        let ties = || self.loads.surface.iter().flat_map(|load| &load.points).any(on_surface);
-        self.loads.damping.is_some() || !self.settings.aggregation && (self.settings.ghost > 0.0 || ties())
-    }
-
     /// Whether a law remembers a number by this name.
     pub(crate) fn remembers(&self, name: &str) -> bool {
         self.bodies.iter().any(|body| body.law.memory().iter().any(|one| one.name == name))
@@ -266,6 +258,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.settings.preconditioner.chosen::<D>(Preconditioned {
             particles: self.particles.len(),
             splines,
+            follow_cubics: self.settings.aggregation && self.approximation.pieces().degree == 3,
             long,
             on_path: self.settings.scheme.follows_path(),
             flows: self.remembers(PLASTIC_STRAIN),

@@ -33,9 +33,6 @@ pub struct Settings {
     pub lumping: f64,
     /// How nodes get velocity and acceleration from the particles.
     pub projection: Projection,
-    /// γ of the ghost stiffness, as a share of Λ + 2G; 0 for none. It holds nodes that have little of a body: without inertia nothing else
-    /// does, and with smooth shape functions the answer needs it. Without effect where nodes are aggregated.
-    pub ghost: f64,
     /// Whether nodes with little of a body follow well-supported ones ([`aggregation`](crate::aggregation)). Without inertia nothing else
     /// holds such nodes.
     pub aggregation: bool,
@@ -67,7 +64,6 @@ impl Default for Settings {
             scheme: Arc::new(Newmark::default()),
             lumping: 1.0,
             projection: Projection::default(),
-            ghost: 0.0,
             aggregation: false,
             renewal: Renewal::default(),
             initial_guess: InitialGuess::default(),

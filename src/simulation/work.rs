@@ -58,7 +58,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         work += mean_work(&end.external_force(phi)?, &start.external_force(&before)?, dphi);
         let mut dissipated = 0.0;
-        if self.damps() {
+        if self.loads.damping.is_some() {
             let lost = |equilibrium: &Equilibrium<'_, D, L>, phi| equilibrium.forces(Role::Dissipates, phi);
             dissipated = mean_work(&lost(end, phi)?, &lost(&start, &before)?, dphi);
         }

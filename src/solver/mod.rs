@@ -23,7 +23,7 @@ pub(crate) use nonnegative::NonnegativeLeastSquares;
 #[cfg(feature = "direct")]
 pub use preconditioner::Direct;
 pub use preconditioner::{
-    Bend, BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner,
+    BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner,
     Preconditioning,
 };
 pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};

@@ -152,7 +152,7 @@ impl<const D: usize> Cloud<D> {
         let Self { particles, bodies, loads, supports, nodal } = self;
         let dt = 0.5;
         let alphas = Newmark::default().alphas(dt);
-        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt, ghost: 0.0 }
+        Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: 0.0, dt }
     }
 
     fn equilibrium<'a>(&'a self, lumping: f64, prescribed: &'a [PrescribedDof]) -> Equilibrium<'a, D, Faulty> {

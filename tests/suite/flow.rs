@@ -300,7 +300,7 @@ fn bodies_that_flow_have_exact_tangents_and_converge() -> Result<(), Failure> {
 fn energy_is_stored_or_lost() -> Result<(), Failure> {
     for (material, order) in [(METAL, 1.5), (SOIL, 0.7), (POLYMER, 0.7)] {
         let defect = |steps| -> Result<f64, Failure> {
-            let mut simulation = membrane(material, steps, &["ghost_stiffness=0"])?;
+            let mut simulation = membrane(material, steps, &["aggregation=false"])?;
             let reference = Reference::of(&simulation);
             run(&mut simulation)?;
             let energies = Energies::of(&simulation, &reference);

@@ -132,18 +132,7 @@ fn results<const D: usize, L: Law>(
 ) -> Result<Results<D>, Failure> {
     let (nodal, loads) = (Nodal::project(particles, supports, LUMPING)?, Loads::default());
     let (alphas, lumping) = (alphas(), LUMPING);
-    let step = Step {
-        particles,
-        bodies,
-        loads: &loads,
-        supports,
-        nodal: &nodal,
-        alphas,
-        lumping,
-        time: 0.0,
-        dt: DT,
-        ghost: 0.0,
-    };
+    let step = Step { particles, bodies, loads: &loads, supports, nodal: &nodal, alphas, lumping, time: 0.0, dt: DT };
     let equilibrium = Equilibrium::new(step, &[]);
     let residual = equilibrium.residual(dphi)?;
     let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
@@ -320,18 +309,7 @@ fn fails<L: Law>(
     zero: &[Vector<f64, 2>],
     expected: Inadmissible,
 ) {
-    let step = Step {
-        particles,
-        bodies,
-        loads,
-        supports,
-        nodal,
-        alphas: alphas(),
-        lumping: 1.0,
-        time: 0.0,
-        dt: DT,
-        ghost: 0.0,
-    };
+    let step = Step { particles, bodies, loads, supports, nodal, alphas: alphas(), lumping: 1.0, time: 0.0, dt: DT };
     let equilibrium = Equilibrium::new(step, &[]);
     assert_eq!(equilibrium.residual(zero), Err(expected));
     assert_eq!(

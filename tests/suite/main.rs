@@ -14,7 +14,6 @@ mod dynamics;
 mod equilibrium;
 mod examples;
 mod flow;
-mod ghost;
 mod hostile;
 mod images;
 mod kept;

@@ -67,7 +67,7 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
         for family in families() {
             for inertia in ["none", "newmark"] {
                 // In steps of many wave times cuts are as bad as in statics.
-                let scene = || block::<D>(&family, cells, inertia, json!({"ghost_stiffness": 1e-3}));
+                let scene = || block::<D>(&family, cells, inertia, json!({"aggregation": true}));
                 let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
                 let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
                 assert!(same(&one, &other), "{D}D, {family}, {inertia}");

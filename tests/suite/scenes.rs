@@ -27,7 +27,7 @@ const GOOD: &str = r#"{
   ],
   "boundary": { "left": "sliding", "bottom": "fixed", "top": { "held": [true, false] }, "right": { "velocity": [[0, [-1, null]], [2, [0, null]]] } },
   "prescribed": [{ "region": { "ball": { "center": [4, 2], "radius": 0.6 } }, "displacement": [[0, [0, null]], [1, [0.1, null]]] }],
-  "ghost_stiffness": 0.01, "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]], "profile": { "along": [0, 2], "factor": [[0, 1], [4, 0.5]] } },
+  "aggregation": true, "gravity": { "acceleration": [0, -9.81], "curve": [[0, 0], [1, 1]], "profile": { "along": [0, 2], "factor": [[0, 1], [4, 0.5]] } },
   "tractions": [{ "body": "soft", "traction": [0, 5], "curve": [[0, 1]] }],
   "pressures": [{ "body": "grains", "pressure": 7, "surface": { "normal": [0, 1], "area": 0.1 }, "region": { "box": { "min": [0, 1], "max": [1, 2] } } }],
   "solver": { "newton": { "tolerance": 1e-10, "max_iterations": 20 }, "krylov": { "method": { "gmres": { "restart": 50 } }, "forcing": { "fixed": 1e-7 }, "max_iterations": 500 } },

@@ -9,7 +9,7 @@ mod shared;
 /// Scenes of each transformation.
 const SCENES: u64 = 60;
 
-/// With `Devices::Default` the ghost stiffness and loads on surfaces of shapes are judged, too: the modulus of the first particle decides there.
+/// With `Devices::Default` loads on surfaces of shapes are judged, too, and aggregation with inertia.
 const DEVICES: Devices = Devices::Off;
 
 fn judge(transformation: Transformation) {

@@ -191,7 +191,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
         let nodal = nodal.with_prescribed(&prescribed);
         let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);
         let (nodal, lumping, time) = (&nodal, 0.0, t + theta * dt);
-        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt: alphas.dt, ghost: 0.0 };
+        let step = Step { particles, bodies, loads, supports, nodal, alphas, lumping, time, dt: alphas.dt };
         let equilibrium = Equilibrium::new(step, &prescribed);
         let mut u = self.displacement.clone();
         let report = newton(

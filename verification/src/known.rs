@@ -154,12 +154,12 @@ pub const KNOWN: &[Known] = &[
     },
     Known {
         study: "order",
-        what: "a surface that cuts cells, cubic functions and ghost stiffness of 1e-3: order of the stress from 16 to 32 cells; 1.5 asked",
-        why: "Ghost stiffness straightens the field: an error of order gamma h in a layer of width h. It shows at 3e-4 of the stress; with a tenth \
-              of the stiffness the order is 1.5.",
-        since: "23 November 2026",
+        what: "a round hole under tractions, cubic functions: order of the stress from 16 to 32 cells; 2 asked",
+        why: "The planes that stand for the loaded circle leave 1e-5 of its area, which the displacement has reached at 32 cells, and 1.5e-4 of the \
+              stress. From 8 to 16 cells the order is 2.7.",
+        since: "24 November 2026",
         factor: 1.2,
-        cells: &[short_effort(&["stress, round hole", "not-a-knot cubic", "Gauss", "0.001"], 0.65)],
+        cells: &[short_effort(&["stress, round hole", "not-a-knot cubic", "Gauss"], 1.4441)],
     },
     Known {
         study: "symmetry",
@@ -301,55 +301,55 @@ pub const KNOWN: &[Known] = &[
             short_effort(
                 &[
                     "units × powers of 2",
-                    "deformation gradients",
-                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
-                ],
-                1.5e-17,
-            ),
-            short_effort(
-                &[
-                    "units × powers of 2",
-                    "strain energy",
-                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
-                ],
-                8.7e-19,
-            ),
-            short_effort(
-                &[
-                    "units × powers of 2",
-                    "reactions",
-                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
-                ],
-                4.4e-16,
-            ),
-            short_effort(
-                &[
-                    "units × powers of 2",
                     "positions",
-                    "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
+                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
                 ],
-                6.9e-18,
+                1.1e-16,
             ),
             short_effort(
                 &[
                     "units × powers of 2",
                     "deformation gradients",
-                    "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
+                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
                 ],
-                6.0e-18,
+                1.9e-17,
             ),
             short_effort(
                 &[
                     "units × powers of 2",
                     "strain energy",
-                    "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
+                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
                 ],
-                2.2e-18,
+                4.3e-18,
             ),
             short_effort(
                 &[
                     "units × powers of 2",
                     "external work",
+                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
+                ],
+                3.5e-18,
+            ),
+            short_effort(
+                &[
+                    "units × powers of 2",
+                    "reactions",
+                    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none",
+                ],
+                2.2e-16,
+            ),
+            short_effort(
+                &[
+                    "units × powers of 2",
+                    "deformation gradients",
+                    "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
+                ],
+                6.3e-18,
+            ),
+            short_effort(
+                &[
+                    "units × powers of 2",
+                    "strain energy",
                     "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
                 ],
                 8.7e-19,
@@ -360,54 +360,26 @@ pub const KNOWN: &[Known] = &[
                     "reactions",
                     "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none",
                 ],
-                2.0e-15,
+                1.4e-15,
             ),
         ],
     },
     Known {
         study: "loads",
-        what: "LME functions under loads on surfaces: errors of displacement and stress at 8 cells a unit of length over the greatest; 0.01 and 0.1 \
-               asked, and to fall",
-        why: "Sums over particles of LME functions are no integrals. The extension multiplies their errors at corners, the more the wider the functions \
-              are: LME 1.4 should not carry loads on surfaces. Errors of a uniform stress stay the same as the grid is refined, where the body lies \
-              in its cells as it did.",
+        what: "a uniform stress under loads on surfaces, with LME functions: its error at 16 cells a unit of length over that at 8; 1 asked",
+        why: "Sums over particles of LME functions are no integrals. Errors of a uniform stress, up to 7 %, stay as the grid is refined where the \
+              body lies in its cells as it did; those of the displacement fall.",
         since: "24 November 2026",
         factor: 1.5,
         cells: &[
-            short_effort(&["box on grid lines, tension", "LME 1.4", "displacement, particles"], 0.0207),
-            short_effort(&["box on grid lines, tension", "LME 1.4", "stress, particles"], 0.4278),
-            short_effort(&["box on grid lines, tension", "LME 1.4", "displacement, loaded face"], 0.0487),
-            short_effort(&["box on grid lines, tension", "LME 1.4", "stress, loaded face"], 2.4796),
-            short_effort(&["box off by 0.3 h, tension", "LME 3", "stress, loaded face"], 0.1018),
-            short_effort(&["box off by 0.3 h, tension", "LME 3", "stress at the face, h/2 over h"], 1.0),
-            short_effort(&["box off by 0.3 h, tension", "LME 1.4", "displacement, particles"], 0.0109),
-            short_effort(&["box off by 0.3 h, tension", "LME 1.4", "stress, particles"], 0.5489),
-            short_effort(&["box off by 0.3 h, tension", "LME 1.4", "displacement, loaded face"], 0.0126),
-            short_effort(&["box off by 0.3 h, tension", "LME 1.4", "stress, loaded face"], 1.0126),
-            short_effort(&["box turned by 27°, tension", "LME 1.4", "displacement, particles"], 0.2169),
-            short_effort(&["box turned by 27°, tension", "LME 1.4", "stress, particles"], 2.6315),
-            short_effort(&["box turned by 27°, tension", "LME 1.4", "displacement, loaded face"], 0.0583),
-            short_effort(&["box turned by 27°, tension", "LME 1.4", "stress, loaded face"], 4.6466),
-            short_effort(&["box turned by 27°, tension", "LME 1.4", "stress at the face, h/2 over h"], 1.6364),
-            short_effort(&["box on grid lines, pressure", "LME 1.4", "displacement, particles"], 0.0414),
-            short_effort(&["box on grid lines, pressure", "LME 1.4", "stress, particles"], 0.3579),
-            short_effort(&["box on grid lines, pressure", "LME 1.4", "displacement, loaded face"], 0.0731),
-            short_effort(&["box on grid lines, pressure", "LME 1.4", "stress, loaded face"], 1.3793),
-            short_effort(&["box on grid lines, pressure", "LME 1.4", "stress at the face, h/2 over h"], 1.0004),
-            short_effort(&["box off by 0.3 h, pressure", "LME 3", "stress at the face, h/2 over h"], 1.0),
-            short_effort(&["box off by 0.3 h, pressure", "LME 1.4", "displacement, particles"], 0.0146),
-            short_effort(&["box off by 0.3 h, pressure", "LME 1.4", "stress, particles"], 0.507),
-            short_effort(&["box off by 0.3 h, pressure", "LME 1.4", "displacement, loaded face"], 0.0128),
-            short_effort(&["box off by 0.3 h, pressure", "LME 1.4", "stress, loaded face"], 0.6117),
-            short_effort(&["box off by 0.3 h, pressure", "LME 1.4", "stress at the face, h/2 over h"], 1.0002),
+            short_effort(&["box on grid lines, tension", "LME 1.4", "stress at the face, h/2 over h"], 1.0008),
+            short_effort(&["box off by 0.3 h, tension", "LME 1.4", "stress at the face, h/2 over h"], 1.0008),
+            short_effort(&["box turned by 27°, tension", "LME 1.4", "displacement of the face, h/2 over h"], 1.0068),
+            short_effort(&["box turned by 27°, pressure", "LME 1.4", "stress at the face, h/2 over h"], 1.5235),
+            short_effort(&["disc, pressure", "LME 3", "stress at the face, h/2 over h"], 1.2711),
+            short_effort(&["box off by 0.3 h, tension", "LME 3", "stress at the face, h/2 over h"], 1.0082),
+            short_effort(&["box turned by 27°, tension", "LME 1.4", "stress at the face, h/2 over h"], 1.9705),
             short_effort(&["box turned by 27°, pressure", "LME 3", "stress at the face, h/2 over h"], 1.0546),
-            short_effort(&["box turned by 27°, pressure", "LME 1.4", "run"], 1.0),
-            short_effort(&["disc, pressure", "LME 3", "stress, particles"], 0.6821),
-            short_effort(&["disc, pressure", "LME 3", "stress, loaded face"], 0.9434),
-            short_effort(&["disc, pressure", "LME 1.4", "displacement, particles"], 0.2178),
-            short_effort(&["disc, pressure", "LME 1.4", "stress, particles"], 6.2002),
-            short_effort(&["disc, pressure", "LME 1.4", "displacement, loaded face"], 0.2677),
-            short_effort(&["disc, pressure", "LME 1.4", "stress, loaded face"], 22.1876),
         ],
     },
     Known {
@@ -418,11 +390,10 @@ pub const KNOWN: &[Known] = &[
         factor: 1.5,
         cells: &[
             short_effort(&["box turned by 27°, tension", "uGIMP", "stress at the face, h/2 over h"], 1.0301),
-            short_effort(&["box turned by 27°, tension", "cubic", "stress at the face, h/2 over h"], 4.3736),
-            short_effort(&["box turned by 27°, pressure", "cubic", "displacement of the face, h/2 over h"], 1.0934),
-            short_effort(&["box turned by 27°, pressure", "cubic", "stress at the face, h/2 over h"], 4.1675),
+            short_effort(&["box turned by 27°, tension", "cubic", "stress at the face, h/2 over h"], 1.0019),
+            short_effort(&["box turned by 27°, pressure", "cubic", "stress at the face, h/2 over h"], 1.0021),
             short_effort(&["disc, pressure", "uGIMP", "stress at the face, h/2 over h"], 1.5893),
-            short_effort(&["disc, pressure", "quadratic", "stress at the face, h/2 over h"], 1.1047),
+            short_effort(&["disc, pressure", "quadratic", "stress at the face, h/2 over h"], 1.069),
         ],
     },
     Known {
@@ -442,6 +413,15 @@ pub const KNOWN: &[Known] = &[
         since: "22 November 2026",
         factor: 1.2,
         cells: &[full_effort(&["iterations", "block", "2", "LME 1.4", "0.0125"], 22.67)],
+    },
+    Known {
+        study: "robust",
+        what: "linear iterations with multigrid, cubic functions at a Poisson's ratio of 0.499; 100 asked",
+        why: "Outer coefficients that follow a cubic polynomial are stiff where the volume hardly changes, and the levels of hat functions do not see \
+              it. With the ghost stiffness there were 48.",
+        since: "24 November 2026",
+        factor: 1.2,
+        cells: &[short_effort(&["ν", "cubic", "0.499"], 184.5)],
     },
     Known {
         study: "tradeoff",

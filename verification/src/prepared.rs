@@ -38,6 +38,7 @@ impl<const D: usize> Prepared<D> {
         let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
         let (supports, nodes) =
             Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
+        let supports = simulation.aggregated(supports);
         let prescribed = simulation.prescribed(&nodes);
         let nodal = simulation.project(&supports)?.with_prescribed(&prescribed);
         Ok(Self { supports, nodes, prescribed, nodal, alphas: simulation.settings.scheme.end(dt), end: t + dt })

@@ -7,7 +7,6 @@
 mod body_force;
 mod carried_over;
 mod damping;
-mod ghost;
 mod inertia;
 mod mean_dilatation;
 mod pressure;
@@ -17,7 +16,6 @@ mod traction;
 pub use body_force::{BodyForce, ForceField};
 pub use carried_over::CarriedOver;
 pub use damping::{Damping, Rayleigh};
-pub use ghost::Ghost;
 pub use inertia::Inertia;
 pub use mean_dilatation::MeanDilatation;
 pub(crate) use mean_dilatation::frozen_rows;
@@ -34,7 +32,6 @@ use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Support
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
-use crate::solver::Bend;
 use crate::tensor::{Deformation, Tensor, Vector};
 
 /// What all terms of a step are made from.
@@ -58,8 +55,6 @@ pub struct Step<'a, const D: usize, L> {
     pub time: f64,
     /// Δt
     pub dt: f64,
-    /// γ of the ghost stiffness; 0 without.
-    pub ghost: f64,
 }
 
 impl<const D: usize, L> Clone for Step<'_, D, L> {
@@ -134,8 +129,6 @@ pub(crate) struct Given<'a, const D: usize> {
     pub scheme: &'a dyn Scheme,
     /// ε
     pub lumping: f64,
-    /// γ
-    pub ghost: f64,
     /// Whether a body averages its change of volume.
     pub averages: bool,
     /// Whether a grid may be made anew.
@@ -211,9 +204,6 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
 
     /// Adds to the diagonal blocks what nodes have for themselves.
     fn add_blocks_at_nodes(&self, _blocks: &mut [Tensor<f64, D>]) {}
-
-    /// Adds the second differences that it holds, for coarser grids.
-    fn add_bends(&self, _bends: &mut Vec<Bend>) {}
 
     /// Adds to the diagonal blocks what is known by the functions of single particles.
     fn add_blocks_of_functions(&self, _functions: &FunctionsAt<'_, D>, _blocks: &mut [Tensor<f64, D>]) {}
@@ -369,7 +359,6 @@ terms! {
     stress: Stress<'a, D, L>,
     mean_dilatation: MeanDilatation<'a, D, L>,
     damping: Damping<'a, D, L>,
-    ghost: Ghost,
     body_force: BodyForce<D>,
     traction: Traction<D>,
     carried_over: CarriedOver<'a, D>,

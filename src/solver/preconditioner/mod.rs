@@ -9,7 +9,7 @@ pub use block_jacobi::BlockJacobi;
 #[cfg(feature = "direct")]
 pub use direct::Direct;
 pub(crate) use multigrid::bytes as multigrid_bytes;
-pub use multigrid::{Bend, LocalForm, Multigrid};
+pub use multigrid::{LocalForm, Multigrid};
 
 use super::{LinearOperator, Linearization};
 use crate::pooled::Pooled;
@@ -109,6 +109,9 @@ pub struct Preconditioned {
     pub particles: usize,
     /// Whether the functions are B-splines.
     pub splines: bool,
+    /// Whether these are cubic, and outer coefficients follow others: in 3D diagonal blocks then take up to 30 times the iterations of multigrid
+    /// (`scenes/block_static.json`).
+    pub follow_cubics: bool,
     /// Whether inertia does not dominate the steps.
     pub long: bool,
     /// Whether steps follow a path of equilibria, by GMRES.
@@ -148,13 +151,15 @@ impl Preconditioning {
     /// assert_eq!(Automatic.chosen::<3>(Preconditioned { flows: true, ..long }), (Multigrid, "the body may flow"));
     /// let isochoric = Preconditioned { isochoric: true, ..long };
     /// assert_eq!(Automatic.chosen::<3>(isochoric), (Multigrid, "a body hardly changes its volume"));
+    /// let cubic = Preconditioned { splines: true, follow_cubics: true, ..long };
+    /// assert_eq!(Automatic.chosen::<3>(cubic), (Multigrid, "outer coefficients follow cubic polynomials"));
     /// let on_path = Preconditioned { on_path: true, ..long };
     /// assert_eq!(Automatic.chosen::<3>(on_path), (Multigrid, "restarts lose what few iterations keep"));
     /// // What is asked for is used.
     /// assert_eq!(Multigrid.chosen::<3>(small), (Multigrid, "it was asked for"));
     /// ```
     pub fn chosen<const D: usize>(self, of: Preconditioned) -> (Self, &'static str) {
-        let Preconditioned { particles, splines, long, on_path, flows, isochoric } = of;
+        let Preconditioned { particles, splines, follow_cubics, long, on_path, flows, isochoric } = of;
         let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
         let axes = (D - 1).min(2);
         match self {
@@ -167,6 +172,9 @@ impl Preconditioning {
                 (Self::Direct, "few particles, and inertia does not dominate")
             }
             Self::Automatic if long && isochoric => (Self::Multigrid, "a body hardly changes its volume"),
+            Self::Automatic if long && follow_cubics && D == 3 => {
+                (Self::Multigrid, "outer coefficients follow cubic polynomials")
+            }
             Self::Automatic if long && particles >= many[axes] => {
                 (Self::Multigrid, "many particles, and inertia does not dominate")
             }

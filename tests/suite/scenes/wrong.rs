@@ -5,7 +5,7 @@ use bfree::scene::{self, Place, SceneError};
 
 /// (what stands in the good scene, what replaces it, the key to be named, words of the message)
 const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
-    (r#""ghost_stiffness": 0.01"#, r#""ghost_stiffness": -1"#, "ghost_stiffness", &["-1 is not", "0", "1"]),
+    (r#""aggregation": true"#, r#""ghost_stiffness": -1"#, "ghost_stiffness", &["-1 is not", "0", "1"]),
     (r#""along": [0, 2]"#, r#""along": [0, 0]"#, "gravity.profile.along", &["zero vector", "direction"]),
     (r#""along": [0, 2]"#, r#""along": [1]"#, "gravity.profile.along", &["length 1", "2 components"]),
     ("[4, 0.5]", "[0, 0.5]", "gravity.profile.factor[1][0]", &["0 is not", "row before, 0"]),

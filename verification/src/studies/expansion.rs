@@ -78,7 +78,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
         r#"bodies.0.volumetric="mean_dilatation""#.to_owned(),
         "pressures=[]".to_owned(),
         // It would hold second differences of the whole motion, which are large here.
-        "ghost_stiffness=0".to_owned(),
+        "aggregation=false".to_owned(),
         r#"solver={"newton":{"tolerance":1e-6,"max_iterations":60}}"#.to_owned(),
         "output={}".to_owned(),
     ];

@@ -227,7 +227,7 @@ pub(super) fn cloud<const D: usize, L: Law>(
         }, // Not a half, where ε and 1 − ε are the same.
         settings: Settings {
             lumping: 0.3,
-            ghost: 0.02,
+
             newton: NewtonSettings { precision: Precision::Mixed, ..NewtonSettings::default() },
             ..Settings::default()
         }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0)) })

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 pub enum Devices {
     /// The program's default, and loads on surfaces of shapes.
     Default,
-    /// None: no ghost stiffness, and loads on particles.
+    /// None where there is inertia, and loads on particles.
     Off,
 }
 
@@ -73,7 +73,8 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         // Velocities are drawn to those that are projected, in which a half lacks the other one.
         blend: if half { None } else { one_of(random, &[None, Some(10.0)]) },
         damping: one_of(random, &[None, Some([1.0, 1e-4])]),
-        ghost: (devices == Devices::Off).then_some(0.0),
+        // Without inertia nothing else holds nodes with little of a body.
+        aggregation: (devices == Devices::Off).then_some(!inertia),
         forcing: 1e-9,
         slab: false,
     };

@@ -118,8 +118,8 @@ pub struct Scene {
     pub blend: Option<f64>,
     /// Rayleigh's constants, of mass and of stiffness.
     pub damping: Option<[f64; 2]>,
-    /// γ of the ghost stiffness; the program's default if `None`.
-    pub ghost: Option<f64>,
+    /// Whether nodes with little of a body follow others; the program's default if `None`.
+    pub aggregation: Option<bool>,
     /// How far each linear system is solved.
     pub forcing: f64,
     /// Whether the scene is a slab of one cell between sliding faces in three dimensions.
@@ -219,10 +219,8 @@ impl Scene {
             scene["gravity"] = json!({ "acceleration": acceleration, "curve": ramp });
         }
         self.write_load(&mut scene, &ramp, thickness, &in_space);
-        if let Some(ghost) = self.ghost {
-            scene["ghost_stiffness"] = json!(ghost);
-            // Without inertia nothing else holds nodes with little of a body.
-            scene["aggregation"] = json!(ghost == 0.0 && !inertia);
+        if let Some(aggregation) = self.aggregation {
+            scene["aggregation"] = json!(aggregation);
         }
         if let (Some(rate), true) = (self.blend, inertia) {
             scene["transfer"] = json!({ "blend": { "rate": rate / units.time, "order": 2 } });

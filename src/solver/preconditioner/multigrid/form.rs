@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, Σ_nodes w·B u, and bends. Lengths are in cells.
+/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, and Σ_nodes w·B u. Lengths are in cells.
 #[derive(Clone, Debug, Default)]
 pub struct LocalForm {
     /// Cells along each axis; 0 along axes that do not exist.
@@ -27,24 +27,8 @@ pub struct LocalForm {
     pub filled: Vec<f64>,
     /// m
     pub masses: Vec<f64>,
-    /// Second differences that are held.
-    pub bends: Vec<Bend>,
     /// `A[i][k][j][l]` of ∂w_i/∂x_k and ∂u_j/∂x_l.
     pub tangents: Vec<f64>,
-}
-
-/// The energy ½ k |u_a − 2 u_b + u_c|² of three neighbours along an axis.
-#[derive(Clone, Copy, Debug)]
-pub struct Bend {
-    /// a, b, c
-    pub nodes: [u32; 3],
-    /// k
-    pub stiffness: f64,
-}
-
-impl Bend {
-    /// The weights of a, b and c.
-    pub const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
 }
 
 impl LocalForm {

@@ -1,10 +1,10 @@
 //! A coarse grid: hat functions, the tangent on them as stencils, and the way up and down.
 
 use super::chebyshev::largest;
-use super::form::{Bend, LocalForm};
+use super::form::LocalForm;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::LinearOperator;
-use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
+use crate::tensor::{Tensor, Vector, inverse};
 use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -26,8 +26,6 @@ pub(super) struct Level<const D: usize> {
     /// The neighbours of each node, and the entries.
     neighbours: Vec<[u32; 27]>,
     entries: Vec<[Tensor<f64, D>; 27]>,
-    /// What a stencil does not reach: the outer two unknowns of bends, and their entry.
-    far: Vec<(usize, usize, f64)>,
     inverse: Vec<Tensor<f64, D>>,
     pub largest: f64,
 }
@@ -57,10 +55,6 @@ impl<const D: usize> Level<D> {
                 }
             }
             y.copy_from_slice(sum.as_slice());
-        }
-        for &(a, c, entry) in &self.far {
-            y[a] += entry * x[c];
-            y[c] += entry * x[a];
         }
     }
 }
@@ -122,11 +116,10 @@ impl<const D: usize> Level<D> {
         for (cell, &at) in of_coarse.iter().enumerate() {
             level.add_cell(form, cell, &next, at, &numbers);
         }
-        level.add_bends(form, &mut next, &numbers);
         level.add_nodes(form, &mut next);
         level.follow(form, &mut next);
         level.hold_empty(&next);
-        level.hold(&next.bends);
+        level.hold();
         level.invert_blocks(&next);
         next.prescribed.clone_from(&level.held);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
@@ -203,32 +196,6 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// Adds what holds second differences, as much as it would on this grid: none between coarse nodes, a half at them; k is as h^{D−2}.
-    fn add_bends(&mut self, form: &LocalForm, next: &mut LocalForm, numbers: &HashMap<[u32; 3], u32>) {
-        let mut places = HashMap::new();
-        for bend in &form.bends {
-            let [before, centre, _] = bend.nodes.map(|node| form.nodes[node as usize]);
-            let Some(axis) = (0..D).find(|&k| before[k] != centre[k] && centre[k] % 2 == 0) else { continue };
-            for &(centre, weight) in &self.above[bend.nodes[1] as usize] {
-                let mut ends = [next.nodes[centre as usize]; 2];
-                (ends[0][axis], ends[1][axis]) = (ends[0][axis] - 1, ends[1][axis] + 1);
-                let [Some(&before), Some(&after)] = ends.map(|end| numbers.get(&end)) else { continue };
-                let at = *places.entry((centre, axis)).or_insert_with(|| {
-                    next.bends.push(Bend { nodes: [before, centre, after], stiffness: 0.0 });
-                    next.bends.len() - 1
-                });
-                next.bends[at].stiffness += 0.5 * weight * bend.stiffness;
-            }
-        }
-        for bend in &next.bends {
-            let nodes = bend.nodes.map(|node| node as usize);
-            for (k, l) in [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2), (2, 1), (2, 2)] {
-                let entry = &mut self.entries[nodes[k]][place(next.nodes[nodes[k]], next.nodes[nodes[l]])];
-                *entry += scaled(&identity(), bend.stiffness * Bend::WEIGHTS[k] * Bend::WEIGHTS[l]);
-            }
-        }
-    }
-
     /// Lets outer nodes follow others, as far as nothing holds them.
     fn follow(&mut self, form: &LocalForm, next: &mut LocalForm) {
         (next.aggregated, next.follows) = (form.aggregated, vec![false; D * next.nodes.len()]);
@@ -253,13 +220,8 @@ impl<const D: usize> Level<D> {
     }
 
     /// Nothing in the rows and columns of what is held.
-    fn hold(&mut self, bends: &[Bend]) {
-        let Self { entries, neighbours, held, far, .. } = self;
-        let outer = bends.iter().flat_map(|bend| {
-            let [a, _, c] = bend.nodes.map(|node| node as usize * D);
-            (0..D).map(move |i| (a + i, c + i, bend.stiffness))
-        });
-        far.extend(outer.filter(|&(a, c, _)| !held[a] && !held[c]));
+    fn hold(&mut self) {
+        let Self { entries, neighbours, held, .. } = self;
         for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
             for (entry, &mut other) in row.iter_mut().zip(neighbours).filter(|(_, other)| **other != NONE) {
                 for (i, j) in (0..D).flat_map(|i| (0..D).map(move |j| (i, j))) {
@@ -314,9 +276,12 @@ impl<const D: usize> Level<D> {
         let mut matrix = DMatrix::zeros(size, size);
         let mut unit = vec![0.0; size];
         for (k, mut column) in matrix.column_iter_mut().enumerate() {
-            unit[k] = 1.0;
-            self.apply(&unit, column.as_mut_slice());
-            unit[k] = 0.0;
+            // Nothing may come from a held value to what follows it.
+            if !self.held[k] {
+                unit[k] = 1.0;
+                self.apply(&unit, column.as_mut_slice());
+                unit[k] = 0.0;
+            }
             // Values that are no unknowns have the identity's rows.
             if column.iter().all(|entry| *entry == 0.0) {
                 column[k] = 1.0;

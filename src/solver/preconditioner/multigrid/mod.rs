@@ -1,9 +1,8 @@
 //! Multigrid on the background grid: one V-cycle as preconditioner.
 //!
 //! The finest level is the tangent itself, known by its product. Coarser ones are hat functions on grids of twice the spacing each, with the
-//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils; second
-//! differences that something holds are held on each of them. Outer
-//! nodes follow inner ones, as those of the finest level do. Motions go down by linear interpolation of nodal values, forces go up by its
+//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils. Outer nodes
+//! follow inner ones, as those of the finest level do. Motions go down by linear interpolation of nodal values, forces go up by its
 //! transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the same before and after, so that the whole is symmetric where the
 //! tangent is.
 
@@ -12,7 +11,7 @@ mod filter;
 mod form;
 mod level;
 
-pub use form::{Bend, LocalForm};
+pub use form::LocalForm;
 
 use super::{BlockJacobi, Preconditioner};
 use crate::solver::vector::Entry;

@@ -35,7 +35,6 @@ const SWEEP: Check = Check::Test("sweep::");
 const LAWS: Check = Check::Test("laws::");
 const SCHEMES: Check = Check::Test("schemes::");
 const SMOOTH: Check = Check::Test("smoothing::");
-const GHOSTS: Check = Check::Test("ghost::");
 const LEVELS: Check = Check::Test("multigrid::");
 const FOLLOWS: Check = Check::Test("aggregation::");
 const PATHS: Check = Check::Test("path::");
@@ -54,7 +53,7 @@ const BONDS: Check = Check::Test("contact::");
 /// All checks that a patch can name.
 pub(super) const CHECKS: &[Check] = &[
     TANGENT, PATCH, BALANCE, DIGITS, OPERATOR, MANUFACTURED, ORDER, DYNAMICS, POINTS, LOADS, SHAPES, SCHEMES, SMOOTH, SWEEP,
-    LAWS, GHOSTS, FOLLOWS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS, CLOCKS, ADAPTS,
+    LAWS, FOLLOWS, LEVELS, PATHS, KEPT, CARRIES, TRANSFERS, CELLS, FLOWS, MEMORY, SOLVER, SOLIDS, CLOCKS, ADAPTS,
     BONDS,
 ];
 
@@ -106,7 +105,6 @@ const CARRIED: &str = "src/mechanics/terms/carried_over.rs";
 const DAMPING: &str = "src/mechanics/terms/damping.rs";
 const BODY_FORCE: &str = "src/mechanics/terms/body_force.rs";
 const TRACTION: &str = "src/mechanics/terms/traction.rs";
-const GHOST: &str = "src/mechanics/terms/ghost.rs";
 const MEAN: &str = "src/mechanics/terms/mean_dilatation.rs";
 const DILATATION: &str = "src/mechanics/dilatation.rs";
 const PRESSURE: &str = "src/mechanics/terms/pressure.rs";
@@ -127,7 +125,6 @@ const STEP_BALANCE: &str = "src/simulation/balance.rs";
 const STEP_KEEP: &str = "src/simulation/keep.rs";
 const BORNE: &str = "src/simulation/borne.rs";
 const STEP_WORK: &str = "src/simulation/work.rs";
-const SIMULATION: &str = "src/simulation/mod.rs";
 const QUADRATURE: &str = "src/shape/quadrature.rs";
 const GENERALIZED: &str = "src/mechanics/schemes/generalized_alpha.rs";
 const NEO_HOOKEAN: &str = "src/material/neo_hookean.rs";
@@ -802,42 +799,22 @@ pub(super) const PATCHES: &[Patch] = &[
         "self.inverse.is_empty()",
         "true",
         Killed(&[SOLVER], &[POINTS])),
-    patch("half of the middle node's force in the ghost stiffness's product", GHOST,
-        "out[b][i] -= force + force;",
-        "out[b][i] -= force;",
-        Killed(&[TANGENT], &[POINTS])),
-    patch("diagonal blocks of the ghost stiffness by the weight, not its square", GHOST,
-        "self.factor * bend.stiffness * weight * weight",
-        "self.factor * bend.stiffness * weight",
-        Killed(&[TANGENT], &[POINTS])),
-    patch("the ghost stiffness's potential twice as large", GHOST,
-        "T::lit(0.5 * bend.stiffness)",
-        "T::lit(bend.stiffness)",
-        Killed(&[TANGENT], &[POINTS])),
-    patch("ghost stiffness by the first difference", GHOST,
-        "a - b - b + c",
-        "a - b",
-        Killed(&[GHOSTS, TANGENT], &[POINTS])),
-    patch("no ghost stiffness where there is nothing of a body", GHOST,
-        "filled(node) < 0.5",
-        "(0.25..0.5).contains(&filled(node))",
-        Killed(&[GHOSTS], &[POINTS])),
     patch("no coarse levels", MULTIGRID,
         "levels.correct(0, fine, &b, &mut x);",
         "{}",
-        Killed(&[LEVELS], &[GHOSTS])),
+        Killed(&[LEVELS], &[FOLLOWS])),
     patch("smoothing before the coarse levels alone", MULTIGRID,
         "chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);",
         "{}",
-        Killed(&[LEVELS], &[GHOSTS])),
+        Killed(&[LEVELS], &[FOLLOWS])),
     patch("a double-precision system with levels in the units of a single one", MULTIGRID,
         "tangent.scale() / self.scale",
         "1.0",
-        Killed(&[LEVELS], &[GHOSTS])),
+        Killed(&[LEVELS], &[FOLLOWS])),
     patch("coarse nodes that are held move", MULTIGRID_LEVEL,
         "held[coarse as usize * D + i] = form.prescribed[fine * D + i]",
         "held[coarse as usize * D + i] = false",
-        Killed(&[LEVELS], &[GHOSTS])),
+        Killed(&[LEVELS], &[FOLLOWS])),
     patch("a prediction that forgets the motion on a grid that is kept", NODAL,
         "motion + alphas.predicted(v, a)",
         "motion * 0.0 + alphas.predicted(v, a)",
@@ -990,10 +967,6 @@ pub(super) const PATCHES: &[Patch] = &[
         "(-facet.normal, -facet.turn)",
         "(-facet.normal, facet.turn)",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
-    patch("what ties take is not booked", SIMULATION,
-        "self.settings.ghost > 0.0 || ties()",
-        "self.settings.ghost > 0.0",
-        Killed(&[GHOSTS], &[POINTS])),
     patch("Gauss points between middles where the body ends", LAYOUT,
         "if goes_on { (n / 2..n).map(whole).collect() } else { (0..n).map(part).collect() }",
         "(n / 2..n).map(whole).collect::<Points>()",
@@ -1022,10 +995,6 @@ pub(super) const PATCHES: &[Patch] = &[
         "touch(particles, grid, supports)",
         "particles.is_empty()",
         Killed(&[KEPT], &[DYNAMICS])),
-    patch("points of a load run ahead of their body", GHOST,
-        "all.into_iter().map(tied).fold(0.0, f64::max)",
-        "1e-3 * all.into_iter().map(tied).fold(0.0, f64::max)",
-        Killed(&[GHOSTS], &[POINTS])),
     patch("affine fits that forget where the node is", AFFINE,
         "*fitted += slope * x",
         "*fitted += slope * (0.9 * x)",
