@@ -13,7 +13,7 @@ assert.equal(run.times.length, Number(snapshots));
 const drawn = [];
 const uploads = [];
 const frames_of_particles = [];
-// What the pen does, in its order.
+// Strokes of the pen, in their order.
 const strokes = [];
 const gl = new Proxy({}, {
   get: (_, name) => {

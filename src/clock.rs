@@ -319,7 +319,7 @@ mod tests {
         assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
     }
 
-    /// What failed in whole steps is not tried in one of them again.
+    /// A step whose whole length failed is not tried in that length again.
     #[test]
     fn the_way_to_an_end_between_steps_is_as_short_as_the_coming_step() {
         let mut clock = Clock::new(1.0, 3);

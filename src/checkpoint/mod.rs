@@ -178,7 +178,7 @@ pub enum CheckpointError {
     OtherParticles {
         /// The checkpoint.
         path: PathBuf,
-        /// What differs.
+        /// The quantity that differs.
         array: String,
     },
 }

@@ -88,7 +88,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         field
     }
 
-    /// As [`Self::extended`], in memory of a pool; `None` where every node is an unknown.
+    /// E û in memory of a pool; `None` where every node is an unknown.
     pub fn extended_in<T: Real>(&self, supports: &Supports<D>, field: &[Vector<T, D>]) -> Option<Pooled<Vector<T, D>>>
     where
         Vector<T, D>: Element,

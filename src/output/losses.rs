@@ -3,7 +3,7 @@
 use super::history::Energies;
 use serde::{Deserialize, Serialize};
 
-/// What happened in a step that may lose energy; the first that applies.
+/// The event of a step that may lose energy; the first that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Cause {
@@ -20,7 +20,7 @@ pub(crate) enum Cause {
 impl Cause {
     const ALL: [Self; 4] = [Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
 
-    /// What happened in a step.
+    /// The events of a step.
     pub fn of(feels_wall: bool, shares: bool, renewed: bool) -> Self {
         match (feels_wall, shares, renewed) {
             (true, ..) => Self::Wall,
@@ -40,7 +40,7 @@ impl Cause {
         }
     }
 
-    /// What keeps more energy there.
+    /// The cure: a setting that keeps more energy there.
     fn cure(self, lumped: bool) -> &'static str {
         match (self, lumped) {
             (Self::Wall | Self::Bodies, true) => {
@@ -59,13 +59,13 @@ impl Cause {
     }
 }
 
-/// What was lost so far, and where.
+/// The energy lost so far, by its cause.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Losses {
     /// The balance of energy after the last step.
     balance: f64,
-    /// What the balance has fallen by, by [`Cause`].
+    /// The fall of the balance, by [`Cause`].
     by_cause: [f64; Cause::ALL.len()],
     /// The largest energy so far: kinetic, strain, and what was dissipated.
     largest: f64,

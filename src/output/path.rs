@@ -1,4 +1,4 @@
-//! What a path of equilibria does that nobody asked for: its load turns, it bends sharply, it returns the way it came.
+//! Events on a path of equilibria: its load turns, it bends sharply, it returns the way it came.
 
 use super::Reference;
 use crate::simulation::Simulation;
@@ -60,7 +60,7 @@ pub(crate) struct Followed {
     turn: Option<usize>,
 }
 
-/// What a path has done in a step.
+/// The events of a path in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Event {
     /// The load turned at this λ.

@@ -303,7 +303,7 @@ pub(crate) struct Report<'a> {
     pub counts: Counts,
     /// How long it took.
     pub seconds: Seconds,
-    /// What was warned of.
+    /// The warnings that were given.
     pub warnings: &'a [Warning],
     /// Bodies that shared nodes.
     pub contact: &'a [Contact],

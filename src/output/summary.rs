@@ -25,7 +25,7 @@ pub struct Summary {
     pub krylov: Krylov,
     /// Bodies that shared nodes.
     pub contact: Vec<Contact>,
-    /// What was warned of.
+    /// The warnings that were given.
     pub warnings: Vec<Warning>,
     /// What was done.
     pub counts: Counts,

@@ -93,7 +93,7 @@ pub(crate) struct Watched {
     pub energies: Energies,
     /// Whether there is inertia: load steps take work from loads that are there at once.
     pub moves: bool,
-    /// What happened in it that may lose energy.
+    /// The event in it that may lose energy.
     pub cause: Cause,
     /// Whether the mass is lumped in full.
     pub lumped: bool,
@@ -126,7 +126,7 @@ impl Watch {
         &self.warnings[known..]
     }
 
-    /// What of energy is created or lost.
+    /// The energy that is created or lost.
     fn see_energy(&mut self, step: &Watched) {
         self.losses.add(&step.energies, step.cause);
         self.lumped = step.lumped;

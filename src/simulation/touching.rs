@@ -1,4 +1,4 @@
-//! What bodies feel in a step beside themselves: walls that they have come to, and each other.
+//! Contacts of bodies in a step: with walls that they have come to, and with each other.
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;

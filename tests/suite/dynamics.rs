@@ -157,7 +157,7 @@ fn vibrated(renewed: &str) -> Result<[f64; 2], Failure> {
 fn a_cantilever_that_vibrates_keeps_its_energy_and_its_frequency_on_a_grid_that_is_kept() -> Result<(), Failure> {
     let [balance, period] = vibrated(r#"{"strain": 0.1}"#)?;
     assert!(balance.abs() < 5e-3 && period.abs() < 3e-3, "{balance} {period}");
-    // What the manual says of a grid that is new in every step, of which a run warns.
+    // The manual describes a grid that is new in every step, of which a run warns.
     let [balance, period] = vibrated(r#""every_step""#)?;
     assert!((balance + 0.025).abs() < 0.002 && (period - 0.009).abs() < 0.001, "{balance} {period}");
     Ok(())

@@ -17,7 +17,7 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
 }
 
-/// What `start` becomes by the checkpoint of a simulation that began as it does.
+/// `start` as the checkpoint of a simulation continues it that began the same way.
 pub fn restored<const D: usize>(simulation: &Simulation<D>, start: &Simulation<D>) -> Result<Simulation<D>, Failure> {
     let folder = tempfile::tempdir()?;
     let identity = Identity::new(serde_json::Value::Null, &start.particles);

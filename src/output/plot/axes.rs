@@ -65,9 +65,9 @@ pub(super) struct Axes {
     pub corner: Point,
     /// Its width and height.
     pub size: Point,
-    /// What the level axis spans.
+    /// The range of the level axis.
     pub x: (f64, f64),
-    /// What the upright axis spans.
+    /// The range of the upright axis.
     pub y: (f64, f64),
 }
 

@@ -59,7 +59,7 @@ impl Panel {
     }
 }
 
-/// What a picture shows, and of which run.
+/// The subject of a picture, and the run that it is of.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Heading {
     pub what: String,

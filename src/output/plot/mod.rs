@@ -319,7 +319,7 @@ fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, 
     Ok(Some(panel).filter(|panel| panel.size() > ROUND_OFF * (2.0 * mass * kinetic).sqrt()))
 }
 
-/// What a panel of probes or reactions shows; panels of one quantity have one scale.
+/// The quantity of a panel of probes or reactions; panels of one quantity have one scale.
 fn quantity(report: Option<&Value>, table: &str, panel: &str) -> String {
     if table == "reactions" {
         return if panel.ends_with("_torque") { "torque" } else { "force" }.to_owned();

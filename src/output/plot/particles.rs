@@ -21,13 +21,13 @@ const MAX_DRAWN: (usize, usize) = (50_000, 20_000);
 /// The radius of a disc over the distance of neighbours: it has the area of a lattice's square.
 const RADIUS: f64 = 0.56;
 
-/// What all pictures of a run have in common.
+/// The common part of all pictures of a run.
 pub(super) struct Scene {
     /// From where it is seen.
     pub directions: Directions,
     /// Lower and upper corner of the box around all particles at all times.
     pub bounds: [[f64; 3]; 2],
-    /// What the colours span.
+    /// The range of the colours.
     pub span: (f64, f64),
     /// The run.
     pub run: String,
@@ -92,7 +92,7 @@ impl Scene {
         std::array::from_fn(|k| self.bounds[number >> k & 1][k])
     }
 
-    /// What the picture spans to the right and up: the box and a cell around it, but in a plane nothing beyond the grid.
+    /// The extent of the picture to the right and up: the box and a cell around it, but in a plane nothing beyond the grid.
     fn window(&self, snapshot: &Snapshot) -> ((f64, f64), (f64, f64)) {
         let grid = &snapshot.background;
         let corners = (0..8).map(|number| self.directions.project(&self.corner(number)));

@@ -107,7 +107,7 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|letter| width(letter).map_or(size, f64::from)).sum()
 }
 
-/// As much of the beginning of a text as is at most `most` wide.
+/// The longest beginning of a text that is at most `most` wide.
 pub(super) fn shortened(text: &str, size: f64, most: f64) -> String {
     if width(text, size) <= most {
         return text.to_owned();

@@ -63,7 +63,7 @@ enum Form {
     Disc,
 }
 
-/// What acts on the free faces.
+/// The load on the free faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Load {
     /// Tension along x: P = diag(P_xx, 0).

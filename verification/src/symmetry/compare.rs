@@ -42,7 +42,7 @@ const SAME: f64 = 1e-3;
 /// A quantity that two scenes do not have in common, or how nearly they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disagreement {
-    /// What differs.
+    /// The quantity that differs.
     pub quantity: &'static str,
     /// The largest difference, over the size of the quantity.
     pub difference: f64,
@@ -69,7 +69,7 @@ pub enum SymmetryError {
     Image(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// What a scene ends in, in plain units, particle by particle.
+/// The end state of a scene, in plain units, particle by particle.
 struct Answer {
     start: Vec<[f64; 2]>,
     volume: Vec<f64>,

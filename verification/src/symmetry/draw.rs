@@ -180,7 +180,7 @@ fn form(
     }
 }
 
-/// What stands on the bottom is held there, without inertia in both directions.
+/// A body that stands on the bottom is held there, without inertia in both directions.
 fn faces(random: &mut Random, half: bool, held: bool, inertia: bool) -> [Option<Hold>; 4] {
     let across = if half { 0.0 } else { random.between(-0.02, 0.02) };
     let moves = Hold::Moves([across, random.between(-0.02, 0.02)]);

@@ -56,7 +56,7 @@ pub enum Law {
     DruckerPrager,
 }
 
-/// What a face of the box does.
+/// The condition at a face of the box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
     Sliding,

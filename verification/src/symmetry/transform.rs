@@ -1,4 +1,4 @@
-//! What may be done to a scene that must not change its answer.
+//! Transformations of a scene that must not change its answer.
 
 use super::scene::{Form, Hold, Law, Load, Pressing, Scene, Units};
 

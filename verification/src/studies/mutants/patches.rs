@@ -97,7 +97,7 @@ const INERTIA: &str = "src/mechanics/terms/inertia.rs";
 const STRESS: &str = "src/mechanics/terms/stress.rs";
 const PATH: &str = "src/mechanics/path.rs";
 const UNKNOWNS: &str = "src/mechanics/unknowns.rs";
-const AGGREGATION: &str = "src/aggregation.rs";
+const AGGREGATION: &str = "src/aggregation/pieces.rs";
 const COLUMNS: &str = "src/mechanics/sweep/columns.rs";
 const AFFINE: &str = "src/mechanics/affine.rs";
 const KEPT_GRID: &str = "src/mechanics/kept.rs";
@@ -379,6 +379,14 @@ pub(super) const PATCHES: &[Patch] = &[
         "(at - l) as f64 / (k - l) as f64",
         "(at - l - 1) as f64 / (k - l) as f64",
         Killed(&[FOLLOWS], &[POINTS])),
+    patch("no cell is found across a corner", "src/aggregation/bodies.rs",
+        "            found.1\n        };",
+        "            if found.0 <= (2 * FURTHEST - 1).pow(2) { found.1 } else { Vec::new() }\n        };",
+        Killed(&[FOLLOWS], &[POINTS])),
+    patch("held values lead others in the matrix of the bottom level", "src/solver/preconditioner/multigrid/level.rs",
+        "if !self.held[k] {",
+        "if true {",
+        Killed(&[LEVELS], &[POINTS])),
     patch("loads of uGIMP by its own functions", COLUMNS,
         "{ other } else { product }",
         "{ let _ = other; product } else { product }",

@@ -1,0 +1,152 @@
+//! Which knot cells are well filled, and which of them an outer node follows.
+
+use super::{Occupied, Pieces};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// Shares of two cells that differ by less than this, relative to the larger one, are the same: rounding does not choose a cell.
+const SAME: f64 = 1e-6;
+
+/// How many cells away an outer node looks for a good cell. Polynomials grow with the distance; a node that finds none is an unknown.
+const FURTHEST: i64 = 6;
+
+/// The occupied knot cells of all bodies.
+pub(super) struct Bodies {
+    pieces: Pieces,
+    grid: [i64; 3],
+    dimension: usize,
+    cells: Vec<([i64; 3], f64)>,
+    places: HashMap<[i64; 3], usize>,
+    /// The first cell of the connected piece that a cell belongs to.
+    piece: Vec<usize>,
+    /// The active nodes of each cell's functions; `None` where one of them is not active.
+    pub(super) windows: Vec<Option<Vec<u32>>>,
+    numbers: HashMap<[i64; 3], u32>,
+}
+
+impl Bodies {
+    pub(super) fn new(pieces: Pieces, occupied: &Occupied<'_>) -> Self {
+        let mut cells: Vec<_> = occupied.cells.iter().map(|&(cell, share)| (cell.map(i64::from), share)).collect();
+        cells.sort_unstable_by_key(|(cell, _)| *cell);
+        let numbers = occupied.nodes.iter().zip(0..).map(|(node, number)| (node.map(i64::from), number)).collect();
+        let places = cells.iter().enumerate().map(|(place, (cell, _))| (*cell, place)).collect();
+        let mut bodies = Self {
+            pieces,
+            grid: occupied.grid.map(i64::from),
+            dimension: occupied.dimension,
+            piece: (0..cells.len()).collect(),
+            windows: Vec::new(),
+            cells,
+            places,
+            numbers,
+        };
+        bodies.windows = bodies.cells.iter().map(|(cell, _)| bodies.window(*cell)).collect();
+        bodies.connect();
+        bodies
+    }
+
+    /// The active nodes of a cell's functions, if all are active.
+    fn window(&self, cell: [i64; 3]) -> Option<Vec<u32>> {
+        let along = |k: usize| if k < self.dimension { self.pieces.window(cell[k], self.grid[k]) } else { 0..=0 };
+        let all = along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| [x, y, z])));
+        all.map(|node| self.numbers.get(&node).copied()).collect()
+    }
+
+    /// The occupied cells at most `reach` away along every axis, the cell itself among them.
+    fn around(&self, cell: [i64; 3], reach: i64) -> impl Iterator<Item = usize> {
+        let dimension = self.dimension;
+        let range = move |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
+        let all = range(2).flat_map(move |z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
+        all.filter_map(move |by| self.places.get(&[0, 1, 2].map(|k| cell[k] + by[k])).copied())
+    }
+
+    /// Joins neighbouring cells to pieces.
+    fn connect(&mut self) {
+        let mut seen = vec![false; self.cells.len()];
+        for start in 0..self.cells.len() {
+            let mut stack = if seen[start] { Vec::new() } else { vec![start] };
+            seen[start] = true;
+            while let Some(cell) = stack.pop() {
+                self.piece[cell] = start;
+                let beside: Vec<usize> = self.around(self.cells[cell].0, 1).filter(|&next| !seen[next]).collect();
+                beside.iter().for_each(|&next| seen[next] = true);
+                stack.extend(beside);
+            }
+        }
+    }
+
+    /// The good cells: those that are filled; then, as long as a cell has no good one beside it, the fullest of such cells.
+    pub(super) fn good(&self) -> Vec<usize> {
+        let may = |cell: &usize| self.windows[*cell].is_some();
+        let filled = |cell: &usize| self.cells[*cell].1 >= self.pieces.share * (1.0 - SAME);
+        let mut good: Vec<usize> = (0..self.cells.len()).filter(|cell| may(cell) && filled(cell)).collect();
+        let mut left: HashSet<usize> = (0..self.cells.len()).filter(may).collect();
+        let mut new = good.clone();
+        loop {
+            new.iter().for_each(|&cell| self.around(self.cells[cell].0, 1).for_each(|beside| _ = left.remove(&beside)));
+            let share = |cell: usize| self.cells[cell].1;
+            let fullest = |&cell: &usize| {
+                let mut beside = self.around(self.cells[cell].0, 1).filter(|beside| left.contains(beside));
+                beside.all(|beside| share(cell) >= share(beside) * (1.0 - SAME))
+            };
+            new = left.iter().copied().filter(fullest).collect();
+            if new.is_empty() {
+                good.sort_unstable();
+                return good;
+            }
+            good.extend(&new);
+        }
+    }
+
+    /// The square of the distance from a node to the centre of a cell, in half spacings.
+    fn distance(&self, node: [i64; 3], cell: usize) -> i64 {
+        (0..self.dimension).map(|k| (2 * node[k] - self.pieces.centre(self.cells[cell].0[k])).pow(2)).sum()
+    }
+
+    /// The nearest good cells of the pieces whose cells are nearest to a node.
+    pub(super) fn nearest(&self, node: [u32; 3], good: &HashSet<usize>) -> Vec<usize> {
+        let node = node.map(i64::from);
+        let nearest = |may: &dyn Fn(usize) -> bool| {
+            let mut found = (i64::MAX, Vec::new());
+            for reach in 1..=FURTHEST {
+                for cell in self.around(node, reach).filter(|&cell| may(cell)) {
+                    match self.distance(node, cell) {
+                        nearer if nearer < found.0 => found = (nearer, vec![cell]),
+                        same if same == found.0 && !found.1.contains(&cell) => found.1.push(cell),
+                        _ => {}
+                    }
+                }
+                // All cells whose centres are so near have been seen.
+                if found.0 <= (2 * reach - 1).pow(2) {
+                    break;
+                }
+            }
+            found.1
+        };
+        let pieces: HashSet<usize> = nearest(&|_| true).into_iter().map(|cell| self.piece[cell]).collect();
+        let mut cells = nearest(&|cell| good.contains(&cell) && pieces.contains(&self.piece[cell]));
+        cells.sort_unstable();
+        cells
+    }
+
+    /// The mean of what the polynomials of `cells` are at a node.
+    pub(super) fn row(&self, node: [u32; 3], cells: &[usize]) -> BTreeMap<u32, f64> {
+        let mut row = BTreeMap::new();
+        for &cell in cells {
+            let along = |k: usize| match k < self.dimension {
+                true => self.pieces.follow(self.cells[cell].0[k], self.grid[k], i64::from(node[k])),
+                false => vec![(0, 1.0)],
+            };
+            let [x, y, z] = [along(0), along(1), along(2)];
+            for &(k, of_z) in &z {
+                for &(j, of_y) in &y {
+                    for &(i, of_x) in &x {
+                        if let Some(&number) = self.numbers.get(&[i, j, k]) {
+                            *row.entry(number).or_insert(0.0) += of_x * of_y * of_z / cells.len() as f64;
+                        }
+                    }
+                }
+            }
+        }
+        row
+    }
+}

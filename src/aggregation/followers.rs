@@ -1,0 +1,89 @@
+//! E applied to fields of vectors.
+
+use super::Extension;
+use crate::scalar::Real;
+use crate::tensor::Vector;
+use std::sync::Arc;
+
+/// E of a field of vectors, of which some components are prescribed: those of an outer node do not follow.
+#[derive(Clone, Debug, Default)]
+pub struct Followers<const D: usize> {
+    extension: Arc<Extension>,
+    /// Which components of each outer node follow.
+    follows: Vec<[bool; D]>,
+}
+
+impl<const D: usize> Followers<D> {
+    /// Of an extension, but for the values `(node, component)` that are prescribed.
+    ///
+    /// ```
+    /// use bfree::aggregation::{Extension, Followers, Occupied, Pieces};
+    /// use bfree::tensor::Vector;
+    ///
+    /// let nodes: Vec<[u32; 3]> = (0..5).map(|i| [i, 0, 0]).collect();
+    /// let cells = [1.0, 1.0, 1.0, 0.1].iter().zip(0..).map(|(&share, i)| ([i, 0, 0], share)).collect();
+    /// let occupied = Occupied { dimension: 1, grid: [8, 0, 0], nodes: &nodes, cells };
+    /// let followers = Followers::<1>::new(Extension::new(Pieces::LINEAR, &occupied).into(), [].into_iter());
+    /// // u = E û continues a linear field; Eᵀ f keeps its resultant and its moment.
+    /// let mut field: Vec<_> = [0.0, 1.0, 2.0, 3.0, 0.0].map(|x| Vector::from([x])).into();
+    /// followers.extend(&mut field);
+    /// assert_eq!(field[4][0], 4.0);
+    /// let mut force: Vec<_> = [0.0, 0.0, 0.0, 0.0, 1.0].map(|x| Vector::from([x])).into();
+    /// followers.restrict(&mut force);
+    /// assert_eq!(force, [0.0, 0.0, -1.0, 2.0, 0.0].map(|x| Vector::from([x])));
+    /// ```
+    pub fn new(extension: Arc<Extension>, prescribed: impl Iterator<Item = (usize, usize)>) -> Self {
+        let mut follows = vec![[true; D]; extension.len()];
+        for (node, component) in prescribed {
+            if let Ok(place) = extension.outer().binary_search(&(node as u32)) {
+                follows[place][component] = false;
+            }
+        }
+        Self { extension, follows }
+    }
+
+    /// Whether every node is an unknown.
+    pub fn is_empty(&self) -> bool {
+        self.extension.is_empty()
+    }
+
+    /// Every outer node, which of its components follow, and the inner nodes with their weights.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, [bool; D], impl Iterator<Item = (usize, f64)>)> {
+        self.extension.rows().zip(&self.follows).map(|((outer, leaders), follows)| (outer, *follows, leaders))
+    }
+
+    /// The row of a node, if it is an outer one.
+    pub(crate) fn row(&self, node: usize) -> Option<([bool; D], impl Iterator<Item = (usize, f64)>)> {
+        let place = self.extension.outer().binary_search(&(node as u32)).ok()?;
+        Some((self.follows[place], self.extension.leaders(place)))
+    }
+
+    /// u = E û, in place.
+    pub fn extend<T: Real>(&self, field: &mut [Vector<T, D>]) {
+        for (outer, follows, leaders) in self.rows() {
+            let mut sum = Vector::<T, D>::zeros();
+            leaders.for_each(|(leader, weight)| sum += field[leader] * T::lit(weight));
+            (0..D).filter(|&i| follows[i]).for_each(|i| field[outer][i] = sum[i]);
+        }
+    }
+
+    /// R̂ = Eᵀ R, in place: zero at components that follow.
+    pub fn restrict<T: Real>(&self, forces: &mut [Vector<T, D>]) {
+        self.restrict_with(forces, |weight| weight);
+    }
+
+    /// |E|ᵀ of magnitudes, in place.
+    pub(crate) fn restrict_magnitudes<T: Real>(&self, magnitudes: &mut [Vector<T, D>]) {
+        self.restrict_with(magnitudes, f64::abs);
+    }
+
+    fn restrict_with<T: Real>(&self, forces: &mut [Vector<T, D>], of: impl Fn(f64) -> f64) {
+        for (outer, follows, leaders) in self.rows() {
+            let mut moved = Vector::<T, D>::zeros();
+            for i in (0..D).filter(|&i| follows[i]) {
+                moved[i] = std::mem::replace(&mut forces[outer][i], T::zero());
+            }
+            leaders.for_each(|(leader, weight)| forces[leader] += moved * T::lit(of(weight)));
+        }
+    }
+}

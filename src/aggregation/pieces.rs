@@ -1,0 +1,128 @@
+//! Which polynomials shape functions are made of, and how the polynomial of one cell goes on beyond it.
+
+/// Axes of fewer cells have no room for two ends at which functions curve.
+const ROOM: i64 = 4;
+
+/// The polynomials of which shape functions are made, along an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pieces {
+    /// The degree p, 1 to 3; 1 for functions that are no polynomials.
+    pub degree: u32,
+    /// The degree with which outer nodes continue the polynomial of a cell: p where sums over particles integrate, else 1. Higher degrees
+    /// would make errors of sums larger.
+    pub extension: u32,
+    /// Whether functions curve next to a wall of the grid ([`NotAKnotBspline`](crate::approximation::NotAKnotBspline)), where the unknown of
+    /// the wall's node is the value there. If not, coefficients beyond a wall continue linearly.
+    pub curves_at_walls: bool,
+    /// θ, the share of a knot cell that a body fills at least if the cell is good; no unit.
+    pub share: f64,
+}
+
+impl Pieces {
+    /// Of linear functions, and of those that are no polynomials.
+    pub const LINEAR: Self = Self { degree: 1, extension: 1, curves_at_walls: false, share: 0.5 };
+
+    /// The knot cell along an axis of `cells` cells, at `local` spacings from its first node.
+    pub(crate) fn cell(self, local: f64, cells: u32) -> u32 {
+        if self.degree.is_multiple_of(2) { (local + 0.5) as u32 } else { (local as u32).min(cells.saturating_sub(1)) }
+    }
+
+    /// The knot cells that a length along an axis overlaps, and which part of it lies in each; in spacings from the first node.
+    pub(crate) fn overlaps(self, middle: f64, length: f64, cells: u32) -> Vec<(u32, f64)> {
+        let (from, to) = ((middle - 0.5 * length).max(0.0), (middle + 0.5 * length).min(f64::from(cells)));
+        if from >= to {
+            return vec![(self.cell(middle, cells), 1.0)];
+        }
+        let begin = |cell: u32| f64::from(cell) - if self.degree.is_multiple_of(2) { 0.5 } else { 0.0 };
+        let part = |cell: u32| (to.min(begin(cell + 1)) - from.max(begin(cell))).max(0.0) / (to - from);
+        (self.cell(from, cells)..=self.cell(to, cells)).map(|cell| (cell, part(cell))).collect()
+    }
+
+    /// The share of a knot cell that lies within the grid along an axis: a cell of even degree is halved by a wall.
+    pub(crate) fn within(self, cell: u32, cells: u32) -> f64 {
+        if self.degree.is_multiple_of(2) && (cell == 0 || cell == cells) { 0.5 } else { 1.0 }
+    }
+
+    /// The centre of a cell, in half spacings.
+    pub(super) fn centre(self, cell: i64) -> i64 {
+        if self.degree.is_multiple_of(2) { 2 * cell } else { 2 * cell + 1 }
+    }
+
+    /// The nodes of a cell's functions along an axis of `cells` cells.
+    pub(super) fn window(self, cell: i64, cells: i64) -> std::ops::RangeInclusive<i64> {
+        let first = self.first(cell, cells);
+        first.max(0)..=(first + i64::from(self.degree)).min(cells)
+    }
+
+    /// The first coefficient of a cell's polynomial, counted as a node: it may lie beyond a wall.
+    fn first(self, cell: i64, cells: i64) -> i64 {
+        let first = cell - i64::from(self.degree / 2);
+        let last = cells - i64::from(self.degree);
+        if self.curves(cells) { first.clamp(0, last) } else { first }
+    }
+
+    fn curves(self, cells: i64) -> bool {
+        self.curves_at_walls && cells >= ROOM && self.degree > 1
+    }
+
+    /// The node `node`, along an axis of `cells` cells, as the polynomial of `cell` continues there: other nodes and weights.
+    pub(super) fn follow(self, cell: i64, cells: i64, node: i64) -> Vec<(i64, f64)> {
+        if self.window(cell, cells).contains(&node) {
+            return vec![(node, 1.0)];
+        }
+        let coefficient = |at: i64| self.coefficient(cell, cells, at);
+        let scaled =
+            |factor: f64, list: Vec<(i64, f64)>| list.into_iter().map(move |(node, weight)| (node, factor * weight));
+        if self.curves(cells) && (node == 0 || node == cells) {
+            // The unknown of a wall's node is the value.
+            let inwards = if node == 0 { 1 } else { -1 };
+            let value = if self.degree == 2 { &VALUE_QUADRATIC[..] } else { &VALUE_CUBIC[..] };
+            return value
+                .iter()
+                .zip(0..)
+                .flat_map(|(&weight, k)| scaled(weight, coefficient(node + k * inwards)))
+                .collect();
+        }
+        coefficient(node)
+    }
+
+    /// The coefficient `at` of the polynomial of a cell, by Lagrange's formula from those of its window:
+    /// e_jk = Π_{l≠k} (j − l)/(k − l).
+    fn coefficient(self, cell: i64, cells: i64, at: i64) -> Vec<(i64, f64)> {
+        let (first, by) = (self.first(cell, cells), i64::from(self.extension.min(self.degree)));
+        let last = first + i64::from(self.degree);
+        // Those nearest to it.
+        let window = if at < first { first..=first + by } else { last - by..=last };
+        let mut list = Vec::new();
+        for k in window.clone() {
+            let others = window.clone().filter(|&l| l != k);
+            let weight: f64 = others.map(|l| (at - l) as f64 / (k - l) as f64).product();
+            list.extend(self.unknowns(k, cells).into_iter().map(|(node, factor)| (node, factor * weight)));
+        }
+        list
+    }
+
+    /// A coefficient in terms of unknowns: beyond a wall u₋ₖ = 2u₀ − uₖ; where functions curve, u₀ is the value at the wall.
+    fn unknowns(self, k: i64, cells: i64) -> Vec<(i64, f64)> {
+        if self.curves(cells) {
+            let own = if self.degree == 2 { &COEFFICIENT_QUADRATIC[..] } else { &COEFFICIENT_CUBIC[..] };
+            return match k {
+                0 => own.iter().zip(0..).map(|(&weight, node)| (node, weight)).collect(),
+                _ if k == cells => own.iter().zip(0..).map(|(&weight, node)| (cells - node, weight)).collect(),
+                _ => vec![(k, 1.0)],
+            };
+        }
+        match k {
+            _ if k < 0 => vec![(0, 2.0), (-k, -1.0)],
+            _ if k > cells => vec![(cells, 2.0), (2 * cells - k, -1.0)],
+            _ => vec![(k, 1.0)],
+        }
+    }
+}
+
+/// The value at a wall from the coefficients c₀, c₁, … of the polynomial there, and c₀ from the value u₀ and c₁, ….
+/// Quadratic: u₀ = (c₋₁ + 6c₀ + c₁)/8 with c₋₁ = 3c₀ − 3c₁ + c₂. Cubic: u₀ = (c₋₁ + 4c₀ + c₁)/6 with c₋₁ = 4c₀ − 6c₁ + 4c₂ − c₃.
+const VALUE_QUADRATIC: [f64; 3] = [9.0 / 8.0, -2.0 / 8.0, 1.0 / 8.0];
+const VALUE_CUBIC: [f64; 4] = [8.0 / 6.0, -5.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0];
+const COEFFICIENT_QUADRATIC: [f64; 3] = [8.0 / 9.0, 2.0 / 9.0, -1.0 / 9.0];
+const COEFFICIENT_CUBIC: [f64; 4] = [6.0 / 8.0, 5.0 / 8.0, -4.0 / 8.0, 1.0 / 8.0];
