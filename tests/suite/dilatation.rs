@@ -211,6 +211,24 @@ fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
     Ok(())
 }
 
+/// The stress that is read at a loaded edge is the body's: its points have the mean dilatation of the cell nearest to them.
+#[test]
+fn points_of_a_loaded_edge_have_the_dilatation_of_the_nearest_cell() -> Result<(), Failure> {
+    let mut simulation = membrane(0.49, 4.0, 1, &[LINEAR, MEAN])?;
+    let start = simulation.particles.by_id().position;
+    simulation.advance()?;
+    let particles = &simulation.particles;
+    let solid = particles.solid_places();
+    for point in &simulation.loads.surface[0].points {
+        let own = particles.dilatation[point.particle];
+        let place = start[particles.id[point.particle] as usize];
+        let beside = |&&q: &&u32| (start[particles.id[q as usize] as usize] - place).amax() < 4.0;
+        let near: Vec<f64> = solid.iter().filter(beside).map(|&q| particles.dilatation[q as usize]).collect();
+        assert!(own != 0.0 && near.contains(&own), "{own:e} is none of {near:?}");
+    }
+    Ok(())
+}
+
 /// Against nine-node elements with three volumes each, 32 × 32 of them: see the study `locking`, which does it in full.
 #[test]
 fn a_membrane_that_keeps_its_volume_does_not_lock() -> Result<(), Failure> {
