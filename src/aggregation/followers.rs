@@ -1,4 +1,4 @@
-//! E applied to fields of vectors.
+//! E, applied to fields of vectors of which some components are prescribed.
 
 use super::Extension;
 use crate::scalar::Real;

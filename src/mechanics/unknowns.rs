@@ -11,11 +11,11 @@ use crate::tensor::{Tensor, Vector, identity};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most cells along an axis that a particle fills: one that is drawn out further tells nothing of the cells between.
+/// The greatest length of a particle's domain, in cells: the domain of a particle that is drawn out further is not known to be filled.
 const LONGEST: f64 = 2.0;
 
-/// The extension E of the bodies in a grid, by the volume that particles have now. A particle fills the cells that its domain overlaps, as
-/// far as particles lie in them: so the share of a cell goes on as particles move from one to the next.
+/// The extension E of the bodies in a grid, by the volume that particles have now. A particle fills the cells that its domain overlaps, so
+/// that the share of a cell changes gradually as particles move into it. Cells in which no particle lies count as empty.
 pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
     let grid = supports.grid();
     let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
@@ -23,7 +23,7 @@ pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>
     let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
     let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
     for p in solid() {
-        // A cube of the particle's volume at rest, as long along each axis as the ellipsoid is that a ball in it becomes.
+        // The domain is a box. At rest it is a cube of the particle's volume; its edge along axis k grows with |row k of F|.
         let f = identity::<f64, D>() + particles.displacement_gradient[p];
         let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
         let length = |k: usize| (side * f.row(k).norm()).min(LONGEST);

@@ -236,8 +236,8 @@ impl Scene {
         problems
     }
 
-    /// Whether nodes with little of a body follow others. In shorter steps, mass holds what stiffness does not; but for nodes that see more of
-    /// a loaded surface than of the particles below it.
+    /// Whether nodes with little of a body follow others. In short steps their mass holds them, except for nodes that see more of a loaded
+    /// surface than of the particles below it. Adaptive steps become short at impacts.
     fn aggregates(&self) -> bool {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));

@@ -151,7 +151,7 @@ fn a_cycle_is_symmetric_and_positive_and_of_no_scale() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A ball whose lower part is held: at its surface, held nodes lead others. The direct solve of the coarsest grid leaves those out.
+/// At the surface of a ball whose lower part is held, held nodes lead others. The matrix of the coarsest grid must have no entries of them.
 #[test]
 fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Failure> {
     let scene = json!({

@@ -276,7 +276,7 @@ impl<const D: usize> Level<D> {
         let mut matrix = DMatrix::zeros(size, size);
         let mut unit = vec![0.0; size];
         for (k, mut column) in matrix.column_iter_mut().enumerate() {
-            // Nothing may come from a held value to what follows it.
+            // A held value is no unknown: the nodes that follow it must not put entries into its column.
             if !self.held[k] {
                 unit[k] = 1.0;
                 self.apply(&unit, column.as_mut_slice());
