@@ -118,7 +118,7 @@ impl Scene {
             lumping: self.time.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             aggregation: self.aggregates(),
-            renewal: self.grid.renewed(self.time.inertia),
+            renewal: self.renewal(),
             initial_guess: self.time.initial_guess(),
             wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {

@@ -154,7 +154,7 @@ impl Scene {
     }
 
     fn is_kept(&self) -> bool {
-        self.grid.renewed(self.time.inertia) != Renewal::EveryStep
+        self.renewal() != Renewal::EveryStep
     }
 
     /// Whether sums over particles are integrals, of Gauss's points on a grid that is kept, and no mass is lumped, not even in part.

@@ -1,6 +1,5 @@
 //! The box and its background grid.
 
-use super::time::Inertia;
 use crate::grid::Grid;
 use crate::mechanics::kept::Renewal;
 use crate::problems::{Number, Problems, sensible};
@@ -13,9 +12,6 @@ const MAX_CELLS: f64 = 1e6;
 
 /// How far, relative to itself, the number of cells of an axis may be from a whole number.
 const WHOLE: f64 = 1e-9;
-
-/// The strain up to which load steps keep a grid by themselves.
-const MOST_STRAIN: f64 = 1.0;
 
 /// How well neighbouring nodes must be told apart, relative to their distance.
 const DISTINCT: f64 = 1e-6;
@@ -36,7 +32,8 @@ pub struct GridBox {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing: f64,
     /// When the background grid is renewed. With a grid that is kept, the answer does not depend on the number of steps, stresses are
-    /// smooth, and bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps, `"every_step"` with inertia.
+    /// smooth, and bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps; with inertia `{"strain": 0.1}` for a
+    /// single body that a fixed face of the box holds from the start, with the transfer `"flip"`, and `"every_step"` for others.
     pub renewed: Option<Renewal>,
 }
 
@@ -105,12 +102,6 @@ impl GridBox {
         let whole = cells.round();
         (self.spacing > 0.0 && (1.0..=MAX_CELLS).contains(&whole) && (cells - whole).abs() <= WHOLE * whole)
             .then_some(whole as u32)
-    }
-
-    /// When it is made anew.
-    pub(super) fn renewed(&self, inertia: Inertia) -> Renewal {
-        let by_itself = if inertia.has_inertia() { Renewal::EveryStep } else { Renewal::Strain(MOST_STRAIN) };
-        self.renewed.unwrap_or(by_itself)
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {

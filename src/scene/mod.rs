@@ -49,6 +49,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+/// The strain up to which load steps keep a grid by themselves.
+const STATIC_STRAIN: f64 = 1.0;
+
+/// The strain up to which a clamped body keeps its grid with inertia. The cantilever of `docs/src/choosing.md` loses 0.01 % of its energy.
+const VIBRATION_STRAIN: f64 = 0.1;
+
+/// A body that comes this near to a face of the box, in spacings, touches it.
+const TOUCHES: f64 = 1e-9;
+
 /// A simulation: bodies in a box, what acts on them, and how it is computed. All units are the user's own consistent set.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -85,7 +94,8 @@ pub struct Scene {
     pub prescribed: Vec<boundary::Prescribed>,
     /// Whether nodes with little of a body follow well-supported nodes (extended B-splines). Such nodes are no unknowns: they continue the
     /// polynomial of the nearest well-filled cell. Loads on surfaces then act through functions that balance the internal force. Default:
-    /// true without inertia, where the surface of a shape is loaded, and in steps of one length at Courant numbers above 10; else false.
+    /// true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, and in steps of one length at
+    /// Courant numbers above 10; else false.
     pub aggregation: Option<bool>,
     /// No longer used, and read for one release: aggregation has replaced the ghost stiffness. Where `aggregation` is not given, 0 means
     /// false, and more than 0 true.
@@ -236,14 +246,47 @@ impl Scene {
         problems
     }
 
-    /// Whether nodes with little of a body follow others. In short steps their mass holds them, except for nodes that see more of a loaded
-    /// surface than of the particles below it. Adaptive steps become short at impacts.
+    /// Whether nodes with little of a body follow others. In short steps a lumped mass holds them, except for nodes that see more of a
+    /// loaded surface than of the particles below it. Adaptive steps become short at impacts.
     fn aggregates(&self) -> bool {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
         let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
-        let needed = long_steps || loads.into_iter().any(|load| load.surface.is_none());
+        let consistent = self.time.inertia.has_inertia() && self.time.lumping() == 0.0;
+        let needed = long_steps || consistent || loads.into_iter().any(|load| load.surface.is_none());
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
+    }
+
+    /// When the grid is reset. A clamped body vibrates, and seldom meets anything; others may come to walls, which a grid reset in every step
+    /// feels from farther away.
+    fn renewal(&self) -> Renewal {
+        let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
+        self.grid.renewed.unwrap_or(match self.time.inertia.has_inertia() {
+            false => Renewal::Strain(STATIC_STRAIN),
+            true if flip && self.is_clamped() => Renewal::Strain(VIBRATION_STRAIN),
+            true => Renewal::EveryStep,
+        })
+    }
+
+    /// Whether there is one body, and its shape reaches a fixed face of the box.
+    fn is_clamped(&self) -> bool {
+        match self.dimension() {
+            1 => self.reaches_fixed_face::<1>(),
+            2 => self.reaches_fixed_face::<2>(),
+            _ => self.reaches_fixed_face::<3>(),
+        }
+    }
+
+    fn reaches_fixed_face<const D: usize>(&self) -> bool {
+        let [body] = self.bodies.as_slice() else { return false };
+        let Some(shape) = body.shape.as_ref().and_then(shape::Shape::build::<D>) else { return false };
+        let (lower, upper) = shape.bounding_box();
+        let (origin, size) = (self.grid.origin(), &self.grid.size);
+        let near = TOUCHES * self.grid.spacing;
+        (0..D).any(|k| {
+            let fixed = |is_upper: bool| *self.boundary.face(k, is_upper) == boundary::Face::Fixed;
+            (fixed(false) && lower[k] < origin[k] + near) || (fixed(true) && upper[k] > origin[k] + size[k] - near)
+        })
     }
 
     /// The largest Courant number, that of waves of pressure; infinite without inertia.
@@ -337,7 +380,7 @@ impl Scene {
         self.time.complete();
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
-        self.grid.renewed = Some(self.grid.renewed(self.time.inertia));
+        self.grid.renewed = Some(self.renewal());
         if self.time.inertia.has_inertia() {
             self.transfer.get_or_insert_default();
         }

@@ -11,6 +11,27 @@ const BEAM: &str = "elastica.json";
 const NO_BETA: &str = "time.beta=null";
 const NO_GAMMA: &str = "time.gamma=null";
 
+/// One body that a fixed face of the box holds from the start; others may come to walls.
+#[test]
+fn a_clamped_body_keeps_its_grid_by_default() -> Result<(), Failure> {
+    let asked = |name: &str, overrides: &[&str]| -> Result<Renewal, Failure> {
+        Ok(scene::<2>(name, overrides)?.settings.renewal)
+    };
+    let (kept, new) = (Renewal::Strain(0.1), Renewal::EveryStep);
+    for (overrides, renewal) in [
+        (&[][..], kept),
+        (&[r#"boundary.left="sliding""#], new),
+        (&[r#"boundary={"right":"fixed"}"#], new),
+        (&[r#"transfer={"pic":{}}"#], new),
+        (&[r#"grid.renewed="every_step""#], new),
+        (&[r#"time.inertia="none""#, NO_BETA, NO_GAMMA], Renewal::Strain(1.0)),
+    ] {
+        assert_eq!(asked("cantilever.json", overrides)?, renewal, "{overrides:?}");
+    }
+    assert_eq!(asked("rebound.json", &[])?, new);
+    Ok(())
+}
+
 /// A short beam, bent by half of its length in `steps` load steps.
 fn beam(steps: u32, more: &[&str]) -> Result<Simulation<2>, Failure> {
     let step = format!("time.step={}", 1.0 / f64::from(steps));
