@@ -1,7 +1,7 @@
-//! What a step is made of, in particles a second: `cargo bench --bench step`, with `-- product` behind it for one part.
+//! The parts of a step, in particles per second: `cargo bench --bench step`, with `-- product` behind it for one part.
 //!
-//! One thread; a jittered, strained block with 2^D particles a cell. The study `operator` of the verification compares the same
-//! parts with the limits of the machine.
+//! One thread; a jittered, strained block with 2^D particles per cell. The study `operator` of the verification compares the same parts
+//! with the limits of the machine.
 
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
@@ -24,7 +24,7 @@ fn main() {
     divan::main();
 }
 
-/// A block of `cells`ᴰ cells, its particles moved by up to 0.1 h.
+/// A block of `cells`ᴰ cells. Its particles are moved by up to 0.1 h.
 fn block<const D: usize>(shape: &str, cells: u32) -> Simulation<D> {
     let approximation = match shape {
         "linear" => json!("linear"),
@@ -49,7 +49,7 @@ fn block<const D: usize>(shape: &str, cells: u32) -> Simulation<D> {
     simulation
 }
 
-/// Calls `work` with the equilibrium of the coming step and a small displacement.
+/// Calls `work` with the equilibrium of the next step and a small displacement.
 fn at_a_step<const D: usize>(
     bencher: Bencher<'_, '_>,
     shape: &str,

@@ -1,8 +1,8 @@
 //! Your own law, from its energy alone.
 //!
-//! A Mooney–Rivlin-like solid: W = c₁ (I₁ − 3) + c₂ (I₂ − 3) + K/2 (J − 1)² − (2c₁ + 4c₂) ln J, with the invariants of C = I + 2E.
-//! The energy is the one function below; stress and tangent come from dual numbers, so Newton stays quadratic. For small strains it
-//! is a linear elastic solid of shear modulus 2 (c₁ + c₂), which is how this example checks itself.
+//! A Mooney–Rivlin-like solid: W = c₁ (I₁ − 3) + c₂ (I₂ − 3) + K/2 (J − 1)² − (2c₁ + 4c₂) ln J, with the invariants of C = I + 2E. The
+//! function below gives the energy. Dual numbers give stress and tangent, so Newton's method stays quadratic. For small strains the law is
+//! a linear elastic solid of shear modulus 2 (c₁ + c₂); the example checks that limit.
 //!
 //! `cargo run --release --features examples --example law_from_energy`
 
@@ -39,7 +39,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut simulation =
         scene.build::<2>(&folder)?.with_laws(|_| FromEnergy(Mooney { c1: 10.0, c2: 5.0, bulk: 150.0 }));
 
-    // Up to the first impact the body flies freely; at t = 22 it is compressed against the wall.
+    // Up to the first impact the body flies freely; at t = 22 the wall compresses it.
     let (mut most, mut start) = (0, None);
     while simulation.clock.time() < 22.0 {
         let report = simulation.advance()?;

@@ -1,8 +1,8 @@
-//! Driving the solver step by step: watch a run, and end it when you have seen enough.
+//! Driving the solver step by step: watch a run, and stop it when you have seen enough.
 //!
-//! [`Simulation::advance`] takes one step and reports what it did; between two of them the state is yours to read. Here an observer
-//! follows the elastic cylinder of section 4.3 of the paper to its first impact at the wall and stops when it begins to swing
-//! back: the kinetic energy has become strain energy by then.
+//! [`Simulation::advance`] takes one step and reports on it; between two steps the state is yours to read. The observer follows the elastic
+//! cylinder of section 4.3 of the paper to its first impact at the wall. It stops the run when the cylinder begins to swing back: the
+//! kinetic energy has then become strain energy.
 //!
 //! `cargo run --release --features examples --example observer`
 
@@ -40,7 +40,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
             return ControlFlow::Break(());
         }
         most = strain.max(most);
-        // Something else may have gone wrong; an observer may always say stop.
+        // Something else may have gone wrong, so the observer also stops after t = 30.
         if simulation.clock.time() > 30.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let time = simulation.clock.time();

@@ -1,11 +1,11 @@
 //! Your own shape function: hats and quadratic B-splines mixed.
 //!
-//! N = (1 − c) hat + c spline inherits from both what any shape function needs: Σ N = 1 and Σ N x_I = x, and at a wall of the box
-//! the nodes of that wall alone. As a product of functions of one coordinate it implements [`Separable`] and gets the fast,
-//! sum-factorised sweep for nothing. In your own CI let `verification::check_approximation(&Mixed(0.5))` judge it.
+//! N = (1 − c) hat + c spline inherits two properties from both: Σ N = 1 and Σ N x_I = x. At a wall of the box, only the nodes of the wall
+//! have N ≠ 0. N is a product of functions of one coordinate, so it implements [`Separable`] and uses the fast, sum-factorised transfer
+//! without further code. In your own CI let `verification::check_approximation(&Mixed(0.5))` judge it.
 //!
-//! The example checks consistency at many points, and then mechanics: a free bar that was stretched rings with the period
-//! T = 2L/c of its first mode, c² = M/ρ with M the modulus of uniaxial strain.
+//! The example checks consistency at many points, and then mechanics: a free bar that was stretched vibrates with the period T = 2L/c of
+//! its first mode, c² = M/ρ with the modulus M of uniaxial strain.
 //!
 //! `cargo run --release --features examples --example own_shape_function`
 
@@ -18,7 +18,7 @@ use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::Vector;
 use std::error::Error;
 
-/// The part c of the spline, in [0, 1].
+/// The share c of the spline, in [0, 1].
 #[derive(Clone, Copy, Debug)]
 pub struct Mixed(pub f64);
 
@@ -56,7 +56,7 @@ impl Separable for Mixed {
 const LENGTH: f64 = 2.0;
 const DENSITY: f64 = 1.0;
 
-/// A bar of length 2 in a box of length 4, stretched as its first mode is: u = A sin(π s/L), s from its middle.
+/// A bar of length 2 in a box of length 4, stretched in the shape of its first mode: u = A sin(π s/L), with s measured from its middle.
 fn stretched(lame: Lame) -> Simulation<1, Material, Mixed> {
     let grid = Grid { origin: Vector::zeros(), spacing: 0.05, cells: [80] };
     let (mut particles, count, amplitude) = (Particles::default(), 80, 1e-4);

@@ -1,8 +1,8 @@
 //! A scene in code: a square falls 1 m onto a floor.
 //!
-//! Everything a JSON scene can say is a field of [`Simulation`]: grid, shape functions, bodies, particles, loads, settings. What it
-//! checks is mechanics, exact but for the tolerance of Newton's method: while the body is free, the centre of mass follows ½ g t²;
-//! and in the end weight and floor have given it its momentum, p = m g t + Σ R Δt.
+//! A JSON scene sets the fields of [`Simulation`]: grid, shape functions, bodies, particles, loads, settings. The example checks two facts
+//! of mechanics, exact to the tolerance of Newton's method. While the body is free, the centre of mass follows ½ g t². At the end, weight
+//! and floor have given the body its momentum, p = m g t + Σ R Δt.
 //!
 //! `cargo run --release --features examples --example scene_in_code`
 
@@ -50,7 +50,7 @@ pub fn square() -> Result<Simulation<2>, Box<dyn Error>> {
     Ok(simulation)
 }
 
-/// Drops it, and checks the fall and the blow.
+/// Drops the square, and checks the fall and the impact.
 pub fn main() -> Result<(), Box<dyn Error>> {
     let mut simulation = square()?;
     let mass: f64 = simulation.particles.mass.iter().sum();
@@ -62,7 +62,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     while simulation.clock.time() < 0.8 {
         let step = simulation.advance()?;
         let (t, fallen) = (simulation.clock.time(), height(&simulation) - start);
-        // Until then no particle sees a node of the floor.
+        // Until t = 0.2 no particle has a node of the floor in its connectivity.
         if t <= 0.2 {
             let free = 0.5 * GRAVITY * t * t;
             assert!((fallen - free).abs() < 1e-9 * free.abs(), "t = {t}: {fallen}, not {free}");

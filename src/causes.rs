@@ -1,15 +1,15 @@
-//! What an error says and what its causes say, each once.
+//! The messages of an error and of its causes, each once.
 
 use std::error::Error;
 
-/// The messages of an error and of its causes, outermost first. A message that already ends with its cause, as "cannot write
-/// a.csv: disk full" does, is not followed by it.
+/// The messages of an error and of its causes, outermost first. A message may already end with its cause, as in "cannot write a.csv: disk
+/// full". The cause is then left out.
 ///
 /// ```
 /// use bfree::causes::{messages, on_one_line};
 ///
 /// let error = bfree::scene::read_file("nowhere.json".as_ref(), &[]).unwrap_err();
-/// // The message ends with its cause, what the system says; that is not told again.
+/// // The message already ends with its cause, the message of the system.
 /// assert_eq!(messages(&error).len(), 1);
 /// assert!(on_one_line(&error).starts_with("cannot read nowhere.json: "));
 /// ```
@@ -26,12 +26,12 @@ pub fn messages(error: &dyn Error) -> Vec<String> {
     messages
 }
 
-/// All of them on one line.
+/// The [`messages`] of an error on one line.
 ///
 /// ```
 /// use bfree::causes::{messages, on_one_line};
 ///
-/// // A particle outside the box: that the step failed, and why.
+/// // A particle outside the box. The line says that the step failed, and why.
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// simulation.particles.position[3][0] = -1.0;

@@ -1,17 +1,17 @@
-//! Time as a count of nominal steps and binary fractions of them: no drift, and halved steps land where whole ones do.
+//! Time as a count of nominal steps and their binary fractions. It does not drift, and halved steps end where whole steps do.
 
 use serde::{Deserialize, Serialize};
 
-/// The most a step can be halved.
+/// The most times a step can be halved.
 pub const MAX_HALVINGS: u32 = 20;
 
 /// Ticks per nominal step.
 const TICKS: u64 = 1 << MAX_HALVINGS;
 
-/// Round-off in an end, in steps.
+/// The tolerance for round-off in an end time, in steps.
 const HAIR: f64 = 1e-6;
 
-/// What a clock inherits from step to step.
+/// The part of a clock that changes in a run. Checkpoints store it.
 ///
 /// ```
 /// use bfree::clock::{Clock, Reached};
@@ -39,7 +39,7 @@ impl Reached {
     }
 }
 
-/// Where a run is in time.
+/// The time of a run, and the length of its steps.
 ///
 /// ```
 /// use bfree::clock::Clock;
@@ -51,7 +51,7 @@ impl Reached {
 /// // No drift: a sum of a thousand steps of 0.1 is not 100.
 /// assert_eq!((clock.time(), clock.steps()), (100.0, 1000));
 /// assert_ne!((0..1000).map(|_| 0.1).sum::<f64>(), 100.0);
-/// // A halved step is counted as a step, and half of it as time.
+/// // A halved step counts as one step, and as half of the time.
 /// assert!(clock.halve());
 /// clock.advance();
 /// assert_eq!((clock.step(), clock.nominal()), (0.05, 0.1));
@@ -62,7 +62,7 @@ impl Reached {
 pub struct Clock {
     nominal: f64,
     max_halvings: u32,
-    /// Of a clock whose only step ends there: see [`Clock::to`].
+    /// The end time of a clock from [`Clock::to`], which has a single nominal step.
     end: Option<f64>,
     /// Time since the start, in ticks of Δt / 2^[`MAX_HALVINGS`].
     ticks: u64,
@@ -79,18 +79,18 @@ impl Clock {
         Self { nominal: dt, max_halvings, end: None, ticks: 0, level: 0, steps: 0 }
     }
 
-    /// How far it has come.
+    /// The steps and the time reached.
     pub fn reached(&self) -> Reached {
         let Self { nominal: _, max_halvings: _, end: _, ticks, level, steps } = *self;
         Reached { ticks, level, steps }
     }
 
-    /// The same clock where another of the same steps has come to; `None` if this one could not come there.
+    /// This clock, set to what another clock with the same nominal step has reached. `None` if this clock cannot reach it.
     ///
     /// ```
     /// use bfree::clock::Clock;
     ///
-    /// // What a checkpoint keeps, and where a run goes on from it.
+    /// // A checkpoint stores the steps and the time reached, and a run continues from them.
     /// let mut clock = Clock::new(0.1, 2);
     /// clock.halve();
     /// clock.advance();
@@ -102,14 +102,14 @@ impl Clock {
     /// ```
     pub fn at(self, reached: Reached) -> Option<Self> {
         let Reached { ticks, level, steps } = reached;
-        // Far below an overflow of the ticks, far above any number of steps.
+        // The limit is far below an overflow of the ticks, and far above any number of steps.
         let possible = level <= self.max_halvings && ticks < 1 << 62 && ticks.is_multiple_of(TICKS >> level);
         possible.then_some(Self { ticks, level, steps, ..self })
     }
 
     /// t_n
     pub fn time(&self) -> f64 {
-        // Exact while the number of steps is: whole steps and the fraction are multiplied once.
+        // The time is exact while the number of steps is, because whole steps and the fraction are each multiplied once.
         let (whole, part) = ((self.ticks / TICKS) as f64, (self.ticks % TICKS) as f64 / TICKS as f64);
         match self.end {
             Some(end) => end + (whole - 1.0) * self.nominal + part * self.nominal,
@@ -127,7 +127,7 @@ impl Clock {
         self.nominal
     }
 
-    /// Whole steps until `end`; one that misses it by less than a millionth of a step has reached it.
+    /// The number of whole steps until `end`. A step that misses `end` by less than a millionth of a step has reached it.
     ///
     /// ```
     /// use bfree::clock::Clock;
@@ -139,7 +139,7 @@ impl Clock {
         (end / self.nominal + HAIR).floor().max(0.0) as u64
     }
 
-    /// What is left to `end` after [`Self::whole_steps`], if it lies between steps.
+    /// The time left to `end` after [`Self::whole_steps`], if `end` lies between steps.
     ///
     /// ```
     /// use bfree::clock::Clock;
@@ -164,8 +164,8 @@ impl Clock {
         end - self.time() <= HAIR * self.nominal
     }
 
-    /// The clock of what is left to `end`, as one nominal step, not longer than the coming one; `None` if `end` is reached, as
-    /// [`Self::whole_steps`] sees it, or more than a step away.
+    /// A clock whose nominal step is the time left to `end`. This step is halved until it is no longer than the coming step. `None` if
+    /// `end` is reached, to the tolerance of [`Self::whole_steps`], or is more than a nominal step away.
     ///
     /// ```
     /// use bfree::clock::Clock;
@@ -202,17 +202,17 @@ impl Clock {
         self.ticks.is_multiple_of(TICKS)
     }
 
-    /// Moves to t_{n+1}; a halved step grows back by one level as soon as it fits the grid of longer steps.
+    /// Moves to t_{n+1}. A halved step doubles as soon as t_{n+1} is a multiple of the doubled step.
     pub fn advance(&mut self) {
         self.advance_and_grow_if(true);
     }
 
-    /// As [`Self::advance`], but a halved step grows back only if it `may` do so.
+    /// Moves to t_{n+1} like [`Self::advance`], but a halved step doubles only if it `may`.
     ///
     /// ```
     /// use bfree::clock::Clock;
     ///
-    /// // Halved once: two halves fill a step, and the third begins the next one.
+    /// // After one halving, two steps fill a nominal step, and the third begins the next one.
     /// let mut clock = Clock::new(1.0, 3);
     /// assert!(clock.halve() && clock.can_halve());
     /// for may_grow in [true, false, false] {
@@ -314,7 +314,7 @@ mod tests {
                 dt
             })
             .into();
-        // Four quarters fill a step; from there on it may double, each time once it is allowed to.
+        // Four quarters fill a nominal step. From there on the step doubles when it is allowed to.
         assert_eq!(lengths, [0.25, 0.25, 0.25, 0.25, 0.5, 0.5]);
         assert_eq!((clock.time(), clock.step()), (2.0, 1.0));
     }
@@ -328,7 +328,7 @@ mod tests {
         // 0.85 is left, in quarters of it.
         let last = clock.to(1.1).unwrap();
         assert_eq!((last.step(), last.time()), (0.25 * (1.1 - 0.25), 0.25));
-        // Where less is left than the coming step, all of it.
+        // If less is left than the coming step, the last step takes all of it.
         assert_eq!(clock.to(0.4).unwrap().step(), 0.4 - 0.25);
     }
 

@@ -1,10 +1,10 @@
-//! Programs that run, whole. Each states what it shows, and asserts a fact of mechanics; the tests run all of them.
+//! Complete programs. Each states its subject and asserts a fact of mechanics. The tests run all of them.
 //!
 //! | | |
 //! |---|---|
 //! | [`scene_in_code`] | everything a JSON scene can say, as fields of a [`crate::simulation::Simulation`] |
 //! | [`law_from_energy`] | your own law, from its energy alone |
-//! | [`own_law`] | your own law with its analytic tangent, and the one line that judges it in your CI |
+//! | [`own_law`] | your own law with its analytic tangent, and the one line that checks it in your CI |
 //! | [`own_shape_function`] | your own shape function |
 //! | [`observer`] | the solver driven step by step |
 

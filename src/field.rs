@@ -1,15 +1,15 @@
-//! The fields of the particles that a run can show: the list, known to scenes and to output.
+//! The list of the particle fields that a run can show, shared by scenes and output.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Declares the fields, each with its sentence, its name in scenes and files, and its kind.
+/// Declares the fields, each with its doc comment, its name in scenes and files, and its kind.
 macro_rules! fields {
     ($($(#[$sentence:meta])+ $name:literal => $field:ident: $kind:ident;)+) => {
         /// A quantity that every particle has.
         ///
-        /// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing
-        /// components of displacement, velocity and strain are 0, and the out-of-plane normal stress is that of plane (uniaxial) strain.
+        /// Vectors and tensors are given in three dimensions whatever `D` is. The missing stretches are 1, so the missing components of
+        /// displacement, velocity and strain are 0. The out-of-plane normal stress is that of plane (uniaxial) strain.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
         pub enum Field {
             $($(#[$sentence])+ #[serde(rename = $name)] $field),+
@@ -19,12 +19,12 @@ macro_rules! fields {
             /// All fields.
             pub const ALL: &[Self] = &[$(Self::$field),+];
 
-            /// The name, as in scenes and files.
+            /// The name in scenes and files.
             ///
             /// ```
             /// use bfree::field::Field;
             ///
-            /// // One name, in scenes and in files.
+            /// // Scenes and files use the same name.
             /// let read: Field = serde_json::from_str(r#""von_mises""#)?;
             /// assert_eq!(read, Field::VonMises);
             /// assert_eq!(read.name(), "von_mises");
@@ -34,7 +34,7 @@ macro_rules! fields {
                 match self { $(Self::$field => $name),+ }
             }
 
-            /// What its components are.
+            /// The kind of its components.
             ///
             /// ```
             /// use bfree::field::{Field, Kind};
@@ -74,9 +74,9 @@ fields! {
     "von_mises" => VonMises: Scalar;
     /// Strain energy per reference volume.
     "energy_density" => EnergyDensity: Scalar;
-    /// Accumulated plastic strain; 0 of laws that have none.
+    /// Accumulated plastic strain; 0 for laws without plastic flow.
     "plastic_strain" => PlasticStrain: Scalar;
-    /// Energy per reference volume that flow and relaxation have taken; 0 of elastic laws.
+    /// Energy per reference volume dissipated by plastic flow and relaxation; 0 for elastic laws.
     "dissipated_density" => DissipatedDensity: Scalar;
     /// Mass.
     "mass" => Mass: Scalar;
@@ -86,7 +86,7 @@ fields! {
     "body" => Body: Index;
 }
 
-/// How many components a field has, and what they mean.
+/// The components of a field, and their meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// One number.
@@ -104,7 +104,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Names of the components; that of a scalar is empty.
+    /// Names of the components. The name of a scalar's component is empty.
     ///
     /// ```
     /// use bfree::field::Kind;
@@ -125,12 +125,12 @@ impl Kind {
 }
 
 impl Field {
-    /// Whether particles have it only where bodies have inertia.
+    /// Whether particles have the field only if bodies have inertia.
     ///
     /// ```
     /// use bfree::field::Field;
     ///
-    /// // Time derivatives need it, what follows from the position alone does not.
+    /// // Time derivatives need inertia. Fields that follow from the position alone do not.
     /// assert!(Field::Velocity.needs_inertia() && Field::Acceleration.needs_inertia());
     /// assert!(!Field::Displacement.needs_inertia() && !Field::Stress.needs_inertia());
     /// ```
@@ -138,9 +138,9 @@ impl Field {
         matches!(self, Self::Velocity | Self::Acceleration)
     }
 
-    /// The columns of a table in `dimension` dimensions that hold the field under the name `name`: `name` itself for a scalar,
-    /// `name_x`, … for as many components of a vector as there are dimensions, `name_1`, … for principal values, `name_xx`, … for all components
-    /// of a tensor.
+    /// The columns that hold the field in a table, for a run in `dimension` dimensions. A scalar has the column `name`. A vector has
+    /// `name_x`, … for its first `dimension` components. Principal values have `name_1`, …, and a tensor has `name_xx`, … for all
+    /// components.
     ///
     /// ```
     /// use bfree::field::Field;

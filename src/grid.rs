@@ -2,7 +2,8 @@
 
 use crate::tensor::Vector;
 
-/// How far from a node a place is on it, relative to its coordinate and that of the grid's origin: what rounding may have moved it by.
+/// A position this near to a node lies on the node. The distance is a round-off bound, relative to the coordinates of the position and of
+/// the grid's origin.
 const ON_NODE: f64 = 32.0 * f64::EPSILON;
 
 /// The uniform background grid of a box: `cells[k]` cells of edge `spacing` along axis `k`, nodes at the cell corners.
@@ -27,7 +28,7 @@ pub struct Grid<const D: usize> {
     pub cells: [u32; D],
 }
 
-/// One axis of the grid, in which a product shape function is evaluated.
+/// One axis of the grid, along which a product shape function is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     /// Position of node 0.
@@ -41,8 +42,8 @@ pub struct Axis {
 impl Axis {
     /// `x` in units of the spacing, from node 0; `None` outside the axis (or if `x` is not a number).
     ///
-    /// The upper end is where the last node is: rounding in (x − origin)/h does not push it out. What is within round-off of a node is on it:
-    /// the gradients of linear functions leap there, and round-off does not decide to which side.
+    /// The upper end is the last node: rounding in (x − origin)/h does not push the node out. A position within round-off of a node lies on
+    /// it. The gradients of linear shape functions jump there, and round-off must not decide the side.
     ///
     /// ```
     /// use bfree::grid::Axis;
@@ -51,7 +52,7 @@ impl Axis {
     /// assert_eq!((axis.local(-1.0), axis.local(0.25), axis.local(1.0)), (Some(0.0), Some(2.5), Some(4.0)));
     /// assert_eq!((axis.local(-0.5 - 1e-15), axis.local(-0.5 + 1e-15)), (Some(1.0), Some(1.0)));
     /// assert_eq!((axis.local(1.0 + 1e-15), axis.local(f64::NAN)), (None, None));
-    /// // Far from 0, rounding moves places by more: 1000.3 − 1000 is not 0.3.
+    /// // Far from 0, rounding moves positions by more: 1000.3 − 1000 is not 0.3.
     /// let far = Axis { origin: 1000.0, spacing: 0.1, cells: 40 };
     /// assert_eq!((far.local(1000.3), far.local(1000.3 + 2e-13), far.local(1000.3 + 1e-9).is_some_and(|s| s > 3.0)), (Some(3.0), Some(3.0), true));
     /// ```

@@ -25,22 +25,23 @@ enum Command {
     Run(Run),
     /// Validate a scene and print what it requires.
     Check(SceneArguments),
-    /// Write a scene to start from, and explain its keys; without a problem, list them.
+    /// Write a starter scene and explain its keys. Without a problem, list the problems.
     New(New),
-    /// Draw energies, iterations and particles of a run as SVG and PNG, and all of it with a player as one page, report.html.
+    /// Draw energies, iterations and particles of a run as SVG and PNG. The page report.html also has a player of the snapshots.
     Plot {
         /// The directory of the run's results.
         directory: PathBuf,
-        /// Draw every snapshot instead, as frame_0000.png and on in this directory, for an encoder:
+        /// Draw every snapshot instead, as frame_0000.png, frame_0001.png, … in this directory. An encoder makes the movie:
         /// ffmpeg -framerate 10 -i FRAMES/frame_%04d.png -pix_fmt yuv420p movie.mp4
         #[arg(long, value_name = "FRAMES")]
         movie: Option<PathBuf>,
-        /// The field that colours the particles, or a component of it: von_mises, stress_xx, displacement_y, displacement (its length)
-        /// [default: plastic_strain, von_mises, or the first there is].
+        /// The field, or a component of a field, that colours the particles: von_mises, stress_xx, displacement_y, displacement (its
+        /// length)
+        /// [default: plastic_strain, else von_mises, else the first field of the snapshot].
         #[arg(long, value_name = "FIELD")]
         field: Option<String>,
-        /// From where particles are seen: a plane, or degrees to the right and up from it: xy, 30,20 or xz,30,20
-        /// [default: the plane of the motion; of bodies in space 30,20].
+        /// The direction of sight: a plane (xy), degrees by which the eye moves to the right and up (30,20), or both (xz,30,20)
+        /// [default: the plane of the largest motion, in three dimensions with 30,20].
         #[arg(long, value_name = "VIEW", allow_negative_numbers = true)]
         view: Option<View>,
         /// Draw the snapshot nearest to this time [default: the last].
@@ -86,7 +87,7 @@ fn main() -> ExitCode {
 fn plot(directory: &Path, movie: Option<&Path>, look: &Look) -> Result<(), Failure> {
     let pictures = movie.map_or_else(|| plot_run(directory, look), |frames| plot_frames(directory, frames, look));
     let pictures = pictures.map_err(|error| match error {
-        // About an option.
+        // The option --field names a field that the snapshots do not hold.
         PlotError::Field { .. } => Failure::scene(error),
         error => Failure::run(error),
     })?;

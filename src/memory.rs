@@ -1,10 +1,10 @@
-//! How much memory there is to have, so that a scene that is too large is refused instead of ending the program.
+//! The memory available, so that a scene that is too large is refused instead of ending the program.
 
 use std::fs;
 use std::path::Path;
 
-/// Bytes that can still be had without swapping: what Linux calls available, or what is left of the limits of the control group and of the
-/// shell (`ulimit -v`) if that is less. `None` where the system does not say.
+/// Bytes available without swapping: the least of Linux's `MemAvailable` and the rest of the limits of the control group and of the shell
+/// (`ulimit -v`). `None` where the system reports none of them.
 ///
 /// ```
 /// assert!(bfree::memory::available().is_none_or(|bytes| bytes > 0));
@@ -17,7 +17,7 @@ pub fn available() -> Option<u64> {
     [of_machine, of_group, of_shell].into_iter().flatten().min()
 }
 
-/// What `Max address space` of /proc/self/limits leaves of `VmSize` of /proc/self/status, in bytes.
+/// `Max address space` of /proc/self/limits less `VmSize` of /proc/self/status, in bytes.
 fn address_space(limits: &str, status: &str) -> Option<u64> {
     let value =
         |text: &str, key| text.lines().find_map(|line| line.strip_prefix(key))?.split_whitespace().next()?.parse().ok();
@@ -32,7 +32,7 @@ fn meminfo(text: &str) -> Option<u64> {
     kilobytes.checked_mul(1024)
 }
 
-/// What is left of the limit of a control group (version 2), caches of files not counted as used.
+/// The rest of the limit of a control group (version 2), in bytes. Caches of files do not count as used.
 fn limit_left(group: &Path) -> Option<u64> {
     let read = |name: &str| fs::read_to_string(group.join(name)).ok();
     let number = |name: &str| read(name)?.trim().parse::<u64>().ok();

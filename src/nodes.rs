@@ -1,10 +1,10 @@
-//! Active nodes: those some particle lists with N ≠ 0 or ∇N ≠ 0, numbered in the order of the grid.
+//! Active nodes have N ≠ 0 or ∇N ≠ 0 at some particle. They are numbered in the order of the grid.
 
 use crate::grid::Grid;
 use crate::tensor::Vector;
 use std::sync::Arc;
 
-/// The active nodes of one step. Memory goes with the body, not with the box.
+/// The active nodes of one step. Their memory grows with the body, not with the box.
 ///
 /// ```
 /// use bfree::grid::Grid;
@@ -44,7 +44,7 @@ impl Nodes {
         Self { ids: Arc::new(ids) }
     }
 
-    /// The memory of nodes that nobody knows any more.
+    /// The memory of the list for reuse; empty if a clone still uses it.
     pub(crate) fn into_spare(self) -> Vec<u64> {
         Arc::try_unwrap(self.ids).unwrap_or_default()
     }

@@ -1,19 +1,19 @@
-//! Work on all cores, in an order that does not depend on their number.
+//! Work on all cores, in an order that does not depend on the number of cores.
 //!
-//! What is handed to the threads is not generic here, so that their part is compiled once and not for every kind of work.
+//! Threads receive tasks as `dyn Fn`. Their code is therefore compiled once, and not for every kind of work.
 
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// How many threads work, from now on; without it as many as there are cores.
+/// Sets the number of threads. Without this call there are as many threads as cores.
 ///
 /// # Errors
-/// They cannot be started, or it was said before.
+/// The threads cannot be started, or their number was set before.
 pub fn use_threads(count: usize) -> Result<(), rayon::ThreadPoolBuildError> {
     rayon::ThreadPoolBuilder::new().num_threads(count).build_global()
 }
 
-/// How many threads work.
+/// The number of threads.
 pub fn threads() -> usize {
     rayon::current_num_threads()
 }
@@ -23,7 +23,7 @@ pub(crate) fn several() -> bool {
     threads() > 1
 }
 
-/// `task(0)`, …, `task(count − 1)`, each on whichever thread is free.
+/// Runs `task(0)`, …, `task(count − 1)`, each on any free thread.
 fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
     if count > 1 && several() {
         (0..count).into_par_iter().for_each(task);
@@ -32,12 +32,12 @@ fn each(count: usize, task: &(dyn Fn(usize) + Sync)) {
     }
 }
 
-/// What a mutex guards; a thread that panicked has not spoilt it.
+/// Locks a mutex. The data stays usable after a thread panicked while it held the lock.
 pub(crate) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// `f(part)` of every part.
+/// Calls `f(part)` for every part.
 pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) + Sync)) {
     let parts: Vec<Mutex<Option<P>>> = parts.map(|part| Mutex::new(Some(part))).collect();
     each(parts.len(), &|k| {
@@ -46,7 +46,7 @@ pub(crate) fn for_each<P: Send>(parts: impl Iterator<Item = P>, f: &(dyn Fn(P) +
     });
 }
 
-/// As [`for_each`], with scratch space that a thread hands on from part to part.
+/// [`for_each`] with scratch space, which is reused from part to part.
 pub(crate) fn for_each_with<P: Send, S: Send + Default>(
     parts: impl Iterator<Item = P>,
     f: &(dyn Fn(&mut S, P) + Sync),
@@ -64,7 +64,7 @@ pub(crate) fn for_each_with<P: Send, S: Send + Default>(
 pub(crate) fn map<R: Send>(count: usize, f: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
     let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
     for_each(results.iter_mut().enumerate(), &|(k, result)| *result = Some(f(k)));
-    // Every one is there.
+    // Every result is present, so `flatten` drops none.
     results.into_iter().flatten().collect()
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn sort<K: Ord + Send>(keys: &mut [K]) {
     keys.par_sort_unstable();
 }
 
-/// Of several failures, of any threads, the one with the smallest number.
+/// The failure with the smallest number, whichever threads failed.
 pub(crate) struct First<E>(Mutex<Option<(usize, E)>>);
 
 impl<E> First<E> {

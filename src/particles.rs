@@ -6,14 +6,14 @@ use crate::tensor::{Deformation, Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What change of volume the energy of a body sees.
+/// The change of volume in the energy of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Dilatation {
-    /// That of every particle.
+    /// The change of volume of each particle.
     #[default]
     Pointwise,
-    /// The mean of the particles in a cell of the grid: a body that hardly changes its volume does not lock. For laws whose energy has a
+    /// The mean over the particles in a cell of the grid. It keeps a nearly incompressible body from locking. For laws whose energy has a
     /// part that depends on the volume alone; not for `st_venant_kirchhoff` and `drucker_prager`.
     MeanDilatation,
 }
@@ -27,23 +27,23 @@ pub struct Body<L> {
     pub law: L,
     /// Mass per reference volume, ρ₀.
     pub density: f64,
-    /// What change of volume its energy sees; pointwise of a law without [`Law::volumetric`], whatever stands here.
+    /// The change of volume in its energy. For a law without [`Law::volumetric`] it is always pointwise.
     pub dilatation: Dilatation,
 }
 
 impl<L: Law> Body<L> {
-    /// Whether its change of volume is averaged.
+    /// Whether the change of volume is averaged.
     pub(crate) fn averages(&self) -> bool {
         self.dilatation == Dilatation::MeanDilatation && self.response(0.0).is_some()
     }
 
-    /// What its law says of a volume that has become 1 + `change` times what it was.
+    /// The response of the law to the volume ratio 1 + `change`.
     pub(crate) fn response<T: Real>(&self, change: T) -> Option<VolumeResponse<T>> {
         self.law.volumetric(&Deformation::new(Tensor::<T, 1>::from_element(change)))
     }
 
-    /// What the mean dilatation 1 + `change` adds to the energy per reference volume, U(θ) − U(J), and to each normal component of Cauchy's
-    /// stress, U'(θ) − U'(J), of a particle of volume ratio 1 + `j`; zeros of a body whose dilatation is pointwise.
+    /// The effect of the mean dilatation θ = 1 + `change` at a particle of volume ratio J = 1 + `j`. The energy per reference volume grows
+    /// by U(θ) − U(J), and each normal component of the Cauchy stress by U'(θ) − U'(J). Both are zero if the dilatation is pointwise.
     pub(crate) fn averaged(&self, change: f64, j: f64) -> [f64; 2] {
         if self.dilatation == Dilatation::Pointwise {
             return [0.0; 2];
@@ -54,11 +54,11 @@ impl<L: Law> Body<L> {
     }
 }
 
-/// State of all particles, and of the points of loaded surfaces, at the last converged step; one entry per particle in each array. Without inertia those of velocity and
-/// acceleration are empty.
+/// State of all particles, and of the points of loaded surfaces, at the last converged step. Each array has one entry per particle. Without
+/// inertia the arrays of velocity and acceleration are empty.
 ///
-/// In memory particles lie near the order in which the sweep over cells takes them: a step may put them in another one. Who a particle
-/// is, its `id` says; results, probes and messages go by that.
+/// Particles lie in memory nearly in the order of the loop over cells, and a step may rearrange them. The `id` identifies a particle in
+/// results, probes and messages.
 ///
 /// ```
 /// use bfree::particles::Particles;
@@ -90,18 +90,18 @@ pub struct Particles<const D: usize> {
     pub mass: Vec<f64>,
     /// Index of the body in the simulation's list.
     pub body: Vec<u32>,
-    /// Number of the particle in the order of their making, from 0.
+    /// Number of the particle in the order of creation, from 0.
     pub id: Vec<u32>,
-    /// What laws remember, [`Self::remembered`] numbers a particle, one particle after the other.
+    /// Internal variables of the laws: [`Self::remembered`] numbers a particle, one particle after the other.
     pub memory: Vec<f64>,
-    /// Numbers that the law with the longest memory remembers; 0 where all are elastic.
+    /// The largest number of internal variables of any law; 0 if all laws are elastic.
     pub remembered: usize,
-    /// θ − 1 of bodies whose change of volume is averaged, 0 of others; empty where there are none.
+    /// θ − 1 in bodies whose change of volume is averaged, 0 in other bodies. Empty if no body averages it.
     pub dilatation: Vec<f64>,
 }
 
 impl<const D: usize> Particles<D> {
-    /// Bytes of one particle in all arrays but those of velocity and acceleration.
+    /// Bytes of one particle in the arrays of every run: x, H, volume, mass, body and id.
     pub const BYTES: usize =
         size_of::<Vector<f64, D>>() + size_of::<Tensor<f64, D>>() + 2 * size_of::<f64>() + 2 * size_of::<u32>();
 
@@ -110,13 +110,13 @@ impl<const D: usize> Particles<D> {
         self.position.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
     }
 
-    /// Makes room for `more` particles, and no more than that: arrays that double need for a moment three times their size. Those of
-    /// velocity and acceleration grow when there is one.
+    /// Makes room for exactly `more` particles, because an array that doubles needs three times its size for a moment. The arrays of
+    /// velocity and acceleration grow with the first particle that has inertia.
     ///
     /// Example: [`Self::push_without_inertia`].
     pub fn reserve(&mut self, more: usize) {
@@ -127,14 +127,14 @@ impl<const D: usize> Particles<D> {
         [body, id].into_iter().for_each(|array| array.reserve_exact(more));
     }
 
-    /// Adds an undeformed particle at rest acceleration.
+    /// Adds an undeformed particle with zero acceleration.
     pub fn push(&mut self, position: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
         self.push_without_inertia(position, volume, mass, body);
         self.velocity.push(velocity);
         self.acceleration.push(Vector::zeros());
     }
 
-    /// Adds an undeformed particle to those that have no inertia; its mass is what gravity acts on.
+    /// Adds an undeformed particle without inertia. Only gravity acts on its mass.
     ///
     /// ```
     /// use bfree::particles::Particles;
@@ -145,7 +145,7 @@ impl<const D: usize> Particles<D> {
     /// for i in 0..100 {
     ///     particles.push_without_inertia(Vector::from([f64::from(i), 0.0]), 0.5, 2.0, 0);
     /// }
-    /// // They weigh something, and do not move.
+    /// // The particles have weight, and do not move.
     /// assert_eq!((particles.len(), particles.mass.iter().sum::<f64>()), (100, 200.0));
     /// assert!(particles.velocity.is_empty() && particles.kinetic_energy() == 0.0);
     /// ```
@@ -158,13 +158,13 @@ impl<const D: usize> Particles<D> {
         self.body.push(body);
     }
 
-    /// What the law of the particle at the place `p` is given for a step of length `dt`.
+    /// The arguments of the law at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
     pub fn start(&self, p: usize, dt: f64) -> Start<'_> {
         Start { dt, memory: &self.memory[p * self.remembered..(p + 1) * self.remembered] }
     }
 
-    /// As [`Self::remember_rest`], of laws that remember more than there is room for: those of bodies put together in code.
+    /// Calls [`Self::remember_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
     pub(crate) fn remember<L: Law>(&mut self, bodies: &[Body<L>]) {
         if bodies.iter().any(|body| body.law.memory().len() > self.remembered) {
             self.remember_rest(bodies);
@@ -172,7 +172,7 @@ impl<const D: usize> Particles<D> {
         self.make_room_for_dilatation(bodies);
     }
 
-    /// θ of bodies that average it, at rest where none is there yet.
+    /// Makes room for θ if a body averages it. New entries are at rest.
     fn make_room_for_dilatation<L: Law>(&mut self, bodies: &[Body<L>]) {
         if bodies.iter().any(Body::averages) {
             self.dilatation.resize(self.len(), 0.0);
@@ -184,7 +184,7 @@ impl<const D: usize> Particles<D> {
         self.dilatation.get(p).copied().unwrap_or(0.0)
     }
 
-    /// Gives every particle the memory that its law has at rest.
+    /// Sets the internal variables of every particle to the values at rest of its law.
     pub fn remember_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.remembered = bodies.iter().map(|body| body.law.memory().len()).max().unwrap_or(0);
         let width = self.remembered;
@@ -197,7 +197,7 @@ impl<const D: usize> Particles<D> {
         self.make_room_for_dilatation(bodies);
     }
 
-    /// Where the particles lie in memory, by id.
+    /// The places of the particles in memory, by id.
     ///
     /// Example: [`Self::rearrange`].
     pub fn places(&self) -> Vec<u32> {
@@ -208,7 +208,7 @@ impl<const D: usize> Particles<D> {
         places
     }
 
-    /// Where the particle `id` lies in memory.
+    /// The place of the particle `id` in memory.
     ///
     /// Example: [`Self::rearrange`].
     pub fn place(&self, id: usize) -> Option<usize> {
@@ -224,7 +224,8 @@ impl<const D: usize> Particles<D> {
         sorted
     }
 
-    /// Puts what lies at `order[i]` to the place `i`, each array within its own memory; `order` must be a permutation.
+    /// Moves the particle at `order[i]` to the place `i`; `order` must be a permutation. All arrays except the internal variables are
+    /// permuted in place.
     ///
     /// ```
     /// use bfree::particles::Particles;
@@ -259,13 +260,13 @@ impl<const D: usize> Particles<D> {
         self.mass.iter().zip(&self.velocity).map(|(&m, v)| v * m).sum()
     }
 
-    /// Whether the particle at the place `p` has a volume: a point of a loaded surface has none, it goes with the body and shows the
-    /// load where it is.
+    /// Whether the particle at the place `p` has a volume. A point of a loaded surface has none: it moves with the body and gives the load
+    /// its position.
     pub fn is_solid(&self, p: usize) -> bool {
         self.volume[p] > 0.0
     }
 
-    /// Where those that have a volume lie in memory, by id.
+    /// The places in memory of the particles that have a volume, by id.
     ///
     /// ```
     /// // A body, and the points of its loaded end.
@@ -282,7 +283,7 @@ impl<const D: usize> Particles<D> {
         places
     }
 
-    /// V₀ J, the volume that a particle has now.
+    /// V₀ J, the present volume of a particle.
     pub(crate) fn present_volume(&self, p: usize) -> f64 {
         self.volume[p] * Deformation::new(self.displacement_gradient[p]).jacobian
     }
@@ -290,12 +291,12 @@ impl<const D: usize> Particles<D> {
     /// Σ ½ m v·v
     pub fn kinetic_energy(&self) -> f64 {
         let energies = self.mass.iter().zip(&self.velocity).map(|(&m, v)| 0.5 * m * v.norm_squared());
-        // Of no velocities the sum would be −0.
+        // The `sum` of an empty iterator would be −0.
         energies.fold(0.0, |sum, energy| sum + energy)
     }
 }
 
-/// Puts what lies at `order[i]` to the place `i`, cycle after cycle.
+/// Moves the entry at `order[i]` to the place `i`, cycle after cycle.
 fn permute<T: Copy>(array: &mut [T], order: &[u32], moved: &mut [bool]) {
     moved.fill(false);
     for start in 0..array.len() {

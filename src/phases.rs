@@ -1,4 +1,4 @@
-//! Seconds, and passes over the particles, by phase of a step.
+//! The timer of a step: seconds and loops over the particles, by phase.
 
 use std::time::Instant;
 
@@ -7,11 +7,11 @@ use std::time::Instant;
 pub enum Phase {
     /// Shape functions and active nodes.
     ShapeFunctions,
-    /// Particles → nodes.
+    /// Particle-to-grid transfer.
     Projection,
-    /// Newton, with its residuals, tangents and Krylov iterations.
+    /// Newton's method, with its residuals, tangents and Krylov iterations.
     Newton,
-    /// Reactions, work, nodes → particles.
+    /// Reactions, work, grid-to-particle transfer.
     Update,
 }
 
@@ -25,7 +25,7 @@ impl Phase {
     ];
 }
 
-/// Measures phases one after the other.
+/// Measures the phases of a step, one after the other.
 ///
 /// ```
 /// use bfree::phases::{Phase, Stopwatch};
@@ -50,7 +50,7 @@ impl Phase {
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     last: (Instant, u64),
-    /// Phases that are over.
+    /// The number of phases that are over.
     over: usize,
     seconds: [f64; Phase::ALL.len()],
     passes: [u64; Phase::ALL.len()],
@@ -62,7 +62,7 @@ impl Stopwatch {
         Self { last: (Instant::now(), 0), over: 0, seconds: [0.0; Phase::ALL.len()], passes: [0; Phase::ALL.len()] }
     }
 
-    /// Books the time since the last lap to `phase`, and the passes over the particles, of which there were `passes` so far.
+    /// Adds the seconds and the loops over the particles since the last lap to `phase`. `passes` is the total number of loops so far.
     pub fn lap(&mut self, phase: Phase, passes: u64) {
         let now = Instant::now();
         self.seconds[phase as usize] += (now - self.last.0).as_secs_f64();
@@ -71,19 +71,19 @@ impl Stopwatch {
         self.over = phase as usize + 1;
     }
 
-    /// Books the time since the last lap to the phase that then began: it was not brought to its end.
+    /// Adds the time since the last lap to the phase that began then and failed.
     pub fn give_up(&mut self) {
         if let Some(&(phase, _)) = Phase::ALL.get(self.over) {
             self.lap(phase, self.last.1);
         }
     }
 
-    /// Seconds booked to each of [`Phase::ALL`].
+    /// Seconds in each of [`Phase::ALL`].
     pub fn seconds(&self) -> [f64; Phase::ALL.len()] {
         self.seconds
     }
 
-    /// Passes over the particles booked to each of [`Phase::ALL`].
+    /// Loops over the particles in each of [`Phase::ALL`].
     pub fn passes(&self) -> [u64; Phase::ALL.len()] {
         self.passes
     }

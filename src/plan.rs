@@ -1,4 +1,4 @@
-//! What a scene requires: which terms are in use and why, how many unknowns, and what each array costs in memory.
+//! The requirements of a scene: the terms in use and why, the number of unknowns, and the memory of each array.
 
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
@@ -22,18 +22,18 @@ use std::mem::size_of;
 /// A term of the residual, or a part of the step, and whether this scene has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TermUse {
-    /// Its name.
+    /// The name of the term.
     pub name: &'static str,
-    /// Whether it is computed.
+    /// Whether the term is computed.
     pub used: bool,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
 /// An array and its bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrayUse {
-    /// What it holds.
+    /// The contents of the array.
     pub name: &'static str,
     /// Bytes.
     pub bytes: u64,
@@ -44,14 +44,14 @@ pub struct ArrayUse {
 pub struct SurfaceUse {
     /// The load.
     pub load: &'static str,
-    /// Loaded points, where the surface is; or particles of the body, where the scene gives normal and area.
+    /// The number of loaded points. They lie on the surface, or are particles of the body if the scene gives normal and area.
     pub points: usize,
-    /// Reference area of them all.
+    /// The reference area of all points together.
     pub area: f64,
 }
 
 impl SurfaceUse {
-    /// Of each surface load of a simulation.
+    /// One entry for each surface load of a simulation.
     ///
     /// ```
     /// use bfree::plan::SurfaceUse;
@@ -84,7 +84,7 @@ impl Display for SurfaceUse {
     }
 }
 
-/// A run needs more memory than there is.
+/// A run needs more memory than is available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the run needs {} of memory at one time, and {} can be had: use a coarser grid, fewer particles per cell, or fewer Krylov \
@@ -93,11 +93,11 @@ impl Display for SurfaceUse {
 pub struct TooLarge {
     /// Bytes that the arrays of a step hold at one time.
     pub needed: u64,
-    /// Bytes that can be had.
+    /// Bytes available.
     pub memory: u64,
 }
 
-/// What a run of a simulation requires, at its present state.
+/// The requirements of a run of a simulation, in its present state.
 ///
 /// ```
 /// use bfree::plan::Plan;
@@ -105,9 +105,9 @@ pub struct TooLarge {
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let plan = Plan::of(&scene.build::<2>("scenes".as_ref())?)?;
 /// assert_eq!((plan.particles, plan.grid_nodes), (112, 31 * 11));
-/// // Two unknowns for each active node, but for those on walls.
+/// // Each active node has two unknowns, except on walls.
 /// assert!(plan.active_nodes < 341 && plan.unknowns <= 2 * plan.active_nodes);
-/// // A step leaves its arrays to the next one.
+/// // A step reuses the arrays of the step before.
 /// assert_eq!(plan.bytes(), plan.arrays.iter().map(|array| array.bytes).sum::<u64>());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -123,17 +123,17 @@ pub struct Plan {
     pub active_nodes: usize,
     /// Free degrees of freedom of the first step.
     pub unknowns: usize,
-    /// When the grid is made anew.
+    /// When the grid is reset.
     pub renewal: Renewal,
-    /// The method that solves the linear systems, and why it does.
+    /// The method that solves the linear systems, and the reason.
     pub krylov: (Krylov, &'static str),
-    /// Their preconditioner, and why it is.
+    /// The preconditioner of the linear systems, and the reason.
     pub preconditioner: (Preconditioning, &'static str),
     /// Terms of the residual and parts of the step.
     pub terms: Vec<TermUse>,
     /// The large arrays.
     pub arrays: Vec<ArrayUse>,
-    /// What was assumed about loaded surfaces.
+    /// The points and the area assumed for each loaded surface.
     pub surfaces: Vec<SurfaceUse>,
     /// Bodies that share nodes at the start, in words.
     pub sharing: Vec<String>,
@@ -143,7 +143,7 @@ impl Plan {
     /// The plan of a simulation, from its shape functions at the present positions.
     ///
     /// # Errors
-    /// A particle without shape functions.
+    /// A particle has no shape functions.
     pub fn of<const D: usize, L: Law, A: ShapeFunction>(
         simulation: &Simulation<D, L, A>,
     ) -> Result<Self, SupportError> {
@@ -166,7 +166,7 @@ impl Plan {
         })
     }
 
-    /// Bytes of all arrays: a step leaves them to the next one.
+    /// Bytes of all arrays together. A step reuses the arrays of the step before.
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|array| array.bytes).sum()
     }
@@ -185,14 +185,14 @@ impl Plan {
     /// ```
     ///
     /// # Errors
-    /// They do not.
+    /// The arrays do not fit.
     pub fn check_fits(&self, memory: u64) -> Result<(), TooLarge> {
         let needed = self.bytes();
         if needed <= memory { Ok(()) } else { Err(TooLarge { needed, memory }) }
     }
 }
 
-/// Nodal values that are solved for.
+/// The number of nodal values to solve for.
 fn unknowns<const D: usize>(supports: &Supports<D>, prescribed: &[PrescribedDof]) -> usize {
     let unknowns = Unknowns::new(supports, prescribed);
     let follow: usize = unknowns.following_mask(supports.nodes()).into_iter().map(usize::from).sum();
@@ -243,7 +243,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
 }
 
-/// How many nodes follow others.
+/// The number of nodes that follow others, in words.
 fn aggregated<const D: usize>(supports: &Supports<D>) -> String {
     match supports.extension() {
         None => "only with aggregation".into(),
@@ -253,7 +253,7 @@ fn aggregated<const D: usize>(supports: &Supports<D>) -> String {
     }
 }
 
-/// How often the sweep asks which law it evaluates.
+/// The frequency at which the loop over particles looks up the law, in words.
 fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> String {
     let often = match supports.is_tiled() {
         true => "once in a pass over the particles",
@@ -265,7 +265,7 @@ fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, s
     }
 }
 
-/// What the linear systems are solved in.
+/// The precision of the linear systems.
 fn precision_used<const D: usize>(supports: &Supports<D>) -> Precision {
     supports.unit().map_or(Precision::Double, |_| Precision::Mixed)
 }
@@ -295,10 +295,10 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
     let preconditioner = simulation.preconditioner().0;
     let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
-    // What is not there does not appear.
+    // Arrays that the run does not have are not listed.
     let keeps = simulation.settings.renewal != Renewal::EveryStep;
     let averages = simulation.bodies.iter().any(Body::averages);
-    // θ, also when the grid was new; which cell, and what a pass finds there.
+    // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
     let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
     let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
     let asks = simulation.loads.field.is_some() && (keeps || !moves);
@@ -307,25 +307,25 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
         (moves, "particles: v, a", particles * 2 * vector),
         (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
-        // At the start and at the end of the step.
+        // The prediction at the start and at the end of the step.
         (consistent, "particles: prediction for the consistent inertia", particles * 2 * vector),
-        // The field without what nodes can carry, what it changes by, and the change of the other field.
+        // The part of the field that nodes cannot represent, its change, and the change of the other field.
         (smooths, "particles: smoothing", particles * 3 * vector),
         (fits, "affine fits of v, a", particles * tensor + nodes * 4 * (tensor + vector)),
         (true, "shape functions: N, dN/dx by axis", supports.bytes()),
         (tiled, "particles: the order of the sweep", particles * 2 * size_of::<u64>()),
         // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
         (true, "nodal fields: loads, Δφ, residuals", nodes * 8 * vector),
-        // Both as projected, and with prescribed values in place.
+        // v and a, as projected and with prescribed values in place.
         (weighs, "nodal mass", nodes * 2 * size_of::<f64>()),
         (moves, "nodal fields: v, a", nodes * 4 * vector),
         (keeps, "particles: x, H when the grid was new", particles * (vector + tensor)),
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
-        // Where they are, and where they were in the last load step.
+        // The positions on a kept grid, and in load steps the positions of the last step.
         (asks, "particles: x for a field of forces", particles * vector * (usize::from(keeps) + usize::from(!moves))),
-        // As projected, and with prescribed values in place; and over a grid that is kept. Not on the first grid.
+        // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
         (!moves && simulation.may_renew(), "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
-        // And those that were in balance.
+        // The loaded points, and in load steps the points of the last equilibrium.
         (faces > 0, "loaded surfaces", faces * if moves { 1 } else { 2 } * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),
         (averages, "particles: mean dilatation", of_mean),

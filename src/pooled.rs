@@ -1,5 +1,4 @@
-//! Vectors whose memory serves again, as that of deal.II's `GrowingVectorMemory` does: a step that takes as many as the one before
-//! allocates none of them.
+//! A memory pool for vectors, like deal.II's `GrowingVectorMemory`. A step that takes as many vectors as the step before allocates none.
 
 use crate::parallel::held;
 use bytemuck::Pod;
@@ -8,20 +7,20 @@ use nalgebra::SMatrix;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex};
 
-/// Vectors of fewer bytes are no burden to the system's allocator.
+/// Vectors of fewer bytes are not pooled: they are no burden to the system's allocator.
 const SMALL: usize = 1 << 14;
 
-/// Memory this many times as large as what is asked for waits for something larger.
+/// A spare vector more than this many times larger than needed is kept for a larger request.
 const TOO_LARGE: usize = 4;
 
-/// What an array has beyond its need, so that a few nodes more do not ask for another one: one part in so many.
+/// A new vector has spare room of one part in this number, so that a few more nodes need no new allocation.
 const ROOM: usize = 64;
 
-/// Numbers are kept in multiples of so many, so that they can become vectors and tensors of 1 to 3 dimensions, and vector lanes.
+/// Capacities are multiples of this number, so that the memory fits vectors and tensors of 1 to 3 dimensions, and vector lanes.
 const MULTIPLE: usize = 144;
 
-/// Where vectors are lent from; a clone lends from the same place. What is lent comes back when it is dropped, and goes with the last
-/// of them.
+/// A memory pool that lends vectors. A clone shares the memory of the pool. A vector returns to the pool when it is dropped. The pool is
+/// freed with its last clone and its last vector.
 ///
 /// ```
 /// use bfree::pooled::Pool;
@@ -32,23 +31,23 @@ const MULTIPLE: usize = 144;
 /// let at = ones.as_ptr();
 /// assert_eq!(ones.iter().sum::<f64>(), 100_007.0);
 /// drop(ones);
-/// // A little shorter, and in the same place.
+/// // A slightly shorter vector has the same memory.
 /// let next = pool.collect((0..99_990).map(f64::from));
 /// assert_eq!((next.len(), next[7], next.as_ptr()), (99_990, 7.0, at));
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Pool(Arc<Mutex<Spare>>);
 
-/// Vectors that nobody has at present.
+/// Vectors that are not on loan.
 #[derive(Debug, Default)]
 pub struct Spare {
     double: Vec<Vec<f64>>,
     single: Vec<Vec<f32>>,
 }
 
-/// What memory is kept as.
+/// The number type of pooled memory.
 pub trait Number: Pod + Send {
-    /// The vectors kept as such.
+    /// The spare vectors of this type.
     fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>>;
 }
 
@@ -64,9 +63,9 @@ impl Number for f32 {
     }
 }
 
-/// What a pooled vector can be made of: a number, or several side by side, so that each can have the memory of the other.
+/// An element of a pooled vector: a number, or several numbers side by side. Vectors of different elements can reuse the same memory.
 pub trait Element: Pod + Send {
-    /// The number.
+    /// The type of the numbers.
     type Number: Number;
 }
 
@@ -90,7 +89,7 @@ impl<X: Number, const N: usize> Element for [X; N] {
 }
 
 impl Pool {
-    /// `count` times `value`.
+    /// A vector of `count` times `value`.
     pub fn filled<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
         let mut vector = self.taken(count);
         vector.clear();
@@ -98,14 +97,14 @@ impl Pool {
         Pooled { vector, pool: self.clone() }
     }
 
-    /// As many as `count` of whatever there is, or else of `value`: to be written over.
+    /// A vector of `count` unspecified elements, to be overwritten. Elements beyond the old contents are `value`.
     pub fn unspecified<T: Element>(&self, count: usize, value: T) -> Pooled<T> {
         let mut vector = self.taken(count);
         vector.resize(count, value);
         Pooled { vector, pool: self.clone() }
     }
 
-    /// All items; room is taken for as many as the iterator is sure of.
+    /// A vector of all items, with room for the least number of items that the iterator promises.
     pub fn collect<T: Element>(&self, items: impl IntoIterator<Item = T>) -> Pooled<T> {
         let items = items.into_iter();
         let mut vector = self.taken(items.size_hint().0);
@@ -114,7 +113,8 @@ impl Pool {
         Pooled { vector, pool: self.clone() }
     }
 
-    /// A vector of anything with room for `count`: the smallest one there is, or a new one in the place of one that has become too small.
+    /// A vector of any contents with room for `count` elements: the smallest spare one that fits, or a new one. A new vector replaces a
+    /// spare one that has become too small.
     fn taken<T: Element>(&self, count: usize) -> Vec<T> {
         if count * size_of::<T>() < SMALL {
             return Vec::with_capacity(count);
@@ -129,7 +129,7 @@ impl Pool {
             let small = || list.iter().position(|one| one.capacity() < length && length <= TOO_LARGE * one.capacity());
             smallest.map(|(at, _)| at).or_else(small).map(|at| list.swap_remove(at))
         };
-        // What is too small goes now that nobody waits.
+        // A vector that is too small is freed here, after the lock is released.
         let mut kept = kept
             .filter(fits)
             .unwrap_or_else(|| Vec::with_capacity((length + length / ROOM).next_multiple_of(MULTIPLE)));
@@ -145,12 +145,12 @@ pub struct Pooled<T: Element> {
 }
 
 impl<T: Element> Pooled<T> {
-    /// Where it is from.
+    /// The pool of the vector.
     pub fn pool(&self) -> &Pool {
         &self.pool
     }
 
-    /// The same as plain numbers.
+    /// The vector as plain numbers, in the same memory.
     pub fn into_numbers(mut self) -> Pooled<T::Number>
     where
         T::Number: Element,

@@ -1,29 +1,29 @@
-//! What is wrong with the values of a scene: every problem at once, each with its place, the value found and what is allowed.
+//! All problems with the values of a scene at once, each with its place, the value found and the values allowed.
 
 use std::fmt::{self, Display};
 
-/// Problems kept; a table of a million wrong rows needs no million messages.
+/// The most problems kept: a table of a million wrong rows needs no million messages.
 pub(crate) const KEPT: usize = 50;
 
-/// Bodies, loads, parts of a shape or probes, at most.
+/// The most bodies, loads, parts of a shape or probes.
 pub(crate) const MOST: usize = 1000;
 
-/// Characters shown of a value.
+/// The most characters shown of a value.
 const SHOWN: usize = 80;
 
-/// No length, time or modulus may be larger: squares and products of allowed numbers then stay finite.
+/// The largest length, time or modulus allowed. Squares and products of allowed numbers then stay finite.
 pub(crate) const LARGEST: f64 = 1e100;
 
-/// One thing wrong in a scene.
+/// One problem in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     /// The key, such as `bodies[0].density`.
     pub path: String,
-    /// What stands there.
+    /// The value found.
     pub value: String,
-    /// What may stand there.
+    /// The values allowed.
     pub allowed: String,
-    /// Where it stands; unknown for keys that are absent.
+    /// The place of the value; unknown for keys that are absent.
     pub place: Option<Place>,
 }
 
@@ -80,7 +80,7 @@ pub struct Problems {
 }
 
 impl Problems {
-    /// Whether nothing is wrong.
+    /// Whether there are no problems.
     ///
     /// ```
     /// // γ and β of Newmark's method that would not be stable.
@@ -94,7 +94,7 @@ impl Problems {
         self.list.is_empty()
     }
 
-    /// Adds a problem: `value` stands at `path`, but `allowed`.
+    /// Adds a problem: `value` was found at `path`. `allowed` says what is allowed there.
     pub(crate) fn refuse(&mut self, path: &str, value: impl Display, allowed: impl Display) {
         if self.list.len() == KEPT {
             self.more += 1;
@@ -112,14 +112,14 @@ impl Problems {
         }
     }
 
-    /// A number of sensible size.
+    /// Checks that a number has a sensible size.
     pub(crate) fn number(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x);
         self.require(ok, path, Number(x), format_args!("must be finite and at most {LARGEST:e} in size"));
         ok
     }
 
-    /// A number of sensible size, > 0.
+    /// Checks that a number has a sensible size and is > 0.
     pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x) && x > 1.0 / LARGEST;
         let allowed = if x > 0.0 {
@@ -131,19 +131,19 @@ impl Problems {
         ok
     }
 
-    /// A number between two, both allowed.
+    /// Checks that a number lies between two numbers, both allowed.
     pub(crate) fn between(&mut self, path: &str, x: f64, min: f64, max: f64) -> bool {
         let ok = x >= min && x <= max;
         self.require(ok, path, Number(x), format_args!("must lie between {} and {}", Number(min), Number(max)));
         ok
     }
 
-    /// A whole number between two, both allowed.
+    /// Checks that a whole number lies between two numbers, both allowed.
     pub(crate) fn whole(&mut self, path: &str, n: u32, min: u32, max: u32) {
         self.require((min..=max).contains(&n), path, n, format_args!("must be a whole number from {min} to {max}"));
     }
 
-    /// A list of bodies or the like; what is too long is not looked into.
+    /// Checks the length of a list. A list that is too long is returned empty, so that its entries are not checked.
     pub(crate) fn few<'a, T>(&mut self, path: &str, list: &'a [T]) -> &'a [T] {
         let ok = list.len() <= MOST;
         self.require(
@@ -155,7 +155,7 @@ impl Problems {
         if ok { list } else { &[] }
     }
 
-    /// A vector of one finite number per dimension.
+    /// Checks that a vector has one number of sensible size per dimension.
     pub(crate) fn vector(&mut self, path: &str, x: &[f64], dimension: usize) -> bool {
         let right_length = self.length(path, x.len(), dimension);
         let mut ok = right_length;
@@ -165,7 +165,7 @@ impl Problems {
         ok
     }
 
-    /// One entry per dimension.
+    /// Checks that there is one entry per dimension.
     pub(crate) fn length(&mut self, path: &str, entries: usize, dimension: usize) -> bool {
         let ok = entries == dimension;
         self.require(
@@ -188,7 +188,7 @@ impl Display for Problems {
     }
 }
 
-/// Finite, and small enough to be squared.
+/// Whether a number is finite and small enough to be squared.
 pub(crate) fn sensible(x: f64) -> bool {
     x.abs() <= LARGEST
 }

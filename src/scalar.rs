@@ -37,10 +37,11 @@ impl<T: DualNumCopy> Real for T {
     }
 }
 
-/// The root x of r(x) = 0 with all derivatives that `T` carries, from its value, found by whatever means, and dr/dx there: what a law that
-/// solves something needs to be differentiated (implicit function theorem). r sees with `T` what it depends on.
+/// The root x of r(x) = 0 with all derivatives that `T` carries, by the implicit function theorem. A law that solves an equation needs this
+/// function to be differentiable. `root` is the value of x, found by any means, and `slope` is dr/dx there. `residual` captures the
+/// quantities that r depends on, with their derivatives, as `T`.
 ///
-/// Each step of Newton's method, with the slope fixed, makes one more order of the derivatives right; the first polishes the value.
+/// Each step of Newton's method, with the slope fixed, makes one more order of the derivatives right. The first step polishes the value.
 ///
 /// ```
 /// use bfree::scalar::{Real, implicit};

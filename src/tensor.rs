@@ -1,8 +1,8 @@
 //! D×D tensors over nalgebra, and the strain measures computed from H = F − I without cancellation.
 //!
-//! Shakeri, Ghaffari, Thompson, Stengel, Brown, "Stable numerics for finite-strain elasticity", 2024.
-//! nalgebra's own `determinant` and `try_inverse` need a field with ordering by magnitude and do not accept nested
-//! dual numbers, so the determinant and the cofactor are written out here, once.
+//! Shakeri, Ghaffari, Thompson, Stengel, Brown, "Stable numerics for finite-strain elasticity", 2024. nalgebra's own `determinant` and
+//! `try_inverse` need a field with ordering by magnitude and do not accept nested dual numbers. The determinant and the cofactor are
+//! therefore written out here, once.
 
 use crate::scalar::Real;
 use nalgebra::{SMatrix, SVector};
@@ -84,7 +84,7 @@ pub fn outer<T: Real, const D: usize>(a: &Vector<T, D>, b: &Vector<T, D>) -> Ten
 /// ```
 /// use bfree::tensor::{Tensor, contract, symmetric};
 ///
-/// // The rest is skew, and its contraction with anything symmetric vanishes.
+/// // The rest is skew, and its contraction with any symmetric tensor vanishes.
 /// let a = Tensor::<f64, 2>::new(1.0, 2.0, 4.0, 8.0);
 /// let (sym, skew) = (symmetric(&a), a - symmetric(&a));
 /// assert_eq!((sym, skew), (sym.transpose(), -skew.transpose()));
@@ -118,7 +118,7 @@ pub fn scaled<T: Real, const D: usize>(a: &Tensor<T, D>, s: T) -> Tensor<T, D> {
 /// // cof(A)ᵀ A = det(A) I
 /// let a = Tensor::<f64, 3>::new(2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 1.0, 0.0, 1.0);
 /// assert_eq!(cofactor(&a).transpose() * a, identity::<f64, 3>() * determinant(&a));
-/// // Nanson: cof F maps areas. Flattened along x, what faces x keeps its area and what faces y loses it.
+/// // Nanson: cof F maps areas. In a body flattened along x, a face normal to x keeps its area, and a face normal to y loses it.
 /// let flat = Tensor::<f64, 2>::from_diagonal(&Vector::from([0.0, 1.0]));
 /// assert_eq!(cofactor(&flat), Tensor::from_diagonal(&Vector::from([1.0, 0.0])));
 /// ```
@@ -187,7 +187,7 @@ pub(crate) fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {
     sum
 }
 
-/// The deformation at a point, kept as H = F − I, with the measures the laws need.
+/// The deformation at a point, stored as H = F − I, with the measures the laws need.
 ///
 /// Every measure is accurate to a few rounding errors *relative to its own size*, at strains of 1e-15 as at 10.
 /// D = 1 is uniaxial strain, D = 2 plane strain: the missing stretches are 1.
@@ -281,9 +281,9 @@ impl<T: Real, const D: usize> Deformation<T, D> {
         self.j * (T::lit(2.0) + self.j)
     }
 
-    /// ln J = k ln 2 + 2 artanh s with s = (m − 1)/(m + 1) and m = J/2ᵏ between √½ and √2, m − 1 being j where k = 0.
+    /// ln J = k ln 2 + 2 artanh s with s = (m − 1)/(m + 1) and m = J/2ᵏ between √½ and √2. Where k = 0, m − 1 = j.
     ///
-    /// Arithmetic alone: a loop over it becomes vector instructions, and no two machines differ.
+    /// The evaluation uses arithmetic alone, so that a loop over it is vectorised and all machines give the same digits.
     ///
     /// ```
     /// use bfree::tensor::{Deformation, Tensor};
@@ -311,16 +311,16 @@ impl<T: Real, const D: usize> Deformation<T, D> {
 
     /// tr E − j, of second order.
     ///
-    /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D) has nothing to cancel while H is small because the strain is.
-    /// Where a rotation makes H much larger than E, those terms do cancel, and from J² = det(I + 2E) follows
-    /// (j tr E − 4 I₂(E) − 8 det E)/(2 + j), of strains alone (in 2D without the det E of 3D).
+    /// ½ H:H (1D), ½ H:H − det H (2D), ½ H:H − I₂(H) − det H (3D) does not cancel while H is as small as the strain. Where a rotation makes
+    /// H much larger than E, these terms do cancel. J² = det(I + 2E) then gives (j tr E − 4 I₂(E) − 8 det E)/(2 + j) in strains alone,
+    /// without det E in 2D.
     ///
     /// ```
     /// use bfree::tensor::{Deformation, Tensor, Vector, trace};
     ///
     /// let at = Deformation::<f64, 2>::new(Tensor::from_diagonal(&Vector::from([0.25, -0.5])));
     /// assert_eq!(at.trace_e_minus_j(), trace(&at.green_lagrange()) - at.j);
-    /// // Where that difference is lost in round-off: uniaxial, tr E − j = ½ h².
+    /// // Here round-off loses that difference: uniaxial, tr E − j = ½ h².
     /// let small = Deformation::<f64, 1>::new(Tensor::from_element(1e-10));
     /// assert_eq!(small.trace_e_minus_j(), 0.5 * 1e-10 * 1e-10);
     /// ```
@@ -343,7 +343,8 @@ impl<T: Real, const D: usize> Deformation<T, D> {
         }
     }
 
-    /// tr E − ln J, of second order: by the two differences below and above while J is not large, where both would be much larger than it.
+    /// tr E − ln J, of second order. While J is not large, it is the sum of (tr E − j) and (j − ln J). For large J both would be much
+    /// larger than their sum.
     #[inline(always)]
     pub fn trace_e_minus_log_jacobian(&self) -> T {
         if self.j.value() < 2.0 {
@@ -353,8 +354,8 @@ impl<T: Real, const D: usize> Deformation<T, D> {
         }
     }
 
-    /// j − ln(1 + j), of second order. With s = j/(2+j), ln(1+j) = 2 artanh s, and
-    /// j − ln(1+j) = j s − 2 s³ (1/3 + s²/5 + s⁴/7 + …) has nothing to cancel.
+    /// j − ln(1 + j), of second order. With s = j/(2+j), ln(1+j) = 2 artanh s, and j − ln(1+j) = j s − 2 s³ (1/3 + s²/5 + s⁴/7 + …) does
+    /// not cancel.
     ///
     /// ```
     /// use bfree::tensor::{Deformation, Tensor};

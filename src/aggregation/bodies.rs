@@ -1,12 +1,13 @@
-//! Which knot cells are well filled, and which of them an outer node follows.
+//! Knot cells of the bodies: the search for good cells, and the good cells whose polynomials an outer node follows.
 
 use super::{Occupied, Pieces};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Shares of two cells that differ by less than this, relative to the larger one, are the same: rounding does not choose a cell.
+/// Relative tolerance of comparisons between filled fractions: round-off must not choose a cell.
 const SAME: f64 = 1e-6;
 
-/// How many cells away an outer node looks for a good cell. Polynomials grow with the distance; a node that finds none is an unknown.
+/// The largest distance, in cells, at which an outer node looks for a good cell: polynomials grow with the distance. A node that finds no
+/// good cell is an unknown.
 const FURTHEST: i64 = 6;
 
 /// The occupied knot cells of all bodies.
@@ -16,9 +17,9 @@ pub(super) struct Bodies {
     dimension: usize,
     cells: Vec<([i64; 3], f64)>,
     places: HashMap<[i64; 3], usize>,
-    /// The first cell of the connected piece that a cell belongs to.
+    /// For each cell, the first cell of the connected piece that contains it.
     piece: Vec<usize>,
-    /// The active nodes of each cell's functions; `None` where one of them is not active.
+    /// For each cell, the nodes of its functions; `None` if one of these nodes is not active.
     pub(super) windows: Vec<Option<Vec<u32>>>,
     numbers: HashMap<[i64; 3], u32>,
 }
@@ -44,14 +45,14 @@ impl Bodies {
         bodies
     }
 
-    /// The active nodes of a cell's functions, if all are active.
+    /// The nodes of a cell's functions; `None` unless all of these nodes are active.
     fn window(&self, cell: [i64; 3]) -> Option<Vec<u32>> {
         let along = |k: usize| if k < self.dimension { self.pieces.window(cell[k], self.grid[k]) } else { 0..=0 };
         let all = along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| [x, y, z])));
         all.map(|node| self.numbers.get(&node).copied()).collect()
     }
 
-    /// The occupied cells at most `reach` away along every axis, the cell itself among them.
+    /// The occupied cells at most `reach` cells away along every axis, including the cell itself.
     fn around(&self, cell: [i64; 3], reach: i64) -> impl Iterator<Item = usize> {
         let dimension = self.dimension;
         let range = move |k: usize| if k < dimension { -reach..=reach } else { 0..=0 };
@@ -59,7 +60,7 @@ impl Bodies {
         all.filter_map(move |by| self.places.get(&[0, 1, 2].map(|k| cell[k] + by[k])).copied())
     }
 
-    /// Joins neighbouring cells to pieces.
+    /// Finds the connected pieces: cells that share a corner belong to one piece.
     fn connect(&mut self) {
         let mut seen = vec![false; self.cells.len()];
         for start in 0..self.cells.len() {
@@ -74,7 +75,8 @@ impl Bodies {
         }
     }
 
-    /// The good cells: those that are filled; then, as long as a cell has no good one beside it, the fullest of such cells.
+    /// The good cells: all cells filled to at least θ. While some cells have no good neighbour, the locally fullest of these cells become
+    /// good as well. The nodes of a good cell are all active.
     pub(super) fn good(&self) -> Vec<usize> {
         let may = |cell: &usize| self.windows[*cell].is_some();
         let filled = |cell: &usize| self.cells[*cell].1 >= self.pieces.share * (1.0 - SAME);
@@ -97,12 +99,12 @@ impl Bodies {
         }
     }
 
-    /// The square of the distance from a node to the centre of a cell, in half spacings.
+    /// The squared distance from a node to the centre of a cell, with lengths in half spacings.
     fn distance(&self, node: [i64; 3], cell: usize) -> i64 {
         (0..self.dimension).map(|k| (2 * node[k] - self.pieces.centre(self.cells[cell].0[k])).pow(2)).sum()
     }
 
-    /// The nearest good cells of the pieces whose cells are nearest to a node.
+    /// The good cells nearest to a node, among the connected pieces that contain the cells nearest to the node.
     pub(super) fn nearest(&self, node: [u32; 3], good: &HashSet<usize>) -> Vec<usize> {
         let node = node.map(i64::from);
         let nearest = |may: &dyn Fn(usize) -> bool| {
@@ -115,7 +117,7 @@ impl Bodies {
                         _ => {}
                     }
                 }
-                // All cells whose centres are so near have been seen.
+                // The search has visited all cells whose centres are this near.
                 if found.0 <= (2 * reach - 1).pow(2) {
                     break;
                 }
@@ -128,7 +130,7 @@ impl Bodies {
         cells
     }
 
-    /// The mean of what the polynomials of `cells` are at a node.
+    /// The row of E for a node: the mean of the polynomials of `cells` at that node, as weights of other nodes.
     pub(super) fn row(&self, node: [u32; 3], cells: &[usize]) -> BTreeMap<u32, f64> {
         let mut row = BTreeMap::new();
         for &cell in cells {

@@ -1,20 +1,20 @@
-//! E, applied to fields of vectors of which some components are prescribed.
+//! The extension E applied to vector fields, some of whose components are prescribed.
 
 use super::Extension;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use std::sync::Arc;
 
-/// E of a field of vectors, of which some components are prescribed: those of an outer node do not follow.
+/// The extension E for vector fields. A prescribed component of an outer node does not follow inner nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Followers<const D: usize> {
     extension: Arc<Extension>,
-    /// Which components of each outer node follow.
+    /// For each outer node, the components that follow.
     follows: Vec<[bool; D]>,
 }
 
 impl<const D: usize> Followers<D> {
-    /// Of an extension, but for the values `(node, component)` that are prescribed.
+    /// E without the pairs `(node, component)` in `prescribed`: a prescribed component does not follow.
     ///
     /// ```
     /// use bfree::aggregation::{Extension, Followers, Occupied, Pieces};
@@ -47,12 +47,12 @@ impl<const D: usize> Followers<D> {
         self.extension.is_empty()
     }
 
-    /// Every outer node, which of its components follow, and the inner nodes with their weights.
+    /// For each outer node: the components that follow, and the inner nodes with their weights.
     pub fn rows(&self) -> impl Iterator<Item = (usize, [bool; D], impl Iterator<Item = (usize, f64)>)> {
         self.extension.rows().zip(&self.follows).map(|((outer, leaders), follows)| (outer, *follows, leaders))
     }
 
-    /// The row of a node, if it is an outer one.
+    /// The row of an outer node; `None` for other nodes.
     pub(crate) fn row(&self, node: usize) -> Option<([bool; D], impl Iterator<Item = (usize, f64)>)> {
         let place = self.extension.outer().binary_search(&(node as u32)).ok()?;
         Some((self.follows[place], self.extension.leaders(place)))
@@ -67,12 +67,12 @@ impl<const D: usize> Followers<D> {
         }
     }
 
-    /// R̂ = Eᵀ R, in place: zero at components that follow.
+    /// R̂ = Eᵀ R, in place. Components that follow become zero.
     pub fn restrict<T: Real>(&self, forces: &mut [Vector<T, D>]) {
         self.restrict_with(forces, |weight| weight);
     }
 
-    /// |E|ᵀ of magnitudes, in place.
+    /// |E|ᵀ applied to round-off bounds, in place.
     pub(crate) fn restrict_magnitudes<T: Real>(&self, magnitudes: &mut [Vector<T, D>]) {
         self.restrict_with(magnitudes, f64::abs);
     }

@@ -1,21 +1,22 @@
 //! Aggregation of nodes at the boundary of a body (extended B-splines: Höllig, Reif and Wipper, SIAM J. Numer. Anal. 39, 2001).
 //!
-//! A node with little of a body has next to no stiffness, and its value is next to free. Such an *outer* node is no unknown. It follows
-//! well-supported *inner* nodes,
+//! A node that supports only a small part of a body has next to no stiffness, so its value is almost arbitrary. Such an *outer* node is not
+//! an unknown. An outer node follows well-supported *inner* nodes:
 //!
 //! ```text
 //! u = E û,    R̂ = Eᵀ R,    K̂ = Eᵀ K E
 //! ```
 //!
-//! by the polynomial of the nearest *good* cell of its piece of body. E has no parameter with a unit and no stiffness of its own. It
-//! reproduces polynomials of the functions' degree, so rigid motions, uniform strains, resultants and moments of loads stay exact.
+//! The weights in E come from the polynomial of the nearest *good* cell of the same connected piece of the body. E has no parameter with a
+//! unit, and no stiffness. E reproduces polynomials of the functions' degree. So rigid motions and uniform strains stay exact, and so do
+//! resultants and moments of loads.
 //!
-//! - A *knot cell* is where all functions are one polynomial: [c, c+1] for odd degrees, [c − ½, c + ½] for even ones. Its *window* is the
-//!   nodes of these functions.
-//! - A knot cell is *good* if the body fills at least the share θ of it. Where there is no good cell next to a cell, the fullest cells
-//!   there count as good.
-//! - A node is inner if it is in the window of a good cell, and outer if it is not.
-//! - Among good cells at one distance, the mean of their polynomials counts: mirrored bodies have mirrored motions.
+//! - A *knot cell* is an interval in which each function is a single polynomial: [c, c+1] for odd degrees, [c − ½, c + ½] for even degrees.
+//!   The *window* of a knot cell is the set of nodes of these functions.
+//! - A knot cell is *good* if the body fills at least the fraction θ of it. If no cell next to a knot cell is good, the fullest cells there
+//!   count as good.
+//! - A node is inner if it is in the window of a good cell, and outer otherwise.
+//! - If several good cells are equally near, the mean of their polynomials counts. So mirrored bodies have mirrored motions.
 
 mod bodies;
 mod followers;
@@ -27,29 +28,30 @@ pub use pieces::Pieces;
 use bodies::Bodies;
 use std::collections::{BTreeMap, HashSet};
 
-/// E: the outer nodes, each with the inner nodes that it follows and their weights. All other nodes stay as they are.
+/// The extension E in sparse rows: each outer node, the inner nodes that it follows, and their weights. E is the identity at all other
+/// nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Extension {
-    /// Of the functions.
+    /// The polynomial degree of the shape functions.
     degree: u32,
     /// The outer nodes, ascending.
     outer: Vec<u32>,
-    /// Where the list of each of them begins; one more at the end.
+    /// For each outer node, the start of its row in `leaders` and `weights`; the last entry is the end of the last row.
     starts: Vec<u32>,
     leaders: Vec<u32>,
     weights: Vec<f64>,
 }
 
-/// Where a body lies in the grid, as the extension sees it. Indices have three axes; an axis that does not exist has no cells, and index 0.
+/// The part of the grid that a body occupies. Indices have three components; an axis beyond D has no cells, and index 0.
 #[derive(Clone, Debug)]
 pub struct Occupied<'a> {
-    /// D
+    /// The number of dimensions D.
     pub dimension: usize,
     /// Cells along each axis.
     pub grid: [u32; 3],
     /// The active nodes.
     pub nodes: &'a [[u32; 3]],
-    /// Each knot cell with something in it, and the share of it that is filled.
+    /// The occupied knot cells, each with its filled fraction.
     pub cells: Vec<([u32; 3], f64)>,
 }
 
@@ -112,7 +114,7 @@ impl Extension {
         &self.outer
     }
 
-    /// The inner nodes that the outer node at `place` of [`Self::outer`] follows, and their weights.
+    /// The inner nodes that the outer node `outer()[place]` follows, and their weights.
     pub fn leaders(&self, place: usize) -> impl Iterator<Item = (usize, f64)> + use<'_> {
         let range = self.starts[place] as usize..self.starts[place + 1] as usize;
         self.leaders[range.clone()].iter().zip(&self.weights[range]).map(|(&leader, &weight)| (leader as usize, weight))

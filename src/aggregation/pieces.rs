@@ -1,33 +1,34 @@
-//! Which polynomials shape functions are made of, and how the polynomial of one cell goes on beyond it.
+//! The polynomial pieces of shape functions, and the continuation of one cell's polynomial beyond that cell.
 
-/// Axes of fewer cells have no room for two ends at which functions curve.
+/// The fewest cells of an axis on which functions may curve at both ends.
 const ROOM: i64 = 4;
 
-/// The polynomials of which shape functions are made, along an axis.
+/// The polynomial pieces of shape functions along an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pieces {
-    /// The degree p, 1 to 3; 1 for functions that are no polynomials.
+    /// The degree p, 1 to 3; 1 for functions that are not polynomials.
     pub degree: u32,
-    /// The degree with which outer nodes continue the polynomial of a cell: p where sums over particles integrate, else 1. Higher degrees
-    /// would make errors of sums larger.
+    /// The degree with which outer nodes continue the polynomial of a cell: p if the particles are quadrature points, else 1. For other
+    /// particles a higher degree would increase the errors of sums over particles.
     pub extension: u32,
-    /// Whether functions curve next to a wall of the grid ([`NotAKnotBspline`](crate::approximation::NotAKnotBspline)), where the unknown of
-    /// the wall's node is the value there. If not, coefficients beyond a wall continue linearly.
+    /// Whether functions may curve next to a wall of the grid ([`NotAKnotBspline`](crate::approximation::NotAKnotBspline)). If so, the
+    /// unknown of a wall node is the value there. If not, coefficients beyond a wall continue linearly.
     pub curves_at_walls: bool,
-    /// θ, the share of a knot cell that a body fills at least if the cell is good; no unit.
+    /// θ: a knot cell is good if a body fills at least this fraction of the cell; no unit.
     pub share: f64,
 }
 
 impl Pieces {
-    /// Of linear functions, and of those that are no polynomials.
+    /// The pieces of linear functions, also used for functions that are not polynomials.
     pub const LINEAR: Self = Self { degree: 1, extension: 1, curves_at_walls: false, share: 0.5 };
 
-    /// The knot cell along an axis of `cells` cells, at `local` spacings from its first node.
+    /// The knot cell at `local` spacings from the first node of an axis of `cells` cells.
     pub(crate) fn cell(self, local: f64, cells: u32) -> u32 {
         if self.degree.is_multiple_of(2) { (local + 0.5) as u32 } else { (local as u32).min(cells.saturating_sub(1)) }
     }
 
-    /// The knot cells that a length along an axis overlaps, and which part of it lies in each; in spacings from the first node.
+    /// The knot cells that an interval along an axis overlaps, each with the fraction of the interval in that cell. `middle` and `length`
+    /// are in spacings, and `middle` counts from the first node.
     pub(crate) fn overlaps(self, middle: f64, length: f64, cells: u32) -> Vec<(u32, f64)> {
         let (from, to) = ((middle - 0.5 * length).max(0.0), (middle + 0.5 * length).min(f64::from(cells)));
         if from >= to {
@@ -38,7 +39,7 @@ impl Pieces {
         (self.cell(from, cells)..=self.cell(to, cells)).map(|cell| (cell, part(cell))).collect()
     }
 
-    /// The share of a knot cell that lies within the grid along an axis: a cell of even degree is halved by a wall.
+    /// The fraction of a knot cell inside the grid, along an axis: a wall halves a knot cell of even degree.
     pub(crate) fn within(self, cell: u32, cells: u32) -> f64 {
         if self.degree.is_multiple_of(2) && (cell == 0 || cell == cells) { 0.5 } else { 1.0 }
     }
@@ -54,7 +55,7 @@ impl Pieces {
         first.max(0)..=(first + i64::from(self.degree)).min(cells)
     }
 
-    /// The first coefficient of a cell's polynomial, counted as a node: it may lie beyond a wall.
+    /// The first coefficient of a cell's polynomial, as a node index; the index may lie beyond a wall.
     fn first(self, cell: i64, cells: i64) -> i64 {
         let first = cell - i64::from(self.degree / 2);
         let last = cells - i64::from(self.degree);
@@ -65,7 +66,7 @@ impl Pieces {
         self.curves_at_walls && cells >= ROOM && self.degree > 1
     }
 
-    /// The node `node`, along an axis of `cells` cells, as the polynomial of `cell` continues there: other nodes and weights.
+    /// The unknown of `node` from the continued polynomial of `cell`, as nodes and weights. The axis has `cells` cells.
     pub(super) fn follow(self, cell: i64, cells: i64, node: i64) -> Vec<(i64, f64)> {
         if self.window(cell, cells).contains(&node) {
             return vec![(node, 1.0)];
@@ -74,7 +75,7 @@ impl Pieces {
         let scaled =
             |factor: f64, list: Vec<(i64, f64)>| list.into_iter().map(move |(node, weight)| (node, factor * weight));
         if self.curves(cells) && (node == 0 || node == cells) {
-            // The unknown of a wall's node is the value.
+            // The unknown of a wall node is the value there, not the coefficient.
             let inwards = if node == 0 { 1 } else { -1 };
             let value = if self.degree == 2 { &VALUE_QUADRATIC[..] } else { &VALUE_CUBIC[..] };
             return value
@@ -86,12 +87,12 @@ impl Pieces {
         coefficient(node)
     }
 
-    /// The coefficient `at` of the polynomial of a cell, by Lagrange's formula from those of its window:
+    /// The coefficient `at` = j of a cell's polynomial, by Lagrange's formula from the coefficients k in the window of the cell:
     /// e_jk = Π_{l≠k} (j − l)/(k − l).
     fn coefficient(self, cell: i64, cells: i64, at: i64) -> Vec<(i64, f64)> {
         let (first, by) = (self.first(cell, cells), i64::from(self.extension.min(self.degree)));
         let last = first + i64::from(self.degree);
-        // Those nearest to it.
+        // The window coefficients nearest to `at`.
         let window = if at < first { first..=first + by } else { last - by..=last };
         let mut list = Vec::new();
         for k in window.clone() {
@@ -102,7 +103,7 @@ impl Pieces {
         list
     }
 
-    /// A coefficient in terms of unknowns: beyond a wall u₋ₖ = 2u₀ − uₖ; where functions curve, u₀ is the value at the wall.
+    /// The coefficient `k` in terms of unknowns. Beyond a wall u₋ₖ = 2u₀ − uₖ. Where functions curve, u₀ is the value at the wall.
     fn unknowns(self, k: i64, cells: i64) -> Vec<(i64, f64)> {
         if self.curves(cells) {
             let own = if self.degree == 2 { &COEFFICIENT_QUADRATIC[..] } else { &COEFFICIENT_CUBIC[..] };
@@ -120,7 +121,8 @@ impl Pieces {
     }
 }
 
-/// The value at a wall from the coefficients c₀, c₁, … of the polynomial there, and c₀ from the value u₀ and c₁, ….
+/// The weights of c₀, c₁, … that give the value u₀ at a wall (`VALUE_…`), and the weights of u₀, c₁, … that give c₀
+/// (`COEFFICIENT_…`). The c are the coefficients of the polynomial at the wall.
 /// Quadratic: u₀ = (c₋₁ + 6c₀ + c₁)/8 with c₋₁ = 3c₀ − 3c₁ + c₂. Cubic: u₀ = (c₋₁ + 4c₀ + c₁)/6 with c₋₁ = 4c₀ − 6c₁ + 4c₂ − c₃.
 const VALUE_QUADRATIC: [f64; 3] = [9.0 / 8.0, -2.0 / 8.0, 1.0 / 8.0];
 const VALUE_CUBIC: [f64; 4] = [8.0 / 6.0, -5.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0];

@@ -11,16 +11,16 @@ use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The B-spline of the given degree.
+/// A uniform B-spline of degree 2 or 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bspline {
-    /// Continuous first derivative, three nodes an axis.
+    /// Continuous first derivative, three nodes per axis.
     Quadratic,
-    /// Continuous second derivative, four nodes an axis.
+    /// Continuous second derivative, four nodes per axis.
     Cubic,
 }
 
-/// B-splines.
+/// B-splines centred on the nodes.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "Bspline")]
 #[serde(default, deny_unknown_fields)]

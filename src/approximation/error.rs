@@ -1,14 +1,14 @@
-//! What can go wrong with a shape function, and what is allowed instead.
+//! Errors of shape functions: positions outside the grid, and parameters out of range.
 
 use crate::problems::Number;
 
-/// A particle no shape function can serve, or parameters of a family that mean nothing.
+/// An error in the evaluation of shape functions or in the parameters of a family.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ApproximationError {
     /// The particle left the box of the grid, or its position is not a number.
     #[error("position {position:?} is outside the box from {lower:?} to {upper:?}")]
     Outside {
-        /// The position asked for.
+        /// The position of the particle.
         position: Vec<f64>,
         /// Lower corner of the box.
         lower: Vec<f64>,
@@ -23,25 +23,25 @@ pub enum ApproximationError {
         /// Cells along the axis.
         cells: u32,
     },
-    /// A parameter of a family that means nothing.
+    /// A parameter of a family is out of range.
     #[error("{parameter} is {}; it must be {allowed}", Number(*value))]
     Parameter {
-        /// What it is.
+        /// The name of the parameter.
         parameter: &'static str,
-        /// Its value.
+        /// The value of the parameter.
         value: f64,
-        /// Its range.
+        /// The allowed range.
         allowed: &'static str,
     },
     /// A family lists more nodes along an axis than its [`Separable::width`](super::Separable::width).
     #[error("{listed} nodes are listed along an axis by functions that say they reach {allowed} at most")]
     TooManyNodes {
-        /// Nodes listed.
+        /// Number of nodes listed.
         listed: usize,
-        /// The width.
+        /// The width of the family.
         allowed: usize,
     },
-    /// The circle of max-ent holds too few nodes to have every particle in their convex hull.
+    /// The circle of max-ent holds too few nodes: some particles lie outside the convex hull of their nodes.
     #[error(
         "max-ent on a circle with γ = {gamma} and tolerance {tolerance:e} leaves particles outside the hull of their \
          nodes in {dimension} dimensions; γ must be < {limit}, or take the separable family, which has no limit"
@@ -53,10 +53,10 @@ pub enum ApproximationError {
         tolerance: f64,
         /// D
         dimension: usize,
-        /// γ̂ must stay below this.
+        /// The limit: γ̂ must be smaller.
         limit: f64,
     },
-    /// Neither Newton nor the derivative-free search found the multipliers of max-ent.
+    /// Neither Newton's method nor the derivative-free search found the Lagrange multipliers of max-ent.
     #[error("max-ent with γ = {gamma} found no multipliers at {position:?}: Σ N (x - x_I) = {residual:e} h is left")]
     NoMultipliers {
         /// γ̂

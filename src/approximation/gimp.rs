@@ -17,7 +17,7 @@ pub struct Gimp {
 }
 
 impl Gimp {
-    /// Particles that fill their cell, `count` along each axis: l_p = h / (2 count).
+    /// The functions for particles that fill their cell, `count` along each axis: l_p = h / (2 count).
     ///
     /// ```
     /// use bfree::approximation::{AxisWeights, Gimp, Separable};

@@ -1,21 +1,21 @@
-//! Functions away from walls: there they depend on the place in the cell alone, and are arithmetic without a branch, for one number or
-//! for the lanes of a vector.
+//! Shape functions away from walls. There the functions depend only on the position in the cell, so their code has no branch. The code runs
+//! on one number or on the lanes of a vector.
 
 use super::kernel::Kernel;
 use super::{Bspline, Gimp, Lme, bspline};
 use std::ops::{Add, Div, Mul, Sub};
 
-/// The most nodes on a side, beyond those of the cell, that vector lanes have room for.
+/// The largest number of nodes on a side, beyond those of the cell, for which vector lanes have room.
 pub(crate) const FURTHEST: usize = 4;
 
-/// Nodes of a [`Column`].
+/// The number of nodes in a [`Column`].
 pub(crate) const NODES: usize = 2 * FURTHEST + 2;
 
-/// A number, or the lanes of a vector; every operation is rounded, so that both have the same bits.
+/// A number, or the lanes of a vector. Every operation rounds, so numbers and lanes agree bitwise.
 pub(crate) trait Lane:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// The constant `x`, beside a number of the same kind.
+    /// The constant `x` in the type of `self`.
     fn constant(self, x: f64) -> Self;
 
     /// `then` where `self` < `other`, and `otherwise` elsewhere.
@@ -42,39 +42,38 @@ impl Lane for f64 {
     }
 }
 
-/// The functions of an axis at one coordinate: the nodes cell − M … cell + 1 + M, zero where a function does not reach.
+/// N and dN/dx along an axis at one coordinate, for the nodes cell − M … cell + 1 + M; zero where a function does not reach.
 pub(crate) struct Column<T> {
     /// N
     pub values: [T; NODES],
     /// dN/dx
     pub derivatives: [T; NODES],
-    /// The last correction of an iteration, relative; if it is larger than [`SETTLED`],
-    /// [`Separable::axis`](super::Separable::axis) has to find the functions.
+    /// The last relative correction of Newton's method. If the correction exceeds [`SETTLED`], the iteration has not converged, and
+    /// [`Separable::axis`](super::Separable::axis) must find the functions.
     pub correction: T,
 }
 
-/// A correction below this leaves an error of its square.
+/// Convergence tolerance of Newton's method: after a correction below this, the error is about the square of the correction.
 pub(crate) const SETTLED: f64 = 1e-9;
 
 /// A family of functions away from walls.
 pub(crate) trait Interior {
-    /// What is looked up before the arithmetic begins.
+    /// The tabulated starting value of Newton's method; 0 for functions without an iteration.
     #[inline(always)]
     fn start(&self, _below: f64) -> f64 {
         0.0
     }
 
-    /// The functions at the distances `below`·h and `above`·h from the nodes of the cell.
+    /// The functions at a point `below`·h from the lower node of the cell and `above`·h from the upper node.
     fn column<T: Lane, const M: usize>(&self, below: T, above: T, start: T, spacing: f64) -> Column<T>;
 }
 
-/// Something to be done with the functions of one family, which reach `M` nodes beyond those of the cell.
+/// An operation on the functions of one family, which reach `M` nodes beyond those of the cell.
 pub(crate) trait InteriorVisitor {
-    /// Does it.
     fn visit<const M: usize>(self, interior: &impl Interior);
 }
 
-/// A family that has vector lanes.
+/// A shipped family, which vector lanes can evaluate.
 #[derive(Clone, Copy, Debug)]
 pub enum Shipped<'a> {
     /// See [`Linear`](super::Linear).
@@ -88,7 +87,8 @@ pub enum Shipped<'a> {
 }
 
 impl Shipped<'_> {
-    /// Functions vanish from this distance on, in units of the spacing, but for those of the cell; at most [`FURTHEST`] + 1.
+    /// The distance beyond which functions vanish, in units of the spacing; at most [`FURTHEST`] + 1. The functions of the cell's own nodes
+    /// may reach further.
     pub(crate) fn radius(&self) -> f64 {
         match self {
             Self::Linear => 1.0,
@@ -99,7 +99,7 @@ impl Shipped<'_> {
         }
     }
 
-    /// Calls `visitor` with the functions, by a type that leaves no branch in a loop over particles.
+    /// Calls `visitor` with the concrete type of the functions, so that a loop over particles has no branch on the family.
     pub(crate) fn with(&self, visitor: impl InteriorVisitor) {
         match self {
             Self::Linear => visitor.visit::<0>(&super::Linear),
@@ -114,7 +114,7 @@ impl Shipped<'_> {
     }
 }
 
-/// The distance of the `i`-th node of a column.
+/// The signed distance D of the `i`-th node of a column, in units of the spacing.
 #[inline(always)]
 pub(super) fn distance<T: Lane, const M: usize>(i: usize, below: T, above: T) -> T {
     if i <= M {

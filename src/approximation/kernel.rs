@@ -1,12 +1,12 @@
-//! Kernels centred on the nodes, with the ghosts beyond a wall folded back.
+//! Kernels centred on the nodes. Ghost nodes beyond a wall are folded back to nodes of the grid.
 
 use super::interior::Lane;
 use super::{ApproximationError, AxisWeights, product::Place};
 use crate::grid::Axis;
 
-/// D ↦ (φ, φ'), lengths in units of the spacing.
+/// A kernel D ↦ (φ, φ'), with lengths in units of the spacing.
 pub(super) trait Kernel {
-    /// φ = 0 from this distance on; at most 2.
+    /// The distance beyond which φ = 0; at most 2.
     fn radius(&self) -> f64;
 
     /// φ and φ'.
@@ -15,9 +15,9 @@ pub(super) trait Kernel {
 
 /// N_k = φ((x − x_k)/h).
 ///
-/// A ghost beyond a wall continues the field linearly, u₋ₖ = 2u₀ − uₖ: N₀ += 2N₋ₖ, Nₖ −= N₋ₖ. That keeps partition of
-/// unity and linear consistency, and makes N₀ = 1 at the wall. The mirror node of a ghost always exists: a point of the
-/// box reaches one ghost at most, also on an axis of one cell.
+/// A ghost node beyond a wall continues the field linearly, u₋ₖ = 2u₀ − uₖ: N₀ += 2N₋ₖ, Nₖ −= N₋ₖ. This continuation keeps partition of
+/// unity and linear consistency, and makes N₀ = 1 at the wall. The mirror node of a ghost always exists: a point of the grid reaches at
+/// most one ghost, even on an axis of one cell.
 #[inline(always)]
 pub(super) fn folded(
     kernel: &impl Kernel,

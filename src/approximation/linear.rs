@@ -8,7 +8,7 @@ use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::problems::Problems;
 
-/// The product of hats. On a cell face the gradient is the one of the upper cell.
+/// Products of hat functions. On a cell face the gradient is that of the upper cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Linear;
 

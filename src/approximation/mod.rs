@@ -1,9 +1,9 @@
-//! Shape functions N and ∇N: one file a family, with its functions and what a scene writes of it ([`Listed`]); one list, which makes
-//! [`Approximation`] and [`Parameters`].
+//! Shape functions N and ∇N. Each family has one file, with its functions and its keys in a scene ([`Listed`]). One list of the families
+//! makes [`Approximation`] and [`Parameters`].
 //!
-//! Linear, GIMP, B-splines and the separable local max-ent functions (LME) are products of functions of one coordinate
-//! ([`Separable`]) and share one tensor product; LME on the paper's circle of nodes is not. Positions and spacing are in
-//! the user's unit of length, values have none, gradients are per length.
+//! Linear, GIMP, B-splines and the separable local max-ent functions (LME) are products of one-dimensional functions ([`Separable`]). These
+//! families share one tensor product. LME on the paper's circle of nodes is not a product. Positions and spacing are in the user's unit of
+//! length. N has no unit, and ∇N has the unit 1/length.
 //!
 //! ```
 //! use bfree::approximation::{Approximation, Lme, Scratch, ShapeFunction, Support, Validate};
@@ -47,7 +47,7 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters that can be judged before any particle is there.
+/// Validation of a family's parameters before any particle exists.
 ///
 /// ```
 /// use bfree::approximation::{Gimp, Lme, Validate};
@@ -58,16 +58,16 @@ use serde::{Deserialize, Serialize};
 /// assert!(refused.to_string().contains("0.6"), "{refused}");
 /// ```
 pub trait Validate {
-    /// Whether the family works with its parameters in `dimension` = 1, 2 or 3 dimensions.
+    /// Checks the parameters of the family in `dimension` = 1, 2 or 3 dimensions.
     ///
     /// # Errors
-    /// The parameter that means nothing, and its range.
+    /// A parameter is out of range. The error names the parameter and its range.
     fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
         Ok(())
     }
 }
 
-/// The nodes a particle sees: all with N ≠ 0 or ∇N ≠ 0. A buffer to be reused.
+/// Connectivity and shape-function values of a particle: all nodes with N ≠ 0 or ∇N ≠ 0. The buffer is reused.
 ///
 /// ```
 /// use bfree::approximation::Support;
@@ -94,7 +94,7 @@ pub struct Support<const D: usize> {
 }
 
 impl<const D: usize> Support<D> {
-    /// Empties the list, keeping its memory.
+    /// Empties the list and keeps its memory.
     #[inline]
     pub fn clear(&mut self) {
         self.nodes.clear();
@@ -111,7 +111,7 @@ impl<const D: usize> Support<D> {
     }
 }
 
-/// Memory a shape function works in; one for each thread.
+/// Work arrays of a shape function; each thread has its own.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     axes: [AxisWeights; 3],
@@ -143,10 +143,10 @@ pub struct Scratch {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait ShapeFunction: Validate + Send + Sync {
-    /// Fills `out` with the nodes seen from `x`; on an error its content means nothing.
+    /// Fills `out` with the nodes that have N ≠ 0 or ∇N ≠ 0 at `x`. After an error the content of `out` means nothing.
     ///
     /// # Errors
-    /// `x` outside the box or not a number; parameters that [`Validate::validate`] refuses, where they would matter.
+    /// `x` is outside the box of the grid, or not a number. [`Validate::validate`] refuses the parameters, and they matter at `x`.
     fn evaluate<const D: usize>(
         &self,
         grid: &Grid<D>,
@@ -155,10 +155,10 @@ pub trait ShapeFunction: Validate + Send + Sync {
         out: &mut Support<D>,
     ) -> Result<(), ApproximationError>;
 
-    /// The functions of one coordinate whose product this is, if it is one.
+    /// The one-dimensional functions of a product; `None` if the functions are not a product.
     fn separable(&self) -> Option<&dyn Separable>;
 
-    /// By which polynomials nodes at the boundary of a body follow others.
+    /// The polynomial pieces by which outer nodes at the boundary of a body follow inner nodes.
     fn pieces(&self) -> Pieces {
         self.separable().map_or(Pieces::LINEAR, Separable::pieces)
     }
@@ -186,33 +186,33 @@ impl<S: Separable> ShapeFunction for S {
     }
 }
 
-/// What a family of the list has beside its functions.
+/// The parts of a listed family besides its functions: its keys, constructor and examples.
 pub trait Listed: ShapeFunction {
-    /// What a scene writes of it: the doc comments of the fields are the manual. `()` if there is nothing but its key.
+    /// The keys of the family in a scene; `()` if it has only its name. The doc comments of the fields are the manual.
     type Parameters;
 
-    /// Whether the functions depend on how wide particles are, which all bodies must then agree on.
+    /// Whether the functions depend on the width of particles. If so, all bodies must have particles of one width.
     const ONE_HALF_WIDTH: bool = false;
 
-    /// The functions; or `None`, and `problems` of the keys below `path`.
+    /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
     fn build(given: &Self::Parameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation>;
 
-    /// Members with their names: what tests and studies run over.
+    /// Named members of the family, for tests and studies.
     fn examples() -> Vec<(&'static str, Approximation)>;
 }
 
-/// The cells of a scene, which shape functions depend on beside their own parameters.
+/// The data of a scene on which shape functions depend, besides their own parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cells {
-    /// D
+    /// The number of dimensions D.
     pub dimension: usize,
     /// Particles along each axis of a cell.
     pub particles_per_axis: u32,
-    /// Whether sums over particles are integrals, of Gauss's points, and no mass is lumped.
+    /// Whether the particles are Gauss points, so that sums over particles are integrals, and no mass is lumped.
     pub integrated: bool,
 }
 
-/// Makes of the list of families what every family is in.
+/// Makes the types that contain every family from the list of families.
 macro_rules! approximations {
     ($($(#[$sentence:meta])+ $key:literal => $family:ident $(($given:ident: $parameters:ty))? $(or $other:ident)?;)*) => {
         /// Any of the shipped shape functions.
@@ -221,7 +221,7 @@ macro_rules! approximations {
             $($(#[$sentence])+ $family($family), $(#[doc = concat!("See [`", stringify!($other), "`].")] $other($other),)?)*
         }
 
-        /// The family of shape functions that joins particles and nodes.
+        /// The family of shape functions between particles and nodes.
         #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
         #[schemars(rename = "Approximation")]
         pub enum Parameters {
@@ -234,12 +234,12 @@ macro_rules! approximations {
                 match self { $(Self::$family { .. } => $key),* }
             }
 
-            /// Whether all bodies must agree on how wide particles are.
+            /// Whether all bodies must have particles of one width.
             pub(crate) fn one_half_width(&self) -> bool {
                 match self { $(Self::$family { .. } => $family::ONE_HALF_WIDTH),* }
             }
 
-            /// The functions; or `None`, and `problems` of the keys below `path`.
+            /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
             ///
             /// ```
             /// use bfree::approximation::{Gimp, Cells, Parameters};
@@ -261,7 +261,7 @@ macro_rules! approximations {
         }
 
         impl Approximation {
-            /// Members of every family with their names: what tests and studies run over.
+            /// Named members of every family, for tests and studies.
             pub fn examples() -> Vec<(&'static str, Self)> {
                 [$($family::examples()),*].concat()
             }
@@ -297,23 +297,23 @@ macro_rules! approximations {
     };
 }
 
-// The list of families: the sentence of the manual, the key of scenes, the type, and what else a scene may mean by the key.
-// CONTRIBUTING.md says what else a shipped family touches.
+// The list of families. Each entry has the sentence of the manual, the key in scenes, the type, and a second type that the key may select.
+// CONTRIBUTING.md lists the other places that a shipped family touches.
 approximations! {
     /// Products of hat functions. Simple and rough: forces jump when a particle crosses a cell face.
     "linear" => Linear;
-    /// Products of one-dimensional uGIMP functions; the half width of a particle follows from the bodies'
-    /// `particles_per_cell`, which must all agree.
+    /// Products of one-dimensional uGIMP functions. The half-width of a particle follows from `particles_per_cell`, which must be equal for
+    /// all bodies.
     "gimp" => Gimp;
-    /// Products of B-splines centred on the nodes. At walls they curve with Gauss's points on a kept grid, in load steps and with
-    /// `time.lumping` = 0; with a lumped mass, or with regular particles, their second derivative is zero there.
+    /// Products of B-splines centred on the nodes. The splines may curve at walls if all particles are Gauss points on a grid that is not
+    /// reset. In addition, no mass may be lumped (load steps, or `time.lumping` = 0). Otherwise the second derivative is zero at walls.
     "bspline" => Bspline(given: BsplineParameters) or NotAKnotBspline;
     /// Local maximum entropy functions.
     "lme" => Lme(given: LmeParameters) or LmeCircle;
 }
 
 impl Parameters {
-    /// The degree of the polynomials that they are along an axis; of one that comes near, for local maximum entropy functions.
+    /// The polynomial degree of the functions along an axis. Local maximum-entropy functions have the degree of a comparable polynomial.
     pub(crate) fn degree(&self) -> u32 {
         match self {
             Self::Linear | Self::Gimp => 1,
@@ -322,8 +322,8 @@ impl Parameters {
         }
     }
 
-    /// How far apart, in grid spacings, the surfaces of two bodies are when they begin to feel each other, at least and at most: measured
-    /// by the test `contact`. `None` of functions that were not measured.
+    /// The smallest and the largest distance between the surfaces of two bodies, in grid spacings, at which their interaction begins. The
+    /// test `contact` measures both distances. `None` for functions that were not measured.
     ///
     /// ```
     /// let cubic = bfree::approximation::Parameters::default();
@@ -342,7 +342,7 @@ impl Parameters {
     }
 }
 
-/// Cells the shape functions measured, those that nothing beats in error and work at once (study `tradeoff`).
+/// Cubic B-splines: of the measured shape functions, no other has both a smaller error and less work (study `tradeoff`).
 impl Default for Parameters {
     fn default() -> Self {
         Self::Bspline(BsplineParameters::default())

@@ -5,15 +5,15 @@ use super::{ApproximationError, AxisWeights, Bspline, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 
-/// B-splines without a kink next to the end of an axis: up to the second kink from a wall they are one polynomial of their degree, which
-/// may curve. (Where [`Bspline`] has u₋₁ = 2u₀ − u₁, and so u″ = 0 at the wall, u₋₁ is that of the polynomial: 3u₀ − 3u₁ + u₂ of
-/// quadratic, 4u₀ − 6u₁ + 4u₂ − u₃ of cubic ones.) The unknown of a wall's node is the value there, in place of u₀. The space is that
-/// of an open knot vector.
+/// B-splines without a knot next to the end of an axis: up to the second knot from a wall they are one polynomial, which may curve.
+/// [`Bspline`] has u₋₁ = 2u₀ − u₁, and so u″ = 0 at the wall. Here u₋₁ continues the polynomial: 3u₀ − 3u₁ + u₂ for quadratic splines,
+/// 4u₀ − 6u₁ + 4u₂ − u₃ for cubic splines. The unknown of a wall node is the value there, in place of u₀. The space is that of an open
+/// knot vector.
 ///
-/// Linear consistency holds with the nodes where they are. But N of the third node is negative near the wall (down to −1/16 of quadratic,
-/// −0.19 of cubic ones): of a body that ends there a lumped mass would be, too. And sums over particles must be integrals: with regular
-/// ones those of [`Bspline`], which are mirrored at walls, err less. So it is for Gauss's points without a lumped mass. Axes of fewer than
-/// four cells have no room for two ends, and the functions of [`Bspline`].
+/// Linear consistency holds with the nodes at their grid positions. N of the third node is negative near the wall: down to −1/16 for
+/// quadratic splines, −0.19 for cubic splines. If a body ends there, a lumped mass would be negative, too. Sums over particles must be
+/// integrals. With regular particles the functions of [`Bspline`], which are mirrored at walls, have smaller errors. So these splines are
+/// for Gauss points without a lumped mass. Axes of fewer than four cells have no room for two ends, and use the functions of [`Bspline`].
 ///
 /// ```
 /// use bfree::approximation::{ApproximationError, AxisWeights, Bspline, NotAKnotBspline, Separable};
@@ -33,12 +33,12 @@ use crate::grid::Axis;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotAKnotBspline(pub Bspline);
 
-/// Cells an axis must have for two ends.
+/// The fewest cells that an axis needs for two ends.
 const ROOM: u32 = 4;
 
-/// At s spacings from a wall, N = b s + c s² + e s³ of the nodes counted from there, and 1 more of node 0.
+/// At s spacings from a wall, N = b s + c s² + e s³, plus 1 for node 0. Nodes count from the wall.
 struct End {
-    /// The second kink: from there on the functions are those of [`Bspline`].
+    /// The distance of the second knot from the wall: further inside, the functions are those of [`Bspline`].
     reach: f64,
     /// b, c, e
     coefficients: &'static [[f64; 3]],

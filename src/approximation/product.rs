@@ -1,11 +1,11 @@
-//! Functions of one coordinate and their tensor product: the one path of all separable families.
+//! One-dimensional functions and their tensor product, which all separable families share.
 
 use super::{ApproximationError, Shipped, Support, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::{Axis, Grid, indices};
 use crate::tensor::Vector;
 
-/// The functions of one axis at one coordinate, nodes `first .. first + values.len()`. A buffer to be reused.
+/// N and dN/dx along one axis at one coordinate, for the nodes `first .. first + values.len()`. The buffer is reused.
 ///
 /// ```
 /// use bfree::approximation::AxisWeights;
@@ -37,14 +37,14 @@ impl AxisWeights {
         self.derivatives.clear();
     }
 
-    /// Appends the function of the next node.
+    /// Appends N and dN/dx of the next node.
     #[inline]
     pub fn push(&mut self, value: f64, derivative: f64) {
         self.values.push(value);
         self.derivatives.push(derivative);
     }
 
-    /// The hats of the two nodes of a cell, at the distance `below`·h from its lower node, `above`·h from its upper one.
+    /// Sets the hat functions of the two nodes of a cell, `below`·h above the lower node and `above`·h below the upper node.
     #[inline]
     pub(super) fn hats(&mut self, place: &Place, spacing: f64) {
         self.start(place.cell);
@@ -53,7 +53,7 @@ impl AxisWeights {
     }
 }
 
-/// A shape function that is a product of functions of one coordinate, N(x) = Π_k N_k(x_k).
+/// A shape function that is a product of one-dimensional functions, N(x) = Π_k N_k(x_k).
 ///
 /// ```
 /// use bfree::approximation::{AxisWeights, Bspline, Separable};
@@ -70,53 +70,55 @@ impl AxisWeights {
 /// # Ok::<(), bfree::approximation::ApproximationError>(())
 /// ```
 pub trait Separable: Validate + Send + Sync {
-    /// The functions of `axis` that do not vanish at `x`.
+    /// Fills `out` with the functions of `axis` that do not vanish at `x`.
     ///
     /// # Errors
-    /// `x` outside the axis or not a number; an axis without cells.
+    /// `x` is outside the axis or not a number, or the axis has no cells.
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError>;
 
-    /// The most nodes an axis can list, were it long enough. The list holds the nodes of the cell, and is not longer than this.
+    /// The largest number of nodes that [`Self::axis`] lists on a long axis. The list always contains the nodes of the cell.
     fn width(&self) -> usize;
 
-    /// The functions as one of the shipped families, which the sweep evaluates in vector lanes where no wall is near; `None` for any
-    /// other.
+    /// The shipped family that these functions belong to; `None` for any other. Away from walls, the transfer between particles and nodes
+    /// evaluates shipped families in vector lanes.
     fn shipped(&self) -> Option<Shipped<'_>> {
         None
     }
 
-    /// With which functions loads on a surface act, and the motion of a surface is read.
+    /// The functions through which loads act on a surface and the motion of a surface is read.
     fn at_surface(&self) -> AtSurface<'_> {
         AtSurface::Own
     }
 
-    /// By which polynomials nodes at the boundary of a body follow others.
+    /// The polynomial pieces by which outer nodes at the boundary of a body follow inner nodes.
     fn pieces(&self) -> Pieces {
         Pieces::LINEAR
     }
 
-    /// Whether they are B-splines, away from walls: diagonal blocks serve those better than other functions of that width.
+    /// Whether the functions are B-splines away from walls. Block-Jacobi is more effective for B-splines than for other functions of equal
+    /// width.
     fn is_spline(&self) -> bool {
         matches!(self.shipped(), Some(Shipped::Bspline(_)))
     }
 }
 
-/// The functions at a point x of a loaded surface. Loads act through functions that balance the internal force: the sum σ Σ_p V_p ∇N_I(x_p)
-/// over the particles of a body under uniform stress is the same sum over its surface.
+/// The functions at a point x of a loaded surface. Loads must act through functions that balance the internal force. Under uniform stress,
+/// the sum σ Σ_p V_p ∇N_I(x_p) over the particles of a body then equals the nodal force of the tractions on its surface.
 #[derive(Clone, Copy)]
 pub enum AtSurface<'a> {
-    /// Those of the family: for particles that integrate, the two sums are the same.
+    /// The functions of the family. If the particles are quadrature points, the internal force and the load balance.
     Own,
-    /// Other functions. V_p ∇N_I of uGIMP is the difference of a hat between the ends of the particle, and the sum telescopes to hats.
+    /// Other functions. For uGIMP, V_p ∇N_I is the difference of a hat function between the ends of the particle. The sum telescopes to hat
+    /// functions.
     Other(&'a dyn Separable),
-    /// Those of the nearest particle, continued linearly along each axis: they reach no node that the particle does not reach.
+    /// The functions of the nearest particle, continued linearly along each axis, so that they reach only the nodes of that particle.
     NearestParticle,
 }
 
-/// As [`Separable::axis`], and not longer than [`Separable::width`]: the sweep has no room for more.
+/// Calls [`Separable::axis`] and checks that the list is not longer than [`Separable::width`]: the transfer has no room for more nodes.
 ///
 /// # Errors
-/// Those of the list, or its length.
+/// Errors of [`Separable::axis`], or a list that is too long.
 #[inline]
 pub(crate) fn list<S: Separable + ?Sized>(
     family: &S,
@@ -129,10 +131,10 @@ pub(crate) fn list<S: Separable + ?Sized>(
     if listed <= allowed { Ok(()) } else { Err(ApproximationError::TooManyNodes { listed, allowed }) }
 }
 
-/// A coordinate in its cell, in units of the spacing; both distances are accurate at the walls.
+/// The position of a coordinate in its cell, in units of the spacing. Both distances are accurate at the walls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
-    /// The cell, and its lower node. A point on the upper wall belongs to the last cell.
+    /// The number of the cell, and of its lower node. A point on the upper wall belongs to the last cell.
     pub cell: u32,
     /// Distance from the lower node, 0 … 1.
     pub below: f64,
@@ -142,25 +144,25 @@ pub(crate) struct Place {
 
 impl Place {
     /// # Errors
-    /// A point outside the axis, or an axis without cells.
+    /// The point is outside the axis, or the axis has no cells.
     #[inline]
     pub fn new(axis: &Axis, x: f64) -> Result<Self, ApproximationError> {
         check(axis)?;
         axis.local(x).map(|s| Self::at(axis, s)).ok_or_else(|| outside(&[*axis], &[x]))
     }
 
-    /// The place `s` spacings behind the origin, 0 … cells.
+    /// The position at `s` spacings from the origin, 0 … cells.
     #[inline(always)]
     pub fn at(axis: &Axis, s: f64) -> Self {
         let cell = (s as u32).min(axis.cells - 1);
-        // Exact: s and the cell agree in their leading digits.
+        // This difference is exact: s and the cell number agree in their leading digits.
         let below = s - f64::from(cell);
         Self { cell, below, above: 1.0 - below }
     }
 }
 
 /// # Errors
-/// An axis without cells.
+/// The axis has no cells, or no finite and positive spacing.
 #[inline]
 pub(crate) fn check(axis: &Axis) -> Result<(), ApproximationError> {
     if axis.cells == 0 || !(axis.spacing > 0.0 && axis.spacing.is_finite()) {
@@ -179,7 +181,7 @@ pub(super) fn outside(axes: &[Axis], x: &[f64]) -> ApproximationError {
     }
 }
 
-/// The point must lie in the box; the error names all coordinates.
+/// Checks that the point lies in the grid; the error names all coordinates.
 #[inline]
 pub(super) fn inside<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> Result<(), ApproximationError> {
     if grid.contains(x) {
@@ -191,8 +193,8 @@ pub(super) fn inside<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> Resu
 
 /// N_I = Π_k N_k,   ∂N_I/∂x_k = N_k' Π_{m≠k} N_m,   the first axis running fastest.
 ///
-/// A node is left out only if its value and every component of its gradient are exactly zero: on a cell face the far
-/// node of the linear functions has N = 0 and a finite gradient, and F goes wrong without it.
+/// A node is left out only if its value and every component of its gradient are exactly zero. On a cell face the far node of the linear
+/// functions has N = 0 and a finite gradient. Without that node F would be wrong.
 #[inline]
 pub(super) fn product<const D: usize>(axes: &[AxisWeights; 3], out: &mut Support<D>) {
     out.clear();

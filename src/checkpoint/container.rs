@@ -2,14 +2,14 @@
 //!
 //! | bytes | content |
 //! |---|---|
-//! | 8 | `bfree\r\n` and 0x1A: whoever sends it as text breaks it visibly |
+//! | 8 | `bfree\r\n` and 0x1A: a transfer as text changes these bytes, so the damage is detected |
 //! | 4 | version of the format |
 //! | 4 | length of the header |
-//! | … | the header, JSON: names, types and lengths of the arrays, and whatever the writer adds |
+//! | … | the header in JSON: names, types and lengths of the arrays, and the content given by the writer |
 //! | 4 | CRC-32 of version, length and header |
-//! | … | for every array its numbers, then their CRC-32 |
+//! | … | the numbers of each array, followed by their CRC-32 |
 //!
-//! All numbers are little endian. The file ends with the last checksum: one that is cut off, or longer, is refused.
+//! All numbers are little endian. The file ends with the last checksum. A file that is shorter or longer is refused.
 
 use crc32fast::Hasher;
 use serde::de::DeserializeOwned;
@@ -22,36 +22,36 @@ const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
 /// Version of the format.
 const VERSION: u32 = 7;
 
-/// Bytes of a header, at most: a scene has at most a quarter of that.
+/// Largest size of a header, in bytes. A scene takes at most a quarter of it.
 const MAX_HEADER: u32 = 64 << 20;
 
-/// Numbers converted at a time.
+/// Numbers converted to or from bytes at a time.
 const CHUNK: usize = 8192;
 
-/// Why a file cannot be used.
+/// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum Damage {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("it cannot be read: {0}")]
     Io(#[from] io::Error),
-    /// It is something else.
+    /// The file is not a checkpoint of bfree.
     #[error("it is no checkpoint of bfree")]
     Foreign,
-    /// Written by another version.
+    /// The file has another version of the format.
     #[error("its format is version {0}, this program reads version {VERSION}")]
     Version(u32),
-    /// Cut off, or something was appended.
+    /// The file has the wrong length: it is cut off, or bytes were appended.
     #[error("it has {found} bytes and should have {expected}")]
     Length {
-        /// Bytes it has.
+        /// Bytes found in the file.
         found: u64,
-        /// Bytes it should have.
+        /// Bytes that the file should have.
         expected: u64,
     },
     /// A checksum is wrong.
     #[error("its {0} is damaged: the checksum is wrong")]
     Checksum(String),
-    /// All checksums are right, but the content is not that of a checkpoint.
+    /// All checksums are right, but the content does not describe a checkpoint.
     #[error("its content is not understood: {0}")]
     Content(String),
 }
@@ -85,7 +85,7 @@ pub(super) struct Array {
     pub values: Vec<f64>,
 }
 
-/// Writes a file.
+/// Writes `content` and `arrays` in the format of this module.
 pub(super) fn write(
     out: &mut impl Write,
     content: &impl Serialize,
@@ -116,7 +116,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Reads a file of `found` bytes. Nothing is allocated that the file is too short to fill.
+/// Reads a file of `found` bytes. Arrays longer than the file are refused before they are allocated.
 pub(super) fn read<H: DeserializeOwned>(mut input: impl Read, found: u64) -> Result<(H, Vec<Array>), Damage> {
     let long_enough = |expected: u64| if found >= expected { Ok(()) } else { Err(Damage::Length { found, expected }) };
     let prefix = (MAGIC.len() + 8) as u64;
@@ -227,7 +227,7 @@ mod tests {
         }
         let longer = [&whole[..], b"\0"].concat();
         assert!(matches!(parsed(&longer), Err(Damage::Length { .. })));
-        // the file may also be shorter than the system said
+        // the file may turn out shorter than the length reported by the system
         assert!(matches!(read::<Value>(&whole[..50], whole.len() as u64), Err(Damage::Io(_))));
     }
 

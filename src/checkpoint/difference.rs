@@ -1,11 +1,11 @@
-//! Where two scenes differ.
+//! The first key in which two scenes differ.
 
 use serde_json::Value;
 
-/// Keys that say how long a run is, what it is called, and when it is saved: they change no step of it.
+/// Keys that change no step of a run: the schema, the title, the end and the time between checkpoints.
 const FREE: [&str; 4] = ["$schema", "title", "time.end", "output.checkpoint"];
 
-/// A key with different values; `None` stands for an absent one.
+/// A key with different values. `None` is an absent value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Difference {
     pub key: String,
@@ -13,13 +13,13 @@ pub(super) struct Difference {
     pub now: Option<Value>,
 }
 
-/// The first key with which a run would take other steps, or write other files.
+/// The first differing key that changes the steps or the files of a run.
 pub(super) fn first(then: &Value, now: &Value) -> Option<Difference> {
     within("", Some(then), Some(now))
 }
 
 fn within(key: &str, then: Option<&Value>, now: Option<&Value>) -> Option<Difference> {
-    // A key that is absent and one that is null are the same to a scene.
+    // In a scene, an absent key and null mean the same.
     let present = |value: Option<&Value>| value.is_some_and(|value| !value.is_null());
     match (then, now) {
         _ if then == now || (!present(then) && !present(now)) || FREE.contains(&key) => None,

@@ -1,9 +1,9 @@
-//! Checkpoints: from which a run that was killed continues with the same bits.
+//! Checkpoints, from which a killed run continues with bitwise identical results.
 //!
-//! Two files in the directory of the results take turns, so that the one before is there while a new one is written; each is
-//! written under a temporary name, synced and renamed. A checkpoint holds what a step inherits (`state.rs`), the scene, and where
-//! the files of the results ended ([`Mark`]): [`restore`] puts the simulation back, [`Recorder::resume`] cuts the files off there.
-//! A new array has its place in `state.rs`.
+//! Two files in the directory of the results are written in turn, so the previous checkpoint survives while a new one is written. Each file
+//! is written under a temporary name, synced and renamed. A checkpoint holds the state at tₙ (`state.rs`), the scene, and the ends of the
+//! result files ([`Mark`]). [`restore`] puts the simulation back. [`Recorder::resume`] cuts the files off at the mark. A new state array is
+//! added in `state.rs`.
 //!
 //! ```
 //! use bfree::checkpoint::{Checkpoints, Identity, forget, restore, unfinished};
@@ -26,13 +26,13 @@
 //!     checkpoints.write_if_due(&simulation, &mut recorder)?;
 //! }
 //! assert_eq!(unfinished(&directory).map(|run| run.steps), Some(2));
-//! // It goes on from t = 0.1, to the same bits.
+//! // The run continues from t = 0.1, with bitwise identical results.
 //! let mut continued = start.clone();
 //! restore(&directory, &identity, &mut continued)?;
 //! assert_eq!(continued.clock.time(), 0.1);
 //! continued.advance()?;
 //! assert_eq!((&continued.particles, continued.clock), (&simulation.particles, simulation.clock));
-//! // Or a checkpoint now, whether one is due or not; and none any more.
+//! // A checkpoint can be written at any time, and all checkpoints can be removed.
 //! checkpoints.write(&simulation, &mut recorder)?;
 //! let mut last = start.clone();
 //! restore(&directory, &identity, &mut last)?;
@@ -60,13 +60,13 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// The files that take turns.
+/// The two files, written in turn.
 const NAMES: [&str; 2] = ["checkpoint_0.bfree", "checkpoint_1.bfree"];
 
-/// The program that writes.
+/// Name and version of this program.
 const PROGRAM: &str = concat!("bfree ", env!("CARGO_PKG_VERSION"));
 
-/// What belongs to a run and to no other.
+/// The scene and the initial particles, which identify a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -77,12 +77,12 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// Of the run of `scene` that starts with `particles`.
+    /// Identity of the run of `scene` that starts with `particles`.
     pub fn new<const D: usize>(scene: Value, particles: &Particles<D>) -> Self {
         Self { scene, start: state::fingerprint(particles) }
     }
 
-    /// Whether a checkpoint of `then` continues this run.
+    /// Checks that a checkpoint with the identity `then` belongs to this run.
     fn check(&self, then: &Self, path: &Path) -> Result<(), CheckpointError> {
         let path = path.to_owned();
         let shown = |value: Option<Value>| value.map_or_else(|| "nothing".to_owned(), |value| shortened(&value));
@@ -96,7 +96,7 @@ impl Identity {
     }
 }
 
-/// A value, as far as it fits into a line.
+/// The text of a value, cut to the length of a line.
 fn shortened(value: &Value) -> String {
     const SHOWN: usize = 60;
     let text = value.to_string();
@@ -104,31 +104,31 @@ fn shortened(value: &Value) -> String {
     text.chars().take(SHOWN).chain(more.chars()).collect()
 }
 
-/// The JSON of a checkpoint.
+/// The JSON content of a checkpoint.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Content {
     program: String,
     identity: Identity,
-    /// What was asked on the command line, for whoever looks into the file.
+    /// The command line, for a reader of the file. [`restore`] ignores it.
     command: Value,
     clock: Reached,
     mark: Mark,
 }
 
-/// Checkpoints that cannot be written, or from which the run cannot be continued.
+/// A checkpoint cannot be written, removed or continued from.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The results could not be put on the disk, or the checkpoint not be written.
+    /// The results could not be synced to disk, or the checkpoint could not be written.
     #[error("no checkpoint could be written at t = {time}{}", before.as_ref().map_or(String::new(), |path| {
         format!("; the one before, {}, is whole: --restart continues from it", path.display())
     }))]
     Write {
         /// Time of the state.
         time: f64,
-        /// The checkpoint before.
+        /// The previous checkpoint.
         before: Option<PathBuf>,
-        /// Why.
+        /// The reason.
         source: OutputError,
     },
     /// A checkpoint of an earlier run could not be removed.
@@ -136,10 +136,10 @@ pub enum CheckpointError {
     Remove {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason given by the operating system.
         source: std::io::Error,
     },
-    /// There is none.
+    /// The directory has no checkpoint.
     #[error(
         "{} has no checkpoint to continue from; the key output.checkpoint says how often one is written, and without --restart \
          the run begins anew", directory.display()
@@ -148,12 +148,12 @@ pub enum CheckpointError {
         /// The directory of the results.
         directory: PathBuf,
     },
-    /// There are some, but none can be used.
+    /// The directory has checkpoints, but none can be used.
     #[error("no checkpoint in {} can be used: {}", directory.display(), list(unusable))]
     NoneGood {
         /// The directory of the results.
         directory: PathBuf,
-        /// All of them.
+        /// All checkpoints, with reasons.
         unusable: Vec<Unusable>,
     },
     /// The scene has changed.
@@ -171,7 +171,7 @@ pub enum CheckpointError {
         /// Its value now.
         now: String,
     },
-    /// The particles at the start are others.
+    /// The particles at the start have changed.
     #[error(
         "{} is of a run that started with other particles: {array} differs; has a file of particles, triangles or pixels changed?", path.display()
     )]
@@ -189,7 +189,7 @@ pub enum CheckpointError {
 pub struct Unusable {
     /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// The reason.
     pub reason: String,
 }
 
@@ -205,23 +205,23 @@ pub struct Checkpoints {
     command: Value,
     /// Time between checkpoints.
     every: f64,
-    /// How many multiples of it had passed when the last one was due.
+    /// Multiples of `every` that had passed when the last checkpoint was due.
     passed: Option<f64>,
-    /// The last one, and the steps taken then.
+    /// File number of the last checkpoint, and the steps taken until then.
     last: Option<(usize, u64)>,
 }
 
 impl Checkpoints {
-    /// Of the run `identity` into `directory`, whenever the time passes a multiple of `every` > 0. After a restart, the checkpoint
-    /// it came from stays until the next two are written.
+    /// Checkpoints of the run `identity` in `directory`, due whenever the time passes a multiple of `every` > 0. After a restart, the
+    /// second new checkpoint replaces the checkpoint `from`.
     pub fn new(directory: PathBuf, identity: Identity, command: Value, every: f64, from: Option<&Restored>) -> Self {
         Self { directory, identity, command, every, passed: None, last: from.map(|restored| restored.place) }
     }
 
-    /// Writes one if the time has reached a multiple of `every` since the last, or if there is none yet.
+    /// Writes a checkpoint if the time has reached a multiple of `every` since the last checkpoint, or if there is none yet.
     ///
     /// # Errors
-    /// The system refuses; the last checkpoint is whole.
+    /// The operating system refuses. The last checkpoint is still whole.
     pub fn write_if_due<const D: usize, L, A>(
         &mut self,
         simulation: &Simulation<D, L, A>,
@@ -235,10 +235,10 @@ impl Checkpoints {
         self.write(simulation, recorder)
     }
 
-    /// Writes one, unless the last is of the same state.
+    /// Writes a checkpoint, unless the last checkpoint holds the same state.
     ///
     /// # Errors
-    /// The system refuses; the last checkpoint is whole.
+    /// The operating system refuses. The last checkpoint is still whole.
     pub fn write<const D: usize, L, A>(
         &mut self,
         simulation: &Simulation<D, L, A>,
@@ -250,7 +250,7 @@ impl Checkpoints {
         }
         let slot = self.last.map_or(0, |(last, _)| 1 - last);
         let path = self.directory.join(NAMES[slot]);
-        // What a checkpoint says of the files must be on the disk before it is.
+        // The result files must be on disk before the checkpoint that refers to them.
         let written = recorder.mark().and_then(|mark| {
             let content = Content {
                 program: PROGRAM.to_owned(),
@@ -268,20 +268,20 @@ impl Checkpoints {
     }
 }
 
-/// A run that was put back.
+/// A run restored from a checkpoint.
 #[derive(Debug)]
 pub struct Restored {
     /// The checkpoint.
     pub path: PathBuf,
-    /// Its number, and the steps taken then.
+    /// File number of the checkpoint, and the steps taken until then.
     place: (usize, u64),
-    /// Where the files ended.
+    /// Ends of the result files.
     pub mark: Mark,
-    /// Snapshots written before it that are not there any more.
+    /// Snapshots that were written before the checkpoint and are missing now.
     pub missing: Vec<PathBuf>,
-    /// Checkpoints that would have been newer, or cannot be read.
+    /// Newer checkpoints and unreadable checkpoints, which could not be used.
     pub unusable: Vec<Unusable>,
-    /// The program that wrote it, if it was another version: the bits may differ then.
+    /// The program that wrote the checkpoint, if it was another version. The results may then differ in their bits.
     pub other_program: Option<String>,
 }
 
@@ -292,10 +292,10 @@ struct Candidate {
     arrays: Vec<Array>,
 }
 
-/// Puts a simulation that is as at the start of the run `identity` into the state of the last good checkpoint in `directory`.
+/// Restores the last good checkpoint in `directory`. Before, the simulation must be in its state at the start of the run `identity`.
 ///
 /// # Errors
-/// There is no good one, or it is of another run; the simulation is then as before.
+/// There is no good checkpoint, or it belongs to another run. The simulation is then unchanged.
 pub fn restore<const D: usize, L, A>(
     directory: &Path,
     identity: &Identity,
@@ -336,18 +336,18 @@ fn read(path: &Path) -> Result<(Content, Vec<Array>), Damage> {
     container::read(BufReader::new(file), length)
 }
 
-/// A run that was killed or interrupted, and could be continued.
+/// A killed or interrupted run that can be continued.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unfinished {
-    /// Its last checkpoint that can be read.
+    /// The last readable checkpoint.
     pub path: PathBuf,
-    /// Steps taken then.
+    /// Steps taken up to the checkpoint.
     pub steps: u64,
 }
 
-/// The run in `directory` that was killed or interrupted, if there is one with a checkpoint that can be read.
+/// The killed or interrupted run in `directory`, if it has a readable checkpoint.
 pub fn unfinished(directory: &Path) -> Option<Unfinished> {
-    // A run that was killed wrote no report.
+    // A killed run wrote no report.
     let over = outcome(directory).is_some_and(|outcome| outcome != "interrupted");
     let readable = NAMES.iter().filter_map(|name| {
         let path = directory.join(name);
@@ -357,16 +357,16 @@ pub fn unfinished(directory: &Path) -> Option<Unfinished> {
     readable.max_by_key(|one| one.steps).filter(|_| !over)
 }
 
-/// What the report of the run in `directory` says of its end.
+/// The outcome in the report of the run in `directory`.
 fn outcome(directory: &Path) -> Option<Value> {
     let text = std::fs::read(directory.join("report.json")).ok()?;
     Some(serde_json::from_slice::<Value>(&text).ok()?["outcome"].take())
 }
 
-/// Removes the checkpoints of an earlier run: a new one in the same directory must not be continued from them.
+/// Removes the checkpoints of an earlier run, so that a new run in the directory is not continued from them.
 ///
 /// # Errors
-/// The system refuses.
+/// The operating system refuses.
 pub fn forget(directory: &Path) -> Result<(), CheckpointError> {
     for path in NAMES.map(|name| directory.join(name)) {
         match std::fs::remove_file(&path) {

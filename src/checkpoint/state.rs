@@ -1,4 +1,4 @@
-//! What a step inherits from the one before: all of it, and nothing else.
+//! The state at tₙ: everything that a step takes from the previous step, and nothing else.
 
 use super::container::Array;
 use crate::clock::Reached;
@@ -11,8 +11,8 @@ use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
 
-/// The arrays a step inherits, by name. A field of the simulation that is added later does not compile here until somebody has
-/// decided on which side it belongs; a new array has its place in [`inherited`] and in [`restore`].
+/// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
+/// stored. A new array is added here and in [`restore`].
 pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<(&'static str, Cow<'_, [f64]>)> {
     let Simulation {
         grid: _,
@@ -77,7 +77,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
         arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
     }
-    // Its loads are those of the scene.
+    // The loads of `borne` are those of the scene.
     if let Some(Borne { loads: _, reactions, together, asked }) = borne {
         let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
         arrays.push((BORNE, std::iter::once(f64::from(u8::from(*together))).chain(forces).collect()));
@@ -86,32 +86,32 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     arrays
 }
 
-/// Which bodies are joined.
+/// `Simulation::joined`: pairs of bonded bodies.
 const JOINED: &str = "joined";
 
-/// What the last load step balanced: whether bodies moved nodes together, then the reactions.
+/// The last converged load step: whether bodies moved nodes together (`Borne::together`), then the reactions.
 const BORNE: &str = "borne";
 
-/// Where it asked for forces.
+/// Particle positions at which the last load step evaluated a field of forces.
 const BORNE_ASKED: &str = "borne_asked";
 
-/// Arrays that are not always there, or not always of one length.
+/// Prefixes of arrays that may be absent or vary in length.
 const VARYING: [&str; 3] = ["kept_", JOINED, BORNE];
 
-/// Of a grid that is kept: x of the particles, then φ, its rate, v, a and R₀ of the nodes.
+/// Vectors of a grid that is not reset: x of the particles in the reference configuration, then φ, its rate, v, a and R₀ of the nodes.
 const KEPT: [&str; 6] =
     ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration", "kept_unbalanced"];
 
-/// H of the particles when it was new.
+/// H of the particles in the reference configuration.
 const KEPT_GRADIENT: &str = "kept_displacement_gradient";
 
-/// θ − 1, likewise.
+/// θ − 1 of the particles in the reference configuration.
 const KEPT_DILATATION: &str = "kept_dilatation";
 
-/// The grid that was kept, if one was; how many nodes it has only a step can tell.
+/// The kept grid, if there is one. Its number of nodes cannot be checked here, because only a step knows it.
 ///
 /// # Errors
-/// Numbers that are not those of so many particles, or fields of different length.
+/// An array does not fit the number of particles, or nodal fields differ in length.
 fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kept<D>>, String> {
     let of = |name: &str| arrays.iter().find(|array| array.name == name).map(|array| array.values.as_slice());
     let vectors = |name: &str| -> Vec<Vector<f64, D>> {
@@ -131,10 +131,10 @@ fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kep
     if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
 }
 
-/// What the last load step balanced, without its loads.
+/// The last converged load step, without its loads.
 ///
 /// # Errors
-/// Numbers that are not those of so many particles or conditions.
+/// An array does not fit the number of particles or of prescribed conditions.
 fn borne<const D: usize>(
     numbers: &[f64],
     asked: &[f64],
@@ -154,20 +154,20 @@ fn borne<const D: usize>(
     }))
 }
 
-/// The order in which particles lie in `ids`, by their present places; `None` if they are not the same particles.
+/// The present places of the particles, in the order of `ids`. `None` if `ids` belong to other particles.
 fn order(present: &[u32], ids: &[f64]) -> Option<Vec<u32>> {
     let mut places = vec![None; present.len()];
     for (place, &id) in present.iter().enumerate() {
         *places.get_mut(id as usize)? = Some(place as u32);
     }
-    // Each one once.
+    // `take` refuses a second particle with the same id.
     ids.iter().map(|&id| places.get_mut(id as usize)?.take()).collect()
 }
 
-/// Puts a simulation into the state of `arrays` and `reached`, all or nothing.
+/// Sets a simulation to the state of `arrays` and `reached`, all or nothing.
 ///
 /// # Errors
-/// The array that is absent or of another length, or the clock.
+/// An array is absent or has another length, the ids belong to other particles, or the clock cannot show the time.
 pub(super) fn restore<const D: usize, L, A>(
     simulation: &mut Simulation<D, L, A>,
     reached: Reached,
@@ -187,12 +187,13 @@ pub(super) fn restore<const D: usize, L, A>(
     let of = |name: &str| arrays.iter().find(|array| array.name == name).map_or(&[][..], |array| &array.values);
     let borne = borne(of(BORNE), of(BORNE_ASKED), simulation.particles.len(), simulation.loads.prescribed.len())?;
     simulation.clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
-    // What no array holds goes where it was, too.
+    // Particle data without an array is rearranged, too.
     simulation.kept = None;
     simulation.rearrange(&order);
     simulation.kept = kept;
     simulation.borne = borne;
-    // In the order in which the particles lie now, but for its loads, which have just been rearranged.
+    // `borne` has the order of the checkpoint, which is now the order of the particles. Its loads come from the simulation, which has just
+    // been rearranged.
     simulation.borne.iter_mut().for_each(|borne| borne.loads.clone_from(&simulation.loads));
     simulation.joined = of(JOINED).chunks_exact(2).map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
     let held = arrays.iter().filter(|array| array.name == "held").flat_map(|array| &array.values);
@@ -220,7 +221,7 @@ pub(super) fn restore<const D: usize, L, A>(
     Ok(())
 }
 
-/// Checksums of the particles at the start of a run: they may come from files that have changed since.
+/// Checksums of the particles at the start of a run. A file of particles may have changed since.
 pub(super) fn fingerprint<const D: usize>(particles: &Particles<D>) -> Vec<(String, u32)> {
     let Particles { position, velocity, volume, mass, body, .. } = particles;
     [

@@ -1,11 +1,11 @@
-//! The frozen tangent in closed form: what isotropic laws without history need, from a handful of numbers.
+//! The linearised tangent in closed form, from a handful of numbers, for isotropic laws without internal variables.
 
 use crate::scalar::{Arithmetic, Real, Single};
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
-/// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N; B, b and c symmetric.
+/// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N. B, b and c are symmetric.
 ///
-/// `N` is a number, or a whole vector of lanes with a particle in each.
+/// `N` is a number, or a vector with one particle in each lane.
 ///
 /// ```
 /// use bfree::material::{Elastic, Lame, NeoHookean};
@@ -28,7 +28,7 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedTangent<N, const D: usize> {
-    /// A: ΔF⁻ᵀ of the neo-Hookean solids, F F_nᵀ of St. Venant and Kirchhoff's.
+    /// A: ΔF⁻ᵀ for the neo-Hookean solids, F F_nᵀ for the St. Venant–Kirchhoff solid.
     pub a: [[N; D]; D],
     /// B, times V₀.
     pub right: [[N; D]; D],
@@ -36,7 +36,7 @@ pub struct ClosedTangent<N, const D: usize> {
     pub bulk: N,
     /// q, times V₀.
     pub q: N,
-    /// b and V₀ c, for laws that have the term; the same for all states of a law.
+    /// b and V₀ c, for laws with this term. A law has it at every state, or at none.
     pub both: Option<[[[N; D]; D]; 2]>,
 }
 
@@ -149,7 +149,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
         }
     }
 
-    /// The geometric part alone, L B with B = V₀ F_n S F_nᵀ, or all but it.
+    /// The geometric part L B alone, with B = V₀ F_n S F_nᵀ, if `geometric`; otherwise the rest.
     pub(crate) fn part(&self, b: &Tensor<f64, D>, geometric: bool) -> Self {
         if geometric {
             let nothing = [[0.0; D]; D];

@@ -1,4 +1,4 @@
-//! Drucker and Prager's criterion: soils, with cohesion, friction, and a dilatancy of their own.
+//! Drucker and Prager's yield criterion for soils, with cohesion, friction, and a dilatancy independent of friction.
 
 use super::hencky::Radial;
 use super::plastic::round_off;
@@ -9,11 +9,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::SQRT_2;
 
-/// Flow where √J₂ + η p reaches ξ c(ε̄), with p = tr τ/3 positive in tension, and η and ξ those of a [`Cone`]. The flow dilates by η̄, the η of ψ;
-/// at the apex it is any that leads there (de Souza Neto, Perić, Owen, 2008, sec. 8.3).
+/// Plastic flow starts where √J₂ + η p reaches ξ c(ε̄). p = tr τ/3 is positive in tension, and a [`Cone`] gives η and ξ. The flow dilates
+/// by η̄, the η of ψ. At the apex it is any flow that leads to the apex (de Souza Neto, Perić, Owen, 2008, sec. 8.3).
 ///
-/// τ is Kirchhoff's stress J σ. ε̄ grows by ξ Δγ on the cone; at the apex by that of the shear, and ξ/η of what dilates beyond: associated
-/// there, so that ψ = 0 has a return too.
+/// τ is the Kirchhoff stress J σ. ε̄ grows by ξ Δγ on the cone. At the apex it grows by ξ Δγ of the shear, and by ξ/η times the dilatation
+/// beyond it. This further flow is associated, so that the return map exists for ψ = 0 too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DruckerPrager {
     /// η
@@ -26,24 +26,24 @@ pub struct DruckerPrager {
     cohesion: Hardening,
 }
 
-/// Which cone stands for Mohr and Coulomb's pyramid |τ| + σ tan φ = c.
+/// The cone in place of Mohr and Coulomb's pyramid |τ| + σ tan φ = c.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "StrengthCone")]
 pub enum Cone {
-    /// The one through its compressive edges: as strong as the pyramid in triaxial compression, stronger elsewhere.
+    /// The cone through the compressive edges of the pyramid: as strong as the pyramid in triaxial compression, stronger elsewhere.
     #[default]
     Compression,
-    /// The one that is as strong as the pyramid where soil flows in plane strain: for slopes and footings in 2D.
+    /// The cone that is as strong as the pyramid where soil flows in plane strain: for slopes and footings in 2D.
     PlaneStrain,
 }
 
 impl Cone {
     /// η, η̄ and ξ of φ and ψ in radians.
     ///
-    /// Compression: η = 6 sin φ/(√3 (3 − sin φ)), ξ = η/tan φ, and η̄ the η of ψ. Plane strain: flow without an out-of-plane part has
-    /// s_zz = −⅔ η̄ √J₂; put into Mohr and Coulomb's criterion, η = sin φ/d, ξ = cos φ/d, d = √(1 − η̄²/3) + η̄ sin φ/3. With ψ = φ that is
-    /// η = 3 tan φ/√(9 + 12 tan² φ).
+    /// Compression: η = 6 sin φ/(√3 (3 − sin φ)), ξ = η/tan φ, and η̄ is the η of ψ. Plane strain: flow without an out-of-plane part has
+    /// s_zz = −⅔ η̄ √J₂. Mohr and Coulomb's criterion then gives η = sin φ/d and ξ = cos φ/d with d = √(1 − η̄²/3) + η̄ sin φ/3. For ψ = φ
+    /// this is η = 3 tan φ/√(9 + 12 tan² φ).
     fn slopes(self, phi: f64, psi: f64) -> [f64; 3] {
         match self {
             Self::Compression => {
@@ -75,7 +75,7 @@ pub struct DruckerPragerParameters {
     pub dilatancy: f64,
     /// The cohesion c, as a function of the accumulated plastic strain.
     pub cohesion: Hardening,
-    /// Which cone stands for Mohr and Coulomb's pyramid of φ and c. Default: `"compression"`.
+    /// The cone in place of Mohr and Coulomb's pyramid of φ and c. Default: `"compression"`.
     #[serde(default)]
     pub cone: Cone,
 }
@@ -87,7 +87,7 @@ impl DruckerPrager {
     /// use bfree::material::{Cone, DruckerPrager, Hardening, Lame, Law, Plastic, Start};
     /// use bfree::tensor::{Deformation, Tensor, Vector};
     ///
-    /// // Pulled apart on all sides it bears tr τ/3 = c cot φ.
+    /// // Under tension on all sides the soil bears tr τ/3 = c cot φ.
     /// let (c, phi) = (0.1, 30.0_f64);
     /// let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c), Cone::Compression);
     /// let law = Plastic { solid: Lame::from_young_poisson(1000.0, 0.3)?, criterion };
@@ -116,7 +116,7 @@ impl Criterion for DruckerPrager {
         let allowed = format_args!("must lie between 0 and the friction, {}", Number(*friction));
         problems.require(dilates || !rough, &format!("{path}.dilatancy"), Number(*dilatancy), allowed);
         let criterion = Self::new(*friction, *dilatancy, *cohesion, *cone);
-        // G + K η η̄ on the cone and K η² at the apex, over ξ², must exceed what softening takes.
+        // G + K η η̄ on the cone and K η² at the apex, both over ξ², must exceed the rate of softening.
         let stiffness = solid.filter(|_| rough && dilates).map_or(f64::INFINITY, |solid| {
             let (bulk, eta) = (solid.bulk_modulus(), criterion.friction);
             let cone = solid.shear + bulk * eta * criterion.dilatancy;
@@ -141,7 +141,7 @@ impl Criterion for DruckerPrager {
         Self::new(30.0, 10.0, cohesion, Cone::Compression)
     }
 
-    /// The cone, √J₂ − G Δγ + η (p − K η̄ Δγ) = ξ c(ε̄ + ξ Δγ), unless √J₂ < G Δγ: then the apex, η p = ξ c.
+    /// Returns to the cone, √J₂ − G Δγ + η (p − K η̄ Δγ) = ξ c(ε̄ + ξ Δγ). If √J₂ < G Δγ, it returns to the apex, η p = ξ c.
     fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
         let Self { friction: eta, dilatancy: eta_bar, cohesive: xi, cohesion } = self;
         let (shear, bulk, lit) = (solid.shear, solid.bulk_modulus(), T::lit);
@@ -166,11 +166,11 @@ impl Criterion for DruckerPrager {
                 t_v: -w * lit(SQRT_2 * shear * eta * bulk),
                 t_d: elastic.g * (T::one() - w * lit(shear)),
             };
-            // p Δε_v + √J₂ 2Δd/√2, both of the end: Δε_v = η̄ Δγ and Δd = Δγ/√2
+            // p Δε_v + √J₂ 2Δd/√2 with the stresses at the end of the step, Δε_v = η̄ Δγ and Δd = Δγ/√2
             let dissipated = gamma * (p * lit(*eta_bar) + left);
             return Returned { radial, plastic_strain: before + gamma * lit(*xi), dissipated };
         }
-        // All of the shear goes, and dilates by η̄; then η δ more until η K (v − η̄ √J₂/G − η δ) = ξ c(ε̄ + ξ √J₂/G + ξ δ).
+        // All shear flows and dilates by η̄. A dilatation η δ follows, until η K (v − η̄ √J₂/G − η δ) = ξ c(ε̄ + ξ √J₂/G + ξ δ).
         let sheared = root_j2 * lit(1.0 / shear);
         let after = before + sheared * lit(*xi);
         let excess = (v - sheared * lit(*eta_bar)) * lit(eta * bulk);
@@ -178,7 +178,7 @@ impl Criterion for DruckerPrager {
         let flowed = sheared * lit(*eta_bar) + delta * lit(*eta);
         let (p, plastic_strain) = ((v - flowed) * lit(bulk), after + delta * lit(*xi));
         let hardens = cohesion.slope(plastic_strain) * lit(xi * xi);
-        // √J₂/G and δ by d; δ by v
+        // Derivatives of √J₂/G and δ with respect to d, and of δ with respect to v
         let (s_d, d_v) = (lit(SQRT_2), w * lit(eta * bulk));
         let d_d = -w * (lit(eta * bulk * eta_bar) + hardens) * s_d;
         let radial = Radial {

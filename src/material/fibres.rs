@@ -12,21 +12,21 @@ use serde::{Deserialize, Serialize};
 #[schemars(rename = "FibreReinforced")]
 #[serde(deny_unknown_fields)]
 pub struct FibreReinforcedParameters {
-    /// The law of the matrix; one that remembers nothing.
+    /// The law of the matrix. It must be an elastic law.
     pub base: Box<Parameters>,
-    /// Where fibres run in the undeformed body, of any length but 0; three numbers in every dimension.
+    /// Direction of the fibres in the undeformed body, of any length but 0. It has three numbers in every dimension.
     pub direction: [f64; 3],
-    /// k₁ (stress), > 0: a quarter of what fibres add to Young's modulus along them at rest.
+    /// k₁ (stress), > 0. At rest, fibres add 4 k₁ to Young's modulus along their direction.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub modulus: f64,
-    /// k₂ (no unit), ≥ 0: how soon fibres stiffen. With 0 their energy is k₁/2 (I₄ − 1)².
+    /// k₂ (no unit), ≥ 0. The larger it is, the sooner fibres stiffen. With 0 their energy is k₁/2 (I₄ − 1)².
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub exponent: f64,
 }
 
-/// W = W_base + k₁/(2k₂) (e^{k₂ (I₄ − 1)²} − 1) with I₄ = a·C a along the fibres a, where they are stretched; they bear no compression
-/// (Holzapfel, Gasser, Ogden, J. Elasticity 61, 2000).
+/// W = W_base + k₁/(2k₂) (e^{k₂ (I₄ − 1)²} − 1) with I₄ = a·C a, for fibres in the direction a. Fibres bear tension alone (Holzapfel,
+/// Gasser, Ogden, J. Elasticity 61, 2000).
 ///
 /// ```
 /// use bfree::material::{Elastic, FibreReinforced, Lame, Law, NeoHookean, Start};
@@ -55,7 +55,7 @@ pub struct FibreReinforced {
 }
 
 impl FibreReinforced {
-    /// Fibres in a matrix; `None` if that remembers something, or of a direction or constants that are none.
+    /// Fibres in a matrix. `None` unless the matrix is elastic, the direction has a length, `modulus` > 0 and `exponent` ≥ 0.
     pub fn new(base: impl Into<Material>, direction: Vector<f64, 3>, modulus: f64, exponent: f64) -> Option<Self> {
         let base = base.into();
         let unit = direction.try_normalize(0.0).filter(|unit| (unit.norm() - 1.0).abs() < 1e-9);
@@ -63,14 +63,14 @@ impl FibreReinforced {
         unit.filter(|_| good).map(|direction| Self { base: Box::new(base), direction, modulus, exponent })
     }
 
-    /// a ⊗ a, and I₄ − 1 = 2 a·E a where that is positive: with `D` components, for nothing is stretched along the others.
+    /// a ⊗ a, and I₄ − 1 = 2 a·E a if it is positive. `D` components of a are enough, because nothing is stretched along the other axes.
     fn stretched<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> (Tensor<T, D>, Option<T>) {
         let along = Tensor::from_fn(|i, k| T::lit(self.direction[i] * self.direction[k]));
         let stretch = contract(&along, &at.green_lagrange()) * T::lit(2.0);
         (along, (stretch.value() > 0.0).then_some(stretch))
     }
 
-    /// k₁ e^{k₂ x²}, of x = I₄ − 1.
+    /// k₁ e^{k₂ x²} with x = I₄ − 1.
     fn stiffness<T: Real>(&self, x: T) -> T {
         (x * x * T::lit(self.exponent)).exp() * T::lit(self.modulus)
     }
@@ -112,7 +112,7 @@ impl Law for FibreReinforced {
         stretch.map_or(base, |i| base + scaled(&along, self.slope(i) * contract(&along, x)))
     }
 
-    /// Of the base, and 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
+    /// The blocks of the base, plus 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
     fn tangent_blocks<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
@@ -149,12 +149,12 @@ impl Listed for FibreReinforced {
         problems.positive(&at("modulus"), given.modulus);
         problems.number(&at("exponent"), given.exponent);
         problems.require(given.exponent >= 0.0, &at("exponent"), Number(given.exponent), "must be ≥ 0");
-        // Of any length, without overflow.
+        // A direction of any length must not overflow.
         let direction = direction / direction.amax();
         base.and_then(|base| Self::new(base, direction, given.modulus, given.exponent))
     }
 
-    /// Fibres that are as stiff as the matrix, in no plane of the axes; Hooke's law in compression along them alone.
+    /// Fibres as stiff as the matrix, in no coordinate plane. The law is Hooke's only in compression along the fibres.
     fn example(lame: Lame) -> Self {
         let base = Box::new(NeoHookean::ciarlet(lame).into());
         Self { base, direction: Vector::from([0.6, 0.64, 0.48]), modulus: 0.5 * lame.shear, exponent: 1e-3 }

@@ -5,11 +5,11 @@ use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, symmetric};
 use num_dual::Dual;
 
-/// What a user writes to run a new law: one function.
+/// The strain energy of a new law. A user writes this one function.
 ///
-/// `E` is the 3×3 Green–Lagrange strain ½(FᵀF − I), also in plane and uniaxial strain (the missing components are zero).
-/// Treat `E` as symmetric. Beware of spectral functions (eigenvalues) and of `sqrt`, `powf` at zero: their dual parts
-/// are wrong or NaN at E = 0; use invariants.
+/// `E` is the 3×3 Green–Lagrange strain ½(FᵀF − I), also in plane and uniaxial strain (the missing components are zero). Treat `E` as
+/// symmetric. Avoid spectral functions (eigenvalues), and `sqrt` and `powf` at zero: their dual parts are wrong or NaN at E = 0. Use
+/// invariants.
 ///
 /// ```
 /// use bfree::material::{Elastic, Energy, FromEnergy};

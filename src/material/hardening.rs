@@ -5,32 +5,33 @@ use crate::scalar::{Real, implicit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A strength that changes as plastic strain p accumulates: k(p) = `initial` + `linear` p + `saturation` (1 − e^{−`rate` p}). None,
-/// linear, Voce's, and their sum.
+/// A strength that changes as plastic strain p accumulates: k(p) = `initial` + `linear` p + `saturation` (1 − e^{−`rate` p}). It covers
+/// perfect plasticity, linear hardening, Voce's hardening, and their sum.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hardening {
-    /// Strength of what has not flowed (stress), > 0.
+    /// Strength before any plastic flow (stress), > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub initial: f64,
-    /// Growth with the plastic strain (stress), ≥ 0. Default 0.
+    /// Growth of the strength per plastic strain (stress), ≥ 0. Default 0.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub linear: f64,
-    /// Growth (stress) that plastic strain approaches, with a `rate`; softening if negative, ≥ -`initial`. Default 0.
+    /// Growth of the strength (stress) in the limit of large plastic strain, approached with a `rate`; softening if negative, ≥ -`initial`.
+    /// Default 0.
     #[serde(default)]
     pub saturation: f64,
-    /// How fast it approaches it (no unit), > 0 with a `saturation`. Default 0.
+    /// Rate at which plastic strain brings about the `saturation` (no unit), > 0 with a `saturation`. Default 0.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub rate: f64,
 }
 
-/// Steps of Newton's method at most: it converges from one side.
+/// The most steps of Newton's method, which converges from one side.
 const ITERATIONS: usize = 60;
 
 impl Hardening {
-    /// k = `initial` for ever.
+    /// Perfect plasticity: k = `initial` at every p.
     ///
     /// ```
     /// use bfree::material::Hardening;
@@ -47,7 +48,7 @@ impl Hardening {
     /// ```
     /// use bfree::material::Hardening;
     ///
-    /// // Between its initial and its final strength, to which e^{−1} is left where p = 1/rate.
+    /// // Where p = 1/rate, the strength is e^{−1} times the saturation short of its final value.
     /// let voce = Hardening { initial: 1.0, linear: 0.0, saturation: 2.0, rate: 4.0 };
     /// assert!((voce.strength(0.25) - (3.0 - 2.0 * (-1.0_f64).exp())).abs() < 1e-15);
     /// ```
@@ -61,7 +62,7 @@ impl Hardening {
         T::lit(self.linear) + (p * T::lit(-self.rate)).exp() * T::lit(self.saturation * self.rate)
     }
 
-    /// ∫₀ᵖ k, what it takes to flow so far.
+    /// ∫₀ᵖ k, the plastic work up to p.
     pub fn work<T: Real>(&self, p: T) -> T {
         let Self { initial, linear, saturation, rate } = *self;
         let even = p * T::lit(initial) + p * p * T::lit(0.5 * linear);
@@ -73,7 +74,7 @@ impl Hardening {
 
     /// The Δ > 0 with a − b Δ − c k(p + c Δ) = 0, and 1/(b + c² k') there; a must exceed c k(p), and b + c² k' must be positive.
     ///
-    /// Newton's method from Δ = 0 stays on one side of the root where k is concave, and after its first step where k is convex.
+    /// Newton's method from Δ = 0 stays on one side of the root: from the start where k is concave, after its first step where k is convex.
     pub(super) fn solve<T: Real>(&self, a: T, b: f64, c: f64, p: T) -> (T, T) {
         let (a_0, p_0) = (a.value(), p.value());
         let mut root = 0.0_f64;
@@ -92,7 +93,7 @@ impl Hardening {
         (delta, slope(delta).recip())
     }
 
-    /// Whether its numbers are good, and no step can lose its solution: c² k' > −b.
+    /// Whether the parameters are allowed, and every step has a solution: c² k' > −b.
     pub(super) fn check(&self, stiffness: f64, problems: &mut Problems, path: &str) -> bool {
         let Self { initial, linear, saturation, rate } = *self;
         let at = |key: &str| format!("{path}.{key}");
@@ -114,7 +115,7 @@ impl Hardening {
             Number(saturation),
             format_args!("must be at least -initial = {}", Number(least)),
         );
-        // One without the other does nothing.
+        // A rate without a saturation does nothing, nor does a saturation without a rate.
         if strong && (rate > 0.0) != (saturation != 0.0) {
             let allowed = if rate > 0.0 { "needs a saturation" } else { "must be > 0 with a saturation" };
             problems.refuse(&at("rate"), Number(rate), allowed);

@@ -1,8 +1,8 @@
-//! Hencky's elasticity: the logarithmic strain ε = ½ ln b of b = F G Fᵀ, and what isotropic laws in it make of S and ℂ.
+//! Hencky's elasticity: the logarithmic strain ε = ½ ln b of b = F G Fᵀ, and S and ℂ of isotropic laws in ε.
 //!
-//! G is the inverse of the plastic (or viscous) right Cauchy–Green tensor, I where nothing has flowed. It belongs to the reference configuration, so
-//! that no rotation of the body touches it. A step that flows by Δε multiplies b by e^{−2Δε}, both in the same axes: the exponential map
-//! (Weber and Anand, 1990; Simo, 1992). Everything is in three dimensions, with the missing stretches of F one.
+//! G is the inverse of the plastic (or viscous) right Cauchy–Green tensor, and I where nothing has flowed. G belongs to the reference
+//! configuration, so rotations of the body do not change it. A step that flows by Δε multiplies b by e^{−2Δε}, in the same axes: the
+//! exponential map (Weber and Anand, 1990; Simo, 1992). All tensors are in three dimensions, and the missing stretches of F are 1.
 
 use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
 use super::{Lame, embed};
@@ -12,7 +12,7 @@ use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scal
 /// Rows and columns of the six numbers of a symmetric tensor.
 const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// A symmetric tensor from six numbers; zero of what is not there.
+/// A symmetric tensor from six numbers. Missing numbers are zero.
 fn six(numbers: &[f64]) -> Tensor<f64, 3> {
     let mut a = Tensor::zeros();
     for (&(i, k), &x) in SIX.iter().zip(numbers) {
@@ -33,17 +33,17 @@ fn half_b_less_one<T: Real>(at: &Deformation<T, 3>, flowed: &[f64]) -> Tensor<T,
     scaled(&(elastic + at.f * flowed * at.f.transpose()), T::lit(0.5))
 }
 
-/// The strain ε of a state, in parts.
+/// The strain ε of a state, split into tr ε and dev ε.
 pub(super) struct Strained<T: Real> {
     at: Deformation<T, 3>,
-    /// tr ε, the logarithm of the elastic change of volume.
+    /// tr ε, the logarithm of the elastic volume ratio.
     pub volume: T,
     /// dev ε
     pub deviator: Tensor<T, 3>,
 }
 
 impl<T: Real> Strained<T> {
-    /// From F, and the six numbers of G − I; none of them is G = I.
+    /// From F and the six numbers of G − I. An empty list means G = I.
     pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
         let strain = function(&Hencky, &half_b_less_one(&at, flowed));
@@ -56,7 +56,7 @@ impl<T: Real> Strained<T> {
         contract(&self.deviator, &self.deviator)
     }
 
-    /// ‖dev ε‖; where it is zero, so are its derivatives.
+    /// ‖dev ε‖. Where it is zero, its derivatives are taken as zero.
     pub fn norm(&self) -> T {
         let square = self.square();
         if square.value() > 0.0 { square.sqrt() } else { T::zero() }
@@ -96,7 +96,7 @@ pub(super) struct Principal<T: Real> {
 }
 
 impl<T: Real> Principal<T> {
-    /// As [`Strained::new`].
+    /// From the arguments of [`Strained::new`].
     pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
         let half = half_b_less_one(&at, flowed);
@@ -124,7 +124,7 @@ impl<T: Real> Principal<T> {
         if square.value() > 0.0 { square.sqrt() } else { T::zero() }
     }
 
-    /// ℂ in these axes, of principal Kirchhoff stresses `tau`, their derivatives ∂τᵢ/∂εⱼ, and the secants (τᵢ − τⱼ)/(εᵢ − εⱼ).
+    /// ℂ in these axes, from the principal Kirchhoff stresses `tau`, their derivatives ∂τᵢ/∂εⱼ, and the secants (τᵢ − τⱼ)/(εᵢ − εⱼ).
     ///
     /// With L = sym(F⁻ᵀ X F⁻¹), δb = L b + b L makes δεᵢⱼ = (Δ coth Δ) Lᵢⱼ with Δ = εᵢ − εⱼ, so that
     /// F (ℂ:X) Fᵀ = δτ − L τ − τ L is Σⱼ ∂τᵢ/∂εⱼ Lⱼⱼ − 2τᵢ Lᵢᵢ on the diagonal, and [(τᵢ − τⱼ) coth Δ − τᵢ − τⱼ] Lᵢⱼ off it.
@@ -140,7 +140,7 @@ impl<T: Real> Principal<T> {
         Moduli { f_inv_t: self.at.inverse_transpose(), axes: self.axes, normal, shear }
     }
 
-    /// As [`Self::moduli`], of τ = p I + g dev ε with p and t = g d functions of v = tr ε and d = ‖dev ε‖ alone.
+    /// [`Self::moduli`] for τ = p I + g dev ε, where p and t = g d depend on v = tr ε and d = ‖dev ε‖ alone.
     pub fn radial_moduli(&self, radial: &Radial<T>) -> Moduli<T> {
         let Radial { p, g, p_v, p_d, t_v, t_d } = *radial;
         let (deviator, d) = (self.deviator(), self.norm());
@@ -154,7 +154,7 @@ impl<T: Real> Principal<T> {
 }
 
 impl Principal<f64> {
-    /// The six numbers of G − I after a flow by `flow`, principal strains: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
+    /// Writes the six numbers of G − I after a flow with the principal strains `flow`: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
     pub fn flow(&self, flow: [f64; 3], flowed: &[f64], next: &mut [f64]) {
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
         let back = self.at.inverse_transpose().transpose() * self.axes;
@@ -163,12 +163,12 @@ impl Principal<f64> {
     }
 }
 
-/// A Kirchhoff stress τ = p I + g dev ε, and how p and t = g d change with v = tr ε and d = ‖dev ε‖.
+/// A Kirchhoff stress τ = p I + g dev ε, and the derivatives of p and t = g d with respect to v = tr ε and d = ‖dev ε‖.
 #[derive(Clone, Copy, Debug)]
 pub struct Radial<T> {
     /// p, positive in tension.
     pub p: T,
-    /// g, 2G where nothing flows.
+    /// g. It is 2G where nothing flows.
     pub g: T,
     /// ∂p/∂v
     pub p_v: T,
@@ -217,7 +217,7 @@ impl<T: Real> Moduli<T> {
 }
 
 impl Moduli<f64> {
-    /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs: its column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
+    /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
     pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut [[Tensor<f64, D>; D]; D]) {
         let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
         let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();

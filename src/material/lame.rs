@@ -13,7 +13,7 @@ pub struct Lame {
     pub shear: f64,
 }
 
-/// Constants that no stable solid has.
+/// An elastic constant that no stable solid has.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LameError {
     /// G must be finite and positive.
@@ -48,7 +48,7 @@ impl Lame {
     /// ```
     ///
     /// # Errors
-    /// G ≤ 0 or K = Λ + 2G/3 ≤ 0, or not finite.
+    /// G ≤ 0, K = Λ + 2G/3 ≤ 0, or one of them is not finite.
     pub fn new(lambda: f64, shear: f64) -> Result<Self, LameError> {
         positive(shear, LameError::Shear)?;
         positive(lambda + 2.0 * shear / 3.0, LameError::Bulk)?;
@@ -81,7 +81,7 @@ impl Lame {
     /// ```
     /// use bfree::material::Lame;
     ///
-    /// // The paper's rebound: K = 170, G = 30. The same solid by E = 9KG/(3K + G), ν = (3K − 2G)/(6K + 2G).
+    /// // The paper's rebound: K = 170, G = 30. E = 9KG/(3K + G) and ν = (3K − 2G)/(6K + 2G) give the same solid.
     /// let (bulk, shear) = (170.0, 30.0);
     /// let lame = Lame::from_bulk_shear(bulk, shear)?;
     /// assert_eq!((lame.lambda, lame.shear), (150.0, 30.0));
@@ -92,7 +92,7 @@ impl Lame {
     /// ```
     ///
     /// # Errors
-    /// K ≤ 0 or G ≤ 0, or not finite.
+    /// K ≤ 0, G ≤ 0, or one of them is not finite.
     pub fn from_bulk_shear(bulk: f64, shear: f64) -> Result<Self, LameError> {
         positive(bulk, LameError::Bulk)?;
         Self::new(bulk - 2.0 * shear / 3.0, shear)
@@ -126,7 +126,7 @@ impl Lame {
     }
 }
 
-/// Λ/G from which on a stress has less than four digits of G.
+/// The largest Λ/G allowed. Above it a stress has fewer than four digits of G.
 const APART: f64 = 1e12;
 
 /// The constants of an isotropic law: exactly one of the pairs `lambda` and `shear`, `young` and `poisson`, `bulk` and
@@ -152,13 +152,13 @@ pub struct LameParameters {
 }
 
 impl LameParameters {
-    /// Λ and G; or `None`, and `problems` of the keys below `path`.
+    /// Λ and G. `None` if a value below the key `path` is not allowed; `problems` then says why.
     ///
     /// ```
     /// use bfree::material::{Lame, LameParameters};
     /// use bfree::scene::Problems;
     ///
-    /// // The same solid by two pairs: E = 2.5, ν = ¼ is Λ = G = 1. Half of each pair is none.
+    /// // Two pairs give the same solid: E = 2.5, ν = ¼ is Λ = G = 1. One constant of each is not a pair.
     /// let mut problems = Problems::default();
     /// let mut lame = |text| serde_json::from_str::<LameParameters>(text).map(|given| given.lame(&mut problems, "material"));
     /// assert_eq!(lame(r#"{"young": 2.5, "poisson": 0.25}"#)?, Lame::new(1.0, 1.0).ok());

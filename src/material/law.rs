@@ -1,4 +1,4 @@
-//! What a law is: the traits that the residual asks.
+//! The traits of a material law, [`Law`] and [`Elastic`], as the residual calls them.
 
 use super::{ClosedTangent, Material, VolumeResponse, embed};
 use crate::scalar::Real;
@@ -6,49 +6,50 @@ use crate::tensor::{Deformation, Tensor, Vector, outer, symmetric};
 use nalgebra::SMatrix;
 use num_dual::Dual;
 
-/// What a particle remembers of a law from step to step: one number, by name.
+/// An internal variable of a law: one number that a particle keeps from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Remembered {
-    /// As in outputs, checkpoints and `bfree check`.
+    /// The name in outputs, checkpoints and `bfree check`.
     pub name: &'static str,
-    /// Its value in a body at rest.
+    /// The value in a body at rest.
     pub at_rest: f64,
 }
 
-/// The name of an accumulated plastic strain: a field of the output, and particles whose number grows in a step are counted as yielding.
+/// The name of the accumulated plastic strain, a field of the output. A particle is counted as yielding if this variable grows in the step.
 pub const PLASTIC_STRAIN: &str = "plastic_strain";
 
-/// The name of the energy per reference volume that the law has taken for good: it is in the balance of energy.
+/// The name of the dissipated energy per reference volume, a term of the energy balance.
 pub const DISSIPATED: &str = "dissipated";
 
-/// What a law is given beside F: how long the step is, and what the particle remembers at its beginning.
+/// The arguments of a law beside F: the length of the step, and the internal variables at its beginning, t_n.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<'a> {
-    /// Δt; 0 where a load step starts on a new grid, and what was in balance is asked for.
+    /// Δt. It is 0 where a load step on a new grid evaluates the state at t_n, for the out-of-balance force R₀.
     pub dt: f64,
-    /// The numbers that [`Law::memory`] names, at t_n.
+    /// The internal variables that [`Law::memory`] names, at t_n.
     pub memory: &'a [f64],
 }
 
 impl Start<'_> {
-    /// Nothing to remember, and no time: all that an elastic law needs.
+    /// No internal variables and Δt = 0, for elastic laws.
     pub const NONE: Self = Self { dt: 0.0, memory: &[] };
 
-    /// The number that `law` remembers by this name, if it does.
+    /// The internal variable `name` of `law`, if the law has it.
     pub fn recall<L: Law>(&self, law: &L, name: &str) -> Option<f64> {
         self.memory.get(law.memory().iter().position(|one| one.name == name)?).copied()
     }
 }
 
-/// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions, as the residual asks it. An elastic law is written as
-/// [`Elastic`], and is one; a law with memory says here what it remembers and what becomes of that in a step.
+/// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions, as the residual calls it. An elastic law implements
+/// [`Elastic`], which provides this trait. A law with internal variables implements this trait: it names the variables and updates them in
+/// a step.
 ///
 /// ```
 /// use bfree::material::{Law, Remembered, Start};
 /// use bfree::scalar::Real;
 /// use bfree::tensor::{Deformation, Tensor, symmetric};
 ///
-/// /// S = 2G e^{−d} E, softer by the largest |E| met so far, d.
+/// /// S = 2G e^{−d} E, softened by the damage d, the largest |E| so far.
 /// struct Softening { shear: f64 }
 ///
 /// impl Softening {
@@ -85,7 +86,8 @@ impl Start<'_> {
 /// assert!(law.stress(&at, &Start { dt: 1.0, memory: &next })[(0, 0)] < law.stress(&at, &Start { dt: 1.0, memory: &[0.5] })[(0, 0)]);
 /// ```
 pub trait Law: Send + Sync {
-    /// What a particle remembers; nothing of an elastic law. Two names have a meaning for output: [`PLASTIC_STRAIN`] and [`DISSIPATED`].
+    /// The internal variables of the law; none if the law is elastic. Two names have a meaning for output: [`PLASTIC_STRAIN`] and
+    /// [`DISSIPATED`].
     fn memory(&self) -> &[Remembered] {
         &[]
     }
@@ -106,7 +108,7 @@ pub trait Law: Send + Sync {
     /// Second Piola–Kirchhoff stress `S`, symmetric.
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D>;
 
-    /// `ℂ:X = ∂S/∂E : sym X`. By dual numbers through [`Self::stress`], if nothing better is given: a law is then values alone.
+    /// `ℂ:X = ∂S/∂E : sym X`. By default dual numbers differentiate [`Self::stress`], so that a law needs no derivatives of its own.
     fn elasticity<T: Real, const D: usize>(
         &self,
         at: &Deformation<T, D>,
@@ -127,12 +129,12 @@ pub trait Law: Send + Sync {
         density(v, |a| self.elasticity(at, start, &outer(a, b)))
     }
 
-    /// As [`Elastic::volumetric`].
+    /// See [`Elastic::volumetric`].
     fn volumetric<T: Real>(&self, _at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
         None
     }
 
-    /// As [`Elastic::closed`].
+    /// See [`Elastic::closed`].
     fn closed<const D: usize>(
         &self,
         _f_n: &Tensor<f64, D>,
@@ -142,8 +144,9 @@ pub trait Law: Send + Sync {
         None
     }
 
-    /// F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ in row k and column l, of a law without a closed form: its material tangent, for gradients taken in the
-    /// configuration n. By [`Self::tangent_density`]; a law that solves something at each state gives all of them at once.
+    /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ in row
+    /// k and column l. The default calls [`Self::tangent_density`] for every pair. A law that solves equations at each state overrides it,
+    /// to solve them once for all pairs.
     fn tangent_blocks<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
@@ -155,17 +158,18 @@ pub trait Law: Send + Sync {
         std::array::from_fn(|k| std::array::from_fn(|l| block(k, l)))
     }
 
-    /// What is remembered at the end of a step that ends at `at`.
+    /// Writes the internal variables at the end of the step into `next`, which holds the variables at t_n before. `at` is the deformation
+    /// at the end.
     fn remember<const D: usize>(&self, _at: &Deformation<f64, D>, _start: &Start<'_>, _next: &mut [f64]) {}
 
-    /// This law as one of the shipped ones, whose loops over particles are compiled in the library, once; `None` for all others.
+    /// This law as a [`Material`], whose loops over particles are compiled once, in the library. `None` for any other type.
     ///
     /// ```
     /// use bfree::material::{Lame, Law, Material, NeoHookean};
     ///
     /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
     /// let material = Material::from(law);
-    /// // The law in the list is one of the shipped ones: itself.
+    /// // A `Material` returns itself.
     /// assert_eq!(material.shipped(), Some(&material));
     /// assert_eq!(law.shipped(), None);
     /// # Ok::<(), bfree::material::LameError>(())
@@ -174,8 +178,8 @@ pub trait Law: Send + Sync {
         None
     }
 
-    /// Out-of-plane Cauchy stress under plane or uniaxial strain, for output; for isotropic laws.
-    /// By embedding into 3D.
+    /// The out-of-plane Cauchy stress under plane or uniaxial strain, for output. The deformation is embedded in 3D, which is valid for
+    /// isotropic laws.
     ///
     /// ```
     /// use bfree::material::{Lame, Law, Start, StVenantKirchhoff};
@@ -205,7 +209,7 @@ pub(super) fn derivative<T: Real, const D: usize>(
     stress(&Deformation::new(at.h.zip_map(&delta_f, Dual::new))).map(|s| s.eps)
 }
 
-/// ℂmat{v, b}, column by column from what ℂ makes of a ⊗ b.
+/// ℂmat{v, b}, column by column: column k is `[ℂ:(e_k ⊗ b)] v`.
 fn density<T: Real, const D: usize>(
     v: &Vector<T, D>,
     elasticity: impl Fn(&Vector<T, D>) -> Tensor<T, D>,
@@ -218,10 +222,10 @@ fn density<T: Real, const D: usize>(
     density
 }
 
-/// A pointwise hyperelastic law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions: a [`Law`] that remembers nothing.
+/// A pointwise hyperelastic law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions: a [`Law`] without internal variables.
 ///
-/// Every method takes the deformation as H = F − I wrapped in a [`Deformation`] whose Jacobian is positive (the callers in this
-/// module make sure of it). Stresses have the unit of the law's moduli; `W` is per unit reference volume.
+/// Every method takes the deformation as H = F − I wrapped in a [`Deformation`]. Its Jacobian is positive; the callers in this module make
+/// sure of it. Stresses have the unit of the law's moduli; `W` is per unit reference volume.
 ///
 /// ```
 /// use bfree::material::{Elastic, Lame, NeoHookean};
@@ -232,7 +236,7 @@ fn density<T: Real, const D: usize>(
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
 /// let delta = Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0);
-/// // What δF makes of the strain: δE = sym(Fᵀ δF)
+/// // The change of strain by δF: δE = sym(Fᵀ δF)
 /// let strain = symmetric(&(at.f.transpose() * delta));
 /// // S = ∂W/∂E and ℂ:δE = δS, by dual numbers through the law itself.
 /// let dual = Deformation::new(at.h.zip_map(&delta, Dual64::new));
@@ -252,7 +256,7 @@ pub trait Elastic: Send + Sync {
     /// Second Piola–Kirchhoff stress `S = ∂W/∂E`, symmetric.
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D>;
 
-    /// `ℂ:X = ∂S/∂E : sym X`. By dual numbers through [`Self::stress`], if nothing better is given: a law is then values alone.
+    /// `ℂ:X = ∂S/∂E : sym X`. By default dual numbers differentiate [`Self::stress`], so that a law needs no derivatives of its own.
     fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
         derivative(at, x, |at| self.stress(at))
     }
@@ -267,15 +271,15 @@ pub trait Elastic: Send + Sync {
         density(v, |a| self.elasticity(at, &outer(a, b)))
     }
 
-    /// The part of the energy that depends on the volume ratio θ alone, at θ = 1 + `at.h`, if it has one that carries its resistance to
-    /// changes of volume: what a mean dilatation replaces by that of a cell. The same answer, some or none, at every θ.
+    /// The part U(θ) of the energy that depends on the volume ratio θ = 1 + `at.h` alone, if it carries the resistance to changes of
+    /// volume. A mean dilatation evaluates U at the mean θ of a cell. A law returns `Some` at every θ, or `None` at every θ.
     ///
     /// ```
     /// use bfree::material::{Elastic, Lame, NeoHookean};
     /// use bfree::tensor::{Deformation, Tensor};
     /// use num_dual::Dual64;
     ///
-    /// // θ U' and θ (θ U')' are the derivatives that they say they are.
+    /// // θ U' and θ (θ U')' are derivatives with respect to ln θ.
     /// let law = NeoHookean::ciarlet(Lame::new(3.0, 1.0)?);
     /// let at = Deformation::<Dual64, 1>::new(Tensor::from_element(Dual64::new(0.25, 1.25)));
     /// let of = law.volumetric(&at).ok_or("it has one")?;
@@ -286,8 +290,9 @@ pub trait Elastic: Send + Sync {
         None
     }
 
-    /// The whole tangent (geometric + material) of a particle of reference volume `volume` at the state `at`, for gradients taken in the
-    /// configuration `n` whose deformation gradient is `f_n`, if it has this form; the same answer at every state.
+    /// The closed form of the whole tangent (geometric + material) of a particle, if the law has one. `volume` is the reference volume and
+    /// `at` the state. Gradients are taken in the configuration n with the deformation gradient `f_n`. A law returns `Some` at every state,
+    /// or `None` at every state.
     ///
     /// ```
     /// use bfree::material::{Elastic, Lame, NeoHookean, first_piola};
@@ -313,7 +318,7 @@ pub trait Elastic: Send + Sync {
     }
 }
 
-/// An elastic law as the residual asks it.
+/// An elastic law has no internal variables and ignores Δt.
 impl<E: Elastic> Law for E {
     #[inline(always)]
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> T {
@@ -357,7 +362,7 @@ impl<E: Elastic> Law for E {
     }
 }
 
-/// The largest Poisson's ratio of the body at rest, ℂ₁₁₂₂/(ℂ₁₁₁₁ + ℂ₁₁₂₂) over the axes; ν of isotropic laws.
+/// The largest Poisson's ratio of the body at rest, ℂ₁₁₂₂/(ℂ₁₁₁₁ + ℂ₁₁₂₂) over the axes. For isotropic laws it is ν.
 ///
 /// ```
 /// use bfree::material::{Lame, NeoHookean, poissons_ratio};
@@ -375,8 +380,8 @@ pub fn poissons_ratio<L: Law>(law: &L) -> f64 {
     of(0).max(of(1)).max(of(2))
 }
 
-/// The least and the largest stiffness of the body at rest: of the eigenvalues of ℂ for strains of size 1. The least is below zero where the
-/// body gives way by itself.
+/// The least and the largest eigenvalue of ℂ of the body at rest, for strains of size 1. If the least one is negative, the body is
+/// unstable.
 ///
 /// ```
 /// use bfree::material::{Energy, FromEnergy, Lame, NeoHookean, stiffness_at_rest};
@@ -428,7 +433,7 @@ fn stress_along<L: Law>(law: &L, k: usize) -> Tensor<f64, 3> {
     stress_of(law, &Tensor::from_fn(|i, j| if i == k && j == k { 1.0 } else { 0.0 }))
 }
 
-/// The largest modulus of pressure waves along an axis of the body at rest, ℂ₁₁₁₁; Λ + 2G of isotropic laws.
+/// The largest modulus of pressure waves along an axis of the body at rest, ℂ₁₁₁₁. For isotropic laws it is Λ + 2G.
 ///
 /// ```
 /// use bfree::material::{Lame, NeoHookean, p_wave_modulus};

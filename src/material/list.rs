@@ -8,34 +8,35 @@ use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a law of the list has beside its formulas.
+/// A law of the list: its parameters in a scene, its name, its constructor and an example.
 pub trait Listed: Law + Sized {
-    /// What a scene writes of it: the doc comments of the fields are the manual. Isotropic laws share [`LameParameters`](super::LameParameters).
+    /// The parameters of the law in a scene. The doc comments of the fields are the manual. Isotropic laws share
+    /// [`LameParameters`](super::LameParameters).
     type Parameters;
 
-    /// Its name in reports.
+    /// The name of the law in reports.
     const NAME: &'static str;
 
-    /// The law; or `None`, and `problems` of the keys below `path`.
+    /// Builds the law. `None` if a value below the key `path` is not allowed; `problems` then says why.
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self>;
 
-    /// A member that is Hooke's law of Λ and G at small strain, but for fibres, with other constants as it likes: what tests and studies
-    /// take.
+    /// An example for tests and studies. At small strain it is Hooke's law of Λ and G, apart from the stiffness of fibres. Its other
+    /// constants are free.
     fn example(lame: Lame) -> Self;
 }
 
-/// Something to be done with a law of whatever type.
+/// A generic operation on a law of any type.
 pub(crate) trait LawVisitor {
-    /// What comes out.
+    /// The result of the operation.
     type Output;
-    /// Does it.
+    /// Runs the operation on `law`.
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output;
 }
 
-/// Makes of the list of laws what every law is in.
+/// Generates [`Material`], [`Parameters`] and the conversions from the list of laws.
 macro_rules! materials {
     ($($(#[$sentence:meta])+ $key:literal => $law:ident($formula:ty);)*) => {
-        /// Any of the shipped laws.
+        /// One of the shipped laws.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Material {
             $($(#[$sentence])+ $law($formula)),*
@@ -49,7 +50,7 @@ macro_rules! materials {
         }
 
         impl Parameters {
-            /// The law; or `None`, and `problems` of the keys below `path`.
+            /// Builds the law. `None` if a value below the key `path` is not allowed; `problems` then says why.
             ///
             /// ```
             /// use bfree::material::{Lame, NeoHookean, Parameters};
@@ -78,13 +79,13 @@ macro_rules! materials {
         }
 
         impl Material {
-            /// Every law with its name: what tests and studies run over. At small strain all are Hooke's law of Λ and G,
-            /// and fibres beside it.
+            /// An example of every law, with its name, for tests and studies. At small strain each is Hooke's law of Λ and G; fibres add
+            /// their stiffness.
             pub fn examples(lame: Lame) -> Vec<(&'static str, Self)> {
                 vec![$((<$formula>::NAME, Self::$law(Listed::example(lame)))),*]
             }
 
-            /// Calls `visitor` with the law, by a type that leaves no branch in a loop over particles.
+            /// Calls `visitor` with the concrete law, so that a loop over particles does not branch on the type of the law.
             pub(crate) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
                 match self { $(Self::$law(law) => visitor.visit(law.clone())),* }
             }
@@ -98,7 +99,8 @@ macro_rules! materials {
     };
 }
 
-// The list of laws: the sentence of the manual, the key of scenes, the type. CONTRIBUTING.md says what else a shipped law touches.
+// An entry has the sentence of the manual, the key in a scene, and the type. CONTRIBUTING.md lists the other places that a shipped law
+// touches.
 materials! {
     /// Neo-Hookean with Ciarlet's volumetric energy Λ/4 (J² − 1) − Λ/2 ln J: the paper's law.
     "neo_hookean" => NeoHookean(NeoHookean<Ciarlet>);
@@ -110,12 +112,12 @@ materials! {
     "mooney_rivlin" => MooneyRivlin(MooneyRivlin);
     /// Rubber: Ogden's solid, with powers of the principal stretches, compressible.
     "ogden" => Ogden(Ogden);
-    /// Tissue, reinforced rubber: one family of fibres in an elastic matrix; they bear tension alone.
+    /// Tissue, reinforced rubber: one family of fibres in an elastic matrix. The fibres bear tension alone.
     "fibre_reinforced" => FibreReinforced(FibreReinforced);
-    /// Maxwell branches beside an elastic law, at finite strain.
+    /// Maxwell branches parallel to an elastic law, at finite strain.
     "viscoelastic" => Viscoelastic(Viscoelastic);
-    /// Metal: linear elasticity in logarithmic strains, and flow at a von Mises stress that may harden.
+    /// Metal: linear elasticity in logarithmic strains, and plastic flow at a von Mises yield stress that may harden.
     "von_mises" => VonMises(Plastic<VonMises>);
-    /// Soil: linear elasticity in logarithmic strains, and Drucker and Prager's cone: cohesion, friction, dilatancy.
+    /// Soil: linear elasticity in logarithmic strains, and Drucker and Prager's yield cone with cohesion, friction and dilatancy.
     "drucker_prager" => DruckerPrager(Plastic<DruckerPrager>);
 }

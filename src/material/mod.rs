@@ -1,10 +1,10 @@
-//! Laws: one file a law, with its formulas and what a scene writes of it ([`Listed`]); one list, which makes [`Material`] and
-//! [`Parameters`].
+//! Material laws. Each law has its own file, with its formulas and its parameters in a scene ([`Listed`]). One list of the laws generates
+//! [`Material`] and [`Parameters`].
 //!
-//! A law gives its energy `W`, the second Piola–Kirchhoff stress `S`, the action `ℂ:X` of its tangent and the B-free
-//! tangent density `ℂmat{v,b}` of Planas, Romero, Sancho (the paper's eq. 37). The first Piola–Kirchhoff stress `P = F S` is
-//! formed in one place only, [`first_piola`], from F on the left and F inside S given separately: that is what lets
-//! dual numbers check the geometric and the material tangent term by term.
+//! A law gives its energy `W`, the second Piola–Kirchhoff stress `S`, the action `ℂ:X` of its tangent and the B-free tangent density
+//! `ℂmat{v,b}` of Planas, Romero, Sancho (the paper's eq. 37). The first Piola–Kirchhoff stress `P = F S` is formed in one place only,
+//! [`first_piola`]. It takes the F on the left and the F inside S separately, so that dual numbers can check the geometric and the material
+//! tangent term by term.
 
 mod closed_tangent;
 mod drucker_prager;

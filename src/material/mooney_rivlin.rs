@@ -7,8 +7,8 @@ use crate::tensor::{Deformation, Tensor, contract, identity, scaled, second_inva
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// W = c₁ (I₁ − 3) + c₂ (I₂ − 3) − 2 (c₁ + 2c₂) ln J + U(J), with Ciarlet's U: rubber. G = 2 (c₁ + c₂), and the Λ of U is that of the solid less
-/// the 4 c₂ that I₂ has (Ciarlet and Geymonat, 1982).
+/// W = c₁ (I₁ − 3) + c₂ (I₂ − 3) − 2 (c₁ + 2c₂) ln J + U(J), with Ciarlet's U, for rubber. G = 2 (c₁ + c₂). The Λ of U is the Λ of the
+/// solid less 4 c₂, the contribution of I₂ (Ciarlet and Geymonat, 1982).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MooneyRivlin {
     /// c₁ (stress)
@@ -24,7 +24,7 @@ pub struct MooneyRivlin {
 #[schemars(rename = "MooneyRivlin")]
 #[serde(deny_unknown_fields)]
 pub struct MooneyRivlinParameters {
-    /// c₁ (stress), > 0: half of what the shear modulus is without c₂.
+    /// c₁ (stress), > 0. Without c₂ the shear modulus is 2 c₁.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c1: f64,
     /// c₂ (stress), ≥ 0. The shear modulus is 2 (c₁ + c₂).
@@ -35,7 +35,8 @@ pub struct MooneyRivlinParameters {
     pub bulk: f64,
 }
 
-/// 4 I₂(E): j² − 2 (tr E − j) where det E = 0, from J² = det(I + 2E), with the digits that minors lose in turned bodies; by minors in 3D.
+/// 4 I₂(E), by minors in 3D. Where det E = 0, J² = det(I + 2E) gives j² − 2 (tr E − j), which keeps the digits that minors lose under
+/// rotation.
 fn four_minors<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
     if D < 3 {
         at.j * at.j - at.trace_e_minus_j() * T::lit(2.0)
@@ -63,7 +64,7 @@ impl Elastic for MooneyRivlin {
             + Ciarlet::energy(at) * T::lit(0.5 * self.volumetric)
     }
 
-    /// S = 2 (c₁ + 2c₂) (I − C⁻¹) + 4c₂ (tr E I − E) + J U' C⁻¹, with I − C⁻¹ = F⁻¹ (H + F⁻ᵀ Hᵀ) as of the neo-Hookean solids
+    /// S = 2 (c₁ + 2c₂) (I − C⁻¹) + 4c₂ (tr E I − E) + J U' C⁻¹, with I − C⁻¹ = F⁻¹ (H + F⁻ᵀ Hᵀ) as for the neo-Hookean solids
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
         let (f_inv_t, e) = (at.inverse_transpose(), at.green_lagrange());
         let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.shear()));
@@ -102,7 +103,7 @@ impl Listed for MooneyRivlin {
         (bulk > least).then_some(Self { c1, c2, volumetric: bulk - least })
     }
 
-    /// c₂ as large as leaves three quarters of Λ to U, where that is less than an eighth of G.
+    /// c₂ is an eighth of G, or less, so that three quarters of Λ are left to U.
     fn example(lame: Lame) -> Self {
         let c2 = (0.125 * lame.shear).min(lame.lambda / 16.0).max(0.0);
         Self { c1: 0.5 * lame.shear - c2, c2, volumetric: lame.lambda - 4.0 * c2 }

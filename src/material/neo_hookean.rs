@@ -6,7 +6,7 @@ use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 
-/// How the volume resists: U(J) over Λ. A type, so that no branch is left in a loop over particles.
+/// The volumetric energy U(J) of a solid, over Λ. It is a type, so that a loop over particles does not branch on it.
 pub trait Volumetric: Copy + Default + Send + Sync + 'static {
     /// The name of the solid in reports.
     const NAME: &'static str;
@@ -148,8 +148,8 @@ impl<U: Volumetric> Elastic for NeoHookean<U> {
 
     /// S = F⁻¹ P,  P = J U'(J) F⁻ᵀ + G (H + F⁻ᵀ Hᵀ)
     ///
-    /// H + F⁻ᵀHᵀ = F − F⁻ᵀ is small where strain and rotation are, and no larger than F where F is large: as C⁻¹ [J U' I + 2G E],
-    /// shear is a difference of products of size ‖F‖², as G (I − C⁻¹) one of numbers of size 1.
+    /// H + F⁻ᵀHᵀ = F − F⁻ᵀ is small where strain and rotation are small, and no larger than F where F is large. Other forms lose more
+    /// digits: in C⁻¹ [J U' I + 2G E] shear is a difference of products of size ‖F‖², and in G (I − C⁻¹) a difference of numbers of size 1.
     #[inline(always)]
     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();

@@ -10,12 +10,12 @@ use crate::tensor::{Deformation, Tensor, identity, scaled};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J)
+/// A term of Ogden's energy: μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "OgdenTerm")]
 #[serde(deny_unknown_fields)]
 pub struct OgdenTerm {
-    /// μ (stress), of the sign of α.
+    /// μ (stress), with the sign of α.
     pub modulus: f64,
     /// α (no unit), not 0 and at most 100 in size.
     #[schemars(range(min = -100, max = 100))]
@@ -35,10 +35,10 @@ pub struct OgdenParameters {
     pub bulk: f64,
 }
 
-/// Terms at most.
+/// The most terms.
 const MOST: usize = 8;
 
-/// W = Σ μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J) + U(J), with Ciarlet's U: rubber (Ogden, Proc. R. Soc. Lond. A 328, 1972). 2G = Σ μ α.
+/// W = Σ μ/α (λ₁^α + λ₂^α + λ₃^α − 3 − α ln J) + U(J), with Ciarlet's U, for rubber (Ogden, Proc. R. Soc. Lond. A 328, 1972). 2G = Σ μ α.
 ///
 /// In Hencky's strain ε the Kirchhoff stress is τ = Σ μ (e^{αε} − I) + J U' I.
 ///
@@ -89,7 +89,7 @@ impl Law for Ogden {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
-        // Axes carry no derivatives.
+        // The axes of [`Principal`] carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }

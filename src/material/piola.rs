@@ -1,10 +1,10 @@
-//! det F > 0, and P = F S.
+//! The condition det F > 0, and the first Piola–Kirchhoff stress P = F S.
 
 use super::{Elastic, Law, Start};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
 
-/// det F ≤ 0 (or not a number): no body can be there.
+/// No body can have this deformation: det F is ≤ 0, infinite, or not a number.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("det F = {det_f:e} is not positive")]
 pub struct NonPositiveJacobian {
@@ -12,7 +12,7 @@ pub struct NonPositiveJacobian {
     pub det_f: f64,
 }
 
-/// Whether a body can have this det F.
+/// Whether det F is positive and finite.
 #[inline(always)]
 fn possible(det_f: f64) -> bool {
     det_f > 0.0 && det_f.is_finite()
@@ -24,27 +24,27 @@ impl NonPositiveJacobian {
     /// ```
     /// use bfree::material::NonPositiveJacobian;
     ///
-    /// // A flat body is none, one that is nearly flat is.
+    /// // A nearly flat body is admissible, a flat one is not.
     /// assert_eq!(NonPositiveJacobian::check(1e-300), Ok(()));
     /// assert_eq!(NonPositiveJacobian::check(0.0), Err(NonPositiveJacobian { det_f: 0.0 }));
     /// assert!(NonPositiveJacobian::check(f64::NAN).is_err());
     /// ```
     ///
     /// # Errors
-    /// `det_f` is none of a body.
+    /// `det_f` is not positive, or not finite.
     #[inline(always)]
     pub fn check(det_f: f64) -> Result<(), Self> {
         if possible(det_f) { Ok(()) } else { Err(Self { det_f }) }
     }
 }
 
-/// Checks det F > 0, on J and never on J²; refuses NaN.
+/// The deformation of H = F − I, if it is admissible. Checks det F > 0 on J and never on J², and refuses NaN.
 ///
 /// ```
 /// use bfree::material::admissible;
 /// use bfree::tensor::Tensor;
 ///
-/// // Turned inside out in both directions, J² = 1 and even J = 1; in one direction J = −1.
+/// // A body turned inside out in one direction has J = −1, but J² = 1.
 /// let turned = Tensor::<f64, 1>::from_element(-2.0);
 /// assert_eq!(admissible(turned).map_err(|error| error.det_f).unwrap_err(), -1.0);
 /// assert!(admissible(Tensor::<f64, 1>::from_element(-0.999)).is_ok());
@@ -59,7 +59,7 @@ pub fn admissible<T: Real, const D: usize>(h: Tensor<T, D>) -> Result<Deformatio
     Ok(at)
 }
 
-/// The deformation, or that of the body at rest where det F is none of a body; and det F, for the caller to judge.
+/// The deformation, and det F for the caller to check. If det F is not admissible, the deformation is that of a body at rest.
 #[inline(always)]
 pub(crate) fn admissible_or_rest<T: Real, const D: usize>(h: Tensor<T, D>) -> (Deformation<T, D>, f64) {
     let at = Deformation::new(h);
@@ -67,7 +67,7 @@ pub(crate) fn admissible_or_rest<T: Real, const D: usize>(h: Tensor<T, D>) -> (D
     (if possible(det_f) { at } else { Deformation::new(Tensor::zeros()) }, det_f)
 }
 
-/// `P = F S` (eq. 7), F and S of different deformations if derivatives ask for it. The only place that forms P.
+/// `P = F S` (eq. 7). No other function forms P. For derivatives, F and S may belong to different deformations.
 #[inline(always)]
 pub(crate) fn piola<L: Law, T: Real, const D: usize>(
     law: &L,
@@ -95,7 +95,7 @@ pub(crate) fn piola<L: Law, T: Real, const D: usize>(
 /// ```
 ///
 /// # Errors
-/// det F ≤ 0 of the F inside S.
+/// The F inside S has det F ≤ 0.
 #[inline(always)]
 pub fn first_piola<L: Elastic, T: Real, const D: usize>(
     law: &L,
@@ -105,7 +105,7 @@ pub fn first_piola<L: Elastic, T: Real, const D: usize>(
     Ok(piola(law, f_left, &admissible(h_inside)?, &Start::NONE))
 }
 
-/// A D×D tensor as the upper left part of a 3×3 one, the rest zero.
+/// A 3×3 tensor with a D×D tensor as its upper left part, and zeros elsewhere.
 pub(crate) fn embed<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, 3> {
     Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { T::zero() })
 }

@@ -9,72 +9,75 @@ use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
 
-/// Where an isotropic solid flows, and how: a type, so that a loop over particles has one of them.
+/// The yield criterion and the flow rule of an isotropic solid. It is a type, so that a loop over particles does not branch on it.
 ///
-/// It sees the trial strain by v = tr ε and d = ‖dev ε‖, and brings back the Kirchhoff stress; the direction of its deviator stays.
+/// The return map takes the trial strain as v = tr ε and d = ‖dev ε‖, and gives the Kirchhoff stress. It keeps the direction of the
+/// deviator.
 pub trait Criterion: Clone + Send + Sync + Sized + 'static {
-    /// What a scene writes of it.
+    /// The parameters of the criterion in a scene.
     type Parameters;
 
     /// The name of the solid in reports.
     const NAME: &'static str;
 
-    /// Whether the flow is normal to the surface: the tangent is then symmetric.
+    /// Whether plastic flow is normal to the yield surface. The tangent is then symmetric.
     fn is_associated(&self) -> bool;
 
-    /// Whether what flow takes in a step is a potential of it: associated flow, and the work of hardening along the way and not at its end.
+    /// Whether the dissipation of a step is a potential of the plastic flow. The flow must be associated, and the hardening work integrated
+    /// along the step, not taken at its end.
     fn has_potential(&self) -> bool;
 
-    /// Whether the flow keeps the volume, and neither stress nor flow depend on the pressure: tr ε is ln J then.
+    /// Whether plastic flow keeps the volume, so that tr ε = ln J, and neither the deviatoric stress nor the flow depends on the pressure.
     const ISOCHORIC: bool;
 
-    /// The solid and its criterion; or `None`, and `problems` of the keys below `path`.
+    /// The elastic constants and the criterion. `None` if a value below the key `path` is not allowed; `problems` then says why.
     fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)>;
 
-    /// One that a solid of these constants meets at strains of some percent.
+    /// An example that a solid of these constants reaches at strains of a few percent.
     fn example(solid: &Lame) -> Self;
 
-    /// What a step with the trial strain (v, d) ends with, after the plastic strain `before`.
+    /// The return map of a step with the trial strain (v, d). `before` is the accumulated plastic strain at t_n.
     fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T>;
 }
 
-/// Where a return map ends.
+/// The result of a return map.
 #[derive(Clone, Copy, Debug)]
 pub struct Returned<T> {
-    /// The stress, and its derivatives by the trial strain.
+    /// The stress, and its derivatives with respect to the trial strain.
     pub radial: Radial<T>,
     /// The accumulated plastic strain.
     pub plastic_strain: T,
-    /// What flow takes of the energy in this step, per reference volume.
+    /// The energy dissipated by plastic flow in this step, per reference volume.
     pub dissipated: T,
 }
 
 impl<T: Real> Returned<T> {
-    /// No flow.
+    /// A step without plastic flow.
     pub fn elastic(solid: &Lame, v: T, before: f64) -> Self {
         Self { radial: Radial::elastic(solid, v), plastic_strain: T::lit(before), dissipated: T::zero() }
     }
 }
 
-/// Roundings in a trial strain.
+/// The number of roundings allowed for in a trial strain.
 const ROUNDINGS: f64 = 1024.0;
 
-/// Round-off of a stress in units of the modulus, at an elastic strain `d` after the plastic strain `before`: a state that has flowed lies on the
-/// yield surface, and whether it flows on must not depend on its last bits.
+/// Round-off bound of a stress with this modulus, at the elastic strain `d` after the plastic strain `before`. A state that has flowed lies
+/// on the yield surface, and round-off must not decide whether it flows again.
 pub(super) fn round_off(modulus: f64, d: f64, before: f64) -> f64 {
     ROUNDINGS * f64::EPSILON * modulus * (d + before)
 }
 
-/// An elastoplastic solid, isotropic, with the elastic energy W = K/2 (tr ε)² + G dev ε : dev ε in the logarithmic elastic strain ε = ½ ln(F C_p⁻¹ Fᵀ).
+/// An isotropic elastoplastic solid. Its elastic energy W = K/2 (tr ε)² + G dev ε : dev ε depends on the logarithmic elastic strain ε = ½
+/// ln(F C_p⁻¹ Fᵀ).
 ///
-/// A step freezes C_p⁻¹, takes the trial strain, and flows by the exponential map (Simo, Comput. Methods Appl. Mech. Eng. 99, 1992;
-/// de Souza Neto, Perić, Owen, Computational Methods for Plasticity, 2008, ch. 14).
+/// A step takes the trial strain with C_p⁻¹ held fixed, and then updates C_p⁻¹ by the exponential map (Simo, Comput. Methods Appl. Mech.
+/// Eng. 99, 1992; de Souza Neto, Perić, Owen, Computational Methods for Plasticity, 2008, ch. 14).
 ///
 /// ```
 /// use bfree::material::{Hardening, Lame, Law, Plastic, Start, VonMises};
 /// use bfree::tensor::{Deformation, Tensor};
 ///
-/// // Sheared far beyond its yield stress, it bears √3 τ_xy = σ_y, but for a rotation of the stress of the order of the elastic strain.
+/// // Sheared far beyond yield, the solid bears √3 τ_xy = σ_y, up to a rotation of the stress of the order of the elastic strain.
 /// let solid = Lame::from_young_poisson(1000.0, 0.3)?;
 /// let law = Plastic { solid, criterion: VonMises { yield_stress: Hardening::perfect(0.1) } };
 /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.0, 0.0));
@@ -86,16 +89,16 @@ pub(super) fn round_off(modulus: f64, d: f64, before: f64) -> f64 {
 pub struct Plastic<Y> {
     /// Λ and G.
     pub solid: Lame,
-    /// Where it flows.
+    /// The yield criterion.
     pub criterion: Y,
 }
 
-/// A number that a body at rest remembers as 0.
+/// An internal variable that is 0 at rest.
 pub(super) const fn zero(name: &'static str) -> Remembered {
     Remembered { name, at_rest: 0.0 }
 }
 
-/// The accumulated plastic strain, the energy lost, and C_p⁻¹ − I.
+/// The accumulated plastic strain, the dissipated energy, and C_p⁻¹ − I.
 const MEMORY: [Remembered; 8] = [
     zero(PLASTIC_STRAIN),
     zero(DISSIPATED),
@@ -107,7 +110,7 @@ const MEMORY: [Remembered; 8] = [
     zero("inverse_plastic_xz"),
 ];
 
-/// The plastic strain, and C_p⁻¹ − I; those of a body at rest where nothing is remembered.
+/// The plastic strain and C_p⁻¹ − I at t_n. Without internal variables both are those of a body at rest.
 fn remembered<'a>(start: &Start<'a>) -> (f64, &'a [f64]) {
     (start.memory.first().copied().unwrap_or(0.0), start.memory.get(2..).unwrap_or(&[]))
 }
@@ -149,7 +152,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
         self.criterion.has_potential()
     }
 
-    /// W of the elastic strain, and what flow takes in the step; their sum is stationary in the flow where that is associated.
+    /// W of the elastic strain plus the dissipation of the step. For associated flow the sum is stationary with respect to the flow.
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
         let (strained, Returned { radial: Radial { p, g, .. }, dissipated, .. }) = self.returned(at, start);
         let (bulk, shear) = (self.solid.bulk_modulus(), self.solid.shear);
@@ -167,7 +170,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
-        // Axes carry no derivatives.
+        // The axes of [`Principal`] carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }
@@ -187,7 +190,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
         blocks
     }
 
-    /// K/2 (ln J)², where the flow leaves it alone.
+    /// K/2 (ln J)², if plastic flow keeps the volume.
     fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
         Y::ISOCHORIC.then(|| Logarithmic::response(self.solid.bulk_modulus(), at))
     }

@@ -1,9 +1,9 @@
-//! Isotropic functions of a symmetric tensor, Y = f(A): f of each eigenvalue, in the eigenvectors of A.
+//! Isotropic functions of a symmetric tensor, Y = f(A). Y has the eigenvectors of A, and f of each eigenvalue.
 //!
-//! Eigenvectors have no derivatives where eigenvalues meet; Y has. So A is turned by eigenvectors of its real part, plain numbers,
-//! which makes it D + O: D diagonal, O as small as rounding and the derivatives that the number type carries. Of f(D + O) the expansion in O
-//! is known to any order, by divided differences of f (Daleckii and Krein, 1965; Higham, Functions of Matrices, 2008, ch. 3): they are
-//! what is evaluated to full digits, however near the eigenvalues.
+//! Eigenvectors have no derivatives where eigenvalues coincide, but Y has. A is therefore rotated into D + O by the eigenvectors of its
+//! real part. D is diagonal, and O holds only round-off and the derivatives of the number type. Divided differences of f give the expansion
+//! of f(D + O) in O to any order (Daleckii and Krein, 1965; Higham, Functions of Matrices, 2008, ch. 3). They are evaluated to full digits,
+//! however near the eigenvalues are.
 
 use crate::scalar::Real;
 use crate::tensor::Tensor;
@@ -17,7 +17,7 @@ pub(super) trait Function {
     fn difference<T: Real>(&self, x: T, y: T) -> T;
 }
 
-/// ½ ln(1 + 2x): of ½ (b − I), Hencky's strain ½ ln b.
+/// ½ ln(1 + 2x). Applied to ½ (b − I), it gives Hencky's strain ½ ln b.
 pub(super) struct Hencky;
 
 impl Function for Hencky {
@@ -63,7 +63,7 @@ impl Function for Power {
 }
 
 impl Power {
-    /// (e^{αx} − 1 − αx)/α², of second order: the primitive of the function.
+    /// The primitive of the function, (e^{αx} − 1 − αx)/α², which is of second order in x.
     fn primitive<T: Real>(&self, x: T) -> T {
         let z = x * T::lit(self.0);
         let reduced = if z.value().abs() > 0.5 {
@@ -80,7 +80,7 @@ impl Power {
     }
 }
 
-/// tr R(A) of a symmetric A, R the primitive of f, with derivatives up to the second: Σ R(dᵢ) + Σ_{i<k} f[dᵢ, dₖ] Oᵢₖ² + …
+/// tr R(A) of a symmetric A with derivatives up to the second, where R is the primitive of f: Σ R(dᵢ) + Σ_{i<k} f[dᵢ, dₖ] Oᵢₖ² + …
 pub(super) fn primitive_trace<T: Real>(f: &Power, a: &Tensor<T, 3>) -> T {
     let axes = principal_axes(&a.map(T::value)).map(T::lit);
     let a = axes.transpose() * a * axes;
@@ -107,14 +107,14 @@ fn sinh_over<T: Real>(z: T) -> T {
     sum
 }
 
-/// Where two numbers are taken for one in a second divided difference, relative to numbers of size 1: the quotient keeps 11 digits there,
-/// and the derivative that takes its place is as exact. Only second derivatives see it.
+/// Two numbers of size 1 nearer than this count as equal in a second divided difference. At this distance the quotient keeps 11 digits, and
+/// the derivative that replaces it is as exact. Only second derivatives need it.
 const TOGETHER: f64 = 1e-5;
 
 /// f[x, y, z] = (f[x, y] − f[y, z])/(x − z)
 fn second<T: Real>(f: &impl Function, x: T, y: T, z: T) -> T {
     let apart = |a: T, b: T| (a - b).value().abs();
-    // The ends of the quotient are those that are farthest apart.
+    // The two numbers farthest apart become the ends of the quotient.
     let (x, y, z) = if apart(x, y) > apart(x, z) && apart(x, y) >= apart(y, z) {
         (x, z, y)
     } else if apart(y, z) > apart(x, z) {
@@ -159,19 +159,20 @@ pub(crate) fn principal_values(a: &Tensor<f64, 3>) -> [f64; 3] {
     values
 }
 
-/// Sweeps of Jacobi's method: it converges quadratically, four or five are enough.
+/// The most sweeps of Jacobi's method. It converges quadratically, so four or five are enough.
 const SWEEPS: usize = 10;
 
 /// Eigenvectors of a symmetric tensor, in columns, by Jacobi's method (Golub and Van Loan, Matrix Computations, 4th ed., alg. 8.5.2).
 ///
-/// Axes that a zero entry keeps apart stay apart: those of a plane problem are its own, and the third.
+/// A zero off-diagonal entry causes no rotation. In a plane problem two eigenvectors therefore stay in the plane, and the third is its
+/// normal.
 pub(super) fn principal_axes(a: &Tensor<f64, 3>) -> Tensor<f64, 3> {
     let (mut a, mut axes) = (*a, Tensor::identity());
     for _ in 0..SWEEPS {
         let mut turned = false;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let off = a[(p, q)];
-            // Less than half a rounding of what it stands between changes nothing.
+            // An entry below half a rounding of both diagonal entries changes nothing.
             if off.abs() <= 0.25 * f64::EPSILON * a[(p, p)].abs().min(a[(q, q)].abs()) {
                 continue;
             }

@@ -6,7 +6,7 @@ use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
-/// W = Λ/2 (tr E)² + G E:E. Softens in compression; for moderate strains.
+/// W = Λ/2 (tr E)² + G E:E, for moderate strains. The solid softens in compression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StVenantKirchhoff {
     /// Λ and G.

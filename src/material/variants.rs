@@ -1,6 +1,7 @@
-//! A law that is one of several.
+//! The methods of an enum of laws.
 
-/// The methods of [`Law`](crate::material::Law), but for `shipped`, of an enum whose variants are laws: in an `impl Law`, each asks the variant that it is.
+/// The methods of [`Law`](crate::material::Law) except `shipped`, for an enum whose variants are laws. Used inside `impl Law`, each method
+/// calls the law of the active variant.
 ///
 /// ```
 /// use bfree::material::{Lame, Law, NeoHookean, StVenantKirchhoff, Start};

@@ -1,4 +1,4 @@
-//! Finite viscoelasticity: Maxwell branches beside an elastic law.
+//! Finite viscoelasticity: Maxwell branches parallel to an elastic law.
 
 use super::hencky::{Principal, Radial, Strained};
 use super::law::derivative;
@@ -10,7 +10,7 @@ use crate::tensor::{Deformation, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A spring and a dashpot in a row, both for shapes alone.
+/// A Maxwell branch: a spring and a dashpot in series, for deviatoric strain alone.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "MaxwellBranch")]
 #[serde(deny_unknown_fields)]
@@ -28,24 +28,25 @@ pub struct Branch {
 #[schemars(rename = "Viscoelastic")]
 #[serde(deny_unknown_fields)]
 pub struct ViscoelasticParameters {
-    /// The law that is left when all branches have relaxed; one that remembers nothing.
+    /// The law that remains when all branches have relaxed. It must be an elastic law.
     pub base: Box<Parameters>,
-    /// What relaxes beside it, 1 to 8 branches.
+    /// The Maxwell branches parallel to the base, 1 to 8.
     #[schemars(length(min = 1, max = 8))]
     pub branches: Vec<Branch>,
 }
 
-/// An elastic law, and branches with strains of their own: F C_v⁻¹ Fᵀ = b_e, τ = 2G dev ε with ε = ½ ln b_e, which flow by ε̇_v = dev ε/τ_r
-/// (Reese and Govindjee, Int. J. Solids Struct. 35, 1998, with Hencky's springs and dashpots that have no viscosity in volume).
+/// An elastic law with parallel Maxwell branches. Each branch has its own C_v: b_e = F C_v⁻¹ Fᵀ and τ = 2G dev ε with ε = ½ ln b_e. It
+/// flows by ε̇_v = dev ε/τ_r (Reese and Govindjee, Int. J. Solids Struct. 35, 1998, with Hencky's springs and no volumetric viscosity).
 ///
-/// A step freezes C_v⁻¹, takes the trial strain, and lets it relax for Δt by the exponential map: dev ε = e^{−Δt/τ_r} dev ε_trial, which is
-/// exact where F rests, and of first order in Δt where it moves. A step has the potential W + Σ G e^{−Δt/τ_r} dev ε_trial : dev ε_trial.
+/// A step takes the trial strain with C_v⁻¹ held fixed, and relaxes it over Δt by the exponential map: dev ε = e^{−Δt/τ_r} dev ε_trial. The
+/// map is exact where F is constant, and of first order in Δt where F changes. The potential of a step is W + Σ G e^{−Δt/τ_r} dev ε_trial :
+/// dev ε_trial.
 ///
 /// ```
 /// use bfree::material::{Branch, Lame, Law, NeoHookean, Start, Viscoelastic};
 /// use bfree::tensor::{Deformation, Tensor};
 ///
-/// // Sheared a little, and held: G∞ + G₁ e^{−t/τ} is left, in however many steps.
+/// // A small shear is held: G∞ + G₁ e^{−t/τ} remains, whatever the number of steps.
 /// let base = NeoHookean::ciarlet(Lame::new(10.0, 1.0)?);
 /// let law = Viscoelastic::new(base, vec![Branch { shear: 3.0, relaxation_time: 2.0 }]).ok_or("an elastic base")?;
 /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 1e-6, 0.0, 0.0));
@@ -65,10 +66,10 @@ pub struct Viscoelastic {
     branches: Vec<Branch>,
 }
 
-/// Branches at most.
+/// The most branches.
 const MOST: usize = 8;
 
-/// Numbers of C_v⁻¹ − I.
+/// The number of components of C_v⁻¹ − I.
 const SIX: usize = 6;
 
 macro_rules! names {
@@ -84,17 +85,17 @@ macro_rules! names {
     };
 }
 
-/// The energy lost, and C_v⁻¹ − I of every branch.
+/// The dissipated energy, and C_v⁻¹ − I of every branch.
 const MEMORY: [Remembered; 1 + SIX * MOST] = names!(1 2 3 4 5 6 7 8);
 
 impl Viscoelastic {
-    /// Branches beside a law; `None` if that remembers something, or of more than eight branches.
+    /// Branches parallel to a law. `None` if the law has internal variables, or if there are more than eight branches.
     pub fn new(base: impl Into<Material>, branches: Vec<Branch>) -> Option<Self> {
         let base = base.into();
         (base.memory().is_empty() && branches.len() <= MOST).then(|| Self { base: Box::new(base), branches })
     }
 
-    /// Every branch with what it remembers of C_v⁻¹ − I, nothing at rest, and e^{−Δt/τ_r}.
+    /// Every branch with its C_v⁻¹ − I at t_n and e^{−Δt/τ_r}. Without internal variables the slice is empty, which means rest.
     fn branches<'a>(&'a self, start: &Start<'a>) -> impl Iterator<Item = (&'a Branch, &'a [f64], f64)> {
         let (dt, memory) = (start.dt, start.memory);
         self.branches.iter().enumerate().map(move |(i, branch)| {
@@ -136,7 +137,7 @@ impl Law for Viscoelastic {
         start: &Start<'_>,
         x: &Tensor<T, D>,
     ) -> Tensor<T, D> {
-        // Axes carry no derivatives.
+        // The axes of [`Principal`] carry no derivatives.
         if T::NDERIV > 0 {
             return derivative(at, x, |at| self.stress(at, start));
         }
@@ -146,7 +147,7 @@ impl Law for Viscoelastic {
         springs.fold(self.base.elasticity(at, &Start::NONE, x), |sum, stress: Tensor<T, D>| sum + stress)
     }
 
-    /// That of the base: branches have no viscosity in volume, nor springs.
+    /// The response of the base, because branches have neither springs nor viscosity in volume.
     fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
         self.base.volumetric(at)
     }
@@ -164,7 +165,7 @@ impl Law for Viscoelastic {
         blocks
     }
 
-    /// The springs lose G (1 − e^{−2Δt/τ_r}) dev ε_trial : dev ε_trial.
+    /// The branches dissipate G (1 − e^{−2Δt/τ_r}) dev ε_trial : dev ε_trial.
     fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
         let Some((lost, next)) = next.split_first_mut() else { return };
         for ((branch, flowed, decay), next) in self.branches(start).zip(next.chunks_mut(SIX)) {

@@ -1,4 +1,4 @@
-//! Von Mises' criterion with isotropic hardening, associated: metals.
+//! Von Mises' yield criterion for metals, with isotropic hardening and associated flow.
 
 use super::hencky::Radial;
 use super::plastic::round_off;
@@ -8,7 +8,8 @@ use crate::scalar::Real;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Flow where q = √(3/2) ‖dev τ‖ reaches σ_y(p), along dev τ, p accumulating √(2/3) of the plastic strain; τ is Kirchhoff's stress J σ.
+/// Plastic flow starts where q = √(3/2) ‖dev τ‖ reaches σ_y(p), and runs along dev τ. τ is the Kirchhoff stress J σ, and p accumulates
+/// √(2/3) of the norm of the plastic strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VonMises {
     /// σ_y(p)
@@ -22,8 +23,8 @@ pub struct VonMises {
 pub struct VonMisesParameters {
     /// The elastic constants.
     pub elastic: LameParameters,
-    /// The yield stress in tension, as a function of the accumulated plastic strain; of the Kirchhoff stress J σ, which metals have nearly
-    /// in common with the Cauchy stress.
+    /// The yield stress in tension, as a function of the accumulated plastic strain. It limits the Kirchhoff stress J σ, which in metals
+    /// nearly equals the Cauchy stress.
     pub yield_stress: Hardening,
 }
 
@@ -64,7 +65,7 @@ impl Criterion for VonMises {
         let (delta, compliance) = self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n);
         let elastic = Radial::elastic(solid, v);
         let plastic_strain = p_n + delta;
-        // σ_y/q_trial and k'/(3G + k'): far beyond yield, 1 − 3G Δp/q_trial and 1 − 3G/(3G + k') would leave few digits.
+        // Far beyond yield, σ_y/q_trial and k'/(3G + k') keep the digits that 1 − 3G Δp/q_trial and 1 − 3G/(3G + k') lose.
         let radial = Radial {
             g: elastic.g * self.yield_stress.strength(plastic_strain) / trial,
             t_d: elastic.g * self.yield_stress.slope(plastic_strain) * compliance,

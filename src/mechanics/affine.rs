@@ -1,13 +1,13 @@
-//! Projection by affine fits. A mean over the particles that a node sees is the field where their centre of mass is; near a free face that is
-//! not the place of the node, and a body that spins seems to spin more slowly there. With a gradient G for each particle it is the field
-//! at the node:
+//! Projection by affine fits. The mean over the particles around a node is the value of the field at their centre of mass. Near a free
+//! surface this centre is not at the node, and a spinning body seems to spin more slowly there. A gradient G for each particle gives the
+//! field at the node:
 //!
 //! u_I = ⟨u_p + G_p (x_I − x_p)⟩_I,  ⟨·⟩_I = Σ_p N m (·) / m_I,
 //!
 //! G_p = Σ_I N_I B_I,  B_I = (⟨u ⊗ x⟩ − ū ⊗ x̄) (⟨x ⊗ x⟩ − x̄ ⊗ x̄ + δ h² 1)⁻¹.
 //!
-//! B is the slope of the least squares, weighted with N m. As Σ_I N_I (x_I − x_p) = 0, momentum is that of the particles for any G. Affine
-//! fields are met to O(δ).
+//! B is the slope of the least-squares fit, weighted with N m. Because Σ_I N_I (x_I − x_p) = 0, momentum is conserved for any G. Affine
+//! fields are reproduced to O(δ).
 
 use crate::mechanics::mass::is_light;
 use crate::mechanics::sweep::Supports;
@@ -15,11 +15,11 @@ use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, inverse, scaled};
 
-/// δ: across directions in which a node sees particles in less than this of h², the field is taken as constant. Two rows of particles in
-/// a cell have 1/16.
+/// δ: along directions in which the variance of the particle positions is below δ h², the field is taken as constant. Two rows of particles
+/// in a cell have the variance h²/16.
 const FLAT: f64 = 1e-3;
 
-/// u_I of two fields of the particles; `mass` is the lumped one of the active nodes. Nodes that have next to none get zero.
+/// u_I of two particle fields. `mass` is the lumped mass of the active nodes. Light nodes get zero.
 pub(super) fn affine<const D: usize>(
     particles: &Particles<D>,
     supports: &Supports<D>,
@@ -27,7 +27,7 @@ pub(super) fn affine<const D: usize>(
     fields: [&[Vector<f64, D>]; 2],
 ) -> [Pooled<Vector<f64, D>>; 2] {
     let (grid, is_light) = (supports.grid(), is_light(particles));
-    // Seen from a particle, squares of places keep more digits.
+    // Relative to the first particle, squares of positions keep more digits.
     let origin = particles.position.first().copied().unwrap_or_else(Vector::zeros);
     let x = |p: usize| particles.position[p] - origin;
     let mean = |value: &(dyn Fn(usize) -> Vector<f64, D> + Sync)| {

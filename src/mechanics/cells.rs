@@ -1,4 +1,4 @@
-//! A frozen tangent on the grid: as a form on its cells, from which coarser grids are made; and which nodes share entries.
+//! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids; and its sparsity pattern.
 
 use crate::mechanics::sweep::{At, LANES, Laned};
 use crate::mechanics::tangent::Tangent;
@@ -8,7 +8,8 @@ use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
 
 impl<X: Laned, const D: usize> Tangent<'_, D, X> {
-    /// What the particles of a cell make of ∇u, summed; and what nodes make of motions that are the same everywhere.
+    /// The tangent as a form on cells: tangent moduli and masses, summed over the particles of each cell. Terms at nodes add a block for
+    /// each node, the force under uniform motions.
     pub(super) fn on_cells(&self) -> LocalForm {
         let (grid, active) = (self.supports.grid(), self.supports.active());
         let (tiles, volume) = (D.pow(4), grid.spacing.powi(D as i32));
@@ -23,11 +24,11 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         };
         let terms: Vec<_> =
             self.terms.iter().filter_map(|term| term.product_at_points(None)).map(|(_, add)| add).collect();
-        // Gradients are counted in units of 1/h.
+        // The form takes gradients in units of 1/h.
         let factor = (self.unit.length / grid.spacing).powi(2);
         let mut places = HashMap::new();
         self.supports.each_group(|group| {
-            // Points of surfaces have no share in a cell.
+            // Surface points belong to no cell.
             let mut cells = [None; LANES];
             for (of, &p) in cells.iter_mut().zip(group.particles).filter(|(_, p)| self.particles.is_solid(**p as usize))
             {
@@ -80,7 +81,8 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         form
     }
 
-    /// Nodes share an entry at a particle, and so do those that they follow.
+    /// The sparsity pattern: two nodes share an entry if they support the same particle. The inner nodes that they follow then share
+    /// entries, too.
     pub(super) fn joined(&self) -> Neighbours {
         let further = self.terms.iter().map(|term| term.reach()).max().unwrap_or(0);
         let reach = self.supports.reach() + further;

@@ -1,5 +1,5 @@
-//! A run checks its own tangent: every piece of it, through the products that the solver applies, against dual numbers through the
-//! residual.
+//! The tangent check of a run. Each piece of the tangent, through the products that the solver applies, is compared with the derivative of
+//! the residual by dual numbers.
 
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Part, compose};
@@ -8,13 +8,13 @@ use crate::mechanics::tangent::Tangent;
 use crate::mechanics::terms::Piece;
 use crate::tensor::{Tensor, Vector, identity, inverse};
 
-/// The largest relative difference accepted: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
+/// The largest accepted relative difference: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
 ///
 /// ```
 /// use bfree::mechanics::check::tangent_bound;
 /// use bfree::tensor::{Tensor, Vector, identity};
 ///
-/// // κ = ‖F‖ ‖F⁻¹‖ is 2 for F = I in 2D, and the same for any multiple of it; a flat particle is allowed more, but not anything.
+/// // κ = ‖F‖ ‖F⁻¹‖ is 2 for F = I in 2D, and for any multiple of I. A flat particle is allowed more, up to 1e-10.
 /// let bound = tangent_bound(&identity::<f64, 2>());
 /// assert!((bound / (64.0 * 4.0 * f64::EPSILON) - 1.0).abs() < 1e-14);
 /// assert_eq!(tangent_bound(&Tensor::<f64, 2>::from_diagonal(&Vector::from([8.0, 8.0]))), bound);
@@ -25,22 +25,22 @@ pub fn tangent_bound<const D: usize>(f: &Tensor<f64, D>) -> f64 {
     (64.0 * f64::EPSILON * condition * condition).min(1e-10)
 }
 
-/// The tangent's product and the derivative of the residual.
+/// A difference between the product with the tangent and the derivative of the residual.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the tangent is wrong ({compared}): the force on node {node} along axis {axis} is {analytic:e} by the product and {dual:e} by dual \
      numbers; allowed is a difference of {bound:e} relative to {scale:e}"
 )]
 pub struct TangentMismatch {
-    /// What was compared: a term, a part of one, the whole product, its precision, or its diagonal blocks.
+    /// The compared quantity: a term, a part of a term, the whole product, the product in single precision, or the diagonal blocks.
     pub compared: &'static str,
-    /// Active number of the node with the largest difference.
+    /// Number of the active node with the largest difference.
     pub node: usize,
     /// The component.
     pub axis: usize,
-    /// By the product, or the block.
+    /// The value by the product; for blocks, the value of the block.
     pub analytic: f64,
-    /// By dual numbers, or by the product.
+    /// The value by dual numbers; for blocks, the value by the product.
     pub dual: f64,
     /// The relative difference allowed.
     pub bound: f64,
@@ -48,7 +48,7 @@ pub struct TangentMismatch {
     pub scale: f64,
 }
 
-/// What a check found.
+/// A failed check.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// The tangent is wrong.
@@ -65,13 +65,13 @@ impl From<TangentMismatch> for CheckError {
     }
 }
 
-/// A direction without pattern, entries in (−1, 1): the golden-ratio sequence from a start that differs with `seed`.
+/// A quasi-random direction with entries in (−1, 1): the golden-ratio sequence, from a start that depends on `seed`.
 ///
 /// ```
 /// use bfree::mechanics::check::direction;
 /// use bfree::tensor::Vector;
 ///
-/// // No two seeds give the same, and the entries fill (−1, 1) evenly: mean 0, mean square ⅓.
+/// // Two seeds give different entries, and the entries fill (−1, 1) evenly: mean 0, mean square ⅓.
 /// let (u, w) = (direction::<1>(1000, 1), direction::<1>(1000, 2));
 /// assert!(u.iter().zip(&w).all(|(u, w)| u != w));
 /// assert!(u.iter().sum::<Vector<f64, 1>>().norm() < 2.0);
@@ -84,12 +84,13 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
     (0..nodes).map(|node| Vector::from_fn(|i, _| entry(node * D + i))).collect()
 }
 
-/// Relative difference allowed in single precision: rounding of the numbers of a tangent and of sums over a few hundred of them.
+/// Relative difference allowed in single precision, for the rounding of the tangent's numbers and of sums over a few hundred numbers.
 const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Compares, at Δφ and in the direction `u`, every piece of the tangent and the whole of it, through the products that the solver applies, with dual numbers through
-    /// the same sweep; then the diagonal blocks of the preconditioner, and single precision where it is used, with the product.
+    /// Compares the tangent at Δφ in the direction `u`, each piece and the whole, with dual numbers through the same transfer loop. The
+    /// tangent acts through the products that the solver applies. Then the diagonal blocks of the preconditioner are compared with the
+    /// product, and single precision is checked where it is used.
     ///
     /// ```
     /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
@@ -110,7 +111,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// ```
     ///
     /// # Errors
-    /// The first mismatch.
+    /// The first mismatch, or a particle with det F ≤ 0.
     pub fn check_tangent(&self, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<(), CheckError> {
         let mut u = u.to_vec();
         self.clear_prescribed(&mut u);
@@ -126,12 +127,12 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
             let mut dual = self.derivative(piece, dphi, &u)?;
             self.clear_prescribed(&mut dual);
             let analytic = product(&self.tangent_of(piece, dphi)?);
-            // Where all that a piece does cancels, as what pressure does in 1D, its contributions say what round-off is.
+            // The contributions of a piece may cancel, like those of pressure in 1D. Their size is then the scale of round-off.
             let mut scale = norm(&dual).max(self.size_of(piece, dphi, &u)?);
             if piece.part == Part::Whole {
                 of_term = scale;
             }
-            // A part may be what two larger numbers leave: the whole less the other part.
+            // A part may be the small difference of two larger numbers, the whole term and the other part.
             scale = scale.max(of_term);
             compare(piece.name, &analytic, &dual, bound, scale)?;
             if piece.part == Part::Whole {
@@ -150,7 +151,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         Ok(())
     }
 
-    /// The bound of the particle that is deformed most.
+    /// The largest [`tangent_bound`] of all particles.
     fn worst_bound(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let particles = self.step.particles;
         let bounds = self.step.supports.interpolate(dphi, |p, _, g| {
@@ -161,13 +162,13 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         Ok(bounds.into_iter().fold(tangent_bound(&identity::<f64, D>()), f64::max))
     }
 
-    /// What a piece's contributions to K u amount to, where they may cancel: forces of loads times |u|/h.
+    /// The size of a piece's contributions to K u where they may cancel: for loads, the force times |u|/h.
     fn size_of(&self, piece: Piece, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
         Ok(if self.terms.is_load(piece) { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
     }
 
-    /// The diagonal blocks against the product with unit vectors at nodes far enough apart: each sees only its own.
+    /// Compares the diagonal blocks of a few nodes with the products of unit vectors at these nodes.
     fn check_blocks(&self, tangent: &Tangent<'_, D>, bound: f64) -> Result<(), CheckError> {
         let blocks = tangent.diagonal_blocks();
         let prescribed = self.unknowns.prescribed_mask(blocks.len());
@@ -184,7 +185,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
                 unit[node][i] = 1.0;
                 tangent.product(&unit, &mut out);
                 let (mut column, scale) = (blocks[node].column(i).into_owned(), blocks[node].norm());
-                // Rows of values that are no unknowns are the identity's.
+                // Rows of values that are no unknowns are those of the identity, and blocks of uncoupled nodes are diagonal. Neither is
+                // compared.
                 let apart = |k: usize| k != i && uncoupled.contains(&node);
                 (0..D).filter(|&k| held(node, k) || apart(k)).for_each(|k| (column[k], out[node][k]) = (0.0, 0.0));
                 let found = compare("diagonal blocks", &[column], &[out[node]], bound, scale);
@@ -195,7 +197,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 }
 
-/// Nodes whose blocks are compared, and as many that others follow.
+/// Number of nodes whose blocks are compared, and of inner nodes with followers that are compared in addition.
 const BLOCKS: usize = 4;
 
 fn norm<const D: usize>(a: &[Vector<f64, D>]) -> f64 {

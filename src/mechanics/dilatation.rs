@@ -1,8 +1,8 @@
-//! The mean dilatation of the particles of a cell: Θ = Σ V_p ΔJ_p / Σ V_p, with ΔJ_p the change of volume since the grid was new and V_p the
-//! volume there. The cell of a particle is the one that it was in then; the particles of two bodies are averaged apart.
+//! The mean dilatation of the particles of a cell: Θ = Σ V_p ΔJ_p / Σ V_p. V_p is the volume at the last grid reset, ΔJ_p the volume ratio
+//! since then. A particle belongs to the cell that it was in at that reset. Each body in a cell has a mean of its own.
 //!
-//! A particle remembers θ_n, the product of the Θ of all grids before, and sees θ = Θ θ_n: where the grid is renewed, stresses go on as they
-//! were. On a grid that is kept, θ_n stays that of when the grid was new, as H does.
+//! A particle stores θ_n, the product of the Θ of all earlier grids. Its stress depends on θ = Θ θ_n, so that stresses are continuous at a
+//! grid reset. Between two resets θ_n and H keep their values of the last reset.
 
 use crate::grid::{Grid, indices};
 use crate::material::Law;
@@ -11,36 +11,36 @@ use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Vector};
 
-/// No cell.
+/// The entry of a particle without a cell.
 const NONE: u32 = u32::MAX;
 
-/// A particle of a cell, by its places in memory and in the sweep: eight times its group, and its lane.
+/// A particle of a cell: its index in memory, and its slot in the transfer loop, [`LANES`] · group + lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
     pub particle: u32,
     pub slot: u32,
 }
 
-/// The particles whose change of volume is averaged, cell by cell.
+/// The particles whose volume ratios are averaged, cell by cell.
 #[derive(Debug)]
 pub(crate) struct Cells {
-    /// In the order of cells and ids, so that sums do not depend on the places of particles in memory.
+    /// Sorted by cell and id, so that sums do not depend on the order of particles in memory.
     members: Vec<Member>,
-    /// Where the members of each cell begin, and where those of the last one end.
+    /// The index of the first member of each cell; at the end, the number of members.
     starts: Vec<u32>,
     /// The cell of each particle.
     of: Vec<u32>,
-    /// Points of surfaces, which have no volume, and the nearest cell.
+    /// Surface points, which have no volume, each with the nearest cell.
     beside: Vec<(usize, usize)>,
     /// Σ V_p
     volumes: Vec<f64>,
 }
 
 impl Cells {
-    /// Bytes of a particle, at most.
+    /// Upper bound of the bytes per particle.
     pub const BYTES: usize = size_of::<Member>() + 2 * size_of::<u32>() + size_of::<f64>();
 
-    /// Those of bodies that average their change of volume; `None` if none does.
+    /// The cells of the bodies with mean dilatation; `None` if there is no such body.
     pub fn of<const D: usize, L: Law>(
         particles: &Particles<D>,
         bodies: &[Body<L>],
@@ -93,7 +93,7 @@ impl Cells {
         Some(cells)
     }
 
-    /// The members of every cell, with its volume when the grid was new.
+    /// The members of every cell, with their total volume at the last grid reset.
     pub fn iter(&self) -> impl Iterator<Item = (&[Member], f64)> {
         let ranges = self.starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         ranges.map(|range| &self.members[range]).zip(self.volumes.iter().copied())
@@ -105,7 +105,7 @@ impl Cells {
         Some(self.of[particle as usize]).filter(|&cell| cell != NONE).map(|cell| cell as usize)
     }
 
-    /// Θ − 1 of every cell after the motion of the nodes since the grid was new; 0 where a cell is turned inside out.
+    /// Θ − 1 of every cell after the nodal motion since the last grid reset; 0 in a cell that is turned inside out.
     pub fn changes<T: Number, const D: usize>(
         &self,
         particles: &Particles<D>,
@@ -127,7 +127,7 @@ impl Cells {
     }
 }
 
-/// The cell of a place and those around it.
+/// The cell of a point and the cells around that cell.
 fn neighbours<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>) -> impl Iterator<Item = [u32; D]> {
     grid.cell(x).into_iter().flat_map(move |at| {
         indices([3; D]).filter_map(move |step| {
@@ -144,7 +144,7 @@ pub(crate) fn total<T: Real>(change: T, before: f64) -> T {
     change + T::lit(before) + change * T::lit(before)
 }
 
-/// θ − 1 of all particles after the motion of the nodes since the grid was new; empty where no body averages.
+/// θ − 1 of all particles after the nodal motion since the last grid reset; empty if no body has mean dilatation.
 pub(crate) fn after<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
@@ -156,7 +156,7 @@ pub(crate) fn after<const D: usize, L: Law>(
     let seen = |p: usize, cell: usize| total(changes[cell], particles.dilatation(p));
     let of = |p: usize| cells.cell(p as u32).map_or(0.0, |cell| seen(p, cell));
     let mut all: Vec<f64> = (0..particles.len()).map(of).collect();
-    // Points of surfaces see the mean of the cell that is nearest, so that stresses there are the body's.
+    // Surface points take the mean of the nearest cell, so that their stresses are those of the body.
     cells.beside.iter().for_each(|&(p, cell)| all[p] = seen(p, cell));
     all
 }

@@ -1,8 +1,10 @@
-//! A grid that is kept: over several steps shape functions stay those of the configuration in which the grid was new. Nothing is projected
-//! between them, the motion φ of the nodes since then adds up, and F = (I + Σ φ ⊗ ∇N) F_k, with F_k of that configuration: what comes out
-//! does not depend on the number of steps.
+//! The configuration of the last grid reset. Between two resets, shape functions stay those of this configuration (total Lagrangian). With
+//! a reset in every step the formulation is updated Lagrangian.
 //!
-//! A step over a kept grid is thus one that starts where the grid was new, and whose unknown is φ and not Δφ.
+//! Between two resets nothing is projected. The nodal motion φ since the last reset adds up, and F = (I + Σ φ ⊗ ∇N) F_k, with F_k at that
+//! reset. The result does not depend on the number of steps.
+//!
+//! A step without a reset is thus a step that starts in the configuration of the last reset, and whose unknown is φ, not Δφ.
 
 use crate::grid::{Grid, indices};
 use crate::mechanics::loads::Prescribed;
@@ -17,13 +19,14 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt::{Display, Formatter};
 
-/// A node is one body's if the number of the body varies less there than this, relative to its square.
+/// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
 const ALONE: f64 = 1e-9;
 
-/// When the background grid is renewed. While a grid is kept, its held nodes stay held. It is renewed in any case where a body comes to a
-/// part of a wall, or of a prescribed region, at which no body was, and in load steps where one comes to a part of another that it did not
-/// touch at the start; and with inertia in every step as long as a body feels the wall that it has come to, or two bodies touch. In load steps,
-/// what a new grid does not balance of a state that the last one did is carried over as a force on its nodes.
+/// When the background grid is reset. Between two resets the grid is kept, and its prescribed nodes stay prescribed. The grid is always
+/// reset if a body reaches a part of a wall, or of a prescribed region, at which no body was. In load steps the grid is also reset if a
+/// body reaches another body, and the two did not touch at the start. With inertia the grid is reset in every step while a body feels the
+/// wall that it has reached, or while two bodies touch. In load steps, the out-of-balance force of the last converged state on the new grid
+/// is carried over as a force on the nodes of the new grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Renewal {
@@ -32,7 +35,8 @@ pub enum Renewal {
     EveryStep,
     /// Never.
     Never,
-    /// After a step at whose end ‖½ (F_rᵀ F_r − I)‖ of a particle is larger than this (no unit), with F_r its deformation since.
+    /// After a step at whose end ‖½ (F_rᵀ F_r − I)‖ of a particle is larger than this value (no unit). F_r is the deformation of the
+    /// particle since the last reset.
     Strain(#[schemars(extend("exclusiveMinimum" = 0))] f64),
 }
 
@@ -42,7 +46,7 @@ impl Renewal {
         match self {
             Self::EveryStep => false,
             Self::Never => true,
-            // Not a number is not small.
+            // NaN resets the grid.
             Self::Strain(most) => strain <= most,
         }
     }
@@ -58,36 +62,36 @@ impl Display for Renewal {
     }
 }
 
-/// Where the grid was new, and the motion of its nodes since.
+/// The configuration of the last grid reset, and the nodal motion since that reset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Kept<const D: usize> {
-    /// x of the particles when the grid was new; where they are now while a step is under way.
+    /// x of the particles at the last grid reset. During a step [`Self::exchange`] puts the present positions here.
     pub(crate) position: Vec<Vector<f64, D>>,
-    /// H, likewise.
+    /// H, stored like `position`.
     pub(crate) displacement_gradient: Vec<Tensor<f64, D>>,
-    /// θ − 1, likewise, where a body averages it.
+    /// θ − 1, stored like `position`; empty if no body has mean dilatation.
     pub(crate) dilatation: Vec<f64>,
     /// φ of the active nodes.
     pub(crate) motion: Vec<Vector<f64, D>>,
     /// Δφ/Δt of the last step.
     pub(crate) rate: Vec<Vector<f64, D>>,
-    /// v of the active nodes; none without inertia.
+    /// v of the active nodes; empty without inertia.
     pub(crate) velocity: Vec<Vector<f64, D>>,
-    /// a
+    /// a of the active nodes; empty without inertia.
     pub(crate) acceleration: Vec<Vector<f64, D>>,
-    /// R₀, carried over from the grid before; none with inertia, and on the first grid.
+    /// R₀, the out-of-balance force carried over from the grid before; empty with inertia, and on the first grid.
     pub(crate) unbalanced: Vec<Vector<f64, D>>,
 }
 
 impl<const D: usize> Kept<D> {
-    /// Takes the particles back to where the grid was new, or again to where they are.
+    /// Moves the particles to the configuration of the last grid reset. A second call moves them back.
     pub(crate) fn exchange(&mut self, particles: &mut Particles<D>) {
         std::mem::swap(&mut self.position, &mut particles.position);
         std::mem::swap(&mut self.displacement_gradient, &mut particles.displacement_gradient);
         std::mem::swap(&mut self.dilatation, &mut particles.dilatation);
     }
 
-    /// Remembers where the particles were when the grid was new, and what has become of the nodes in a step of length `dt`.
+    /// Stores the configuration of the last grid reset, in which `particles` are, and the nodal state at the end of a step of length `dt`.
     pub(crate) fn renew(&mut self, particles: &Particles<D>, end: &Nodal<D>, dphi: &[Vector<f64, D>], dt: f64) {
         self.position.clone_from(&particles.position);
         self.displacement_gradient.clone_from(&particles.displacement_gradient);
@@ -99,7 +103,7 @@ impl<const D: usize> Kept<D> {
         self.rate = dphi.iter().map(|dphi| dphi / dt).collect();
     }
 
-    /// What the nodes are at the start of a step, with their masses.
+    /// The nodal state at the start of a step, with the mass of `masses`.
     pub(crate) fn state(&self, masses: Nodal<D>, pool: &Pool) -> Nodal<D> {
         let [velocity, acceleration, motion, unbalanced] =
             [&self.velocity, &self.acceleration, &self.motion, &self.unbalanced]
@@ -107,7 +111,7 @@ impl<const D: usize> Kept<D> {
         Nodal { velocity, acceleration, motion, unbalanced, ..masses }
     }
 
-    /// As [`Particles::rearrange`].
+    /// Reorders the particle data, see [`Particles::rearrange`].
     pub(crate) fn rearrange(&mut self, order: &[u32]) {
         self.position = order.iter().map(|&from| self.position[from as usize]).collect();
         self.displacement_gradient = order.iter().map(|&from| self.displacement_gradient[from as usize]).collect();
@@ -116,8 +120,8 @@ impl<const D: usize> Kept<D> {
         }
     }
 
-    /// The prescribed conditions that a particle has come to: it is in a cell with a node of that condition that feels nothing yet, and
-    /// was in one without any.
+    /// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet. At the last grid
+    /// reset, its cell had no node of the condition.
     pub(crate) fn met(
         &self,
         present: &[Vector<f64, D>],
@@ -133,7 +137,7 @@ impl<const D: usize> Kept<D> {
                 .filter(move |(_, one)| one.on.holds(grid, index, &position))
                 .map(|(one, _)| one)
         };
-        // Conditions that hold a new node, by the lower corner of its cells.
+        // Pairs (cell, condition) where the condition holds a node of the cell that is not active yet.
         let mut new = HashSet::new();
         for (cell, ()) in cells(present.iter().map(|x| (x, ())), grid) {
             for index in corners(grid.index(cell)).filter(|&index| nodes.number(grid.id(index)).is_none()) {
@@ -154,7 +158,8 @@ impl<const D: usize> Kept<D> {
         (0..prescribed.len()).filter(|&one| comes(one)).collect()
     }
 
-    /// Whether a particle has come to a body that its own is not joined to: it is in a cell with a node of that body, and was in one without.
+    /// Whether a particle has reached a body that its own body is not bonded to: its cell has a node of that body. At the last grid reset,
+    /// its cell had no node of such a body.
     pub(crate) fn meets(&self, particles: &Particles<D>, joined: &BTreeSet<[u32; 2]>, grid: &Grid<D>) -> bool {
         let body = &particles.body;
         let [now, before] = [&particles.position, &self.position].map(|position| seen(position, body, grid));
@@ -183,7 +188,7 @@ fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D
     seen
 }
 
-/// The bodies that lie in cells with a common corner.
+/// The pairs of bodies that lie in cells with a common corner.
 pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> BTreeSet<[u32; 2]> {
     let seen = seen(position, body, grid);
     let of_node = |bodies: &BTreeSet<u32>| {
@@ -193,12 +198,12 @@ pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], g
     seen.values().flat_map(of_node).filter(|[one, other]| one < other).collect()
 }
 
-/// Whether two bodies touch, or did when the shape functions were made: they lie in cells with a common corner, or move a node together.
+/// Whether two bodies lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
 pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, supports: &Supports<D>) -> bool {
     if !pairs(&particles.position, &particles.body, grid).is_empty() {
         return true;
     }
-    // The variance of the number of the body, weighted with N.
+    // The variance of the body index, weighted with N.
     let sum = |power: i32| {
         let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
         supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
@@ -209,7 +214,7 @@ pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, su
     of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
 }
 
-/// The ids of the cells that hold something, with what they hold, each once.
+/// The pairs of a cell's id and an item in that cell, sorted, each pair once.
 fn cells<'a, const D: usize, T: Ord>(
     held: impl Iterator<Item = (&'a Vector<f64, D>, T)>,
     grid: &Grid<D>,

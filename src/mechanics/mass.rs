@@ -19,7 +19,7 @@ const PROJECTION_TOLERANCE: f64 = 1e-12;
 pub struct Mass<'a, const D: usize> {
     /// The particles.
     pub particles: &'a Particles<D>,
-    /// Their shape functions.
+    /// The shape functions of the particles.
     pub supports: &'a Supports<D>,
     /// The lumped mass of every active node.
     pub lumped: &'a [f64],
@@ -37,7 +37,7 @@ pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) 
     mass
 }
 
-/// Whether a node has so little mass that it gets no projected velocity: its Δφ comes from the stiffness.
+/// Whether a nodal mass is too small for a projected velocity. Δφ of such a light node comes from the stiffness.
 pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64) -> bool + use<D> {
     let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
     move |mass| mass < light
@@ -63,11 +63,11 @@ impl<const D: usize> Mass<'_, D> {
         }
     }
 
-    /// Solves M̃ w = Σ_p m u_p N_I for every field `u` of the particles; at light nodes w = 0. With it the iterations taken, 0 for a
+    /// Solves M̃ w = Σ_p m u_p N_I for every particle field `u`; at light nodes w = 0. Also returns the number of iterations, 0 for a
     /// lumped mass.
     ///
     /// # Errors
-    /// Sums that overflow.
+    /// The sums overflow.
     pub fn project<const K: usize>(
         &self,
         fields: [&[Vector<f64, D>]; K],
@@ -95,7 +95,7 @@ impl<const D: usize> Mass<'_, D> {
         Ok((nodal, iterations))
     }
 
-    /// 1/M̃_II; zero at nodes without mass, and at those that follow others.
+    /// 1/M̃_II; zero at nodes without mass and at outer nodes.
     fn inverse_diagonal(&self, followers: &Followers<D>) -> Pooled<f64> {
         let mut diagonal = self.supports.pool().collect(self.lumped.iter().map(|m| self.lumping * m));
         self.supports.spread_with(Weights::Square, bytemuck::cast_slice_mut(&mut diagonal), |p| {
@@ -105,13 +105,13 @@ impl<const D: usize> Mass<'_, D> {
             let own = std::mem::replace(&mut diagonal[outer], 0.0);
             leaders.for_each(|(leader, weight)| diagonal[leader] += weight * weight * own);
         }
-        // Of the least numbers above 0 there is no inverse.
+        // The smallest positive numbers have no finite inverse.
         let inverse = |d: f64| if d > 0.0 && d.recip().is_finite() { d.recip() } else { 0.0 };
         diagonal.iter_mut().for_each(|d| *d = inverse(*d));
         diagonal
     }
 
-    /// By conjugate gradients from zero: where M̃ is singular, the solution of least norm.
+    /// Solves by conjugate gradients from zero. If M̃ is singular, this gives the solution of least norm.
     fn solve(
         &self,
         followers: &Followers<D>,
@@ -130,12 +130,12 @@ impl<const D: usize> Mass<'_, D> {
     }
 }
 
-/// E of the nodes, whatever is prescribed of them.
+/// The extension E without regard to prescribed values.
 pub(super) fn followers<const D: usize>(supports: &Supports<D>) -> Followers<D> {
     Followers::new(supports.extension().cloned().unwrap_or_default(), std::iter::empty())
 }
 
-/// Eᵀ m of masses, zero at nodes that follow others.
+/// Eᵀ m of nodal masses; zero at outer nodes.
 pub(super) fn restricted<'a, const D: usize>(followers: &Followers<D>, mass: &'a [f64]) -> Cow<'a, [f64]> {
     let mut mass = Cow::Borrowed(mass);
     for (outer, _, leaders) in followers.rows() {

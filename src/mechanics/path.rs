@@ -1,7 +1,8 @@
-//! A path of equilibria, along which loads may rise and fall: a step has a length, and how far the loads have come is found with the motion.
+//! The equilibrium path by arc length: loads may rise and fall along the path. A step has a prescribed arc length Δs; the load parameter λ
+//! at its end is solved for together with the motion.
 //!
-//! d·Δφ + w Δλ = Δs  with d the direction of the last step: the plane of Riks (1979). The weight w is fixed, and so λ is a function of φ, and
-//! R(φ, λ(φ)) a residual like any other. Its tangent K + f′ dᵀ/w is regular at turning points, where K is not.
+//! d·Δφ + w Δλ = Δs, with d the direction of the last step, is the plane of Riks (1979). The weight w is fixed, so λ is a function of φ,
+//! and R(φ, λ(φ)) is a residual like any other. Its tangent K + f′ dᵀ/w is regular at limit points, where K is singular.
 
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
@@ -9,32 +10,34 @@ use crate::pooled::Pooled;
 use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, LocalForm, NonlinearProblem, vector};
 use crate::tensor::Vector;
 
-/// The share of the loads in the length of a step, at most: where they fall steeply the plane still meets the path.
+/// Upper bound of the loads' share in the arc length. With a small share, the plane meets the path even where loads fall steeply.
 const SHARE: f64 = 0.1;
 
-/// The part of a step's load over which the loads' slope is measured: within a piece of a curve, rounding is all that it errs by.
+/// Width of the finite difference for f′(λ), relative to the load increment of a step. Within one piece of a load curve, its only error is
+/// round-off.
 const DIFFERENCE: f64 = 1e-3;
 
-/// Where on its path a simulation is.
+/// The position of a simulation on its equilibrium path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Path {
-    /// λ, the time in whose place the loads act.
+    /// λ, the load parameter: the time at which the loads are evaluated.
     pub load: f64,
     /// Δλ of the last step; 0 before the first.
     pub(crate) increment: f64,
-    /// Δs over Δt, that of the first step.
+    /// Δs/Δt of the first step, valid for all later steps.
     pub(crate) speed: f64,
-    /// w
+    /// w, the weight of Δλ in the arc length.
     pub(crate) weight: f64,
 }
 
 impl Path {
-    /// λ at the end of a load step of length `dt`: the first one, and the next over a grid that is new, which goes on as the last one did.
+    /// λ at the end of a load step of length `dt`. Such a step comes first and after every grid reset. After a reset the load goes on in
+    /// the direction of the last step.
     pub(crate) fn load_step(&self, dt: f64) -> f64 {
         self.load + if self.increment < 0.0 { -dt } else { dt }
     }
 
-    /// The same after a step of length `dt` along Δφ to the load λ.
+    /// The path after a step of length `dt` with the motion Δφ to the load λ.
     pub(crate) fn after<const D: usize>(self, load: f64, dphi: &[Vector<f64, D>], dt: f64) -> Self {
         let increment = load - self.load;
         let length = vector::norm::<f64>(bytemuck::cast_slice(dphi));
@@ -49,12 +52,12 @@ impl Path {
     }
 }
 
-/// The equilibrium at the end of a step along a path.
+/// The equilibrium at the end of a step of arc length Δs.
 pub(crate) struct OnPath<'a, const D: usize, L> {
     path: Path,
-    /// Under the loads at λ_n.
+    /// The equilibrium under the loads at λ_n.
     start: &'a Equilibrium<'a, D, L>,
-    /// f(λ), on the free degrees of freedom.
+    /// f(λ), the external force on the free degrees of freedom.
     force: &'a dyn Fn(f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible>,
     at_start: Pooled<Vector<f64, D>>,
     /// φ_n
@@ -66,7 +69,7 @@ pub(crate) struct OnPath<'a, const D: usize, L> {
 }
 
 impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
-    /// A step of length `dt` in the direction of the last one, whose rate was `rate`.
+    /// A step of length `dt` in the direction of the last step, whose Δφ/Δt was `rate`.
     ///
     /// # Errors
     /// det F ≤ 0 at the start.
@@ -102,14 +105,14 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
 
     /// f′(λ)
     fn slope(&self, load: f64) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
-        // Not Δλ of the last step, which may be next to nothing where the path turns.
+        // Δλ of the last step is no measure: it is nearly zero at a limit point.
         let by = DIFFERENCE * SHARE * self.length / self.path.weight;
         let mut slope = (self.force)(load + by)?;
         slope.iter_mut().zip(&(self.force)(load)?).for_each(|(slope, force)| *slope = (*slope - force) / by);
         Ok(slope)
     }
 
-    /// Whether the loads stay as they are at λ: the path leads nowhere.
+    /// Whether f′(λ) = 0: the loads no longer change, and the path ends.
     pub fn ends(&self, load: f64) -> Result<bool, Inadmissible> {
         Ok(self.slope(load)?.iter().all(|slope| slope.norm() == 0.0))
     }
@@ -167,7 +170,7 @@ impl<const D: usize> LinearOperator for Bordered<'_, D> {
     }
 }
 
-/// Those of K.
+/// The diagonal blocks and the local form are those of K.
 impl<const D: usize> DiagonalBlocks for Bordered<'_, D> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         self.tangent.diagonal_blocks()

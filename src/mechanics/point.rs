@@ -1,13 +1,13 @@
-//! One particle: its deformation, the stress with which it pulls at the nodes, and its frozen tangent.
+//! One particle: its deformation, its stress in the internal force, and its linearised tangent.
 //!
-//! Written once, for every number. Nothing here returns early: a loop over particles is then arithmetic alone, which the
-//! compiler turns into vector instructions where the law is arithmetic alone too.
+//! The code is generic over the number type. No function returns early, so a loop over particles is pure arithmetic. The compiler
+//! vectorises this loop if the law is pure arithmetic, too.
 
 use crate::material::{ClosedTangent, Law, NonPositiveJacobian, Start, admissible_or_rest, piola};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, identity, scaled};
 
-/// A particle whose deformation is impossible.
+/// A particle with det F ≤ 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("particle {particle} cannot be deformed so")]
 pub struct Inadmissible {
@@ -17,11 +17,11 @@ pub struct Inadmissible {
     pub source: NonPositiveJacobian,
 }
 
-/// A part of a term's tangent that can be frozen alone. In the code that computes `F S`, letting only the left F carry derivatives gives
-/// the geometric part, and only the F inside S the material part.
+/// A part of a term's tangent that can be linearised alone. In the code for `F S`, derivatives of the left F alone give the geometric part.
+/// Derivatives of the F inside S alone give the material part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
-    /// All of it.
+    /// The whole tangent.
     #[default]
     Whole,
     /// δF S, from the F on the left of P = F S.
@@ -30,7 +30,7 @@ pub enum Part {
     Material,
 }
 
-/// `x`, or its real part alone.
+/// `x` with its derivatives, or its real part alone.
 #[inline(always)]
 fn carried<T: Real>(x: T, carries: bool) -> T {
     if carries { x } else { T::lit(x.value()) }
@@ -53,8 +53,8 @@ pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) 
     g + h_n + g * h_n
 }
 
-/// V₀ F S F_nᵀ at ∇u = `g`: times ∇_n N_I it is the internal force on node I. With it det F, which the caller judges: where it is
-/// not positive, S is that of the body at rest. Only the F of `part` carry derivatives.
+/// V₀ F S F_nᵀ at ∇u = `g`; its product with ∇_n N_I is the internal force on node I. Also returns det F, which the caller must check.
+/// Where det F ≤ 0, S is that of the undeformed body. Only the F of `part` carry derivatives.
 #[inline(always)]
 pub(super) fn internal<L: Law, T: Real, const D: usize>(
     law: &L,
@@ -79,7 +79,7 @@ pub(super) enum Frozen<const D: usize> {
     General([[[[f64; D]; D]; D]; D]),
 }
 
-/// The law frozen at ∇u = `g`, a part of it alone if asked for, and det F as in [`internal`].
+/// The law linearised at ∇u = `g`, whole or one `part`, and det F as in [`internal`].
 #[inline(always)]
 pub(super) fn freeze<L: Law, const D: usize>(
     law: &L,

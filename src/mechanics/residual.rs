@@ -13,7 +13,7 @@ use crate::tensor::Vector;
 
 pub use crate::mechanics::point::{Inadmissible, compose};
 
-/// Why tangents are not symmetric, if they are not.
+/// The reason why tangents are unsymmetric; `None` if they are symmetric.
 pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Option<&'static str> {
     if loads.surface.iter().any(|load| matches!(load.pressing, Pressing::Pressure(_))) {
         return Some("pressures that follow a surface make the tangent unsymmetric");
@@ -22,12 +22,12 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
     law.then_some("a law makes the tangent unsymmetric")
 }
 
-/// The equilibrium of one step: everything R(Δφ) needs besides Δφ. It cannot touch the particles.
+/// The equilibrium of one step: all data of R(Δφ) except Δφ. Evaluating R never changes the particles.
 ///
 /// R_I = Σ_J M̃_IJ a_J + Σ_p V₀ F S ∇N_I − Σ_p m b N_I − Σ_Γ T N_I A − R₀,  a = α₁ (Δφ − Δφ̂) = α₁ Δφ − α₂ v_n − α₃ a_n
 ///
-/// Where outer nodes follow inner ones ([`aggregation`](crate::aggregation)), all of this is Eᵀ R(E Δφ): values of outer nodes are not
-/// read, and their residual is zero.
+/// Where outer nodes follow inner nodes ([`aggregation`](crate::aggregation)), the residual is Eᵀ R(E Δφ). Values of outer nodes are not
+/// read, and the residual there is zero.
 ///
 /// ```
 /// use bfree::mechanics::{loads::{Curve, Gravity}, schemes::Newmark, sweep::Supports, transfer::Nodal};
@@ -35,7 +35,7 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
-/// // Dropped: what Δφ = β Δt² g makes of a = α₁ Δφ is g, and all forces are in balance.
+/// // Free fall: Δφ = β Δt² g gives a = α₁ Δφ = g, and all forces are in balance.
 /// let (newmark, dt, g) = (Newmark::default(), 0.05, Vector::from([0.0, -10.0]));
 /// simulation.loads.gravity = Some(Gravity { acceleration: g, curve: Curve::constant(1.0) });
 /// let particles = &simulation.particles;
@@ -46,35 +46,35 @@ pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Lo
 /// let residual = equilibrium.residual(&dphi)?;
 /// let largest = residual.iter().map(|r| r.norm()).fold(0.0, f64::max);
 /// assert!(largest < 1e-14 * equilibrium.magnitude(&dphi)?);
-/// // What a scene does not require is not there.
+/// // Terms that a scene does not need are absent.
 /// assert_eq!(equilibrium.terms.pieces().iter().map(|piece| piece.name).collect::<Vec<_>>(),
 ///     ["inertia", "stress", "geometric", "material", "body force"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Equilibrium<'a, const D: usize, L> {
-    /// What the terms were made from.
+    /// The data of the terms.
     pub step: Step<'a, D, L>,
     /// The terms.
     pub terms: Terms<'a, D, L>,
-    /// Degrees of freedom that are not solved for.
+    /// The prescribed degrees of freedom, which are not solved for.
     pub prescribed: &'a [PrescribedDof],
-    /// All that are.
+    /// The unknowns.
     pub(crate) unknowns: Unknowns<'a, D>,
-    /// Who may want the search for it to end.
+    /// A callback that can stop the solution.
     pub stop: Option<&'a Stop>,
 }
 
 impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
-    /// The terms that act in a step, on its free degrees of freedom.
+    /// The equilibrium of a step with these prescribed degrees of freedom.
     pub fn new(step: Step<'a, D, L>, prescribed: &'a [PrescribedDof]) -> Self {
         let unknowns = Unknowns::new(step.supports, prescribed);
         Self { step, terms: Terms::of(&step), prescribed, unknowns, stop: None }
     }
 
-    /// R(Δφ) at every active node; at prescribed degrees of freedom, the reaction.
+    /// R(Δφ) at every active node. At prescribed degrees of freedom, R is the reaction.
     ///
     /// # Errors
-    /// The particle with the smallest id where det F ≤ 0.
+    /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn residual<T: Number>(&self, dphi: &[Vector<T, D>]) -> Result<Vec<Vector<T, D>>, Inadmissible> {
         let mut out = vec![Vector::zeros(); dphi.len()];
         self.residual_into(dphi, &mut out)?;
@@ -89,10 +89,10 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         self.sum_into(|_, _| true, Part::Whole, Weights::Signed, dphi, out)
     }
 
-    /// One piece of R(Δφ) alone; only the occurrences of Δφ in it carry derivatives.
+    /// One piece of R(Δφ). Only the occurrences of Δφ in this piece carry derivatives.
     ///
     /// # Errors
-    /// As [`Self::residual`].
+    /// See [`Self::residual`].
     pub fn residual_of<T: Number>(
         &self,
         piece: Piece,
@@ -103,7 +103,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(out)
     }
 
-    /// The sum of the terms that `picked` takes: those at nodes, and those at particles in one pass.
+    /// The sum of the terms that `picked` selects: contributions at nodes, then contributions at particles in one pass.
     fn sum_into<T: Number>(
         &self,
         picked: impl Fn(&str, Role) -> bool,
@@ -119,7 +119,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
             self.terms.add_at_nodes(&picked, dphi, out);
         }
         let mut points = self.terms.at_points::<T>(&picked, part, dphi);
-        // Of values the magnitudes are those at the nodes.
+        // Terms that use values alone add their magnitudes at the nodes.
         points.retain(|(flow, _)| !magnitude || flow.gradient);
         let (flows, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         if let Some(flow) = flows.into_iter().reduce(Flow::and) {
@@ -140,17 +140,17 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(())
     }
 
-    /// The forces of loads on the nodes, at Δφ.
+    /// The external nodal forces at Δφ.
     ///
     /// # Errors
-    /// As [`Self::residual`].
+    /// See [`Self::residual`].
     pub fn external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.forces(Role::Loads, dphi)?;
         force.iter_mut().for_each(|force| *force = -*force);
         Ok(force)
     }
 
-    /// The same on the free degrees of freedom alone.
+    /// The external nodal forces at Δφ, zero at prescribed degrees of freedom.
     pub(crate) fn free_external_force(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
         let mut force = self.external_force(dphi)?;
         self.clear_prescribed(&mut force);
@@ -164,18 +164,19 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(force)
     }
 
-    /// Norm of the vector of the sums of the magnitudes of all contributions to the free entries of R: what round-off is relative to.
+    /// The size that round-off of R is relative to: in each free entry of R the magnitudes of all contributions are summed. Returns the
+    /// norm of these sums.
     ///
     /// # Errors
-    /// As [`Self::residual`].
+    /// See [`Self::residual`].
     pub fn magnitude(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         Ok(self.free_norm(self.magnitudes(dphi)?))
     }
 
-    /// The same with what rounding Δφ and F_n changes.
+    /// The round-off bound: like [`Self::magnitude`], plus the change of R when Δφ and F_n are rounded.
     ///
     /// # Errors
-    /// As [`Self::residual`].
+    /// See [`Self::residual`].
     pub fn sensitivity(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let mut out = self.magnitudes(dphi)?;
         self.terms.add_sensitivity(&self.unknowns.extended(dphi), &mut out)?;
@@ -195,7 +196,8 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(out)
     }
 
-    /// The incremental potential Π(Δφ) whose gradient is R, and the sum of the magnitudes of its contributions; `None` if a term has none.
+    /// The incremental potential Π(Δφ) whose gradient is R, and the sum of the magnitudes of its contributions; `None` if a term has no
+    /// potential.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -219,7 +221,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::residual`].
+    /// See [`Self::residual`].
     pub fn potential<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
         self.terms.energy(&self.unknowns.extended(dphi))
     }

@@ -1,4 +1,5 @@
-//! Rigid motions that nothing holds. With inertia they are motions like others; without it, a load along one has no equilibrium.
+//! Rigid-body modes that no prescribed motion suppresses. With inertia they are ordinary motions. Without inertia, a load that works on
+//! such a mode has no equilibrium.
 
 use crate::grid::Grid;
 use crate::material::Law;
@@ -8,16 +9,16 @@ use crate::tensor::Vector;
 use nalgebra::{DMatrix, DVector};
 use std::fmt::{Display, Formatter};
 
-/// A motion counts as free if the prescribed degrees of freedom see less than this part of it, as loaded if so much of the loads
-/// acts along it.
+/// Relative tolerance. A mode is free if the prescribed degrees of freedom see less than this part of it. A mode is loaded if more than
+/// this part of the loads works on it.
 const NOTHING: f64 = 1e-9;
 
-/// Bodies that the loads push along a rigid motion which no prescribed degree of freedom holds.
+/// Bodies with a loaded rigid-body mode that no prescribed degree of freedom suppresses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loose {
-    /// Names of the bodies; several if they touch.
+    /// Names of the bodies; several if the bodies touch.
     pub bodies: Vec<String>,
-    /// The axis along which they are pushed; `None` if they are turned.
+    /// The axis of a loaded translation; `None` if the loads turn the bodies.
     pub axis: Option<usize>,
 }
 
@@ -33,12 +34,12 @@ impl Display for Loose {
     }
 }
 
-/// The first group of bodies that touch (share nodes) which is loose.
+/// The first group of touching bodies (bodies that share nodes) with a free and loaded rigid-body mode.
 ///
 /// ```
 /// use bfree::mechanics::{rigid::loose, sweep::Supports};
 ///
-/// // A column that stands on the floor of its box, and the same without the floor.
+/// // A column that stands on the floor of its box, and the same column without the floor.
 /// let scene = bfree::scene::read_file("scenes/column_static.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let found = |of: &bfree::simulation::Simulation<2>| -> Result<_, Box<dyn std::error::Error>> {
@@ -80,7 +81,7 @@ pub fn loose<const D: usize, L: Law>(
     None
 }
 
-/// Of each node, the least node that particles connect it with.
+/// For each node, the smallest node that particles connect it with.
 fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: usize) -> Vec<usize> {
     fn root(parent: &mut [usize], mut node: usize) -> usize {
         while parent[node] != node {
@@ -102,7 +103,7 @@ fn groups<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, count: us
     (0..count).map(|node| root(&mut parent, node)).collect()
 }
 
-/// The rigid motions as fields at x: translations, then rotations about `centre` in units of `size`.
+/// The rigid-body modes at x: translations, then rotations about `centre` in units of `size`.
 fn rigid_motions<const D: usize>(x: &Vector<f64, D>, centre: &Vector<f64, D>, size: f64) -> Vec<Vector<f64, D>> {
     let arm = (x - centre) / size;
     let axes = (0..D).map(|k| Vector::from_fn(|i, _| f64::from(i == k)));
@@ -117,8 +118,8 @@ fn rigid_motions<const D: usize>(x: &Vector<f64, D>, centre: &Vector<f64, D>, si
     axes.chain(turns).collect()
 }
 
-/// Whether a rigid motion of the nodes `members` that the degrees of freedom `held` leave free is loaded; if it is a translation,
-/// along which axis.
+/// The loaded rigid-body mode of the nodes `members` that the degrees of freedom `held` leave free; `None` if there is none. `Some(axis)`
+/// is a translation, `Some(None)` any other mode.
 fn pushed<const D: usize>(
     positions: &[Vector<f64, D>],
     members: &[usize],
@@ -129,7 +130,7 @@ fn pushed<const D: usize>(
     let size = members.iter().map(|&node| (positions[node] - centre).norm()).fold(f64::MIN_POSITIVE, f64::max);
     let motions = |node: usize| rigid_motions(&positions[node], &centre, size);
     let count = D * (D + 1) / 2;
-    // G = Σ m mᵀ over the held degrees of freedom, m being the rigid motions there: what is held of a motion q is q·Gq.
+    // G = Σ m mᵀ over the held degrees of freedom, with m the rigid-body modes there. q·Gq is the held part of a mode q.
     let mut gram = DMatrix::<f64>::zeros(count, count);
     for (node, component) in held {
         let seen = DVector::from_iterator(count, motions(node).iter().map(|motion| motion[component]));
@@ -144,7 +145,7 @@ fn pushed<const D: usize>(
         most += force[node].norm();
     }
     let loaded = |work: f64| work.abs() > NOTHING * most;
-    // What is held is held along an axis: a translation is free along one, or not at all.
+    // Components are held along axes. A free translation is therefore along an axis.
     if let Some(axis) = (0..D).find(|&k| gram[(k, k)] == 0.0 && loaded(work[k])) {
         return Some(Some(axis));
     }
@@ -169,15 +170,15 @@ mod tests {
     #[test]
     fn a_square_is_loose_only_where_it_is_pushed() {
         let floor = [(0, 1), (1, 1)];
-        // On a smooth floor it stands, slides when pushed sideways, and stands again against a wall.
+        // On a smooth floor the square stands, slides when pushed sideways, and stands again against a wall.
         assert_eq!(square(&floor, 3, [0.0, -1.0]), None);
         assert_eq!(square(&floor, 3, [1.0, 0.0]), Some(Some(0)));
         assert_eq!(square(&[(0, 0), (0, 1), (1, 1)], 3, [1.0, 0.0]), None);
-        // On a hinge it turns, unless the load points at the hinge.
+        // On a hinge the square turns, unless the load points at the hinge.
         let hinge = [(0, 0), (0, 1)];
         assert_eq!(square(&hinge, 1, [0.0, -1.0]), Some(None));
         assert_eq!(square(&hinge, 3, [1.0, 1.0]), None);
-        // Held by nothing.
+        // Nothing holds the square.
         assert_eq!(square(&[], 2, [0.0, -2.0]), Some(Some(1)));
         assert_eq!(square(&[], 2, [0.0, 0.0]), None);
     }

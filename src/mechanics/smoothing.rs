@@ -1,40 +1,40 @@
-//! Smoothing of the particles' velocity and acceleration by what the nodes can represent: from FLIP to PIC and FMPM(k).
+//! Smoothing of the particles' velocity and acceleration towards the nodal fields: from FLIP to PIC and FMPM(k).
 //!
-//! The increments of eqs. 50 and 51 (FLIP) keep whatever the particles carry and the nodes do not see. The other extreme
-//! gives every particle its nodes' velocity (PIC); FMPM(k) does so with a better approximation of the projection
-//! (Hammerquist and Nairn 2017, Nairn and Hammerquist 2021). Here the particles move towards it at a rate κ, so that what is
-//! smoothed away in a given time does not depend on Δt.
+//! The increments of eqs. 50 and 51 (FLIP) keep all particle modes, also those that the nodes cannot represent. The other extreme, PIC,
+//! gives every particle the interpolated nodal velocity. FMPM(k) does so with a better approximation of the projection (Hammerquist and
+//! Nairn 2017, Nairn and Hammerquist 2021). Here the particle fields relax towards the nodal fields at a rate κ. The smoothing in a given
+//! time then does not depend on Δt.
 //!
-//! What is smoothed of low order everywhere widens fronts, what is smoothed of high order lets them ring. So the limited kind takes
-//! a high order everywhere, and the first order only at nodes where the velocity has a kink or an extremum, as Jameson, Schmidt and
-//! Turkel (1981) do with differences of second and fourth order in gas dynamics.
+//! Smoothing of low order everywhere widens fronts; smoothing of high order lets fronts ring. [`Smoothing::limited`] therefore smooths with
+//! high order everywhere, and with first order only at nodes where the velocity has a kink or an extremum. Jameson, Schmidt and Turkel
+//! (1981) do so in gas dynamics, with differences of second and fourth order.
 
 use crate::mechanics::sweep::Supports;
 use crate::particles::Particles;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
-/// κ₁ of [`Smoothing::limited`], in κ.
+/// κ₁/κ of [`Smoothing::limited`].
 const AT_KINKS: f64 = 5.0;
 
-/// q from which a node counts as a kink, and the power of q below. For a function linear around the node q is 0, at the vertex of a
-/// parabola 2, on the flank of a front much less than ½.
+/// A node counts as a full kink from this q on. Below, its weight falls with the power `SHARPNESS` of q. q is 0 for a function that is
+/// linear around the node, 2 at the vertex of a parabola, and far below ½ on the flank of a front.
 const KINK: f64 = 0.5;
 const SHARPNESS: i32 = 3;
 
-/// Variances less than this part of the mean square velocity are not told from round-off.
+/// Variances below this part of the mean square velocity count as round-off.
 const ROUND_OFF: f64 = 1e-12;
 
-/// How the fields of the particles follow those of the nodes:
+/// The relaxation of a particle field u_p towards the nodal field:
 ///
 /// u_p ← u_p − θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I),  θ = 1 − exp(−κΔt),
 /// w = Σ_{j<k} (I − M_L⁻¹M)^j ū,  ū = M_L⁻¹ Σ_p N m u_p.
 ///
-/// For k = 1 the first term acts like a viscosity of the size κ h²; the more, the wider the shape functions; for k = 2 like one on
-/// fourth derivatives. For k → ∞, w is the projection with the consistent mass, and only what the nodes cannot represent is removed.
+/// For k = 1 the first term acts like a viscosity of the size κ h², larger for wider shape functions; for k = 2 like one on fourth
+/// derivatives. For k → ∞, w is the projection with the consistent mass, and only modes that the nodes cannot represent are removed.
 ///
-/// The second term is the first of order 1 with a rate of its own at each node, θ_I = 1 − exp(−κ₁ min(1, (2 q_I)³) Δt), where q
-/// compares the curvature of the velocity with its slope:
+/// The second term has the order k = 1, and a rate of its own at each node, θ_I = 1 − exp(−κ₁ min(1, (2 q_I)³) Δt). The number q compares
+/// the curvature of the velocity with its slope:
 /// q_I = |v̄_I − v̿_I|² / σ_I²,  v̿ = M_L⁻¹ M v̄,  σ_I² = Σ_p m N_I |v_p − v̄_I|² / m_I.
 ///
 /// ```
@@ -44,7 +44,7 @@ const ROUND_OFF: f64 = 1e-12;
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
 /// let particles = &mut simulation.particles;
-/// particles.velocity = direction(particles.len(), 1); // full of what nodes cannot see
+/// particles.velocity = direction(particles.len(), 1); // full of modes that nodes cannot represent
 /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// let mass = Nodal::at_rest(particles, &supports).mass;
 ///
@@ -65,17 +65,17 @@ pub struct Smoothing {
     pub order: u32,
     /// κ ≥ 0, per unit of time; infinite for PIC and FMPM(k) proper.
     pub rate: f64,
-    /// κ₁ ≥ 0, per unit of time: the most that is added where the velocity has a kink or an extremum.
+    /// κ₁ ≥ 0, per unit of time: upper bound of the additional rate at kinks and extrema of the velocity.
     pub at_kinks: f64,
 }
 
 impl Smoothing {
-    /// Of order `order` at the rate `rate`, everywhere the same.
+    /// Uniform smoothing of order `order` at the rate `rate`.
     ///
     /// ```
     /// use bfree::mechanics::smoothing::Smoothing;
     ///
-    /// // The limited kind is this one, and more of it at kinks.
+    /// // Limited smoothing is uniform smoothing with an additional rate at kinks.
     /// assert_eq!(Smoothing { at_kinks: 0.0, ..Smoothing::limited(8.0) }, Smoothing::uniform(2, 8.0));
     /// ```
     pub const fn uniform(order: u32, rate: f64) -> Self {
@@ -92,20 +92,20 @@ impl Smoothing {
     /// ```
     /// use bfree::mechanics::smoothing::Smoothing;
     ///
-    /// // Two steps of half the length leave what one leaves: (1 − θ(Δt/2))² = 1 − θ(Δt).
+    /// // Two steps of half the length smooth as much as one step: (1 − θ(Δt/2))² = 1 − θ(Δt).
     /// let smoothing = Smoothing::uniform(2, 8.0);
     /// let left = |dt| 1.0 - smoothing.share(dt);
     /// assert!((left(0.05) * left(0.05) - left(0.1)).abs() < 1e-15);
-    /// // PIC proper: all of it, however short the step.
+    /// // PIC proper has θ = 1, however short the step.
     /// assert_eq!(Smoothing::uniform(1, f64::INFINITY).share(1e-9), 1.0);
     /// ```
     pub fn share(&self, dt: f64) -> f64 {
         -(-self.rate * dt).exp_m1()
     }
 
-    /// θ_I at the active nodes, of which `mass` is M_L; `None` without κ₁.
+    /// θ_I at the active nodes; `None` if κ₁ = 0. `mass` is M_L, the lumped mass of the nodes.
     ///
-    /// Neither a common velocity nor a rotation of the axes changes them, nor the units.
+    /// θ_I depends neither on the units nor on a common velocity or a rotation of the axes.
     pub fn shares_at_kinks<const D: usize>(
         &self,
         particles: &Particles<D>,
@@ -116,7 +116,7 @@ impl Smoothing {
         if self.at_kinks == 0.0 {
             return None;
         }
-        // Seen from the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
+        // In the frame of the centre of mass, the variance ⟨v²⟩ − v̄² loses the fewest digits.
         let frame = particles.momentum() / particles.mass.iter().sum::<f64>();
         let velocity = supports.pool().collect(particles.velocity.iter().map(|v| v - frame));
         let mean = nodal_mean(particles, supports, mass, &velocity);
@@ -129,16 +129,16 @@ impl Smoothing {
             let variance = (square[0] - v.norm_squared()).max(0.0) + ROUND_OFF * square[0];
             let q = if variance > 0.0 { (v - v_twice).norm_squared() / variance } else { 0.0 };
             let kink = (q / KINK).powi(SHARPNESS).min(1.0);
-            // Without a kink 0, for an infinite rate too.
+            // The share is zero without a kink, also for an infinite rate.
             if kink > 0.0 { -(-self.at_kinks * kink * dt).exp_m1() } else { 0.0 }
         };
         Some(supports.pool().collect(mean.iter().zip(&mean_of_mean).zip(&mean_square).map(share)))
     }
 
-    /// −θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I) for a field u of the particles; `mass` is M_L at the active nodes, `at_kinks` are
-    /// the [`Self::shares_at_kinks`].
+    /// −θ (u_p − Σ N w) − Σ N_I θ_I (u_p − ū_I) for a particle field u. `mass` is M_L at the active nodes, `at_kinks` is from
+    /// [`Self::shares_at_kinks`].
     ///
-    /// It conserves Σ m u, because 1ᵀ(M_L − M) = 0 and Σ_p m N_I (u_p − ū_I) = 0; and Σ m u² never grows.
+    /// The change conserves Σ m u, because 1ᵀ(M_L − M) = 0 and Σ_p m N_I (u_p − ū_I) = 0. Σ m u² never grows.
     pub fn change<const D: usize>(
         &self,
         particles: &Particles<D>,
@@ -176,7 +176,7 @@ fn nodal_mean<const C: usize, const D: usize>(
     let mut out: Pooled<Vector<f64, C>> = supports.field();
     supports.spread(&mut out, |p| field[p] * particles.mass[p]);
     for (w, &m) in out.iter_mut().zip(mass) {
-        // A node without mass weighs nothing in what follows either.
+        // A node without mass has no weight in later sums either.
         *w = if m > 0.0 { *w / m } else { Vector::zeros() };
     }
     out

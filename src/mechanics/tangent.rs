@@ -1,4 +1,4 @@
-//! The consistent tangent K(Δφ)·u, matrix-free: the terms frozen at Δφ, applied, never stored (eqs. 30, 34, 38).
+//! The consistent tangent K(Δφ)·u, matrix-free: the terms are linearised at Δφ and applied, and K is never assembled (eqs. 30, 34, 38).
 
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
@@ -13,7 +13,7 @@ use crate::solver::{
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
-/// K(Δφ), frozen: an operator in double or, divided by a power of two, in single precision.
+/// The linearisation K(Δφ): an operator in double precision or, divided by a power of two, in single precision.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -37,7 +37,7 @@ use num_dual::Dual64;
 /// let (u, w) = (direction(nodes.len(), 2), direction(nodes.len(), 3));
 /// let (ku, kw) = (times(&u), times(&w));
 /// assert!((dot(&w, &ku) - dot(&u, &kw)).abs() < 1e-13 * (dot(&ku, &ku) * dot(&w, &w)).sqrt());
-/// // K_II is what node I feels of its own motion.
+/// // K_II is the force on node I under its own motion.
 /// let mut unit = vec![Vector::zeros(); nodes.len()];
 /// unit[30] = Vector::from([1.0, 0.0]);
 /// let column = tangent.diagonal_blocks()[30].column(0).into_owned();
@@ -53,7 +53,7 @@ pub struct Tangent<'a, const D: usize, X = f64> {
 }
 
 impl<X: Laned, const D: usize> Tangent<'_, D, X> {
-    /// K u, over the scale, on the free degrees of freedom (u is taken as zero on the prescribed ones).
+    /// K u over the scale, on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
     pub fn product(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
         out.fill(Vector::zeros());
         let extended = self.unknowns.extended_in(self.supports, u);
@@ -71,7 +71,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         self.unknowns.clear_prescribed(out);
     }
 
-    /// K_II, over the scale, of every active node. A value that is prescribed, or follows others, has the identity's row and column.
+    /// K_II over the scale, of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let mut blocks: Pooled<Tensor<f64, D>> = self.supports.field();
         self.terms.iter().for_each(|term| term.add_blocks_at_nodes(&mut blocks));
@@ -88,7 +88,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         blocks
     }
 
-    /// Adds what following nodes change in the blocks of those that they follow.
+    /// Corrects the blocks of inner nodes for the outer nodes that follow them.
     fn add_followers(&self, quadratic: &dyn Fn(Group<'_>, &mut Quadratic), blocks: &mut [Tensor<f64, D>]) {
         if self.unknowns.followers.is_empty() {
             return;
@@ -112,25 +112,25 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
-    /// Freezes the tangent at Δφ.
+    /// Linearises the residual at Δφ.
     ///
     /// Example: [`Tangent`].
     ///
     /// # Errors
-    /// The particle with the smallest id where det F ≤ 0.
+    /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
         self.frozen(None, dphi, Unit::ONE)
     }
 
-    /// Freezes one piece of the tangent alone.
+    /// Linearises one piece of the residual at Δφ.
     ///
     /// # Errors
-    /// As [`Self::tangent`].
+    /// See [`Self::tangent`].
     pub fn tangent_of(&self, piece: Piece, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
         self.frozen(Some(piece), dphi, Unit::ONE)
     }
 
-    /// Freezes the tangent, or one piece of it, at Δφ in single precision; `None` if the supports are not prepared for it.
+    /// Linearises the residual, or one piece, at Δφ in single precision; `None` if `Supports` is not prepared for single precision.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -158,7 +158,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::tangent`].
+    /// See [`Self::tangent`].
     pub fn single_tangent(
         &self,
         piece: Option<Piece>,
@@ -179,7 +179,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms, unit })
     }
 
-    /// A power of two near the largest entries of K: those of a particle at rest, and of the inertia.
+    /// A power of two near the largest entries of K, estimated from the stiffness of the undeformed bodies and the inertia.
     fn size(&self, h: f64) -> f64 {
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |largest: f64, x| largest.max(*x));
         let moduli: Vec<f64> = (0..self.step.bodies.len()).map(|body| self.step.modulus(body)).collect();
@@ -188,7 +188,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         if size > 0.0 && size.is_finite() { size.log2().round().exp2() } else { 1.0 }
     }
 
-    /// A piece of K u by dual numbers: the derivative of that piece of the residual, through the same sweep.
+    /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -212,7 +212,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::tangent`].
+    /// See [`Self::tangent`].
     pub fn derivative(
         &self,
         piece: Piece,
@@ -224,7 +224,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     }
 }
 
-/// Bytes of the frozen tangent of all particles.
+/// Bytes of the linearised tangent of all particles.
 ///
 /// ```
 /// use bfree::mechanics::{sweep::Supports, tangent::frozen_bytes};

@@ -1,4 +1,4 @@
-//! Which nodal values are unknowns: those that are neither prescribed nor follow others.
+//! The unknowns: nodal values that are neither prescribed nor follow inner nodes.
 
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::grid::indices;
@@ -11,11 +11,11 @@ use crate::tensor::{Tensor, Vector, identity};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The greatest length of a particle's domain, in cells: the domain of a particle that is drawn out further is not known to be filled.
+/// Upper bound of the length of a particle's domain, in cells. Material need not fill the domain of a particle that is stretched further.
 const LONGEST: f64 = 2.0;
 
-/// The extension E of the bodies in a grid, by the volume that particles have now. A particle fills the cells that its domain overlaps, so
-/// that the share of a cell changes gradually as particles move into it. Cells in which no particle lies count as empty.
+/// The extension E of the bodies in a grid, from the present volumes of the particles. A particle fills the cells that its domain overlaps.
+/// The filled share of a cell thus changes gradually as particles move into the cell. A cell that holds no particle counts as empty.
 pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
     let grid = supports.grid();
     let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
@@ -23,7 +23,7 @@ pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>
     let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
     let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
     for p in solid() {
-        // The domain is a box. At rest it is a cube of the particle's volume; its edge along axis k grows with |row k of F|.
+        // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
         let f = identity::<f64, D>() + particles.displacement_gradient[p];
         let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
         let length = |k: usize| (side * f.row(k).norm()).min(LONGEST);
@@ -44,20 +44,21 @@ pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>
     Extension::new(pieces, &Occupied { dimension: D, grid: padded(grid.cells), nodes: &nodes, cells })
 }
 
-/// An index of three axes.
+/// The index with zeros for axes that do not exist.
 pub(crate) fn padded<const D: usize>(index: [u32; D]) -> [u32; 3] {
     std::array::from_fn(|k| index.get(k).copied().unwrap_or(0))
 }
 
-/// The unknowns among the nodal values of a step. Fields have an entry for every active node. Entries that are no unknowns mean nothing
-/// where a field is read, and are zero in forces.
+/// The unknowns among the nodal values of a step. Fields have an entry for every active node. Entries that are no unknowns have no meaning
+/// in a field that is read, and are zero in forces.
 #[derive(Clone, Debug)]
 pub(crate) struct Unknowns<'a, const D: usize> {
     pub prescribed: &'a [PrescribedDof],
     pub followers: Followers<D>,
 }
 
-/// The function with which an unknown of a node acts at a particle, for each component: N and ∇N of the node, and of those that follow it.
+/// The effective shape function of a node at a particle, for each component: N and ∇N of the node, plus the weighted N and ∇N of its outer
+/// nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Function<const D: usize> {
     pub value: [f64; D],
@@ -88,7 +89,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         field
     }
 
-    /// E û in memory of a pool; `None` where every node is an unknown.
+    /// E û in pooled memory; `None` if no node follows others.
     pub fn extended_in<T: Real>(&self, supports: &Supports<D>, field: &[Vector<T, D>]) -> Option<Pooled<Vector<T, D>>>
     where
         Vector<T, D>: Element,
@@ -100,21 +101,21 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         })
     }
 
-    /// Sets what is prescribed to zero.
+    /// Sets the prescribed entries to zero.
     pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
         for dof in self.prescribed {
             field[dof.node][dof.component] = T::zero();
         }
     }
 
-    /// Which values are prescribed, node after node.
+    /// The mask of prescribed values, node by node.
     pub fn prescribed_mask(&self, nodes: usize) -> Vec<bool> {
         let mut mask = vec![false; D * nodes];
         self.prescribed.iter().for_each(|dof| mask[dof.node * D + dof.component] = true);
         mask
     }
 
-    /// Which values follow others, node after node.
+    /// The mask of values that follow inner nodes, node by node.
     pub fn following_mask(&self, nodes: usize) -> Vec<bool> {
         let mut mask = vec![false; D * nodes];
         for (outer, follows, _) in self.followers.rows() {
@@ -123,7 +124,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         mask
     }
 
-    /// The functions of all nodes that act at a particle.
+    /// The effective shape functions at a particle, with their nodes.
     pub fn functions(&self, supports: &Supports<D>, particle: usize) -> Vec<(usize, Function<D>)> {
         let mut all: Vec<_> =
             supports.of(particle).map(|(node, n, grad_n)| (node, Function::of_all(n, grad_n))).collect();
@@ -145,7 +146,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         all
     }
 
-    /// Eᵀ B E of blocks B that nodes have for themselves, on the diagonal.
+    /// The diagonal blocks of Eᵀ B E, for a block-diagonal B.
     pub fn restrict_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
         for (outer, follows, leaders) in self.followers.rows() {
             let own = blocks[outer];
@@ -155,7 +156,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         }
     }
 
-    /// Whether each particle is reached by a node that follows.
+    /// For each particle, whether an outer node supports it.
     pub fn reached(&self, supports: &Supports<D>) -> Vec<bool> {
         let mut outer: Pooled<Vector<f64, D>> = supports.field();
         self.followers.rows().for_each(|(node, ..)| outer[node].fill(1.0));
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         reached
     }
 
-    /// Adds what following nodes change in the diagonal blocks of a quadratic form at one particle.
+    /// Corrects the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.
     pub fn add_followers(
         &self,
         supports: &Supports<D>,
@@ -185,8 +186,8 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         }
     }
 
-    /// The identity's row and column at values that are no unknowns; and nothing beside the diagonal where followers of a node have other
-    /// functions for each component.
+    /// Sets the row and column of each value that is no unknown to those of the identity. Clears the off-diagonal entries of
+    /// [`Self::uncoupled`] nodes.
     pub fn finish_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
         for node in self.uncoupled() {
             blocks[node] = Tensor::from_diagonal(&blocks[node].diagonal());
@@ -204,7 +205,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
         }
     }
 
-    /// The nodes whose components have different functions.
+    /// The nodes whose effective shape functions differ between components.
     pub fn uncoupled(&self) -> BTreeSet<usize> {
         let apart = |follows: &[bool; D]| follows.iter().any(|one| *one != follows[0]);
         let rows = self.followers.rows().filter(|(_, follows, _)| apart(follows));

@@ -1,27 +1,27 @@
-//! Bodies that share nodes: since when, until when, how far apart, and whether they are pulled apart.
+//! Contact of bodies that share nodes: its beginning and end, the gap, and whether the bodies are pulled apart.
 
 use crate::simulation::Sharing;
 use serde::{Deserialize, Serialize};
 
-/// Bodies that met during the run, and whose gap has grown by so much since (in spacings), are pulled apart.
+/// Growth of the gap (in grid spacings) beyond which bodies that met during the run are pulled apart.
 const OPENED: f64 = 0.1;
 
-/// Two bodies that share nodes, or did.
+/// Two bodies that share nodes, or have shared nodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// Their names.
+    /// Names of the bodies.
     pub bodies: [String; 2],
-    /// The time since when they share nodes; that of the start, if they did in the first step.
+    /// Time since when the bodies share nodes: the start of the run, if the bodies share nodes in the first step.
     pub since: f64,
-    /// Whether they share nodes since the start of the run.
+    /// Whether the bodies share nodes since the start of the run.
     pub from_start: bool,
-    /// The time since when they share none any more; `None` while they do.
+    /// Time since when the bodies no longer share nodes; `None` while they share nodes.
     pub until: Option<f64>,
-    /// The distance of their surfaces where they are nearest, in grid spacings: when they began to share nodes, and in the last step in which
-    /// they did; below zero where they overlap. `None` from four spacings on.
+    /// Smallest distance between the surfaces, in grid spacings: when the bodies began to share nodes, and in the last step with shared
+    /// nodes. An overlap is negative. `None` from four spacings on.
     pub gap: [Option<f64>; 2],
-    /// The time at which they were pulled apart for the first time, and did not separate.
+    /// Time at which the bodies were first pulled apart but did not separate.
     pub pulled_apart: Option<f64>,
 }
 
@@ -31,13 +31,13 @@ pub struct Contact {
 pub(crate) struct Contacts(Vec<Contact>);
 
 impl Contacts {
-    /// All so far.
+    /// All contacts so far.
     pub fn all(&self) -> &[Contact] {
         &self.0
     }
 
-    /// Takes note of a step that ended at `time`, the first of the run or a later one; a sentence for each two bodies that are pulled apart
-    /// now for the first time.
+    /// Records a step that ended at `time`; `first` marks the first step of the run. Returns a sentence for each pair of bodies that is now
+    /// pulled apart for the first time.
     pub fn see(&mut self, time: f64, dt: f64, first: bool, sharing: &[Sharing], names: &[&str]) -> Vec<String> {
         let named = |sharing: &Sharing| sharing.bodies.map(|body| names[body as usize].to_owned());
         for contact in self.0.iter_mut().filter(|contact| contact.until.is_none()) {
@@ -67,7 +67,8 @@ impl Contacts {
 }
 
 impl Contact {
-    /// Whether a step pulls them apart: against a tension, if they share nodes since the start; or beyond the gap at which they met.
+    /// Whether a step pulls the bodies apart. Bodies that share nodes since the start are pulled apart by a tension. Bodies that met later
+    /// are pulled apart if the gap exceeds the gap at their meeting by [`OPENED`].
     fn is_pulled(&self, now: &Sharing) -> bool {
         let opened = self.gap[0].zip(now.gap).is_some_and(|(met, gap)| gap > met + OPENED);
         if self.from_start { now.tension.is_some() } else { opened }
@@ -131,7 +132,7 @@ mod tests {
         assert!(contacts.see(0.8, 0.1, false, &[], &names).is_empty());
         let [contact] = contacts.all() else { panic!("one: {contacts:?}") };
         assert_eq!((contact.until, contact.pulled_apart, contact.gap), (Some(0.8), Some(0.6), [Some(1.5), Some(1.9)]));
-        // Since the start, a tension suffices.
+        // For bodies in contact since the start, a tension suffices.
         let mut bonded = Contacts::default();
         assert!(bonded.see(0.1, 0.1, true, &sharing(0.0, None), &names).is_empty());
         let said = bonded.see(0.2, 0.1, false, &sharing(0.01, Some(2.0)), &names);

@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Table(pub(crate) Stream);
 
 impl Table {
-    /// Creates the file and writes the header; or continues one whose first `kept` bytes are good.
+    /// Creates the file and writes the header, or continues a file after its first `kept` bytes.
     ///
     /// # Errors
-    /// The system refuses, two columns have the same name, or the file to be continued has others.
+    /// The operating system refuses, two columns have the same name, or the file to be continued has other columns.
     pub(crate) fn open(path: PathBuf, columns: &[String], kept: Option<Written>) -> Result<Self, OutputError> {
         let mut seen = HashSet::new();
         if let Some(column) = columns.iter().find(|&column| !seen.insert(column)) {
@@ -46,7 +46,7 @@ fn first_line(path: &Path) -> std::io::Result<String> {
     Ok(line.trim_end().to_owned())
 }
 
-/// A name as a cell: in quotes if it holds what would break the row (RFC 4180).
+/// A name as a cell. A name that would break the row stands in quotes (RFC 4180).
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }
@@ -56,7 +56,7 @@ fn quoted(name: &str) -> String {
 pub(crate) struct Row(String);
 
 impl Row {
-    /// Appends a cell; a float gets the fewest digits that read back as the same bits (NaN and inf are written as such).
+    /// Appends a cell. A float gets the fewest digits that read back as the same bits. NaN and infinities are written as `NaN` and `inf`.
     pub(crate) fn push(&mut self, cell: impl std::fmt::Debug) {
         if !self.0.is_empty() {
             self.0.push(',');

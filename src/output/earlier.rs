@@ -1,4 +1,4 @@
-//! What an earlier run has left in the directory of this one, and what somebody else has.
+//! Files of an earlier run, or of somebody else, in the directory of a run.
 
 use super::files::TEMPORARY;
 use super::plot::is_picture;
@@ -20,7 +20,7 @@ fn is_output(name: &str) -> bool {
     FILES.contains(&name) || SnapshotMark::default().precedes(name) || is_picture(name)
 }
 
-/// A file that a run would replace, in a directory where no run of this program has been: none has left its history or its report.
+/// A file that a run would replace, in a directory without a history or report of this program.
 ///
 /// ```
 /// use bfree::output::foreign;
@@ -31,7 +31,7 @@ fn is_output(name: &str) -> bool {
 /// assert_eq!(foreign(folder.path()), None);
 /// std::fs::write(&picture, "mine")?;
 /// assert_eq!(foreign(folder.path()), Some(picture));
-/// // What a run has left beside its history may go with it.
+/// // A picture beside the history of a run may be replaced.
 /// std::fs::write(&history, "step,time,dt,kinetic\n")?;
 /// assert_eq!(foreign(folder.path()), None);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -39,7 +39,7 @@ fn is_output(name: &str) -> bool {
 pub fn foreign(directory: &Path) -> Option<PathBuf> {
     let mut start = Vec::new();
     let begin = File::open(directory.join(HISTORY)).and_then(|file| file.take(10).read_to_end(&mut start));
-    // Of a run that died at once, the history has no line.
+    // The history of a run that died at once has no line.
     if report(directory).is_some() || (begin.is_ok() && b"step,time,".starts_with(&start)) {
         return None;
     }
@@ -49,7 +49,7 @@ pub fn foreign(directory: &Path) -> Option<PathBuf> {
     names.iter().find(|name| name.to_str().is_some_and(is_output)).map(|name| directory.join(name))
 }
 
-/// The report of a run of this program.
+/// The report in `directory`, if this program wrote it.
 fn report(directory: &Path) -> Option<Value> {
     let report: Value = serde_json::from_slice(&std::fs::read(directory.join("report.json")).ok()?).ok()?;
     report["program"].as_str().is_some_and(|program| program.starts_with("bfree ")).then_some(report)
@@ -58,15 +58,15 @@ fn report(directory: &Path) -> Option<Value> {
 /// The results of an earlier run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
-    /// Steps that it took.
+    /// Steps taken.
     pub steps: u64,
-    /// Time that it reached.
+    /// Time reached.
     pub time: f64,
-    /// How it ended, in a word: `finished`, `interrupted` or `failed`. A run that was killed, or whose disk was full, says nothing.
+    /// Outcome: `finished`, `interrupted` or `failed`. `None` if the run was killed, or its disk was full.
     pub outcome: Option<String>,
 }
 
-/// The results in a directory that a new run there would replace. A run without a step has none, unless it ended as asked.
+/// The results in a directory that a new run there would replace. A run without a step has results only if it finished.
 ///
 /// ```
 /// use bfree::output::{Held, held};
@@ -91,7 +91,7 @@ pub fn held(directory: &Path) -> Option<Held> {
 
 /// Step and time in the last whole row of a history.
 fn last_row(history: &Path) -> Option<(u64, f64)> {
-    // A row is much shorter.
+    // Bytes that are read; a row is much shorter.
     const TAIL: u64 = 1 << 16;
     let mut file = File::open(history).ok()?;
     let length = file.metadata().ok()?.len();
@@ -104,8 +104,8 @@ fn last_row(history: &Path) -> Option<(u64, f64)> {
     Some((cells.next()?.parse().ok()?, cells.next()?.parse().ok()?))
 }
 
-/// Removes what an earlier run left under the names this one may use and will not continue from `mark`, so that no file of it is
-/// taken for a new one.
+/// Removes files of an earlier run that this run may write and does not continue from `mark`. Otherwise an old file could be taken for a
+/// new file.
 pub(super) fn remove_later_files(directory: &Path, mark: Option<&Mark>) -> Result<(), OutputError> {
     let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
     let continued = |name: &str| match name {

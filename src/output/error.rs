@@ -1,4 +1,4 @@
-//! What can go wrong while results are written.
+//! Errors while results are written.
 
 use crate::field::Field;
 use crate::material::NonPositiveJacobian;
@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 /// Results could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// The system refused.
+    /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
         /// The file or directory.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason given by the operating system.
         source: std::io::Error,
     },
     /// The report could not be put into JSON.
@@ -41,7 +41,7 @@ pub enum OutputError {
         /// Number of particles.
         particles: usize,
     },
-    /// A velocity or an acceleration of bodies without inertia.
+    /// A velocity or acceleration was asked for, but the bodies have no inertia.
     #[error("particles without inertia have no {}", .0.name())]
     Inertia(Field),
     /// A probe at a particle that does not exist.
@@ -54,7 +54,7 @@ pub enum OutputError {
         /// Number of particles.
         particles: usize,
     },
-    /// A probe at a point that is not a number, or with no particle near.
+    /// A probe has a point that is not finite, or a body without particles.
     #[error(
         "probe {name:?} at {point:?} has no nearest particle; its coordinates must be finite, and its body must have particles"
     )]
@@ -64,7 +64,7 @@ pub enum OutputError {
         /// The point asked for.
         point: Vec<f64>,
     },
-    /// Time between snapshots out of range.
+    /// The time between snapshots is out of range.
     #[error("the time between snapshots is {0:e}; it must be finite and > 0")]
     SnapshotEvery(f64),
     /// Two columns of one table would have the same name.
@@ -75,19 +75,19 @@ pub enum OutputError {
         /// The name.
         column: String,
     },
-    /// A table that was to be continued is another one.
+    /// A table to be continued has other columns.
     #[error("{} has other columns than this run, so it cannot be continued", path.display())]
     OtherColumns {
         /// The table.
         path: PathBuf,
     },
-    /// A file that was to be continued has lost something since.
+    /// A file to be continued has become shorter.
     #[error("{} ends before the place where it was to be continued", path.display())]
     Shorter {
         /// The file.
         path: PathBuf,
     },
-    /// A file that was to be continued holds something else.
+    /// A file to be continued has other content.
     #[error("{} is not what it was when the checkpoint was written", path.display())]
     Changed {
         /// The file.
@@ -104,7 +104,7 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// For `map_err` on an input or output operation.
+    /// Converts an error of the operating system, for `map_err`.
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Io { action, path: path.to_owned(), source }
     }

@@ -28,8 +28,8 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// A particle that does not exist; a reference with another number of particles; a stress where det F ≤ 0; a velocity or
-    /// acceleration where there is no inertia.
+    /// The particle does not exist. The reference has another number of particles. A stress is asked for where det F ≤ 0. A velocity or
+    /// acceleration is asked for without inertia.
     pub fn append<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
@@ -43,7 +43,7 @@ impl Field {
         self.append_at(simulation, reference, place, out)
     }
 
-    /// As [`Self::append`], at the particle that lies at a place in memory.
+    /// Appends the components at the particle with index `place` in memory, see [`Self::append`].
     fn append_at<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
@@ -117,7 +117,7 @@ impl Field {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::append`].
+    /// The errors of [`Self::append`].
     pub fn values<const D: usize, L: Law, A>(
         self,
         simulation: &Simulation<D, L, A>,
@@ -138,7 +138,7 @@ pub(crate) fn padded<const D: usize>(v: &Vector<f64, D>) -> [f64; 3] {
     std::array::from_fn(|i| if i < D { v[i] } else { 0.0 })
 }
 
-/// σ = P Fᵀ / J with P = F S (eq. 7), and the out-of-plane normal stress of plane or uniaxial strain on the rest of the diagonal.
+/// σ = P Fᵀ / J with P = F S (eq. 7). In plane or uniaxial strain, the rest of the diagonal is the out-of-plane normal stress.
 fn cauchy_stress<const D: usize, L: Law>(
     law: &L,
     start: &Start<'_>,
@@ -153,7 +153,7 @@ fn cauchy_stress<const D: usize, L: Law>(
     Ok(stress)
 }
 
-/// √(3/2 s:s), s being the deviator; from differences of the normal stresses, so that a pressure cancels exactly.
+/// Von Mises stress √(3/2 s:s) with the deviator s. Differences of the normal stresses make a pressure cancel exactly.
 fn von_mises(s: &Tensor<f64, 3>) -> f64 {
     let normal = (s[(0, 0)] - s[(1, 1)]).powi(2) + (s[(1, 1)] - s[(2, 2)]).powi(2) + (s[(2, 2)] - s[(0, 0)]).powi(2);
     let shear = s[(0, 1)].powi(2) + s[(1, 2)].powi(2) + s[(0, 2)].powi(2);

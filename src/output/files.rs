@@ -1,4 +1,4 @@
-//! Two ways to put a file on disk: all at once or not at all, and line by line as it grows.
+//! Two ways to write a file: all at once or not at all, and line by line as the file grows.
 
 use super::OutputError;
 use crc32fast::Hasher;
@@ -9,16 +9,16 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
-/// How the names of files that are being written begin; a killed run leaves them behind.
+/// Prefix of the names of temporary files, which a killed run leaves behind.
 pub(crate) const TEMPORARY: &str = ".bfree-";
 
-/// What a dying process may lose of a growing file.
+/// Time between flushes. A dying process loses the lines since the last flush.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Writes a file under a temporary name, then renames it: a reader, or a killed run, sees the old file or the new one.
+/// Writes a file under a temporary name, then renames it. Readers see the old file or the new file, even if the run is killed.
 ///
 /// # Errors
-/// The system refuses; the file is then as before.
+/// The operating system refuses. The file is then unchanged.
 pub(crate) fn write_atomically(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<NamedTempFile>) -> std::io::Result<()>,
@@ -26,7 +26,7 @@ pub(crate) fn write_atomically(
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY);
-    // Readable by others as far as the umask allows, like any other file; the library's default is the owner only.
+    // The umask decides who can read the file. By default the library lets only the owner read it.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let write = || -> std::io::Result<()> {
@@ -40,7 +40,7 @@ pub(crate) fn write_atomically(
     write().map_err(OutputError::io("write", path))
 }
 
-/// What a growing file held at one moment.
+/// Length and checksum of a growing file at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Written {
@@ -49,7 +49,7 @@ pub struct Written {
 }
 
 impl Written {
-    /// Whether the file at `path` begins with it.
+    /// Checks that the file at `path` begins with this content.
     pub(crate) fn check(&self, path: &Path) -> Result<(), OutputError> {
         let mut sum = Hasher::new();
         let read = || -> std::io::Result<u64> {
@@ -78,14 +78,14 @@ impl Written {
 pub(crate) struct Stream {
     path: PathBuf,
     writer: BufWriter<File>,
-    /// Of all bytes so far.
+    /// Checksum of all bytes so far.
     sum: Hasher,
     length: u64,
     flushed: Instant,
 }
 
 impl Stream {
-    /// Creates or empties the file; or, to continue it, keeps what is `kept`, which must be there.
+    /// Creates or empties the file. To continue a file, keeps its first `kept` bytes, which must be there.
     pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
         let Written { bytes: length, crc32 } = kept.unwrap_or(Written { bytes: 0, crc32: 0 });
         let sum = Hasher::new_with_initial_len(crc32, length);
@@ -100,7 +100,7 @@ impl Stream {
         Ok(Self { path, writer: BufWriter::new(file), sum, length, flushed: Instant::now() })
     }
 
-    /// Where it is.
+    /// Path of the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -114,13 +114,13 @@ impl Stream {
         if self.flushed.elapsed() >= FLUSH_INTERVAL { self.flush() } else { Ok(()) }
     }
 
-    /// Hands everything to the system.
+    /// Hands buffered lines to the operating system.
     pub(crate) fn flush(&mut self) -> Result<(), OutputError> {
         self.flushed = Instant::now();
         self.writer.flush().map_err(OutputError::io("write", &self.path))
     }
 
-    /// Puts everything on the disk; the name of the file, and what it holds.
+    /// Syncs the file to disk. Returns its name, length and checksum.
     pub(crate) fn mark(&mut self) -> Result<(String, Written), OutputError> {
         self.flush()?;
         self.writer.get_ref().sync_data().map_err(OutputError::io("write", &self.path))?;

@@ -8,7 +8,7 @@ use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
 use crate::simulation::Simulation;
 use std::path::PathBuf;
 
-/// The axes, as they end names of columns.
+/// Axis names at the ends of column names.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The energies of a simulation, in the user's unit (per unit of the missing dimensions).
@@ -22,18 +22,18 @@ pub struct Energies {
     pub external: f64,
     /// Kinetic and strain energy.
     pub total: f64,
-    /// What damping, flow and relaxation have taken since the start.
+    /// Energy dissipated since the start by damping, plastic flow and relaxation.
     pub dissipated: f64,
-    /// Of it, what flow and relaxation have.
+    /// The part of `dissipated` due to plastic flow and relaxation.
     pub by_laws: f64,
-    /// total₀, less what was dissipated and the work that was done before the reference was taken.
+    /// total₀ + dissipated₀ − external₀ when the reference was taken, see [`Reference::energy`].
     pub initial: f64,
-    /// total + dissipated − total₀ − external: what the time integration and the transfers have gained (> 0) or lost.
+    /// total + dissipated − initial − external: energy that the time integration and the transfers have gained (> 0) or lost.
     pub balance: f64,
 }
 
 impl Energies {
-    /// Of the present state.
+    /// The energies of the present state.
     ///
     /// ```
     /// use bfree::output::{Reference, history::Energies};
@@ -45,7 +45,7 @@ impl Energies {
     /// for _ in 0..3 {
     ///     simulation.step()?;
     /// }
-    /// // What the weight has done is kinetic energy now, ½ M (g t)².
+    /// // The work of gravity has become kinetic energy, ½ M (g t)².
     /// let energies = Energies::of(&simulation, &reference);
     /// let (mass, t) = (simulation.particles.mass.iter().sum::<f64>(), simulation.clock.time());
     /// assert!((energies.external / (0.5 * mass * t * t) - 1.0).abs() < 1e-10);
@@ -65,16 +65,16 @@ impl Energies {
     }
 }
 
-/// What a step cost.
+/// Length of a step, its iterations, and its plastic flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// Δt; 0 for the initial state.
     pub dt: f64,
     /// Newton iterations.
     pub newton: usize,
-    /// Krylov iterations of all its linear systems.
+    /// Krylov iterations of all linear systems in the step.
     pub krylov: usize,
-    /// Share of the volume of bodies with a plastic law that flowed.
+    /// Volume fraction with plastic flow, among bodies with a plastic law.
     pub yielding: f64,
 }
 
@@ -89,7 +89,7 @@ pub struct Cost {
 /// let mut history = History::open(path.clone(), &simulation, None)?;
 /// let energies = history.write(&simulation, &Reference::of(&simulation), Cost::default())?;
 /// history.flush()?;
-/// // The same bits come back from the file.
+/// // The file gives back the same bits.
 /// let text = std::fs::read_to_string(path)?;
 /// let (names, row) = text.trim_end().split_once('\n').ok_or("two lines")?;
 /// let column = names.split(',').position(|name| name == "kinetic").ok_or("a column")?;
@@ -99,7 +99,7 @@ pub struct Cost {
 #[derive(Debug)]
 pub struct History {
     pub(crate) table: Table,
-    /// Without inertia loads are there at once, and a balance says nothing of their work.
+    /// Whether there is inertia. In load steps, loads act at once, and an energy balance says nothing of their work.
     moves: bool,
     dissipates: bool,
     follows_path: bool,
@@ -107,10 +107,10 @@ pub struct History {
 }
 
 impl History {
-    /// Creates the file, with the columns that a simulation has; or continues one whose first `kept` bytes are good.
+    /// Creates the file with the columns of the simulation, or continues a file after its first `kept` bytes.
     ///
     /// # Errors
-    /// The system refuses, or the file to be continued has other columns.
+    /// The operating system refuses, or the file to be continued has other columns.
     pub fn open<const D: usize, L: Law, A>(
         path: PathBuf,
         simulation: &Simulation<D, L, A>,
@@ -131,10 +131,10 @@ impl History {
         Ok(Self { table: Table::open(path, &columns, kept)?, moves, dissipates, follows_path, yields })
     }
 
-    /// Appends the present state; returns its energies.
+    /// Appends the present state and returns its energies.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn write<const D: usize, L: Law, A: ShapeFunction>(
         &mut self,
         simulation: &Simulation<D, L, A>,
@@ -159,10 +159,10 @@ impl History {
         Ok(energies)
     }
 
-    /// Hands everything to the system.
+    /// Hands buffered rows to the operating system.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.table.0.flush()
     }

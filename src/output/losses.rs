@@ -1,9 +1,9 @@
-//! Where a run loses energy beyond what damping and laws take: step by step, by what happened in the step.
+//! Energy that a run loses beyond the dissipation by damping and laws, summed by the event of each step.
 
 use super::history::Energies;
 use serde::{Deserialize, Serialize};
 
-/// The event of a step that may lose energy; the first that applies.
+/// The event of a step that may lose energy. Of several events, the first in this list counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Cause {
@@ -11,16 +11,16 @@ pub(crate) enum Cause {
     Wall,
     /// Bodies share nodes.
     Bodies,
-    /// The grid is new.
+    /// The grid has been reset.
     NewGrid,
-    /// None of these.
+    /// None of these events.
     Step,
 }
 
 impl Cause {
     const ALL: [Self; 4] = [Self::Wall, Self::Bodies, Self::NewGrid, Self::Step];
 
-    /// The events of a step.
+    /// The cause of losses in a step.
     pub fn of(feels_wall: bool, shares: bool, renewed: bool) -> Self {
         match (feels_wall, shares, renewed) {
             (true, ..) => Self::Wall,
@@ -40,7 +40,7 @@ impl Cause {
         }
     }
 
-    /// The cure: a setting that keeps more energy there.
+    /// A setting that keeps more energy in these steps.
     fn cure(self, lumped: bool) -> &'static str {
         match (self, lumped) {
             (Self::Wall | Self::Bodies, true) => {
@@ -67,7 +67,7 @@ pub(crate) struct Losses {
     balance: f64,
     /// The fall of the balance, by [`Cause`].
     by_cause: [f64; Cause::ALL.len()],
-    /// The largest energy so far: kinetic, strain, and what was dissipated.
+    /// The largest sum of kinetic, strain and dissipated energy so far.
     largest: f64,
 }
 
@@ -83,12 +83,12 @@ impl Losses {
         }
     }
 
-    /// The loss as a part of the largest energy so far.
+    /// The loss as a fraction of the largest energy so far.
     pub fn part(&self) -> f64 {
         if self.largest > 0.0 { -self.balance / self.largest } else { 0.0 }
     }
 
-    /// Where it was lost, and what to do. `lumped`: whether the mass is lumped in full.
+    /// A message with the loss, its causes and a cure. `lumped`: whether the mass matrix is lumped in full.
     pub fn says(&self, lumped: bool) -> String {
         let lost: f64 = self.by_cause.iter().filter(|&&lost| lost > 0.0).sum();
         let mut causes: Vec<_> =

@@ -1,6 +1,6 @@
-//! Results on disk and on screen. Reads the simulation, changes nothing.
+//! Results on disk and on screen. This module reads the simulation and does not change it.
 //!
-//! A [`Recorder`] writes into one directory while the run goes on, so that whatever happened so far is there if it dies:
+//! A [`Recorder`] writes into one directory during the run. If the run dies, the results so far are there:
 //!
 //! | file | content |
 //! |---|---|
@@ -8,10 +8,11 @@
 //! | `reactions.csv` | force of every prescribed condition on the bodies, torque of rotations, if there are any |
 //! | `probes.csv` | fields at chosen particles or points, if any are asked for |
 //! | `particles.pvd`, `particles_*.vtu` | snapshots of the particles for ParaView |
-//! | `newton.jsonl` | what Newton's method did, one line a step; becomes part of `report.json` at the end, and stays beside it only where there are checkpoints |
-//! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, what was warned of |
+//! | `newton.jsonl` | Newton's method, one line per step; moved into `report.json` at the end, but also kept if there are checkpoints |
+//! | `report.json` | settings, outcome, counts, seconds by phase, Newton and Krylov iterations and residuals of every step, warnings |
 //!
-//! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have as many digits as it takes to read the same bits back.
+//! [`plot::plot_run`] draws pictures of a directory, and a page with a player of the snapshots. Floats in text files have enough digits to
+//! give back the same bits.
 
 pub mod contact;
 mod csv;

@@ -1,20 +1,20 @@
-//! Events on a path of equilibria: its load turns, it bends sharply, it returns the way it came.
+//! Events on the equilibrium path: the load turns, the path bends sharply, or it goes back along its earlier points.
 
 use super::Reference;
 use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
 
-/// The least cosine of the angle between two steps of a path that goes on.
+/// Smallest cosine of the angle between two successive steps without a sharp bend.
 const BENT: f64 = 0.5;
 
-/// A path that has gone so far from its turning point, relative to the whole, is compared with the way there.
+/// Distance from the turning point, relative to the size of the path, beyond which the path is compared with its earlier points.
 const AWAY: f64 = 0.05;
 
-/// A path that returns is nearer to the way there than this, relative to the distance from the turning point. Beyond a limit point, the
-/// other side at the same load is twice as far.
+/// Largest distance of a returning path from its earlier points, relative to the distance from the turning point. Beyond a limit point, the
+/// other side at the same load is twice as far away as the turning point.
 const SAME: f64 = 0.2;
 
-/// Where a path is: the load, and numbers by which states are told apart.
+/// A point of the path: the load, and moments of the displacement that distinguish states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Point {
@@ -51,28 +51,28 @@ impl Point {
     }
 }
 
-/// A path so far.
+/// The points of the path so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Followed {
     points: Vec<Point>,
-    /// The last point before the load turned.
+    /// Index of the last point before the load turned.
     turn: Option<usize>,
 }
 
-/// The events of a path in a step.
+/// An event on the path in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Event {
     /// The load turned at this λ.
     Turned(f64),
-    /// It turned by this angle (degrees) from one step to the next.
+    /// The path turned by this angle (degrees) from one step to the next.
     Bent(f64),
-    /// It is back on the way that it came, at this λ.
+    /// The path is back on its earlier points, at this λ.
     Returned(f64),
 }
 
 impl Followed {
-    /// Adds a step, whose displacement has the cosine `straight` to that of the step before.
+    /// Adds a step. `straight` is the cosine of the angle between the displacements of this step and the previous step.
     pub fn see<const D: usize, L, A>(
         &mut self,
         simulation: &Simulation<D, L, A>,
@@ -100,7 +100,7 @@ impl Followed {
         events
     }
 
-    /// Whether a point lies on the way to the turning point.
+    /// Whether a point lies on the path before the turning point.
     fn returns(&self, turn: usize, point: &Point) -> bool {
         let origin = vec![0.0; point.moments.len()];
         let scale = self.points.iter().map(|one| one.distance(&origin)).fold(0.0, f64::max);

@@ -10,43 +10,44 @@ use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use std::path::PathBuf;
 
-/// Where a probe looks.
+/// The particle or point that a probe reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place<const D: usize> {
-    /// At a particle, which it follows.
+    /// The particle with this id, which the probe follows.
     Particle(usize),
-    /// At the point of the body that lies `offset` from a particle in the reference configuration, wherever it goes: at x_p + F d, to first
-    /// order in d. Fields other than position and displacement are those of the particle.
+    /// A material point at `offset` d from a particle in the reference configuration. The point lies at x_p + F d, to first order in d.
+    /// Fields other than position and displacement are those of the particle.
     Carried {
-        /// The particle.
+        /// Id of the particle.
         particle: usize,
         /// d
         offset: Vector<f64, D>,
     },
-    /// At the particle nearest to a fixed point, found anew each time; of equally near ones, the first. No field is interpolated.
+    /// The particle nearest to a fixed point, searched anew each time. Among equally near particles, the smallest id counts. No field is
+    /// interpolated.
     Nearest {
         /// The point.
         point: Vector<f64, D>,
-        /// Look at the particles of this body only.
+        /// Only particles of this body are searched.
         body: Option<u32>,
-        /// A nearest particle farther away than this does not count: the values are then NaN.
+        /// Largest distance of the particle from the point. If the particle is farther away, the values are NaN.
         within: f64,
     },
 }
 
-/// A field at a place.
+/// A field at a particle or point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Probe<const D: usize> {
-    /// Name; columns are `name`, or `name_x`, … for the components of a vector, `name_xx`, … of a tensor.
+    /// Name. Columns are `name`, or `name_x`, … for the components of a vector, `name_xx`, … for a tensor.
     pub name: String,
     /// The field.
     pub field: Field,
-    /// Where.
+    /// The particle or point.
     pub place: Place<D>,
 }
 
 impl<const D: usize> Probe<D> {
-    /// The particle looked at now; `None` if none is near enough.
+    /// Id of the particle that is read now; `None` if no particle is near enough.
     fn particle(&self, particles: &Particles<D>) -> Result<Option<usize>, OutputError> {
         let name = || self.name.clone();
         match self.place {
@@ -63,7 +64,7 @@ impl<const D: usize> Probe<D> {
         }
     }
 
-    /// What a point beside the particle adds to its field: F d to the position, H d to the displacement.
+    /// Difference between the material point and its particle: F d in the position, H d in the displacement.
     fn beside(&self, particles: &Particles<D>) -> Option<Vector<f64, D>> {
         let Place::Carried { particle, offset } = self.place else { return None };
         let moved = particles.displacement_gradient[particles.place(particle)?] * offset;
@@ -75,8 +76,8 @@ impl<const D: usize> Probe<D> {
     }
 }
 
-/// The id of the particle nearest to `point`, among those of `body` if one is given, and its distance; of equally near ones, the
-/// smallest id.
+/// Id and distance of the particle nearest to `point`, among the particles of `body` if it is given. Among equally near particles, the
+/// smallest id counts.
 ///
 /// ```
 /// use bfree::output::nearest;
@@ -113,7 +114,7 @@ pub(crate) struct Probes<const D: usize> {
 }
 
 impl<const D: usize> Probes<D> {
-    /// Creates the file with its header; or continues one whose first `kept` bytes are good.
+    /// Creates the file with its header, or continues a file after its first `kept` bytes.
     pub(crate) fn open(path: PathBuf, probes: Vec<Probe<D>>, kept: Option<Written>) -> Result<Self, OutputError> {
         let mut columns = vec!["time".to_owned()];
         for probe in &probes {

@@ -1,5 +1,4 @@
-//! How far a run is, for the one who waits: a bar on a terminal, a line now and then elsewhere; or lines of JSON for a program
-//! that watches. All of it on standard error.
+//! Progress of a run on standard error: a bar on a terminal, a line now and then elsewhere, or lines of JSON for a program.
 
 use super::report::Number;
 use super::warnings::Warning;
@@ -9,20 +8,20 @@ use std::collections::VecDeque;
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
-/// The pace is that of the last so many seconds.
+/// Seconds over which the pace is measured.
 const WINDOW: f64 = 30.0;
 
 /// Time between two lines of progress where standard error is not a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Between two lines of JSON.
+/// Time between two lines of JSON.
 const JSON_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Resolution of the bar.
 const BAR_LENGTH: f64 = 1000.0;
 
-/// Predicts the time left from the simulated time per wall-clock second of the recent past: impacts and halved steps slow a
-/// run down, and an average since the start would hide it.
+/// Predicts the time left from the simulated time per wall-clock second of the recent past. Impacts and halved steps slow a run down. An
+/// average since the start would hide the slower pace.
 ///
 /// ```
 /// use bfree::output::progress::Pace;
@@ -32,7 +31,7 @@ const BAR_LENGTH: f64 = 1000.0;
 /// assert_eq!(pace.left(10.0), None);
 /// pace.mark(100.0, 5.0);
 /// assert_eq!(pace.left(10.0), Some(100.0));
-/// // An impact: the last 40 s were four times as slow, and so will the rest be.
+/// // An impact: the last 40 s were four times as slow, and the rest is predicted at this pace.
 /// pace.mark(140.0, 5.5);
 /// assert_eq!(pace.left(10.0), Some(4.5 / 0.5 * 40.0));
 /// ```
@@ -43,16 +42,16 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Simulated `time` is reached at wall-clock second `wall`.
+    /// Records that simulated `time` is reached at wall-clock second `wall`.
     pub fn mark(&mut self, wall: f64, time: f64) {
         self.marks.push_back((wall, time));
-        // The window must stay covered: a mark goes when the next one is old enough to be the first.
+        // The marks must cover the window: a mark is removed when the next mark is old enough to be the first.
         while self.marks.get(1).is_some_and(|&(second, _)| second <= wall - WINDOW) {
             self.marks.pop_front();
         }
     }
 
-    /// Wall-clock seconds until `end`; `None` as long as nothing can be said.
+    /// Wall-clock seconds until `end`; `None` before any progress is measured.
     pub fn left(&self, end: f64) -> Option<f64> {
         let (&(wall_0, time_0), &(wall_1, time_1)) = (self.marks.front()?, self.marks.back()?);
         let left = (end - time_1) * ((wall_1 - wall_0) / (time_1 - time_0));
@@ -60,7 +59,7 @@ impl Pace {
     }
 }
 
-/// What is shown besides the time.
+/// Numbers shown besides the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shown {
     /// Steps taken.
@@ -69,23 +68,23 @@ pub struct Shown {
     pub newton: usize,
     /// Krylov iterations of the last step.
     pub krylov: usize,
-    /// The balance of energy, with inertia: what was gained (> 0) or lost so far.
+    /// Energy balance so far, gained (> 0) or lost; `None` without inertia.
     pub balance: Option<f64>,
 }
 
-/// For whom progress is shown.
+/// The reader of the progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Audience {
-    /// Nobody; warnings are written all the same.
+    /// Nobody. Warnings are still written.
     Nobody,
-    /// Somebody at a terminal, or who reads a log.
+    /// A person at a terminal, or a person who reads a log.
     #[default]
     Person,
-    /// A program: one JSON object a line, with the key `event`: `step` (at most ten a second, and the last), `warning`.
+    /// A program. Each line is a JSON object with the key `event`: `step` (at most ten a second, and the last step) or `warning`.
     Program,
 }
 
-/// The way it is shown.
+/// Form of the progress.
 #[derive(Debug)]
 enum Display {
     Bar(ProgressBar),
@@ -94,19 +93,19 @@ enum Display {
     },
     Json {
         last: Option<Instant>,
-        /// What was not shown because it came too soon.
+        /// A line held back because it came too soon.
         held: Option<String>,
     },
     Silent,
 }
 
-/// Shows how far a run is.
+/// Shows the progress of a run.
 ///
 /// ```
 /// use bfree::output::progress::{Audience, Progress, Shown};
 /// use bfree::output::warnings::{Kind, Warning};
 ///
-/// // From t = 0 to 1, for nobody: warnings are written all the same.
+/// // From t = 0 to 1, for nobody: warnings are still written.
 /// let mut progress = Progress::new(0.0, 1.0, Audience::Nobody);
 /// let mut energy = 1.0;
 /// for step in 1..=10 {
@@ -128,7 +127,7 @@ pub struct Progress {
     end: f64,
 }
 
-/// A closed standard error does not stop the run.
+/// Writes a line to standard error. A closed standard error does not stop the run.
 fn line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
@@ -142,7 +141,7 @@ impl Progress {
             Audience::Program => Display::Json { last: None, held: None },
             Audience::Person if std::io::stderr().is_terminal() => {
                 let bar = ProgressBar::new(BAR_LENGTH as u64);
-                // The template is a constant; should it be refused, indicatif's own is shown.
+                // If indicatif refuses the constant template, its own style is shown.
                 if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
                     bar.set_style(style);
                 }
@@ -195,7 +194,7 @@ impl Progress {
         }
     }
 
-    /// Writes a warning, whoever watches.
+    /// Writes a warning for every audience.
     pub fn warn(&self, warning: &Warning) {
         let Warning { kind, time, step, message } = warning;
         let text = format!("warning: t = {time}, step {step}: {message}");
@@ -212,7 +211,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away, and shows what was held back.
+    /// Removes the bar, or shows the line that was held back.
     pub fn finish(self) {
         match self.display {
             Display::Bar(bar) => bar.finish_and_clear(),
@@ -222,7 +221,7 @@ impl Progress {
     }
 }
 
-/// Seconds as people say them.
+/// Seconds in a readable unit.
 fn readable(seconds: f64) -> String {
     match seconds {
         s if s < 100.0 => format!("{s:.0} s"),

@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What stands before and behind the entries.
+/// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";
 
-/// A growing series; the file is whole after every snapshot, so that a killed run still opens.
+/// A growing series. The file is whole after every snapshot, so the series of a killed run still opens.
 ///
 /// ```
 /// use bfree::output::pvd::Series;
@@ -40,10 +40,10 @@ impl Series {
         Self { path, entries: String::new() }
     }
 
-    /// Continues the series at `path` after its first `count` entries; later ones are forgotten.
+    /// Continues the series at `path` after its first `count` entries. Later entries are dropped.
     ///
     /// # Errors
-    /// It has not as many, or the system refuses.
+    /// The series has fewer entries, or the operating system refuses.
     pub fn resume(path: PathBuf, count: usize) -> Result<Self, OutputError> {
         let series = Self { entries: first_entries(&path, count)?, path };
         series.write()?;
@@ -53,7 +53,7 @@ impl Series {
     /// Adds `file`, given relative to the directory of the series, and rewrites the list, all or nothing.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn push(&mut self, time: f64, file: &str) -> Result<(), OutputError> {
         // Writing to a string cannot fail.
         let _ = writeln!(self.entries, r#"<DataSet timestep="{time:?}" part="0" file="{file}"/>"#);
@@ -65,7 +65,7 @@ impl Series {
     }
 }
 
-/// The first `count` entries of the series at `path`, one a line.
+/// The first `count` entries of the series at `path`, one per line.
 pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputError> {
     let text = std::fs::read_to_string(path).map_err(OutputError::io("continue", path))?;
     let entries = text.strip_prefix(HEAD).and_then(|rest| rest.strip_suffix(TAIL)).unwrap_or_default();

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 pub(crate) struct Reactions(pub(crate) Table);
 
 impl Reactions {
-    /// Creates the file, with columns `name_x`, `name_y`, … for every prescribed condition, and `name_torque` of a rotation; or continues one whose first `kept`
-    /// bytes are good.
+    /// Creates the file, or continues a file after its first `kept` bytes. Every prescribed condition has one column per axis, such as
+    /// `name_x`. A rotation also has the column `name_torque`.
     pub(crate) fn open<const D: usize>(
         path: PathBuf,
         loads: &Loads<D>,
@@ -28,7 +28,7 @@ impl Reactions {
         Ok(Self(Table::open(path, &columns, kept)?))
     }
 
-    /// Appends what acted at the end of a step.
+    /// Appends the reactions at the end of a step.
     pub(crate) fn write<const D: usize>(
         &mut self,
         time: f64,

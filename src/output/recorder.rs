@@ -1,4 +1,4 @@
-//! Everything that is written about a run, in one place.
+//! The recorder, which writes all files of a run.
 
 use super::earlier::remove_later_files;
 use super::files::{Stream, Written};
@@ -21,21 +21,21 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What to write, and where.
+/// Contents and directory of the output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputSettings<const D: usize> {
-    /// The directory; it is made if it is missing, and files of an earlier run in it are replaced.
+    /// The directory. If it is missing, it is created. Files of an earlier run in the directory are replaced.
     pub directory: PathBuf,
     /// Fields of the snapshots.
     pub fields: Vec<Field>,
-    /// Time between snapshots, > 0: the first state is written, every state that reaches a multiple of it, and the last. Without it
-    /// there are no snapshots.
+    /// Time between snapshots, > 0. Snapshots are written of the first state, of every state that reaches a multiple of this time, and of
+    /// the last state. With `None`, there are no snapshots.
     pub snapshot_every: Option<f64>,
-    /// Fields at particles or points, every step.
+    /// Fields at particles or points, written in every step.
     pub probes: Vec<Probe<D>>,
     /// Time at which the run will end, for the progress bar.
     pub end_time: f64,
-    /// For whom progress is shown.
+    /// The reader of the progress.
     pub audience: Audience,
 }
 
@@ -66,14 +66,14 @@ pub struct Recorder<const D: usize> {
     progress: Progress,
     watch: Watch,
     counts: Counts,
-    /// Of all steps; the total is that of what was done before `since`.
+    /// Seconds of all steps. The total counts the time before `since`.
     seconds: Seconds,
     since: Instant,
-    /// Whether somebody may come back to a mark.
+    /// Whether a run may resume from a mark.
     marked: bool,
 }
 
-/// Where the files of a run end at one moment, and what was counted until then: all that it takes to continue them.
+/// Ends of the files of a run at one moment, and the counts until then. [`Recorder::resume`] needs nothing else to continue the files.
 ///
 /// ```
 /// use bfree::output::{Audience, OutputSettings, Recorder, Reference};
@@ -90,15 +90,15 @@ pub struct Recorder<const D: usize> {
 /// let step = simulation.advance()?;
 /// recorder.record(&simulation, &step)?;
 /// drop(recorder);
-/// // Rows behind the mark are cut off.
+/// // Rows written after the mark are cut off.
 /// mark.check(folder.path())?;
 /// assert!(std::fs::metadata(&history)?.len() > length);
 /// drop(Recorder::resume(settings, &marked, reference, &mark)?);
 /// assert_eq!(std::fs::metadata(&history)?.len(), length);
-/// // A file that has lost some of what it had cannot be continued.
+/// // A file that has become shorter cannot be continued.
 /// std::fs::write(&history, "step\n")?;
 /// assert!(mark.check(folder.path()).is_err());
-/// // Nor one in which a digit is another.
+/// // A file with a changed digit cannot be continued either.
 /// let mut text = std::fs::read(&history)?;
 /// text.resize(length as usize, b'7');
 /// std::fs::write(&history, text)?;
@@ -108,7 +108,7 @@ pub struct Recorder<const D: usize> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
-    /// What each file held that grows.
+    /// Content of every growing file at the mark.
     pub(super) files: BTreeMap<String, Written>,
     pub(super) snapshots: Option<SnapshotMark>,
     watch: Watch,
@@ -117,26 +117,27 @@ pub struct Mark {
 }
 
 impl Mark {
-    /// Whether the files in `directory` that grow still hold what they held then.
+    /// Checks that the growing files in `directory` still hold their content at the mark.
     ///
     /// # Errors
-    /// One of them is gone, shorter, or another.
+    /// A file is missing, shorter, or has other content.
     pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
         self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
         self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
     }
 
-    /// Snapshots written until then that are not in `directory` any more. Nothing that follows needs them.
+    /// Snapshots that were written before the mark and are missing in `directory` now. A continued run does not need them.
     pub fn missing(&self, directory: &Path) -> Vec<PathBuf> {
         self.snapshots.map_or_else(Vec::new, |snapshots| snapshots.missing(directory))
     }
 }
 
 impl<const D: usize> Recorder<D> {
-    /// Makes the directory and the files, and writes the state before the first step.
+    /// Creates the directory and the files, and writes the state before the first step.
     ///
     /// # Errors
-    /// The system refuses; a probe at a particle that does not exist; names that lead to equal columns; a time between snapshots that is not positive; a reference with another number of particles.
+    /// The operating system refuses. A probe names a particle that does not exist. Two columns have the same name. The time between
+    /// snapshots is not positive. The reference has another number of particles.
     pub fn start<L: Law, A: ShapeFunction>(
         settings: OutputSettings<D>,
         simulation: &Simulation<D, L, A>,
@@ -148,13 +149,13 @@ impl<const D: usize> Recorder<D> {
         Ok(recorder)
     }
 
-    /// Continues the files of a run from `mark`, with the simulation as it was then and the reference of the start; what was
-    /// written later is cut off.
+    /// Continues the files of a run from `mark`. The simulation must be in its state at the mark. `reference` must belong to the start of
+    /// the run. Rows written after the mark are cut off.
     ///
     /// Example: [`Mark`].
     ///
     /// # Errors
-    /// As [`Self::start`], and [`Mark::check`].
+    /// The errors of [`Self::start`] and of [`Mark::check`].
     pub fn resume<L: Law, A: ShapeFunction>(
         settings: OutputSettings<D>,
         simulation: &Simulation<D, L, A>,
@@ -176,7 +177,7 @@ impl<const D: usize> Recorder<D> {
         std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
         remove_later_files(&directory, mark)?;
         let at = |name: &str| directory.join(name);
-        // A file that the mark does not know begins anew.
+        // A file that is not in the mark is created anew.
         let kept = |name: &str| mark.and_then(|mark| mark.files.get(name).copied());
         let loads = &simulation.loads;
         let snapshots = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
@@ -204,13 +205,13 @@ impl<const D: usize> Recorder<D> {
         })
     }
 
-    /// Puts everything on the disk and says where the files end, so that [`Self::resume`] can continue them from here.
-    /// `newton.jsonl` then stays when the run has ended.
+    /// Syncs all files to disk and returns their ends, from which [`Self::resume`] continues. After a mark, `newton.jsonl` is kept when the
+    /// run ends.
     ///
     /// Example: [`Mark`].
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
         let files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
@@ -219,7 +220,7 @@ impl<const D: usize> Recorder<D> {
         Ok(Mark { files, snapshots, watch, counts, seconds })
     }
 
-    /// Counts the seconds in which the simulation was built, before the recorder was there.
+    /// Adds the seconds in which the simulation was built, before the recorder started.
     pub fn count_set_up(&mut self, seconds: f64) {
         self.seconds.set_up += seconds;
         self.seconds.total += seconds;
@@ -229,10 +230,10 @@ impl<const D: usize> Recorder<D> {
         Seconds { total: self.seconds.total + self.since.elapsed().as_secs_f64(), ..self.seconds }
     }
 
-    /// Writes a step that has succeeded.
+    /// Records a successful step.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn record<L: Law, A: ShapeFunction>(
         &mut self,
         simulation: &Simulation<D, L, A>,
@@ -285,11 +286,11 @@ impl<const D: usize> Recorder<D> {
         Ok(())
     }
 
-    /// Writes the last snapshot and the report, with `asked` among its entries: what the caller knows of the run, such as the scene
-    /// and the command line.
+    /// Writes the last snapshot and the report. The report includes the entries `asked` of the caller, such as the scene and the command
+    /// line.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn finish<L: Law, A: ShapeFunction>(
         mut self,
         simulation: &Simulation<D, L, A>,

@@ -1,4 +1,4 @@
-//! What the output measures against: the state at the start of the run.
+//! Reference of the output: the state at the start of the run.
 
 use super::OutputError;
 use crate::approximation::ShapeFunction;
@@ -6,12 +6,12 @@ use crate::material::Law;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 
-/// Positions, energy and momentum at the start of the run. A restarted run keeps that of the first one.
+/// Positions, energy and momentum at the start of the run. A restarted run keeps the reference of the first run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference<const D: usize> {
     /// Position of every particle by its id; displacements are measured from here.
     pub position: Vec<Vector<f64, D>>,
-    /// Kinetic and strain energy, and what was dissipated, less the external work done so far.
+    /// Kinetic, strain and dissipated energy, less the external work done so far.
     pub energy: f64,
     /// Σ m v
     pub momentum: Vector<f64, D>,
@@ -42,7 +42,7 @@ impl<const D: usize> Reference<D> {
         }
     }
 
-    /// Whether it belongs to `simulation`, as far as can be told.
+    /// Checks that the reference and `simulation` have equally many particles.
     pub(crate) fn check<L, A>(&self, simulation: &Simulation<D, L, A>) -> Result<(), OutputError> {
         let (reference, particles) = (self.position.len(), simulation.particles.len());
         if reference == particles { Ok(()) } else { Err(OutputError::Reference { reference, particles }) }

@@ -1,4 +1,4 @@
-//! `report.json`: what was asked for, how it ended, what it cost, and what Newton's method did in every step.
+//! `report.json`: settings, outcome and cost of a run, and the iterations and residuals of Newton's method in every step.
 
 use super::OutputError;
 use super::contact::Contact;
@@ -15,12 +15,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
-/// How a run ended.
+/// Outcome of a run.
 #[derive(Clone, Copy, Debug)]
 pub enum Outcome<'a> {
-    /// It reached its end.
+    /// The run reached its end.
     Finished,
-    /// It was asked to stop, and did so after a whole step.
+    /// The run was asked to stop, and stopped after a whole step.
     Interrupted,
     /// A step failed.
     Failed(&'a AdvanceError),
@@ -40,7 +40,7 @@ impl Outcome<'_> {
     }
 }
 
-/// What was done, summed over all steps. Iterations, residuals and products of failed attempts at a step are counted too.
+/// Counts over all steps. Iterations, residuals and tangent products of failed attempts at a step are included.
 ///
 /// ```
 /// use bfree::output::report::Counts;
@@ -52,7 +52,7 @@ impl Outcome<'_> {
 /// counts.add(&step);
 /// counts.add(&simulation.advance()?);
 /// assert_eq!((counts.steps, counts.max_active_nodes), (2, step.active_nodes));
-/// // An attempt that failed did something too.
+/// // A failed attempt is counted, too.
 /// let newton = step.newton.history.clone();
 /// let before = counts.residual_evaluations;
 /// let why = "no equilibrium was found".into();
@@ -68,24 +68,24 @@ impl Outcome<'_> {
 pub struct Counts {
     /// Particles.
     pub particles: usize,
-    /// The most nodes active in a step.
+    /// Largest number of active nodes in a step.
     pub max_active_nodes: usize,
     /// Steps taken.
     pub steps: u64,
-    /// Steps that began with a new grid.
+    /// Steps that began with a grid reset.
     pub grids: u64,
-    /// Attempts at a step that failed, or erred more than the tolerance allows: it was repeated with half of its length, or the run
-    /// ended.
+    /// Attempts at a step that failed, or whose error exceeded the tolerance. The step was then repeated with half of its length, or the
+    /// run ended.
     pub failed_attempts: u64,
-    /// Of the iterations, those of these attempts.
+    /// Newton iterations of failed attempts.
     pub failed_newton_iterations: u64,
-    /// Likewise.
+    /// Krylov iterations of failed attempts.
     pub failed_krylov_iterations: u64,
-    /// Passes over all particles, of steps that succeeded.
+    /// Loops over all particles, in successful steps.
     pub particle_passes: u64,
     /// Newton iterations.
     pub newton_iterations: u64,
-    /// The most Newton iterations of a step that succeeded.
+    /// Largest number of Newton iterations in a successful step.
     pub max_newton_iterations: usize,
     /// Krylov iterations.
     pub krylov_iterations: u64,
@@ -97,7 +97,7 @@ pub struct Counts {
     pub krylov_stagnated: u64,
     /// Residuals evaluated by Newton's method.
     pub residual_evaluations: u64,
-    /// Products with the tangent.
+    /// Products of the tangent with a vector.
     pub tangent_products: u64,
     /// Iterations of the projection onto the nodes.
     pub projection_iterations: u64,
@@ -138,7 +138,7 @@ impl Counts {
     }
 }
 
-/// Seconds of a run, those of steps summed over all of them.
+/// Seconds of a run. Seconds of steps are summed over all steps.
 ///
 /// ```
 /// use bfree::output::report::Seconds;
@@ -149,7 +149,7 @@ impl Counts {
 /// seconds.add(&simulation.step()?);
 /// seconds.add(&simulation.step()?);
 /// seconds.total = start.elapsed().as_secs_f64();
-/// // The phases and what is in none of them are the whole.
+/// // The named parts add up to the total.
 /// let sum: f64 = seconds.named().map(|(_, seconds)| seconds).sum();
 /// assert!((sum / seconds.total - 1.0).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -157,12 +157,12 @@ impl Counts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seconds {
-    /// Of each of [`Phase::ALL`].
+    /// Seconds of each of [`Phase::ALL`].
     pub phases: [f64; Phase::ALL.len()],
-    /// Before the first step: reading the scene, filling bodies with particles.
+    /// Seconds before the first step: reading the scene, filling bodies with particles.
     #[serde(default)]
     pub set_up: f64,
-    /// Of the whole run: set-up, steps, failed attempts, output.
+    /// Seconds of the whole run: set-up, steps, failed attempts, output.
     pub total: f64,
 }
 
@@ -182,7 +182,7 @@ impl Seconds {
         self.phases.iter_mut().zip(watch.seconds()).for_each(|(sum, seconds)| *sum += seconds);
     }
 
-    /// The set-up, the phases by name, and what is in none of them.
+    /// The set-up, the phases by name, and `other`: the remaining seconds.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         let other = self.total - self.set_up - self.phases.iter().sum::<f64>();
         let phases = Phase::ALL.iter().map(|phase| phase.1).zip(self.phases);
@@ -190,7 +190,7 @@ impl Seconds {
     }
 }
 
-/// A float in JSON, which has no NaN and no infinity: those become the strings "NaN", "inf" and "-inf" instead of null.
+/// A float in JSON, which has no NaN and no infinity. NaN and infinities become the strings "NaN", "inf" and "-inf" instead of null.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Number(pub f64);
 
@@ -200,18 +200,18 @@ impl Serialize for Number {
     }
 }
 
-/// What the report says of the iterations in one step or attempt.
+/// The iterations of one step or attempt in the report.
 #[derive(Debug, Serialize)]
 struct NewtonLine {
     /// Iterations of the projection onto the nodes.
     projection_iterations: usize,
     /// ‖R‖ at the initial guess and after each iteration.
     newton_residuals: Vec<Number>,
-    /// Krylov iterations that gave each Newton iteration.
+    /// Krylov iterations of each Newton iteration.
     krylov_iterations: Vec<usize>,
-    /// The true relative residual of the linear system that each of them reached.
+    /// True relative residual of the linear system in each Newton iteration.
     krylov_residuals: Vec<Number>,
-    /// Krylov iterations in all, those of linear systems that gave no step included.
+    /// All Krylov iterations, including linear systems that gave no Newton step.
     krylov_total: usize,
 }
 
@@ -229,7 +229,7 @@ impl NewtonLine {
     }
 }
 
-/// What the report says of an attempt that failed.
+/// A failed attempt in the report.
 #[derive(Debug, Serialize)]
 struct AttemptLine<'a> {
     dt: Number,
@@ -248,7 +248,7 @@ impl<'a> AttemptLine<'a> {
     }
 }
 
-/// What the report says of a step.
+/// A step in the report.
 #[derive(Debug, Serialize)]
 struct StepLine<'a> {
     /// t_{n+1}
@@ -260,12 +260,12 @@ struct StepLine<'a> {
     failed_attempts: Vec<AttemptLine<'a>>,
 }
 
-/// `newton.jsonl`: what Newton's method did in a step on a line, while the run goes on.
+/// `newton.jsonl`: iterations and residuals of Newton's method, one line per step, written during the run.
 #[derive(Debug)]
 pub(crate) struct NewtonLog(pub(crate) Stream);
 
 impl NewtonLog {
-    /// Creates the file, or continues one whose first `kept` bytes are good.
+    /// Creates the file, or continues a file after its first `kept` bytes.
     pub(crate) fn open(path: PathBuf, kept: Option<Written>) -> Result<Self, OutputError> {
         Stream::open(path, kept).map(Self)
     }
@@ -289,9 +289,9 @@ fn failed(path: &Path) -> impl FnOnce(serde_json::Error) -> OutputError {
 /// The report of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Report<'a> {
-    /// What the caller adds.
+    /// Entries that the caller adds.
     pub asked: &'a Map<String, Value>,
-    /// How the run ended.
+    /// Outcome of the run.
     pub outcome: Outcome<'a>,
     /// Time reached.
     pub time: f64,
@@ -299,18 +299,18 @@ pub(crate) struct Report<'a> {
     pub mass: f64,
     /// Energies at the end.
     pub energies: Energies,
-    /// What was done.
+    /// Counts over all steps.
     pub counts: Counts,
-    /// How long it took.
+    /// Seconds of the run by phase.
     pub seconds: Seconds,
-    /// The warnings that were given.
+    /// Warnings of the run.
     pub warnings: &'a [Warning],
     /// Bodies that shared nodes.
     pub contact: &'a [Contact],
 }
 
 impl Report<'_> {
-    /// Writes the report, all or nothing; the steps go from `log` into it line by line, then `log` is removed unless it is `kept`.
+    /// Writes the report, all or nothing. The lines of `log` become its steps. Afterwards `log` is removed, unless it is `kept`.
     pub(crate) fn write(&self, path: &Path, mut log: NewtonLog, kept: bool) -> Result<(), OutputError> {
         log.0.flush()?;
         let log = log.0.path();

@@ -25,24 +25,24 @@ pub(crate) struct Snapshots {
     mark: SnapshotMark,
 }
 
-/// How far the snapshots of a run have come.
+/// Progress of the snapshots of a run, for a checkpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SnapshotMark {
     written: usize,
-    /// Steps taken when the last one was written.
+    /// Steps taken when the last snapshot was written.
     last: Option<u64>,
-    /// How many multiples of the time between snapshots had passed when the last one was due.
+    /// Multiples of the time between snapshots that had passed when the last snapshot was due.
     passed: Option<f64>,
 }
 
-/// The file of a snapshot.
+/// File name of a snapshot.
 fn name(number: usize) -> String {
     format!("particles_{number:06}.vtu")
 }
 
 impl SnapshotMark {
-    /// Whether the series in `directory` still lists all of them.
+    /// Checks that the series in `directory` still lists all written snapshots.
     pub(crate) fn check(&self, directory: &Path) -> Result<(), OutputError> {
         // Nothing is written before the first snapshot.
         if self.written > 0 {
@@ -51,12 +51,12 @@ impl SnapshotMark {
         Ok(())
     }
 
-    /// Those of the snapshots that are not in `directory`.
+    /// The written snapshots that are not in `directory`.
     pub(crate) fn missing(&self, directory: &Path) -> Vec<PathBuf> {
         (0..self.written).map(|number| directory.join(name(number))).filter(|path| !path.is_file()).collect()
     }
 
-    /// Whether a file of this name is a snapshot, and one written later.
+    /// Whether a file of this name is a snapshot that was written later.
     pub(crate) fn precedes(&self, name: &str) -> bool {
         let number = name.strip_prefix("particles_").and_then(|rest| rest.strip_suffix(".vtu"));
         let digits = number.filter(|number| number.len() >= 6 && number.bytes().all(|b| b.is_ascii_digit()));
@@ -65,8 +65,8 @@ impl SnapshotMark {
 }
 
 impl Snapshots {
-    /// Of `fields` (each once, whatever the list says), into `directory`, whenever the time passes a multiple of `every`.
-    /// What was written up to `mark` is continued.
+    /// Snapshots of `fields` in `directory`, due whenever the time passes a multiple of `every`. A repeated field is written once. The
+    /// snapshots up to `mark` are continued.
     pub(crate) fn new(
         directory: PathBuf,
         fields: &[Field],
@@ -87,7 +87,7 @@ impl Snapshots {
         Ok(Self { directory, fields: unique, series, every, mark })
     }
 
-    /// How far they have come.
+    /// The progress of the snapshots.
     pub(crate) fn mark(&self) -> SnapshotMark {
         self.mark
     }
@@ -126,13 +126,13 @@ impl Snapshots {
     }
 }
 
-/// How many multiples of `every` the time has reached.
+/// Number of multiples of `every` that the time has reached.
 pub(crate) fn multiples(clock: &Clock, every: f64) -> f64 {
-    // Round-off must not put a step that ends on a multiple before it.
+    // A step that ends on a multiple must reach the multiple in spite of round-off.
     ((clock.time() + 1e-6 * clock.nominal()) / every).floor()
 }
 
-/// The particles, by their ids, with the fields asked for; no others are computed.
+/// A snapshot of the particles, in the order of their ids, with the given fields. No other field is computed.
 pub(crate) fn snapshot<const D: usize, L: Law, A>(
     simulation: &Simulation<D, L, A>,
     reference: &Reference<D>,

@@ -12,24 +12,24 @@ use std::fmt::{Display, Formatter, Result};
 pub struct Summary {
     /// Time reached.
     pub time: f64,
-    /// Whether there is inertia: without it, kinetic energy and momentum are nothing, and work less energy is what loads lost that were there
-    /// at once.
+    /// Whether there is inertia. Without inertia, kinetic energy and momentum are zero. Loads then act at once and lose the excess of work
+    /// over energy.
     pub moves: bool,
     /// Energies at the end.
     pub energies: Energies,
     /// |p − p₀|, the change of momentum.
     pub momentum_change: f64,
-    /// Σ m |v| at the end, to compare it with.
+    /// Σ m |v| at the end, the scale of `momentum_change`.
     pub momentum_scale: f64,
-    /// What solved the linear systems.
+    /// The solver of the linear systems.
     pub krylov: Krylov,
     /// Bodies that shared nodes.
     pub contact: Vec<Contact>,
     /// The warnings that were given.
     pub warnings: Vec<Warning>,
-    /// What was done.
+    /// Counts over all steps.
     pub counts: Counts,
-    /// How long it took.
+    /// Seconds of the run by phase.
     pub seconds: Seconds,
 }
 

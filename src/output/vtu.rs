@@ -1,7 +1,7 @@
 //! Snapshots as VTK's `.vtu`: an unstructured grid of vertices, arrays appended raw in zlib blocks, little endian.
 //!
-//! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read it; [`Snapshot::read`] reads what
-//! [`Snapshot::write`] wrote, bit for bit.
+//! Format: "VTK File Formats" of the VTK documentation. ParaView, pyvista and meshio read the files. [`Snapshot::read`] reads the files of
+//! [`Snapshot::write`] bit for bit.
 
 use super::OutputError;
 use super::files::write_atomically;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Bytes of an uncompressed block.
 const BLOCK: usize = 1 << 16;
 
-/// VTK's number of a cell that is one point.
+/// VTK's type of a cell that is one point.
 const VERTEX: u8 = 1;
 
 /// The numbers of an array.
@@ -29,22 +29,22 @@ pub enum Values {
 /// An array with one tuple for each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
-    /// Its name.
+    /// Name of the array.
     pub name: String,
-    /// Names of the components; one, and empty, for a scalar.
+    /// Names of the components; one empty name for a scalar.
     pub components: Vec<String>,
     /// All components of the first point, then of the next.
     pub values: Values,
 }
 
-/// The background grid a snapshot was computed on, kept as field data so that a picture can show it.
+/// The background grid of a snapshot, kept as field data so that a picture can show the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background {
     /// Number of dimensions.
     pub dimension: u32,
     /// Lower corner; 0 along missing axes.
     pub origin: [f64; 3],
-    /// Distance of the nodes.
+    /// Distance between neighbouring nodes.
     pub spacing: f64,
     /// Cells along each axis; 0 along missing ones.
     pub cells: [u32; 3],
@@ -85,32 +85,32 @@ pub struct Snapshot {
     pub background: Background,
     /// The points; missing coordinates are 0.
     pub points: Vec<[f64; 3]>,
-    /// Their arrays.
+    /// Arrays of the points.
     pub arrays: Vec<Array>,
 }
 
-/// A file is not a snapshot that bfree wrote.
+/// A file cannot be read as a snapshot of bfree.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The system refused.
+    /// The operating system refused.
     #[error("cannot read {}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason given by the operating system.
         source: std::io::Error,
     },
-    /// The content is not what [`Snapshot::write`] writes.
+    /// The content does not have the format of [`Snapshot::write`].
     #[error("{} is not a snapshot written by bfree: {what}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
-        /// What is missing or wrong.
+        /// Description of the missing or wrong part.
         what: String,
     },
 }
 
-/// The appended data, and the XML that points into it.
+/// The appended data, to which the XML refers by offsets.
 #[derive(Default)]
 struct Appended(Vec<u8>);
 
@@ -130,7 +130,7 @@ impl Appended {
     fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
         let offset = self.push(bytes);
         let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}""#);
-        // A scalar does not name its one component: readers then give a plain list.
+        // Without NumberOfComponents, readers give a scalar as a plain list.
         if components.len() != 1 {
             let _ = write!(xml, r#" NumberOfComponents="{}""#, components.len());
         }
@@ -169,7 +169,7 @@ impl Snapshot {
     /// Writes the file, all or nothing.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The operating system refuses.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
         let mut data = Appended::default();
         let mut xml = String::from(
@@ -209,7 +209,7 @@ impl Snapshot {
     /// Reads a file written by [`Self::write`].
     ///
     /// # Errors
-    /// The system refuses, or the file is another one or damaged.
+    /// The operating system refuses, or the file is not a snapshot, or is damaged.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let content = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
         Self::parse(&content).map_err(|what| ReadError::Format { path: path.to_owned(), what })
@@ -299,7 +299,7 @@ fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, Str
     Ok(Some(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values }))
 }
 
-/// Undoes [`Appended::push`].
+/// Decompresses the data of [`Appended::push`].
 fn inflated(data: &[u8]) -> Option<Vec<u8>> {
     let word = |k: usize| {
         let bytes = data.get(k.checked_mul(8)?..)?.first_chunk::<8>()?;
@@ -356,8 +356,8 @@ mod tests {
         Ok(())
     }
 
-    /// Against the format's description rather than our reader: where the offset says, the header gives block count, block
-    /// size, the size of a partial last block (0 if it is whole) and the compressed sizes, all UInt64.
+    /// The layout is compared with the description of the format and not with our reader. The offset leads to a header of UInt64. The
+    /// header holds the block count, the block size, the size of a partial last block (0 if it is whole) and the compressed sizes.
     #[test]
     fn the_layout_is_that_of_vtk() -> Result<(), Box<dyn std::error::Error>> {
         let mut appended = Appended::default();

@@ -1,4 +1,4 @@
-//! What the one who waits should know before the end: each kind once, with time and value.
+//! Warnings during a run: each kind once, with time and value.
 
 use super::Reference;
 use super::contact::{Contact, Contacts};
@@ -8,22 +8,22 @@ use super::path::{Event, Followed};
 use crate::simulation::{Sharing, Simulation};
 use serde::{Deserialize, Serialize};
 
-/// Energy created, as a part of the largest total energy so far, above which there is a warning.
+/// Created energy, as a fraction of the largest total energy so far, above which there is a warning.
 const CREATED: f64 = 0.01;
 
-/// Energy lost, likewise.
+/// Lost energy, as a fraction of the largest total energy so far, above which there is a warning.
 const LOST: f64 = 0.02;
 
 /// Steps over which the usual number of iterations is averaged.
 const MEMORY: u64 = 50;
 
-/// Steps before iterations are compared with their mean.
+/// Steps before iterations are compared with their mean. A loss of energy is reported if it lasts for as many steps.
 const USUAL_AFTER: u64 = 10;
 
-/// Krylov iterations of a step climb when they are so many times the usual ones, and more than so many.
+/// Thresholds of the warning on Krylov iterations: a multiple of their usual number, and a number of iterations.
 const CLIMB: (f64, f64) = (5.0, 100.0);
 
-/// What a warning is about.
+/// Subject of a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -33,9 +33,9 @@ pub enum Kind {
     EnergyLost,
     /// A step was taken with less than its nominal length, because a longer one failed.
     StepHalved,
-    /// The local error of a step is above the tolerance, and it could not be halved.
+    /// The local error of a step is above the tolerance, and the step could not be halved.
     StepInaccurate,
-    /// Newton's method takes more than half of the iterations it may.
+    /// Newton's method takes more than half of its allowed iterations.
     NewtonClimbs,
     /// The linear solver takes many more iterations than it used to.
     KrylovClimbs,
@@ -45,11 +45,11 @@ pub enum Kind {
     KrylovStagnated,
     /// Two bodies share nodes and are pulled apart.
     BodiesStick,
-    /// Along a path of equilibria, the load has turned.
+    /// The load on the equilibrium path has turned at a limit point.
     PathTurned,
-    /// A path has bent sharply from one step to the next.
+    /// The equilibrium path has bent sharply from one step to the next.
     PathBent,
-    /// A path goes back the way that it came.
+    /// The equilibrium path goes back along its earlier points.
     PathReturned,
 }
 
@@ -57,26 +57,26 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Warning {
-    /// What it is about.
+    /// Subject.
     pub kind: Kind,
     /// t_{n+1} of the step.
     pub time: f64,
-    /// Its number.
+    /// Number of the step.
     pub step: u64,
-    /// What happened, with its value.
+    /// The event and its value.
     pub message: String,
 }
 
-/// Watches a run.
+/// Collects the warnings of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Watch {
     losses: Losses,
-    /// Steps on end after which the loss was too large.
+    /// Consecutive steps after which the loss was too large.
     losing: u64,
     contacts: Contacts,
     path: Followed,
-    /// Whether the mass is lumped in full.
+    /// Whether the mass matrix is lumped in full.
     lumped: bool,
     /// The usual number of Krylov iterations.
     usual_krylov: f64,
@@ -85,29 +85,30 @@ pub(crate) struct Watch {
     warnings: Vec<Warning>,
 }
 
-/// A step, as far as it is watched.
+/// The data of a step for the warnings.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Watched {
     pub time: f64,
     pub step: u64,
     pub energies: Energies,
-    /// Whether there is inertia: load steps take work from loads that are there at once.
+    /// Whether there is inertia. In load steps, loads act at once and lose work.
     pub moves: bool,
-    /// The event in it that may lose energy.
+    /// The event in the step that may lose energy.
     pub cause: Cause,
-    /// Whether the mass is lumped in full.
+    /// Whether the mass matrix is lumped in full.
     pub lumped: bool,
     pub cost: Cost,
-    /// Attempts before it that failed for another reason than their error.
+    /// Earlier attempts at the step that failed for another reason than their local error.
     pub failed: usize,
-    /// Its local error, and the tolerance, if there is one.
+    /// Local error and tolerance of the step; `None` without a tolerance.
     pub error: Option<(f64, f64)>,
     /// Newton iterations allowed.
     pub newton_limit: usize,
-    /// Linear systems left unsolved at the limit, and because their residual no longer fell; failed attempts have some, too.
+    /// Linear systems left unsolved at the limit on iterations (`limited`), or because their residual no longer fell (`stagnated`). Failed
+    /// attempts are included.
     pub limited: usize,
     pub stagnated: usize,
-    /// Krylov iterations allowed for one.
+    /// Krylov iterations allowed for a linear system.
     pub krylov_limit: usize,
 }
 
@@ -117,7 +118,7 @@ impl Watch {
         &self.warnings
     }
 
-    /// Looks at a step; what is new.
+    /// Examines a step and returns the new warnings.
     pub(crate) fn see(&mut self, step: &Watched) -> &[Warning] {
         let known = self.warnings.len();
         self.see_energy(step);
@@ -126,7 +127,7 @@ impl Watch {
         &self.warnings[known..]
     }
 
-    /// The energy that is created or lost.
+    /// Warns of created or lost energy.
     fn see_energy(&mut self, step: &Watched) {
         self.losses.add(&step.energies, step.cause);
         self.lumped = step.lumped;
@@ -146,7 +147,7 @@ impl Watch {
         }
     }
 
-    /// Steps that were halved, or should have been.
+    /// Warns of a step that was halved, or should have been.
     fn see_step(&mut self, step: &Watched) {
         let Watched { cost, failed, error, .. } = *step;
         if failed > 0 {
@@ -163,7 +164,7 @@ impl Watch {
         }
     }
 
-    /// Iterations of Newton's method and of the linear solver.
+    /// Warns of many iterations of Newton's method, and of linear systems that are hard to solve.
     fn see_solver(&mut self, step: &Watched) {
         let Watched { cost, newton_limit, limited, stagnated, krylov_limit, .. } = *step;
         if 2 * cost.newton > newton_limit && newton_limit > 1 {
@@ -204,7 +205,7 @@ impl Watch {
         self.usual_krylov += (krylov - usual) / self.seen.min(MEMORY) as f64;
     }
 
-    /// Looks at the bodies that share nodes after a step; a sentence for each two that stick together from now on.
+    /// Examines the bodies that share nodes after a step. Returns a warning for each pair of bodies that sticks together from now on.
     pub(crate) fn see_contact(&mut self, step: &Watched, sharing: &[Sharing], names: &[&str]) -> &[Warning] {
         let known = self.warnings.len();
         let Watched { time, cost, step: number, .. } = *step;
@@ -214,7 +215,8 @@ impl Watch {
         &self.warnings[known..]
     }
 
-    /// Looks at a step along a path of equilibria, whose displacement has the cosine `straight` to that of the step before.
+    /// Examines a step along the equilibrium path. `straight` is the cosine of the angle between the displacements of this step and the
+    /// previous step.
     pub(crate) fn see_path<const D: usize, L, A>(
         &mut self,
         step: &Watched,
@@ -253,7 +255,8 @@ impl Watch {
         self.contacts.all()
     }
 
-    /// The run is over after a step, the `number`th, that ended at `time`: a loss is told again, as large as it became. What is new.
+    /// Ends the run after step `number`, which ended at `time`. A loss of energy is reported again with its final size. Returns the new
+    /// warning.
     pub(crate) fn end(&mut self, time: f64, number: u64) -> Option<&Warning> {
         let mut told =
             self.warnings.iter().filter(|warning| warning.kind == Kind::EnergyLost).map(|warning| warning.time);
@@ -344,7 +347,7 @@ mod tests {
         assert!(watch.see(&newton).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let krylov = |krylov| Watched { cost: Cost { krylov, ..step(0).cost }, ..step(24) };
         assert!(watch.see(&krylov(150)).is_empty(), "five times is not more than five times");
-        // 39 steps of 30 before, and that of 150
+        // the mean: 39 steps of 30 iterations, and the step of 150
         let words = ["180 iterations in a step; 33", "aggregation", "multigrid"];
         assert!(watch.see(&krylov(180)).iter().any(|warning| words.iter().all(|word| warning.message.contains(word))));
         let limited = Watched { limited: 2, ..step(25) };
@@ -355,13 +358,13 @@ mod tests {
         assert!(watch.see(&stagnated).iter().any(|warning| warning.message.starts_with("3 linear systems")));
         assert!(watch.see(&stagnated).is_empty() && watch.see(&limited).is_empty(), "once");
         assert_eq!(watch.warnings().len(), 8);
-        // At the end it is told as large as it became.
+        // At the end the loss is reported with its final size.
         watch.see(&balance(-0.2));
         let told = watch.end(3.0, 30).map(|warning| (warning.kind, warning.time, warning.message.clone()));
         let Some((Kind::EnergyLost, 3.0, message)) = told else { panic!("{told:?}") };
         assert!(message.contains("2.000e-1, 5.0 %") && message.ends_with("more than 2 % since t = 2.1"), "{message}");
         assert_eq!(watch.end(3.0, 30), None, "once");
-        // what it knows survives a checkpoint
+        // the state of the watch survives a checkpoint
         let text = serde_json::to_string(&watch).unwrap();
         assert_eq!(serde_json::from_str::<Watch>(&text).unwrap(), watch);
     }

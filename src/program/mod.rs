@@ -1,4 +1,4 @@
-//! What the commands share: how they end, and where they write.
+//! Shared by all commands: exit codes, standard output and standard error.
 
 mod new;
 mod probes;
@@ -13,14 +13,14 @@ use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write as _};
 
-/// How the program ends: 2 for a scene or an option that cannot be used, 1 for a run that failed, 130 for one stopped by Ctrl-C.
+/// Reason why a command fails. Exit codes: 2 for a scene or an option that cannot be used, 1 for a failed run, 130 after Ctrl-C.
 pub enum Failure {
     Scene(Box<dyn Error>),
     Run(Box<dyn Error>),
     Interrupted,
 }
 
-/// The exit code of a program that Ctrl-C has ended: 128 and the number of the signal.
+/// Exit code after Ctrl-C: 128 plus the number of the signal.
 pub const INTERRUPTED: u8 = 130;
 
 impl Failure {
@@ -33,7 +33,7 @@ impl Failure {
     }
 }
 
-/// Writes to standard output. A reader that has seen enough and closed the pipe, like `head`, is no failure.
+/// Writes to standard output. A pipe that its reader has closed, as `head` does, is not an error.
 pub fn print(text: impl Display) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -42,7 +42,7 @@ pub fn print(text: impl Display) -> Result<(), Failure> {
     }
 }
 
-/// Writes a line to standard error; where that is impossible, there is nobody to tell.
+/// Writes a line to standard error. A failure to write is ignored, because it cannot be reported anywhere.
 pub fn tell(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }

@@ -1,7 +1,7 @@
 //! `bfree new`: a scene to start from.
 //!
-//! JSON has no comments. The scene names its schema instead, which is written beside it and lets editors explain every key
-//! where it stands; and the same sentences are printed.
+//! JSON has no comments. Instead, the scene names its JSON Schema, which is written beside the scene. Editors show the sentence of each key
+//! from the schema. The command also prints these sentences.
 
 use super::{Failure, print};
 use bfree::scene::{self, keys};
@@ -12,7 +12,7 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-/// The problems, and the scene of each.
+/// Name and scene of every problem.
 const PROBLEMS: [(&str, &str); 15] = [
     ("rebound", include_str!("../../scenes/rebound.json")),
     ("collision", include_str!("../../scenes/collision.json")),
@@ -31,19 +31,19 @@ const PROBLEMS: [(&str, &str); 15] = [
     ("collapse", include_str!("../../scenes/collapse.json")),
 ];
 
-/// The schema's file beside the scene.
+/// File name of the schema beside the scene.
 const SCHEMA: &str = "scene.schema.json";
 
-/// Columns of a terminal, and those of the keys; what a longer key is begins on the next line.
+/// Width of a line, and width of the column of keys. The sentence of a longer key begins on the next line.
 const WIDTH: (usize, usize) = (110, 34);
 
 /// `bfree new`.
 #[derive(Args)]
 pub struct New {
-    /// The problem.
+    /// The problem; without a problem, all problems are listed.
     #[arg(value_parser = PossibleValuesParser::new(PROBLEMS.map(|(name, _)| name)))]
     problem: Option<String>,
-    /// The file to write [default: the problem's name and .json]. A file that is there stays as it is.
+    /// The file to write [default: the problem's name and .json]. An existing file is not overwritten.
     file: Option<PathBuf>,
 }
 
@@ -57,7 +57,7 @@ enum Refused {
 }
 
 impl New {
-    /// Writes the scene, or prints the list.
+    /// Writes the scene of the problem, or prints the list of problems.
     pub fn execute(&self) -> Result<(), Failure> {
         let Some((name, text)) = PROBLEMS.iter().find(|(name, _)| Some(*name) == self.problem.as_deref()) else {
             return print(list());
@@ -66,7 +66,7 @@ impl New {
         let schema = path.parent().unwrap_or(Path::new("")).join(SCHEMA);
         create(&path, &text.replacen('{', &format!("{{\n  \"$schema\": \"{SCHEMA}\","), 1))?;
         match create(&schema, &serde_json::to_string_pretty(&scene::schema()).map_err(Failure::run)?) {
-            // That of an earlier scene.
+            // The schema of an earlier scene exists already.
             Err(Failure::Scene(_)) => {}
             result => result?,
         }
@@ -113,7 +113,7 @@ fn explained(text: &str) -> Result<String, Failure> {
     Ok(out)
 }
 
-/// Writes a file that is not there yet.
+/// Writes a new file. An existing file is an error.
 fn create(path: &Path, content: &str) -> Result<(), Failure> {
     let path = path.to_owned();
     let refused = |source: std::io::Error| match source.kind() {

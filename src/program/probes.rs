@@ -1,4 +1,4 @@
-//! Probes of a scene and the particles they look at.
+//! Probes of a scene and their particles.
 
 use bfree::output::{Place, Probe, nearest};
 use bfree::scene::{self, Scene, output::At};
@@ -7,18 +7,18 @@ use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::fmt::{Display, Formatter};
 
-/// A probe of the scene, and the particle it looks at first.
+/// A probe of the scene, and the particle nearest to its point at the start.
 pub struct Bound<const D: usize> {
     pub probe: Probe<D>,
     particle: usize,
-    /// Its distance from the place that was asked for.
+    /// Distance of the particle from the point given in the scene.
     distance: f64,
-    /// The particle spacing of its body.
+    /// Particle spacing of the particle's body.
     spacing: f64,
 }
 
 impl<const D: usize> Bound<D> {
-    /// What the user should know of a place far from any particle.
+    /// A warning if the nearest particle is farther away than the particle spacing.
     pub fn warning(&self) -> Option<String> {
         (self.distance > self.spacing).then(|| {
             let consequence = match self.probe.place {
@@ -32,7 +32,7 @@ impl<const D: usize> Bound<D> {
         })
     }
 
-    /// For the report.
+    /// The entry of the probe in the report.
     pub fn report(&self) -> Value {
         json!({"name": self.probe.name, "particle": self.particle, "distance": self.distance, "warning": self.warning()})
     }
@@ -50,7 +50,7 @@ impl<const D: usize> Display for Bound<D> {
     }
 }
 
-/// The probes of a scene with the particles nearest to them at the start.
+/// The probes of a scene, each with the particle nearest to it at the start.
 pub fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Bound<D>> {
     let particles = &simulation.particles;
     let bind = |probe: &scene::output::Probe| {

@@ -32,38 +32,38 @@ pub struct Run {
     /// Directory of the results [default: out/ and the scene's name].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// End at this time instead of the scene's time.end; the same values are allowed. Between whole steps the last one is shortened, after
-    /// the checkpoint: a restart goes on as if it had not been taken.
+    /// End at this time instead of time.end of the scene. The same values are allowed. If the end lies between whole steps, the last step
+    /// is shortened. The last checkpoint is written before the shortened step, so a restart continues without it.
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = number)]
     until: Option<f64>,
     /// Take at most this many whole time steps; 0 writes the initial state only.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0, MAX_STEPS as u64))]
     steps: Option<u64>,
-    /// Threads, 1 to 1024 [default: all cores]. The results have the same bits for any number.
+    /// Threads, 1 to 1024 [default: all cores]. Results are bitwise identical for any number of threads.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, 1024))]
     threads: Option<u64>,
-    /// Compare the tangent with dual numbers every EVERY steps, and stop where they part.
+    /// Compare the tangent with dual numbers every EVERY steps, and stop if they differ.
     #[arg(long, value_name = "EVERY", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true,
           value_parser = whole(1, MAX_STEPS as u64))]
     check_tangent: Option<u64>,
     /// Continue a run that was killed or interrupted, in its directory, from its last good checkpoint.
     #[arg(long)]
     restart: bool,
-    /// Begin anew in a directory that holds a run, and lose that run.
+    /// Start a new run in a directory that holds another run, and discard the other run.
     #[arg(long, conflicts_with = "restart")]
     discard: bool,
     /// Draw the results at the end, as `bfree plot` does.
     #[arg(long)]
     plot: bool,
-    /// Show no progress and no summary. Warnings are written all the same.
+    /// Show no progress and no summary. Warnings are still written.
     #[arg(long)]
     quiet: bool,
-    /// How progress is written to standard error: a bar or lines to read, or one JSON object a line for a program that watches.
+    /// Form of the progress on standard error: a bar or lines to read, or one JSON object per line for a program.
     #[arg(long, value_enum, default_value_t, conflicts_with = "quiet")]
     progress: Form,
 }
 
-/// A whole number of an option, in a range.
+/// Parser of an option that takes a whole number from `min` to `max`.
 fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
     move |text| {
         let number = text.parse().ok().filter(|number| (min..=max).contains(number));
@@ -71,12 +71,12 @@ fn whole(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone {
     }
 }
 
-/// A number of an option.
+/// Parser of an option that takes a number.
 fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "must be a number".to_owned())
 }
 
-/// The form of progress.
+/// Form of the progress on standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Form {
     #[default]
@@ -84,7 +84,7 @@ enum Form {
     Json,
 }
 
-/// Another run is in the way.
+/// The directory holds something that the run would replace.
 #[derive(Debug, thiserror::Error)]
 #[error("{} holds {why}write elsewhere by --out {}", directory.display(), free(directory).display())]
 struct WouldBeLost {
@@ -107,12 +107,12 @@ enum Lost {
     Foreign(PathBuf),
 }
 
-/// How an earlier run ended, in words.
+/// Outcome of an earlier run, in words.
 fn ended(held: &Held) -> String {
     held.outcome.clone().unwrap_or_else(|| "did not end and left no checkpoint that can be read".to_owned())
 }
 
-/// The first numbered directory beside `directory` that is not there yet.
+/// The first numbered path beside `directory` that does not exist.
 fn free(directory: &Path) -> PathBuf {
     let numbered = |number: u32| {
         let mut name = directory.file_name().unwrap_or(OsStr::new("results")).to_owned();
@@ -122,12 +122,12 @@ fn free(directory: &Path) -> PathBuf {
     (2..u32::MAX).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| numbered(u32::MAX))
 }
 
-/// A scene whose file has no name but its ending.
+/// The name of the scene file gives no name for the directory of results.
 #[derive(Debug, thiserror::Error)]
 #[error("the name of the scene file {} gives no name for the directory of results: rename the file, or give --out DIR", .0.display())]
 struct Nameless(PathBuf);
 
-/// A checkpoint behind the end.
+/// The checkpoint is later than the end of the run.
 #[derive(Debug, thiserror::Error)]
 #[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
 struct Past {
@@ -136,7 +136,7 @@ struct Past {
     end: f64,
 }
 
-/// No place for results.
+/// The directory of the results cannot be created.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot create the directory {}", directory.display())]
 struct Unmade {
@@ -145,7 +145,7 @@ struct Unmade {
 }
 
 impl Run {
-    /// Whether a program reads what is told, as JSON.
+    /// Whether messages are written as JSON, for a program.
     pub fn tells_json(&self) -> bool {
         self.progress == Form::Json
     }
@@ -176,7 +176,7 @@ impl Run {
         let end = scene.time.end;
         let until = simulation.clock.whole_steps(end);
         let mut last = self.steps.map_or(until, |steps| steps.min(until));
-        // A shortened step is one more.
+        // The shortened step counts as one more step than the whole steps `until`.
         let mut shortens = self.steps.is_none_or(|steps| steps > until);
         let directory = self.directory()?;
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
@@ -221,7 +221,7 @@ impl Run {
         };
         let set_up = start.elapsed().as_secs_f64();
         let mut recorder = match &restored {
-            // What cannot be continued is left as it is.
+            // Files that cannot be continued are left as they are.
             Some(restored) => {
                 Recorder::resume(output, &simulation, reference, &restored.mark).map_err(Failure::scene)?
             }
@@ -245,7 +245,7 @@ impl Run {
             }
             let interrupted = interrupted.load(Ordering::Relaxed);
             if simulation.clock.nominal_steps() >= last || interrupted {
-                // Before the last snapshot, which an undisturbed run would not write here, and before a step that is shortened.
+                // This checkpoint precedes the last snapshot and a shortened step: a longer run has neither of them here.
                 if let Some(mut checkpoints) = checkpoints.take() {
                     let written = checkpoints.write(&simulation, &mut recorder);
                     written.inspect_err(|_| unwritten(time)).map_err(Failure::run)?;
@@ -259,7 +259,7 @@ impl Run {
                     let recorded = recorder.record(&simulation, &step);
                     recorded.inspect_err(|_| unwritten(simulation.clock.time())).map_err(Failure::run)?;
                 }
-                // What the next round says.
+                // The next round of the loop handles the interruption.
                 Err(error) if error.cause.is_stopped() => {}
                 Err(error) => {
                     failure = Some(error);
@@ -306,7 +306,7 @@ impl Run {
     fn directory(&self) -> Result<PathBuf, Failure> {
         let scene = &self.scene.scene;
         let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
-        // `out/..` is where the program runs.
+        // The stem `..` would give `out/..`, the working directory.
         let nameless = stem.chars().all(|letter| letter == '.') || stem == ".json";
         match &self.out {
             Some(out) => Ok(out.clone()),
@@ -315,7 +315,7 @@ impl Run {
         }
     }
 
-    /// Makes room for a new run; results of an earlier one are lost only on request.
+    /// Prepares the directory for a new run. Results of an earlier run are discarded only with `--discard`.
     fn begin(&self, directory: &Path) -> Result<(), Failure> {
         let lost = |why| Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why }));
         if let Some(path) = foreign(directory) {
@@ -330,7 +330,7 @@ impl Run {
         }
     }
 
-    /// Keeps other runs out of the directory until what is returned is dropped, where the file system knows how.
+    /// Locks the directory against other runs until the returned handle is dropped. A file system without locks locks nothing.
     fn claim(&self, directory: &Path) -> Result<Option<File>, Failure> {
         if !self.restart {
             let not_there = directory.exists() && !directory.is_dir();
@@ -346,7 +346,7 @@ impl Run {
         }
     }
 
-    /// Puts the simulation back to the last good checkpoint, and says which it is.
+    /// Restores the simulation from the last good checkpoint, and reports the checkpoint.
     fn restore<const D: usize>(
         &self,
         directory: &Path,
@@ -384,7 +384,7 @@ impl Run {
         }
     }
 
-    /// Tells something beside the progress, in its form.
+    /// Writes a message beside the progress, in the form of the progress.
     fn say(&self, event: &str, message: &str) {
         match self.progress {
             Form::Json => tell(json!({"event": event, "message": message})),
@@ -407,14 +407,15 @@ impl Run {
     }
 }
 
-/// Set by Ctrl-C and by what batch systems send: the run then ends after the current step. A second signal ends it at once.
+/// A flag that is set by Ctrl-C and by the signals of batch systems. The run then ends after a whole step. A second signal ends the program
+/// at once.
 fn stop_on_interrupt() -> std::io::Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), Arc::clone(&interrupted))?;
         flag::register(signal, Arc::clone(&interrupted))?;
     }
-    // A limit on the size of files is an error of writing, and does not end the program without a word.
+    // With SIGXFSZ caught, a limit on the size of files is a write error. Otherwise it would end the program without a message.
     flag::register(SIGXFSZ, Arc::default())?;
     Ok(interrupted)
 }

@@ -1,4 +1,4 @@
-//! The scene that a command is about, and its check.
+//! The scene argument of a command, and `bfree check`.
 
 use super::probes::bound_probes;
 use super::{Failure, print, tell};
@@ -12,7 +12,7 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The scene, and what replaces values of it.
+/// The scene file, and overrides of its keys.
 #[derive(Args)]
 pub struct SceneArguments {
     /// The scene, a JSON file.
@@ -31,43 +31,43 @@ struct Unusable {
 }
 
 impl SceneArguments {
-    /// The scene, checked.
+    /// Reads the scene, applies the overrides and validates the result.
     pub fn read(&self) -> Result<Scene, Failure> {
         let overrides: Result<Vec<Override>, _> = self.overrides.iter().map(|text| text.parse()).collect();
         scene::read_file(&self.scene, &overrides.map_err(Failure::scene)?).map_err(|error| match error {
-            // The one names the file, the other is about an option.
+            // `File` names the file already, and `Override` concerns an option: neither needs the path of the scene.
             SceneError::File { .. } | SceneError::Override(_) => Failure::scene(error),
             error => self.unusable(error),
         })
     }
 
-    /// Names the scene that an error is about.
+    /// Adds the path of the scene to an error.
     pub fn unusable(&self, error: impl Error + 'static) -> Failure {
         Failure::scene(Unusable { path: self.scene.clone(), source: Box::new(error) })
     }
 
-    /// Where the files it names are looked for.
+    /// The folder in which files named by the scene are looked for.
     pub fn folder(&self) -> &Path {
         self.scene.parent().unwrap_or(Path::new("."))
     }
 
-    /// The simulation at t = 0, if there is memory for its particles.
+    /// Builds the simulation at t = 0. Too little memory for its particles is an error.
     pub fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
         scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
     }
 
-    /// What a run of the simulation requires, if there is memory for it.
+    /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.
     pub fn plan<const D: usize>(&self, simulation: &Simulation<D>) -> Result<Plan, Failure> {
         let plan = Plan::of(simulation).map_err(|error| self.unusable(error))?;
-        // The particles are there already.
+        // The particles are allocated already, but the plan counts them again.
         let particles = (simulation.particles.len() * Particles::<D>::BYTES) as u64;
         let memory = memory::available().map_or(u64::MAX, |bytes| bytes.saturating_add(particles));
         plan.check_fits(memory).map_err(|error| self.unusable(error))?;
         Ok(plan)
     }
 
-    /// Prints what the scene requires.
+    /// Runs `bfree check`: prints the particles, plan, output and probes of the scene.
     pub fn check(&self) -> Result<(), Failure> {
         let scene = self.read()?;
         match scene.dimension() {
@@ -115,7 +115,7 @@ impl SceneArguments {
     }
 }
 
-/// What a run writes of the particles, beside the probes; no other field is computed.
+/// The fields in the snapshots, in words. No other field is computed, except for probes.
 fn written(scene: &Scene) -> String {
     let names: Vec<&str> = scene.fields().iter().map(|field| field.name()).collect();
     match scene.output.every {
@@ -124,7 +124,7 @@ fn written(scene: &Scene) -> String {
     }
 }
 
-/// What the accuracy of a scene has set, on one line; nothing without that key.
+/// The keys set by `accuracy`, on one line. `None` if the scene has no `accuracy`.
 pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
     let accuracy = scene.accuracy?;
     let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();

@@ -1,4 +1,4 @@
-//! Bodies: where they are, what they are made of, how they move at the start.
+//! Bodies: shape or particles, material, and initial velocity.
 
 use super::grid::GridBox;
 use super::shape::Shape;
@@ -15,31 +15,31 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
-    /// The name by which loads and probes refer to it; no two bodies share one.
+    /// The unique name by which loads and probes refer to the body.
     #[schemars(length(min = 1))]
     pub name: String,
-    /// The region to fill with particles. Either this or `particles` is given.
+    /// The region to fill with particles. A body has either `shape` or `particles`.
     pub shape: Option<Shape>,
-    /// A file with the particles. Either this or `shape` is given.
+    /// A file with the particles. A body has either `particles` or `shape`.
     pub particles: Option<ParticleFile>,
-    /// The law.
+    /// The constitutive law.
     pub material: material::Parameters,
-    /// What change of volume the energy sees.
+    /// The change of volume that enters the strain energy.
     #[serde(default)]
     pub volumetric: Dilatation,
     /// Mass per reference volume, > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub density: f64,
-    /// The velocity at the start, the same everywhere. Default: zeros, or what the particle file says.
+    /// The initial velocity, uniform in the body. Default: the velocities of the particle file, or zeros.
     pub velocity: Option<Vec<f64>>,
     /// Particles per cell along each axis, 1 to 100; 2 gives the quarter points. Default 2.
     #[serde(default = "Body::default_particles_per_cell")]
     #[schemars(range(min = 1, max = 100))]
     pub particles_per_cell: u32,
-    /// Where particles are in cells that the body fills. Default: `"gauss"` on a grid that is kept, `"regular"` on one that is made anew
-    /// every step and with uGIMP functions.
+    /// Positions of the particles in cells that the body fills. Default: `"regular"` if the grid is reset in every step, and with uGIMP
+    /// functions; else `"gauss"`.
     pub layout: Option<Layout>,
-    /// What becomes of particles in cells that the surface of the shape cuts.
+    /// Treatment of the particles in cut cells, the cells that the surface of the shape cuts.
     #[serde(default)]
     pub fill: Fill,
 }
@@ -107,7 +107,8 @@ impl Body {
     }
 }
 
-/// A body may be cut by the box only where its shape is infinite: a part beyond it would be lost in silence.
+/// Refuses a shape that is empty or whose finite part reaches beyond the box: that part would be lost silently. Only infinite shapes are
+/// clipped.
 fn check_inside<const D: usize>(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
     let (Some(grid), Some(shape)) = (grid.build::<D>(), shape.build::<D>()) else { return };
     let (min, max) = shape.bounding_box();

@@ -1,4 +1,4 @@
-//! Conditions at the faces of the box and prescribed motion inside of it.
+//! Boundary conditions at the faces of the box, and prescribed motion inside the box.
 
 use super::load::Curve;
 use super::shape::Shape;
@@ -6,7 +6,7 @@ use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the nodes of each face of the box may do. Faces that the dimension lacks must not be named.
+/// The boundary condition of each face of the box. Faces that the dimension lacks must not be named.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
@@ -24,64 +24,64 @@ pub struct Boundary {
     pub front: Option<Face>,
 }
 
-/// What the nodes of a face may do.
+/// The boundary condition of the nodes of a face.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Face {
-    /// Move freely.
+    /// All components are free.
     Free,
-    /// Slide: the normal component is held.
+    /// The normal component is held, and the nodes slide along the face.
     Sliding,
-    /// Not move.
+    /// All components are held.
     Fixed,
-    /// Per component: `true` is held, `false` is free.
+    /// One entry per component: `true` is held, `false` is free.
     Held(Vec<bool>),
-    /// Follow a table of displacements since t = 0 (length); constant after the last row.
+    /// Displacements since t = 0 (length) from a table; constant after the last row.
     Displacement(Table),
-    /// Follow a table of velocities; constant after the last row.
+    /// Velocities from a table; constant after the last row.
     Velocity(Table),
-    /// Rotate.
+    /// Rotation about an axis.
     Rotation(Rotation),
 }
 
-/// A motion: rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
+/// A motion as rows `[t, [x, y, …]]`, linear in between, from t = 0 on. A component that is null in every row is free.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Table(pub Vec<Row>);
 
-/// One row of a table: a time, and at that time the components that are prescribed.
+/// One row of a table: a time, and the prescribed components at that time.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 pub struct Row(pub f64, pub Vec<Option<f64>>);
 
-/// Motion of the nodes inside a region, given by either a displacement or a velocity.
+/// Motion of the nodes inside a region, given by exactly one of `displacement`, `velocity` and `rotation`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prescribed {
-    /// The region; the nodes that lie in it at t = 0 are meant.
+    /// The region. The motion applies to the nodes that lie in the region at t = 0.
     pub region: Shape,
     /// A table of displacements since t = 0 (length); constant after the last row.
     pub displacement: Option<Table>,
     /// A table of velocities; constant after the last row.
     pub velocity: Option<Table>,
-    /// A rotation. The region stays where it is, and what the grid holds there rotates: a region should be round about the axis where the
-    /// grid is renewed.
+    /// A rotation. The region stays in place, and the nodes in it rotate. Where the grid is reset (`grid.renewed`), the region should be
+    /// rotationally symmetric about the axis.
     pub rotation: Option<Rotation>,
 }
 
-/// A rotation about a fixed axis, of 2D and 3D. Its torque is in `reactions.csv`.
+/// A rotation about a fixed axis (2D and 3D). The torque is in `reactions.csv`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rotation {
     /// A point of the axis.
     pub center: Vec<f64>,
-    /// The direction of the axis, of any length but zero; in 3D alone, in 2D it is z.
+    /// The direction of the axis, of any length but zero (3D only; in 2D the axis is z).
     pub axis: Option<Vec<f64>>,
-    /// The angle in radians, counterclockwise where the axis points at the reader: rows `[t, angle]`, linear in between and constant
-    /// outside, from 0 at t = 0 on.
+    /// The angle (radians) as rows `[t, angle]`, counterclockwise where the axis points at the reader. The angle is linear in between and
+    /// constant outside, and starts from 0 at t = 0.
     pub angle: Curve,
 }
 
-/// A motion that is given.
+/// A prescribed motion.
 #[derive(Clone, Copy)]
 pub(super) enum Driving<'a> {
     Displacement(&'a Table),
@@ -90,7 +90,7 @@ pub(super) enum Driving<'a> {
 }
 
 impl Face {
-    /// The motion it follows.
+    /// The prescribed motion of the face, if there is one.
     pub(super) fn driving(&self) -> Option<Driving<'_>> {
         match self {
             Self::Displacement(table) => Some(Driving::Displacement(table)),
@@ -102,7 +102,7 @@ impl Face {
 }
 
 impl Driving<'_> {
-    /// Its key.
+    /// The key of the motion in a scene.
     pub(super) fn key(self) -> &'static str {
         match self {
             Self::Displacement(_) => "displacement",
@@ -111,7 +111,7 @@ impl Driving<'_> {
         }
     }
 
-    /// Whether anything in it is not zero.
+    /// Whether any value of the motion is non-zero.
     pub(super) fn moves(self) -> bool {
         match self {
             Self::Displacement(table) | Self::Velocity(table) => table.largest() > 0.0,
@@ -192,7 +192,7 @@ impl Prescribed {
         }
     }
 
-    /// All motions given, of which a checked scene has one.
+    /// All given motions; a checked scene has exactly one.
     pub(super) fn given(&self) -> impl Iterator<Item = Driving<'_>> {
         let (displacement, velocity, rotation) = (&self.displacement, &self.velocity, &self.rotation);
         let tables = displacement.iter().map(Driving::Displacement).chain(velocity.iter().map(Driving::Velocity));
@@ -231,7 +231,7 @@ impl Rotation {
 }
 
 impl Table {
-    /// The largest number without its sign.
+    /// The largest magnitude in the table.
     pub(super) fn largest(&self) -> f64 {
         self.0.iter().flat_map(|row| row.1.iter().flatten()).fold(0.0, |most: f64, x| most.max(x.abs()))
     }
@@ -271,7 +271,7 @@ impl Table {
     }
 }
 
-/// Times of a table or curve: at least one, finite and increasing.
+/// Checks the times of a table or curve: at least one, finite and increasing.
 pub(super) fn check_times(problems: &mut Problems, path: &str, times: impl Iterator<Item = f64>) {
     let mut last: Option<f64> = None;
     for (i, t) in times.enumerate() {

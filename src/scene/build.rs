@@ -1,4 +1,4 @@
-//! From a checked scene to a simulation. The dimension becomes a type here and nowhere else: see [`Scene::dimension`].
+//! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
 use super::filling::Means;
 use super::transfer::Transfer;
@@ -15,7 +15,7 @@ use crate::tensor::Vector;
 use std::path::Path;
 
 impl Scene {
-    /// 1 (uniaxial strain), 2 (plane strain) or 3.
+    /// The dimension: 1 (uniaxial strain), 2 (plane strain) or 3.
     ///
     /// ```
     /// // The dimension is a number in a scene and a type in a simulation.
@@ -28,7 +28,7 @@ impl Scene {
         self.grid.dimension()
     }
 
-    /// The simulation at t = 0. Particle files are looked for in `folder`.
+    /// The simulation at t = 0. Files of particles and shapes are looked for in `folder`.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -40,12 +40,12 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// What only shows once particles are there; and any scene whose dimension is not `D`.
+    /// A scene whose dimension is not `D`, and errors that appear only with the particles.
     pub fn build<const D: usize>(&self, folder: &Path) -> Result<Simulation<D>, BuildError> {
         self.build_within(folder, u64::MAX)
     }
 
-    /// As [`Self::build`], where no more than so many bytes of memory can be had.
+    /// Like [`Self::build`], with at most `memory` bytes available.
     ///
     /// ```
     /// // 112 particles need more than 1 kB, and less than 1 GB.
@@ -57,7 +57,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::build`]; and particles that surely need more, before room is made for them.
+    /// The errors of [`Self::build`], and particles that certainly need more memory, before room is made for them.
     pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
         let grid: Grid<D> =
             self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
@@ -104,7 +104,7 @@ impl Scene {
         Ok(simulation)
     }
 
-    /// The shape functions; or `None`, and what is wrong with them.
+    /// The shape functions; `None` if their parameters are not allowed, with the reasons in `problems`.
     pub(super) fn shape_functions(&self, problems: &mut Problems) -> Option<Approximation> {
         let particles_per_axis = self.bodies.first().map_or(2, |body| body.particles_per_cell);
         let cells = Cells { dimension: self.dimension(), particles_per_axis, integrated: self.is_integrated() };
@@ -161,12 +161,12 @@ impl Scene {
     }
 }
 
-/// A vector of the scene, of as many components as there are dimensions.
+/// A vector of the scene; an error unless it has `D` components.
 pub(super) fn vector<const D: usize>(path: &str, components: &[f64]) -> Result<Vector<f64, D>, BuildError> {
     super::shape::vector(components).ok_or_else(|| dimension::<D>(path))
 }
 
-/// What stands at `path` is of another dimension.
+/// The error for a value at `path` that has another dimension.
 pub(super) fn dimension<const D: usize>(path: &str) -> BuildError {
     BuildError::Dimension { path: path.into(), dimension: D }
 }

@@ -1,4 +1,4 @@
-//! Why a checked scene still gives no simulation.
+//! Errors of building a simulation from a checked scene.
 
 use super::Problems;
 use super::particle_file::ParticleFileError;
@@ -8,10 +8,10 @@ use crate::shape::FillError;
 use crate::simulation::StepError;
 use indicatif::BinaryBytes;
 
-/// Why a checked scene still gives no simulation.
+/// Errors of building a simulation from a checked scene.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// The scene was not checked, or is of another dimension.
+    /// The scene was not checked, or has another dimension.
     #[error("{path}: does not fit {dimension} dimensions")]
     Dimension {
         /// The key.
@@ -19,23 +19,23 @@ pub enum BuildError {
         /// The dimension asked for.
         dimension: usize,
     },
-    /// The scene was not checked: constants of a law or of shape functions.
+    /// Values that are not allowed: those of shapes read from files, or of a scene that was not checked.
     #[error("{0}")]
     Values(Problems),
-    /// A curve or table.
+    /// A curve or table is not allowed.
     #[error("{path}: {source}")]
     Curve {
         /// The key.
         path: String,
-        /// What is wrong.
+        /// The cause.
         source: CurveError,
     },
-    /// A shape without particles, or with too many.
+    /// A shape contains no particles, or too many.
     #[error("{path}: {source}")]
     Fill {
         /// The key.
         path: String,
-        /// What is wrong.
+        /// The cause.
         source: FillError,
     },
     /// More particles than there is memory for.
@@ -46,44 +46,44 @@ pub enum BuildError {
     Memory {
         /// The key.
         path: String,
-        /// Of this body and those before.
+        /// Particles of this body and of those before.
         particles: usize,
-        /// Bytes, at least.
+        /// Required memory in bytes, at least.
         needed: u64,
-        /// Bytes that can be had.
+        /// Available memory in bytes.
         memory: u64,
     },
-    /// A particle file.
+    /// A particle file cannot be used.
     #[error("{path}: {file}: {source}")]
     ParticleFile {
         /// The key.
         path: String,
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: Box<ParticleFileError>,
     },
-    /// The file of a shape.
+    /// The file of a shape cannot be used.
     #[error("{path}: {file} {source}")]
     ShapeFile {
         /// The key.
         path: String,
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: Box<ShapeFileError>,
     },
-    /// A particle of a file that lies outside the grid.
+    /// A particle of a file lies outside the grid.
     #[error("{path}: particle {particle} of the file, at {position:?}, lies outside the grid")]
     Outside {
         /// The key.
         path: String,
-        /// Its number in the file, from 1.
+        /// Number of the particle in the file, from 1.
         particle: usize,
-        /// Where it lies.
+        /// Position of the particle.
         position: Vec<f64>,
     },
-    /// A surface load that finds no surface.
+    /// A surface load acts on no part of the surface.
     #[error("{path}: nothing of the surface of body {body:?} is loaded; enlarge the region or remove the load")]
     NoSurface {
         /// The key.
@@ -94,10 +94,10 @@ pub enum BuildError {
     /// The loads at t = 0 could not be evaluated.
     #[error("the acceleration at t = 0 cannot be computed: {source}")]
     InitialAcceleration {
-        /// What is wrong.
+        /// The cause.
         source: Box<StepError>,
     },
-    /// A number too large or too small to compute with.
+    /// A quantity is too large or too small to compute with.
     #[error(
         "{path}: {what} is {value:e}; it must lie between {least:e} and {most:e}, or its products are not numbers: choose other \
          units, or other values"
@@ -107,27 +107,27 @@ pub enum BuildError {
         path: String,
         /// The quantity.
         what: &'static str,
-        /// Its value.
+        /// The value.
         value: f64,
-        /// The least allowed.
+        /// The smallest allowed value.
         least: f64,
-        /// The most allowed.
+        /// The largest allowed value.
         most: f64,
     },
-    /// Velocities from a file that something else forbids.
+    /// A particle file gives velocities that another key forbids.
     #[error("{path}: {file} gives velocities, and {why}")]
     Velocities {
         /// The key.
         path: String,
         /// The file.
         file: String,
-        /// What forbids them, and what to remove.
+        /// The cause, and what to remove.
         why: &'static str,
     },
     /// The initial velocity could not be interpolated.
     #[error("initial_velocity: {source}")]
     InitialVelocity {
-        /// What is wrong.
+        /// The cause.
         source: Box<StepError>,
     },
 }

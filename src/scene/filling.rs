@@ -1,4 +1,4 @@
-//! What bodies are filled with: how, where their surface is, and what came of it.
+//! Fills bodies with particles, finds their surfaces, and reports their volumes and masses.
 
 use super::body::Body;
 use super::boundary::Face;
@@ -14,18 +14,18 @@ use crate::tensor::Vector;
 use std::fmt::{Display, Formatter};
 use std::path::Path;
 
-/// What a body was filled with.
+/// The particles of a body: number, volume and mass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyUse {
-    /// Its name.
+    /// Name of the body.
     pub name: String,
-    /// Particles.
+    /// Number of particles.
     pub particles: usize,
-    /// Their volume (area in 2D, length in 1D).
+    /// Volume of the particles (area in 2D, length in 1D).
     pub volume: f64,
-    /// Their mass.
+    /// Mass of the particles.
     pub mass: f64,
-    /// The volume of its shape, if it has one.
+    /// Volume of the shape, if the body has a shape.
     pub drawn: Option<f64>,
 }
 
@@ -40,17 +40,17 @@ impl Display for BodyUse {
     }
 }
 
-/// What bodies are filled from and into.
+/// The folder and the memory for filling bodies.
 pub(super) struct Means<'a> {
-    /// Where particle files are.
+    /// Folder of the particle files.
     pub folder: &'a Path,
-    /// Bytes that can be had.
+    /// Available memory in bytes.
     pub memory: u64,
 }
 
 impl Means<'_> {
-    /// Room for `more` particles. A step needs the state at its start, as much for that at its end, and shape functions and
-    /// frozen tangents that are larger still: what it needs in all is known once the shape functions are, and less than this never.
+    /// Reserves room for `more` particles. A step stores the state at its start and at its end. Shape functions and the linearised tangent
+    /// need more memory than a state, so three states are a lower bound. The exact amount is known only once the shape functions are.
     pub fn make_room<const D: usize>(
         &self,
         path: &str,
@@ -68,7 +68,7 @@ impl Means<'_> {
 }
 
 impl Scene {
-    /// The particles of body `number`, behind those before it.
+    /// Appends the particles of body `number`.
     pub(super) fn fill<const D: usize>(
         &self,
         body: &Body,
@@ -130,7 +130,7 @@ impl Scene {
         Ok(())
     }
 
-    /// How the shape of a body is filled.
+    /// The rule by which the shape of a body is filled.
     ///
     /// ```
     /// use bfree::shape::Layout;
@@ -157,14 +157,15 @@ impl Scene {
         self.renewal() != Renewal::EveryStep
     }
 
-    /// Whether sums over particles are integrals, of Gauss's points on a grid that is kept, and no mass is lumped, not even in part.
+    /// Whether sums over particles are Gauss quadrature. The conditions are a grid that is not reset in every step, Gauss layout in all
+    /// bodies, and no lumped mass, not even in part.
     pub(super) fn is_integrated(&self) -> bool {
         let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
         let lumped = self.time.inertia.has_inertia() && self.time.lumping() > 0.0;
         !lumped && self.is_kept() && self.bodies.iter().all(gauss)
     }
 
-    /// What its bodies were filled with, beside what is drawn.
+    /// Number, volume and mass of the particles of each body, beside the volume of the shape.
     ///
     /// ```
     /// // The paper's disc of radius 1.5: its particles count in full or not at all.
@@ -196,8 +197,8 @@ impl Scene {
         self.bodies.iter().enumerate().map(of).collect()
     }
 
-    /// The surface of a body, in the boxes that cut cells have. Where the box ends and holds the motion across, the body goes on: a plane
-    /// of symmetry is no surface.
+    /// The surface of a body as facets, one by one for the boxes of a cut cell. Faces of the grid's box that hold the normal component are
+    /// planes of symmetry, and not part of the surface.
     pub(super) fn facets<const D: usize>(
         &self,
         body: &Body,
@@ -238,7 +239,7 @@ impl Scene {
 }
 
 impl Face {
-    /// Whether it prescribes the component across the face.
+    /// Whether the condition prescribes the component along `axis`, normal to the face.
     fn holds_across(&self, axis: usize) -> bool {
         match self {
             Self::Free => false,

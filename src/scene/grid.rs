@@ -7,33 +7,33 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Cells along one axis, at most.
+/// Maximum number of cells along one axis.
 const MAX_CELLS: f64 = 1e6;
 
-/// How far, relative to itself, the number of cells of an axis may be from a whole number.
+/// Relative tolerance of the number of cells along an axis, which must be a whole number.
 const WHOLE: f64 = 1e-9;
 
-/// How well neighbouring nodes must be told apart, relative to their distance.
+/// Largest round-off of node positions, relative to the spacing.
 const DISTINCT: f64 = 1e-6;
 
-/// The box in which everything happens, and the spacing of its background nodes. Nothing exists outside of it.
+/// The box that holds the whole simulation, and the spacing of its background nodes. Nothing exists outside the box.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridBox {
-    /// The lower corner of the box (length), at most 4e9 spacings from zero: farther away numbers are too coarse to tell nodes
-    /// apart. Default: zeros.
+    /// The lower corner of the box (length), at most 4e9 spacings from zero. Farther away, numbers are too coarse to distinguish nodes.
+    /// Default: zeros.
     pub origin: Option<Vec<f64>>,
-    /// The edges of the box (length), each > 0. One, two or three numbers: they set the dimension of the scene (uniaxial
-    /// strain, plane strain, or three dimensions).
+    /// The edges of the box (length), each > 0. The number of edges is the dimension of the scene: one (uniaxial strain), two (plane
+    /// strain) or three.
     #[schemars(length(min = 1, max = 3))]
     pub size: Vec<f64>,
     /// The distance of neighbouring nodes, the same along all axes (length), > 0. It must divide every edge of the box, to
     /// 1e-9 relative, into at most a million cells.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing: f64,
-    /// When the background grid is renewed. With a grid that is kept, the answer does not depend on the number of steps, stresses are
-    /// smooth, and bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps; with inertia `{"strain": 0.1}` for a
-    /// single body that a fixed face of the box holds from the start, with the transfer `"flip"`, and `"every_step"` for others.
+    /// When the background grid is reset. Between resets, the result does not depend on the number of steps, stresses are smooth, and
+    /// bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps. With inertia, `{"strain": 0.1}` for a single body
+    /// that a fixed face of the box holds from the start, if the transfer is `"flip"`, and `"every_step"` otherwise.
     pub renewed: Option<Renewal>,
 }
 
@@ -52,7 +52,7 @@ impl GridBox {
         self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
     }
 
-    /// The grid itself; `None` unless the section is valid and of dimension `D`.
+    /// The grid; `None` unless the section is valid and of dimension `D`.
     ///
     /// ```
     /// use bfree::scene::grid::GridBox;
@@ -73,7 +73,7 @@ impl GridBox {
         Some(Grid { origin: Vector::from(origin), spacing: self.spacing, cells })
     }
 
-    /// Whether a point lies in the box, its faces included; a box that is not valid holds nothing.
+    /// Whether a point lies in the box or on its faces; false if the section is not valid.
     ///
     /// Example: [`Self::build`].
     pub fn holds(&self, x: &[f64]) -> bool {
@@ -91,12 +91,12 @@ impl GridBox {
         sound.then(|| self.size.iter().map(|&size| self.cells_along(size)).collect())?
     }
 
-    /// How far from zero nodes can be told apart: numbers near x are |x| ε apart.
+    /// Largest distance from zero at which nodes can be distinguished: numbers near x are |x| ε apart.
     fn farthest(&self) -> f64 {
         DISTINCT * self.spacing / f64::EPSILON
     }
 
-    /// How many cells fill an edge, if they fill it.
+    /// The number of cells along an edge, if the spacing divides the edge.
     fn cells_along(&self, size: f64) -> Option<u32> {
         let cells = size / self.spacing;
         let whole = cells.round();

@@ -9,30 +9,31 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Pixels of a file, at most.
+/// Maximum number of pixels of a file.
 pub const MAX_PIXELS: u64 = 1 << 27;
 
-/// What deflate packs into a byte, at most: a PNG file that says it holds more is broken.
+/// Maximum number of bytes that deflate packs into one byte: a PNG file that claims more is broken.
 const DENSEST: u64 = 1032;
 
 /// Pixels of a picture, or voxels of a scan, whose value lies in a range.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageFile {
-    /// Path of the file, relative to the scene's folder: in 2D a grey PNG of at most 8 bits (with fewer bits, white is still 255), in 3D
-    /// a file `.raw` of one unsigned byte a voxel, x fastest, then y, then z.
+    /// Path of the file, relative to the scene's folder. In 2D, a grey PNG of at most 8 bits (with fewer bits, white is still 255). In 3D,
+    /// a `.raw` file of one unsigned byte per voxel, x fastest, then y, then z.
     #[schemars(length(min = 1))]
     pub file: PathBuf,
-    /// The lower corner of the box that the picture covers (length). The last row of a PNG lies there, as one sees it.
+    /// The lower corner of the box that the picture covers (length). The last row of a PNG, at the bottom of the picture, begins at this
+    /// corner.
     pub min: Vec<f64>,
     /// The upper corner (length), above `min` in every component.
     pub max: Vec<f64>,
-    /// The least and the greatest value, 0 to 255, of pixels that belong to the shape: one label twice, or a threshold and 255.
+    /// The smallest and the largest value, 0 to 255, of pixels that belong to the shape: one label twice, or a threshold and 255.
     pub values: [u8; 2],
-    /// Voxels along x, y and z of a raw file; a PNG file knows its size.
+    /// Number of voxels of a raw file along x, y and z; a PNG file states its own size.
     #[schemars(inner(range(min = 1)))]
     pub size: Option<[u32; 3]>,
-    /// What was read.
+    /// The pixels, once the file has been read.
     #[serde(skip)]
     read: OnceLock<Mask>,
 }
@@ -40,41 +41,41 @@ pub struct ImageFile {
 /// A file that gives no shape.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Io(#[from] io::Error),
-    /// It is no PNG file, or a broken one.
+    /// The file is not a PNG file, or is broken.
     #[error("cannot be read: {0}")]
     Png(#[from] png::DecodingError),
-    /// It is a folder, a device or a pipe.
+    /// The path is a folder, a device or a pipe.
     #[error("is no regular file")]
     NoFile,
-    /// Its colours are no values of one byte.
+    /// The colours are not grey values of at most 8 bits without transparency.
     #[error("is a PNG of {0}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency")]
     NotGrey(String),
-    /// It has too many pixels, or none.
+    /// The picture has too many pixels, or none.
     #[error("has {} × {} pixels; 1 to {MAX_PIXELS} in all are allowed", .0[0], .0[1])]
     Size([u32; 2]),
-    /// It is shorter or longer than it should be.
+    /// The file is shorter or longer than its number of pixels requires.
     #[error("has {found} bytes, and {asked} pixels")]
     Length {
-        /// Its bytes.
+        /// Bytes of the file.
         found: u64,
-        /// The pixels that it should hold.
+        /// Expected number of pixels.
         asked: u64,
     },
     /// No pixel belongs to the shape.
     #[error("has no pixel of a value from {} to {}: its values are from {} to {}", .asked[0], .asked[1], .found[0], .found[1])]
     NoPixel {
-        /// The values asked for.
+        /// The smallest and the largest value asked for.
         asked: [u8; 2],
-        /// The least and the greatest there is.
+        /// The smallest and the largest value in the file.
         found: [u8; 2],
     },
 }
 
 impl ImageFile {
-    /// The solid; `None` before the file was read, and unless `min` and `max` have `D` components.
+    /// The solid; `None` before the file has been read, and unless `min` and `max` have `D` components.
     pub(super) fn solid<const D: usize>(&self) -> Option<Pixels<D>> {
         let [min, max] = [&self.min, &self.max].map(|x| super::shape::vector(x));
         Pixels::new(min?, max?, self.read.get()?.clone())
@@ -123,17 +124,17 @@ impl ImageFile {
         problems.list.len() == before
     }
 
-    /// Reads the file, unless that was done.
+    /// Reads the file, unless it has been read.
     ///
     /// # Errors
-    /// A file that cannot be read, is of another kind or size, or has no pixel of the values.
+    /// The file cannot be read, is of another kind or size, or has no pixel in the range of values.
     pub(super) fn read(&self, folder: &Path) -> Result<(), ImageFileError> {
         if self.read.get().is_some() {
             return Ok(());
         }
         let path = folder.join(&self.file);
         let about = fs::metadata(&path)?;
-        // A pipe may wait for ever.
+        // Reading a pipe may block for ever.
         if !about.is_file() {
             return Err(ImageFileError::NoFile);
         }
@@ -168,7 +169,7 @@ fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>
     Ok(bytes)
 }
 
-/// The pixels of a PNG file, the last row first, so that y grows.
+/// The pixels of a PNG file, the last row first, so that y increases upwards.
 fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ImageFileError> {
     let mut decoder = png::Decoder::new(file);
     decoder.set_transformations(png::Transformations::EXPAND);

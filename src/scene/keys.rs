@@ -1,6 +1,6 @@
-//! The keys of a scene, read from its schema: what each of them is, and everything that is wrong with those written.
+//! The keys of a scene, by its schema: the documentation of each key, and all keys and types that do not fit.
 //!
-//! serde stops at the first key or type that does not fit. Once it has, the schema tells the others.
+//! serde stops at the first key or type that does not fit. The schema then finds the others.
 
 use super::place::Step;
 use serde_json::{Map, Value};
@@ -8,19 +8,19 @@ use std::sync::LazyLock;
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::complete_schema().to_value());
 
-/// What serde would say of each key, in serde's words.
+/// All keys and types in `written` that do not fit the schema, with messages in serde's words.
 pub(super) fn wrong(written: &Value) -> Vec<(Vec<Step>, String)> {
     let mut audit = Audit::default();
     audit.value(&SCHEMA, written);
     audit.found
 }
 
-/// A key that is written in a scene, and the sentence that documents it.
+/// A key of a scene and its documentation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key {
-    /// Such as `bodies[].density`, the same for all entries of a list; or with a chosen word, `boundary.left = "sliding"`.
+    /// The path, such as `bodies[].density` for all entries of a list. A chosen word follows the path, as in `boundary.left = "sliding"`.
     pub path: String,
-    /// What it is.
+    /// The documentation.
     pub about: String,
 }
 
@@ -38,7 +38,7 @@ pub fn documented(scene: &Value) -> Vec<Key> {
     keys
 }
 
-/// Follows references, and of a key that may be null takes what else it may be.
+/// Follows references. Of a key that may be null, takes the alternative that is not null.
 fn resolved(mut schema: &Value) -> &Value {
     loop {
         let of_type = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/"));
@@ -56,7 +56,7 @@ fn may_be_null(schema: &Value) -> bool {
     alternatives || types(schema).contains(&"null")
 }
 
-/// `"type": "number"` or `"type": ["number", "null"]`.
+/// The allowed types, from `"type": "number"` or `"type": ["number", "null"]`.
 fn types(schema: &Value) -> Vec<&str> {
     match &schema["type"] {
         Value::String(one) => vec![one],
@@ -79,7 +79,7 @@ fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// A walk through a scene beside its schema.
+/// A walk through a scene and its schema, side by side.
 #[derive(Default)]
 struct Audit {
     steps: Vec<Step>,
@@ -155,7 +155,7 @@ impl Audit {
             (Some((_, variant)), Some(inner)) if variant["properties"].is_object() => {
                 self.within(Step::Key(word.clone()), &variant["properties"][word], inner);
             }
-            // A word that wants more, or an object where a word is enough: serde's business.
+            // serde reports a word without its value, and an object where a word is enough.
             (Some(_), _) => {}
             (None, _) => {
                 let allowed = quoted(variants.iter().map(|(name, _)| *name));
@@ -201,7 +201,7 @@ fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
     }
 }
 
-/// Adds a key, unless it has no sentence or is there already.
+/// Adds a key, unless it has no documentation or is in the list already.
 fn tell(path: String, schema: &Value, keys: &mut Vec<Key>) {
     let about = schema["description"].as_str().unwrap_or_default();
     let key = Key { path, about: about.split_whitespace().collect::<Vec<_>>().join(" ") };

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 #[serde(transparent)]
 pub struct Curve(pub Vec<[f64; 2]>);
 
-/// The same acceleration for all bodies.
+/// Gravity: one acceleration for all bodies.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gravity {
@@ -25,7 +25,7 @@ pub struct Gravity {
     pub profile: Option<Profile>,
 }
 
-/// A factor that varies along a straight line: how far along it a particle is at the beginning of a step.
+/// A factor that varies along a straight line, evaluated at the particle's position at the beginning of a step.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -35,43 +35,48 @@ pub struct Profile {
     pub factor: Curve,
 }
 
-/// A force per reference area that keeps its direction. It acts on points of the body's surface, one for each side of a particle's box
-/// there, that go along with the body. Planes of symmetry (faces of the box that hold the motion across) are no surface.
+/// A force per reference area of constant direction. The force acts at points of the body's surface, one for each side of a particle's box
+/// there. These points move with the body. Planes of symmetry (faces of the box that hold the normal component) are not part of the
+/// surface.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Traction {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded: what of it lies in this region. For one face alone, a `half_space` that begins on it; what
-    /// reaches below loads the sides there too. (Where `surface` is given, the particles that lie in it.) Default: all of it.
+    /// The part of the surface that is loaded: the part inside this region. To load one face alone, give a `half_space` that begins on that
+    /// face. A region that reaches below the face also loads the adjacent sides. (If `surface` is given, the particles in the region are
+    /// loaded.) Default: the whole surface.
     pub region: Option<Shape>,
     /// The force per reference area (stress).
     pub traction: Vec<f64>,
     /// A factor in time. Default: 1.
     pub curve: Option<Curve>,
-    /// Normal and area of particles that carry the load themselves: needed for bodies read from a file, otherwise found from the shape.
+    /// Normal and area of particles that carry the load themselves. Needed for bodies read from a file; otherwise both follow from the
+    /// shape.
     pub surface: Option<Surface>,
 }
 
-/// A pressure that follows the surface. It acts on points of the body's surface, one for each side of a particle's box there, that go
-/// along with the body. Planes of symmetry (faces of the box that hold the motion across) are no surface.
+/// A pressure that follows the surface. The pressure acts at points of the body's surface, one for each side of a particle's box there.
+/// These points move with the body. Planes of symmetry (faces of the box that hold the normal component) are not part of the surface.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pressure {
     /// The name of the body.
     pub body: String,
-    /// The part of the surface that is loaded: what of it lies in this region. For one face alone, a `half_space` that begins on it; what
-    /// reaches below loads the sides there too. (Where `surface` is given, the particles that lie in it.) Default: all of it.
+    /// The part of the surface that is loaded: the part inside this region. To load one face alone, give a `half_space` that begins on that
+    /// face. A region that reaches below the face also loads the adjacent sides. (If `surface` is given, the particles in the region are
+    /// loaded.) Default: the whole surface.
     pub region: Option<Shape>,
     /// The pressure on the deformed surface (stress); positive pushes inwards.
     pub pressure: f64,
     /// A factor in time. Default: 1.
     pub curve: Option<Curve>,
-    /// Normal and area of particles that carry the load themselves: needed for bodies read from a file, otherwise found from the shape.
+    /// Normal and area of particles that carry the load themselves. Needed for bodies read from a file; otherwise both follow from the
+    /// shape.
     pub surface: Option<Surface>,
 }
 
-/// The surface that each loaded particle stands for.
+/// The piece of surface that each loaded particle represents.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Surface {
@@ -126,7 +131,7 @@ impl Pressure {
     }
 }
 
-/// What tractions and pressures have in common.
+/// The keys that tractions and pressures have in common.
 pub(super) struct Loaded<'a> {
     pub body: &'a str,
     pub region: &'a Option<Shape>,
@@ -157,7 +162,7 @@ impl Loaded<'_> {
     }
 }
 
-/// A name that must be that of a body.
+/// Refuses a name that is not the name of a body.
 pub(super) fn check_body(problems: &mut Problems, path: &str, name: &str, bodies: &[Body]) {
     let names: Vec<&str> = bodies.iter().map(|body| body.name.as_str()).collect();
     if names.contains(&name) {

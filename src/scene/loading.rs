@@ -1,4 +1,4 @@
-//! What acts on the bodies of a scene: body forces, held faces and regions, loads on surfaces.
+//! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
 use super::boundary::{Driving, Face, Rotation, Table};
 use super::build::{dimension, vector};
@@ -16,7 +16,7 @@ use crate::tensor::Vector;
 use std::sync::Arc;
 
 impl Scene {
-    /// All loads; points of loaded surfaces become particles without mass.
+    /// Builds all loads. Points of loaded surfaces become particles without mass.
     pub(super) fn loads<const D: usize>(
         &self,
         means: &Means<'_>,
@@ -67,8 +67,8 @@ impl Scene {
         Ok(loads)
     }
 
-    /// The points of a loaded surface: of a body with a shape, where that surface is; of others, the particles that are said to stand
-    /// for it.
+    /// The points of a loaded surface. With the key `surface`, these are particles of the body; otherwise, new points on the surface of the
+    /// shape.
     fn surface<const D: usize>(
         &self,
         path: &str,
@@ -107,7 +107,7 @@ impl Scene {
                 let mut points = Vec::new();
                 for facet in facets {
                     points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
-                    // A hair inside, in the cell where the body is.
+                    // Each point lies inside the surface by a tolerance, in a cell that holds the body.
                     let x = facet.position - facet.normal * (shape::HAIR * grid.spacing);
                     if self.time.inertia.has_inertia() {
                         particles.push(x, velocity.unwrap_or_else(Vector::zeros), 0.0, 0.0, number as u32);
@@ -127,7 +127,7 @@ impl Scene {
 }
 
 impl Face {
-    /// The motion of each component on a face across `axis`.
+    /// The motion of each component on a face normal to `axis`.
     fn motion<const D: usize>(&self, path: &str, axis: usize) -> Result<[Option<Motion<D>>; D], BuildError> {
         if let Some(driving) = self.driving() {
             return driving.motion(path);
@@ -168,7 +168,7 @@ impl Rotation {
 }
 
 impl Table {
-    /// One curve a prescribed component.
+    /// One curve per prescribed component.
     fn motion<const D: usize>(
         &self,
         path: &str,
@@ -186,7 +186,7 @@ impl Table {
     }
 }
 
-/// The factor in time of a load, 1 if none is given.
+/// The factor of a load in time; 1 without a curve.
 fn curve(path: &str, given: Option<&load::Curve>) -> Result<Curve, BuildError> {
     match given {
         Some(curve) => Curve::new(curve.0.clone()).map_err(|source| BuildError::Curve { path: path.into(), source }),

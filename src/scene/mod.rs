@@ -1,8 +1,8 @@
-//! The JSON scene: its types, and reading and checking them.
+//! The JSON scene: types, reader and checks.
 //!
-//! Each key is declared once, as a field whose doc comment is the manual and the [`schema`]. Units are the user's own
-//! consistent set. [`read`] either gives a scene in which everything has been checked that can be without particles, or says
-//! where the text is wrong, or lists all values that are not allowed.
+//! Each key is declared once, as a field. The doc comment of the field serves the manual and the [`schema`]. Units are the user's own
+//! consistent set. [`read`] returns a scene that has passed all checks that need no particles. Otherwise [`read`] returns the place where
+//! the text is wrong, or all values that are not allowed.
 
 pub mod accuracy;
 pub mod body;
@@ -62,18 +62,19 @@ const TOUCHES: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Where an editor finds the schema, for completion and explanations; `bfree new` writes it beside the scene. It has no other effect.
+    /// The location of the schema, with which an editor completes and explains keys; `bfree new` writes the schema beside the scene. The
+    /// key has no other effect.
     #[serde(rename = "$schema")]
     pub schema: Option<String>,
     /// One line about the scene.
     pub title: Option<String>,
     /// The box and its background grid.
     pub grid: grid::GridBox,
-    /// How accurate the results should be: sets, from a measured table, what the scene leaves open of `grid.spacing`, `time.step`,
-    /// `approximation`, `time.lumping`, `bodies[].particles_per_cell` and `solver.newton.tolerance`. What the scene gives
-    /// stays, and without inertia so do `time` and `approximation`. Default: nothing is set.
+    /// The wanted accuracy of the results. The key sets, from a measured table, the keys that the scene does not give among `grid.spacing`,
+    /// `time.step`, `approximation`, `time.lumping`, `bodies[].particles_per_cell` and `solver.newton.tolerance`. Without inertia, `time`
+    /// and `approximation` stay unchanged. Default: nothing is set.
     pub accuracy: Option<accuracy::Accuracy>,
-    /// What the accuracy has set.
+    /// The keys set by `accuracy`.
     #[serde(skip)]
     pub chosen: Vec<accuracy::Chosen>,
     /// The shape functions. Default: `{"bspline": {"degree": 3}}`.
@@ -81,51 +82,51 @@ pub struct Scene {
     pub approximation: approximation::Parameters,
     /// Time stepping.
     pub time: time::Time,
-    /// From nodes to particles. Default: `"flip"`, as in the paper.
+    /// The transfer of velocity and acceleration from the nodes to the particles. Default: `"flip"`, as in the paper.
     pub transfer: Option<transfer::Transfer>,
     /// The bodies, at least one.
     #[schemars(length(min = 1))]
     pub bodies: Vec<body::Body>,
-    /// Conditions at the faces of the box. Default: all free.
+    /// Boundary conditions at the faces of the box. Default: all faces are free.
     #[serde(default)]
     pub boundary: boundary::Boundary,
-    /// Prescribed motion of regions of nodes. Later entries win over earlier ones, and all over the faces.
+    /// Prescribed motion of the nodes in regions. Later entries override earlier ones, and every entry overrides `boundary`.
     #[serde(default)]
     pub prescribed: Vec<boundary::Prescribed>,
-    /// Whether nodes with little of a body follow well-supported nodes (extended B-splines). Such nodes are no unknowns: they continue the
-    /// polynomial of the nearest well-filled cell. Loads on surfaces then act through functions that balance the internal force. Default:
-    /// true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, and in steps of one length at
-    /// Courant numbers above 10; else false.
+    /// Whether nodes with little support from a body follow well-supported nodes (extended B-splines). Such nodes are not unknowns: they
+    /// continue the polynomial of the nearest well-filled cell. Surface loads then act through functions that balance the internal force.
+    /// Default: true without inertia, with a consistent mass (`time.lumping` 0), where the surface of a shape is loaded, and in steps of
+    /// constant length at Courant numbers above 10; else false.
     pub aggregation: Option<bool>,
-    /// No longer used, and read for one release: aggregation has replaced the ghost stiffness. Where `aggregation` is not given, 0 means
-    /// false, and more than 0 true.
+    /// Deprecated, and read for one release: aggregation has replaced the ghost stiffness. If `aggregation` is not given, 0 means false,
+    /// and a positive value means true.
     #[schemars(range(min = 0, max = 1))]
     pub ghost_stiffness: Option<f64>,
     /// The acceleration of gravity. Default: none.
     pub gravity: Option<load::Gravity>,
     /// Rayleigh damping, a M + b K. Default: none.
     pub damping: Option<Rayleigh>,
-    /// Forces on surfaces.
+    /// Tractions (forces per reference area) on surfaces.
     #[serde(default)]
     pub tractions: Vec<load::Traction>,
     /// Pressures on surfaces.
     #[serde(default)]
     pub pressures: Vec<load::Pressure>,
-    /// Velocities at the start, given to nodes. Bodies and particle files must then give none.
+    /// Initial velocities of nodes. Bodies and particle files must then give no velocities.
     pub initial_velocity: Option<InitialVelocity>,
-    /// How the equations of a step are solved.
+    /// The solver of the equations of a step.
     #[serde(default)]
     pub solver: solver::Solver,
-    /// What a run writes.
+    /// The output of a run.
     #[serde(default)]
     pub output: output::Output,
 }
 
-/// Velocities given to nodes at the start, and interpolated once to the particles. No body may then have a velocity of its own.
+/// Initial velocities of nodes, interpolated once to the particles. No body may then have a velocity of its own.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitialVelocity {
-    /// Regions and the velocity of their nodes; other nodes rest, and later regions win. At least one.
+    /// Regions, at least one, and the velocities of their nodes. Later regions override earlier ones, and all other nodes are at rest.
     #[schemars(length(min = 1))]
     pub nodes: Vec<NodeVelocity>,
 }
@@ -152,7 +153,7 @@ pub struct NodeVelocity {
 /// ```
 pub fn schema() -> schemars::Schema {
     let mut schema = complete_schema();
-    // With an accuracy they may be absent.
+    // With `accuracy`, these keys may be absent.
     for (part, key) in [("GridBox", "spacing"), ("Time", "step")] {
         if let Some(Value::Array(required)) = schema.pointer_mut(&format!("/$defs/{part}/required")) {
             required.retain(|one| one != key);
@@ -164,13 +165,13 @@ pub fn schema() -> schemars::Schema {
     schema
 }
 
-/// The schema of a scene in which everything required is there.
+/// The schema without the rule of [`schema`] for `accuracy`: `grid.spacing` and `time.step` are required.
 fn complete_schema() -> schemars::Schema {
     schemars::schema_for!(Scene)
 }
 
 impl Scene {
-    /// Everything that is wrong with the values of the scene, in the order of its sections.
+    /// All values of the scene that are not allowed, in the order of its sections.
     ///
     /// ```
     /// // A scene that was read is right; one that is changed afterwards may be wrong in several places.
@@ -187,7 +188,7 @@ impl Scene {
         self.grid.check(&mut problems);
         let dimension = self.grid.dimension();
         if !(1..=3).contains(&dimension) {
-            // Every other length is judged by this one.
+            // The other checks compare lengths with the dimension.
             return problems;
         }
         self.shape_functions(&mut problems);
@@ -246,8 +247,8 @@ impl Scene {
         problems
     }
 
-    /// Whether nodes with little of a body follow others. In short steps a lumped mass holds them, except for nodes that see more of a
-    /// loaded surface than of the particles below it. Adaptive steps become short at impacts.
+    /// Whether nodes with little support from a body follow other nodes. In short steps a lumped mass holds such nodes, except where a node
+    /// has more of a loaded surface than of the particles below. Adaptive steps become short at impacts.
     fn aggregates(&self) -> bool {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
@@ -257,8 +258,8 @@ impl Scene {
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
-    /// When the grid is reset. A clamped body vibrates, and seldom meets anything; others may come to walls, which a grid reset in every step
-    /// feels from farther away.
+    /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Other bodies may come to walls, and a grid that is reset
+    /// in every step feels a wall from farther away.
     fn renewal(&self) -> Renewal {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
         self.grid.renewed.unwrap_or(match self.time.inertia.has_inertia() {
@@ -268,7 +269,7 @@ impl Scene {
         })
     }
 
-    /// Whether there is one body, and its shape reaches a fixed face of the box.
+    /// Whether the scene has one body, and its shape reaches a fixed face of the box.
     fn is_clamped(&self) -> bool {
         match self.dimension() {
             1 => self.reaches_fixed_face::<1>(),
@@ -289,7 +290,7 @@ impl Scene {
         })
     }
 
-    /// The largest Courant number, that of waves of pressure; infinite without inertia.
+    /// The largest Courant number of pressure waves; infinite without inertia.
     fn courant(&self) -> f64 {
         if !self.time.inertia.has_inertia() {
             return f64::INFINITY;
@@ -316,17 +317,17 @@ impl Scene {
         self.output.fields(self.time.inertia, flows)
     }
 
-    /// The laws of the bodies that have a sound one.
+    /// The laws of all bodies whose constants are allowed.
     fn laws(&self) -> impl Iterator<Item = Material> {
         self.bodies.iter().filter_map(|body| body.material.law(&mut Problems::default(), ""))
     }
 
-    /// Loads that need nothing of grid and particles.
+    /// The loads that depend neither on the grid nor on the particles.
     fn given_as_they_are<const D: usize>(&self) -> Loads<D> {
         Loads { damping: self.damping, ..Loads::default() }
     }
 
-    /// What makes the tangent unsymmetric, if something does.
+    /// The cause of an unsymmetric tangent; `None` if the tangent is symmetric.
     fn unsymmetric(&self) -> Option<&'static str> {
         if !self.pressures.is_empty() {
             Some("pressures make")
@@ -337,7 +338,7 @@ impl Scene {
         }
     }
 
-    /// Without inertia, keys that speak of it say what nobody would do.
+    /// Refuses keys that have a meaning only with inertia.
     fn refuse_inertia(&self, problems: &mut Problems) {
         let mut refuse = |path: &str, value: &str| {
             let inertia = time::word(self.time.inertia);
@@ -355,7 +356,7 @@ impl Scene {
         self.output.of_inertia().for_each(|(path, value)| refuse(&path, &value));
     }
 
-    /// What a path of equilibria cannot have: loads that turn with the body, motions in time, a grid that forgets the direction.
+    /// Refuses features that the arc-length method cannot have: follower pressures, prescribed motion, and a grid reset in every step.
     fn refuse_off_path(&self, problems: &mut Problems) {
         let allowed = "time.inertia is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
         for i in 0..self.pressures.len() {
@@ -375,7 +376,7 @@ impl Scene {
         }
     }
 
-    /// Gives every key its value, of those that mean something.
+    /// Fills in defaults that depend on other keys, for all keys that have a meaning in this scene.
     fn complete(mut self) -> Self {
         self.time.complete();
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();

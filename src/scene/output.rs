@@ -1,4 +1,4 @@
-//! What a run writes.
+//! The output of a run.
 
 use super::body::Body;
 use super::grid::GridBox;
@@ -10,56 +10,56 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
-/// What a run writes.
+/// The output of a run.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// The time between two snapshots of all particles, > 0. Default: no snapshots.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub every: Option<f64>,
-    /// The time between two checkpoints, > 0, from which `bfree run SCENE --restart` continues a run that was killed, with the same
-    /// bits. One more is written at the start, at the end and on Ctrl-C; the last two are kept. Default: no checkpoints.
+    /// The time between two checkpoints, > 0. `bfree run SCENE --restart` continues a killed run from its last checkpoint, with the same
+    /// bits. Checkpoints are also written at the start, at the end and on Ctrl-C; the last two are kept. Default: no checkpoints.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub checkpoint: Option<f64>,
-    /// The fields of a snapshot, each at most once; pictures show the first. Default: displacement, velocity, stress, jacobian; without inertia
-    /// no velocity; before them plastic_strain where a body may flow.
+    /// The fields of a snapshot, each at most once; pictures show the first. Default: displacement, velocity (with inertia only), stress,
+    /// jacobian. If a body may flow plastically, plastic_strain comes first.
     pub fields: Option<Vec<Field>>,
-    /// Histories of one field at one place, written every step.
+    /// Histories of one field at one point, written in every step.
     #[serde(default)]
     pub probes: Vec<Probe>,
 }
 
-/// The history of one field at one place.
+/// The history of one field at one point.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// The name of the history; no two probes share one. Letters, digits, `_` and `-`.
+    /// The unique name of the history, of letters, digits, `_` and `-`.
     #[schemars(regex(pattern = r"^[A-Za-z0-9_-]+$"))]
     pub name: String,
     /// The field.
     pub field: Field,
-    /// The body whose particles are looked at. Default: all bodies.
+    /// The body whose particles are probed. Default: all bodies.
     pub body: Option<String>,
-    /// The place.
+    /// The position.
     pub at: At,
 }
 
-/// The place of a probe.
+/// The position of a probe.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum At {
-    /// The particle that is nearest to this point at t = 0, wherever it goes.
+    /// The particle nearest to this point at t = 0. The probe follows this particle.
     Particle(Vec<f64>),
-    /// The point of the body that is here at t = 0, wherever it goes, such as a corner: the nearest particle's motion, continued by its
-    /// deformation gradient. Fields other than position and displacement are the particle's.
+    /// The material point that is here at t = 0, such as a corner. The probe follows this point: its motion is that of the nearest
+    /// particle, continued by the particle's deformation gradient. Fields other than position and displacement are those of the particle.
     BodyPoint(Vec<f64>),
-    /// This point, fixed in space: at each time the particle nearest to it then, of equally near ones the first. No field is
-    /// interpolated; while no particle is within one grid spacing, the value is NaN.
+    /// This point, fixed in space. At each time, the value is that of the nearest particle, without interpolation; among equally near
+    /// particles, that of the first. While no particle is within one grid spacing, the value is NaN.
     Point(Vec<f64>),
 }
 
 impl Output {
-    /// The fields of a snapshot of bodies with or without inertia, that flow or do not.
+    /// The fields of a snapshot. The default depends on inertia, and on whether a body may flow plastically (`flows`).
     pub(super) fn fields(&self, inertia: Inertia, flows: bool) -> Vec<Field> {
         self.fields.clone().unwrap_or_else(|| {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
@@ -69,7 +69,7 @@ impl Output {
         })
     }
 
-    /// The keys that are given and that only inertia gives a meaning.
+    /// The given keys that have a meaning only with inertia, with their values.
     pub(super) fn of_inertia(&self) -> impl Iterator<Item = (String, String)> {
         let fields = self.fields.iter().flatten().enumerate().map(|(i, &field)| (format!("output.fields[{i}]"), field));
         let probes =

@@ -5,7 +5,7 @@ use super::read::parse;
 use serde_json::Value;
 use std::str::FromStr;
 
-/// Keys one may descend through; scenes are nowhere near as deep.
+/// Maximum number of keys along a path, far more than a scene is deep.
 const MAX_STEPS: usize = 32;
 
 /// A value of the scene to replace or add, parsed from `KEY.PATH=JSON`.
@@ -25,10 +25,10 @@ pub struct Override {
     value: Value,
 }
 
-/// An override that says nothing sensible.
+/// An override that cannot be applied.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OverrideError {
-    /// No `KEY=`.
+    /// The argument is not of the form `KEY.PATH=JSON`.
     #[error("the override {0:?} is not allowed; must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3")]
     Form(String),
     /// The value is neither JSON nor a word.
@@ -36,17 +36,17 @@ pub enum OverrideError {
     Value {
         /// The whole argument.
         argument: String,
-        /// What JSON says.
+        /// Message of the JSON parser.
         message: String,
     },
-    /// A key leads into something that is not an object, or a number to an entry that a list does not have.
+    /// A key addresses a value that is not an object, or a number an entry that a list does not have.
     #[error("the override {argument:?} leads nowhere: {at} {message}")]
     Path {
         /// The whole argument.
         argument: String,
-        /// How far one gets.
+        /// The part of the path that exists.
         at: String,
-        /// What is wrong there.
+        /// The error at that part.
         message: String,
     },
 }
@@ -72,7 +72,7 @@ impl FromStr for Override {
 }
 
 impl Override {
-    /// The argument as it was given.
+    /// The argument of the command line.
     ///
     /// ```
     /// use bfree::scene::Override;
@@ -86,7 +86,7 @@ impl Override {
         &self.argument
     }
 
-    /// Replaces or adds the value in a scene; objects on the way are made where they are absent.
+    /// Replaces or adds the value in a scene. Absent objects along the path are created.
     pub(super) fn apply(&self, scene: &mut Value) -> Result<(), OverrideError> {
         let mut here = scene;
         for (i, step) in self.steps.iter().enumerate() {
@@ -119,7 +119,7 @@ impl Override {
     }
 }
 
-/// Whether keys are there between all dots, and a number between all brackets.
+/// Whether each part between dots has a key, and each pair of brackets a number.
 fn is_path(text: &str) -> bool {
     text.split('.').all(|word| {
         let (key, indices) = word.split_at(word.find('[').unwrap_or(word.len()));
@@ -129,7 +129,7 @@ fn is_path(text: &str) -> bool {
     })
 }
 
-/// What a shell user means by text without quotes.
+/// Whether text without quotes counts as a string.
 fn is_word(text: &str) -> bool {
     let mut letters = text.chars();
     letters.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_')

@@ -5,16 +5,16 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-/// Particles in one file, at most.
+/// Maximum number of particles in one file.
 pub const MAX_PARTICLES: usize = 100_000_000;
 
-/// Bytes of one line, at most.
+/// Maximum length of a line in bytes.
 const MAX_LINE: u64 = 4096;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const VELOCITIES: [&str; 3] = ["vx", "vy", "vz"];
 
-/// The particles of a file, one entry each in every list.
+/// The particles of a file. Each particle has one entry in every list.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileParticles<const D: usize> {
     /// Positions (length).
@@ -28,12 +28,12 @@ pub struct FileParticles<const D: usize> {
 /// A particle file that cannot be used. Lines and columns are counted from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum ParticleFileError {
-    /// It cannot be read, or is not UTF-8.
+    /// The file cannot be read, or is not UTF-8.
     #[error("line {line}: cannot be read: {source}")]
     Io {
         /// The line.
         line: usize,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// A line is too long.
@@ -45,11 +45,11 @@ pub enum ParticleFileError {
     /// The first line does not name the columns.
     #[error("line 1: the header {found:?} is not allowed; must be {expected:?} or {with_velocity:?}")]
     Header {
-        /// The line as it stands.
+        /// The first line of the file.
         found: String,
-        /// Without velocities.
+        /// The expected header without velocities.
         expected: String,
-        /// With velocities.
+        /// The expected header with velocities.
         with_velocity: String,
     },
     /// A line has too few or too many columns.
@@ -69,17 +69,17 @@ pub enum ParticleFileError {
         line: usize,
         /// The column.
         column: usize,
-        /// Its name in the header.
+        /// Name of the column in the header.
         name: &'static str,
-        /// The text that stands there.
+        /// The text found.
         found: String,
-        /// What may stand there.
+        /// The allowed values.
         allowed: &'static str,
     },
-    /// A header and nothing below.
+    /// The file has a header only.
     #[error("the file has no particles")]
     Empty,
-    /// Too many lines.
+    /// The file has too many particles.
     #[error("line {line}: more than {MAX_PARTICLES} particles")]
     TooMany {
         /// The line.
@@ -102,7 +102,7 @@ pub enum ParticleFileError {
 /// ```
 ///
 /// # Errors
-/// The first line, and in it the column, that is wrong.
+/// The first wrong line, and the wrong column in that line.
 pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, ParticleFileError> {
     let file = File::open(path).map_err(|source| ParticleFileError::Io { line: 1, source })?;
     read(BufReader::new(file))
@@ -122,7 +122,7 @@ pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, Partic
 /// ```
 ///
 /// # Errors
-/// The first line, and in it the column, that is wrong.
+/// The first wrong line, and the wrong column in that line.
 pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, ParticleFileError> {
     let mut lines = Lines { text, line: 0 };
     let header = lines.next_line()?.unwrap_or_default();
@@ -184,7 +184,7 @@ fn shortened(text: &str) -> String {
     text.trim_end().chars().take(80).collect()
 }
 
-/// Lines of bounded length, counted.
+/// Reads lines of bounded length, and counts them.
 struct Lines<R> {
     text: R,
     line: usize,

@@ -1,4 +1,4 @@
-//! Where in the text something stands.
+//! Positions of keys and values in the text of a scene.
 
 use crate::problems::Place;
 
@@ -6,7 +6,7 @@ use crate::problems::Place;
 const CONTEXT: usize = 60;
 
 impl Place {
-    /// The place `offset` bytes into `text`; beyond the end it is the end.
+    /// The place at byte `offset` of `text`; an offset beyond the end gives the end.
     pub(super) fn at(text: &str, offset: usize) -> Self {
         let mut offset = offset.min(text.len());
         while !text.is_char_boundary(offset) {
@@ -21,25 +21,25 @@ impl Place {
         Self::Text {
             line: before.matches('\n').count() + 1,
             column: head.chars().count() + 1,
-            // A tab is as wide as the caret's line needs it to be.
+            // A tab becomes one space, so that the caret stands below its column.
             excerpt: excerpt.map(|c| if c.is_control() { ' ' } else { c }).collect(),
             indent: shown.len(),
         }
     }
 
-    /// The place of a line and byte column as serde_json counts them, both from 1 (column 0: before the line).
+    /// The place of a line and byte column as counted by serde_json, both from 1 (column 0: before the line).
     pub(super) fn at_line(text: &str, line: usize, column: usize) -> Self {
         let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
         Self::at(text, start + column.saturating_sub(1))
     }
 }
 
-/// One step on the way to a value.
+/// One step of the path to a value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// Into the object, to this key.
+    /// To the value of this key in an object.
     Key(String),
-    /// Into the list, to this entry, from 0.
+    /// To this entry of a list, counted from 0.
     Index(usize),
 }
 
@@ -51,7 +51,7 @@ pub(super) fn steps(path: &str) -> Vec<Step> {
         .collect()
 }
 
-/// The steps as `bodies[0].density`.
+/// The path of the steps, written as `bodies[0].density`.
 pub(super) fn path(steps: &[Step]) -> String {
     let mut path = String::new();
     for step in steps {
@@ -64,8 +64,8 @@ pub(super) fn path(steps: &[Step]) -> String {
     path
 }
 
-/// The byte offset in `text`, which is valid JSON, of the key (or list entry) named by `steps`, and how many of the steps
-/// lead there: if it is absent, it is the innermost of its parents that is present. `None` if not even the first step is there.
+/// The byte offset in `text` (valid JSON) of the key or list entry named by `steps`, and the number of steps that lead there. If the key is
+/// absent, both belong to its innermost parent that is present. `None` if even the first step is absent.
 pub(super) fn locate(text: &str, steps: &[Step]) -> Option<(usize, usize)> {
     let mut scanner = Scanner { bytes: text.as_bytes(), at: 0 };
     let mut found = None;
@@ -78,7 +78,7 @@ pub(super) fn locate(text: &str, steps: &[Step]) -> Option<(usize, usize)> {
     found
 }
 
-/// A walk over text that is known to be valid JSON.
+/// A scanner over text that is known to be valid JSON.
 struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -95,7 +95,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// Passes a string and returns its bytes, quotes excluded, escapes unresolved.
+    /// Skips a string and returns its bytes, quotes excluded, escapes unresolved.
     fn string(&mut self) -> &[u8] {
         let start = self.at + 1;
         self.at = start;
@@ -111,7 +111,6 @@ impl Scanner<'_> {
         self.bytes.get(start..end).unwrap_or_default()
     }
 
-    /// Passes one value of any kind.
     fn skip_value(&mut self) {
         let mut depth = 0_usize;
         loop {
@@ -141,7 +140,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// From the start of a value to the start of the one named by `step` inside it; returns where the name stands.
+    /// Moves from the start of a value to the entry of that value named by `step`, and returns the offset of the name.
     fn enter(&mut self, step: &Step) -> Option<usize> {
         self.skip_space();
         let open = self.peek()?;

@@ -1,4 +1,4 @@
-//! From text to a checked scene.
+//! Reads text into a checked scene.
 
 use super::overrides::{Override, OverrideError};
 use super::place::{Step, locate, path, steps};
@@ -12,10 +12,10 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The longest scene that is read, in bytes. Particles by the million belong into a CSV file.
+/// Maximum length of a scene in bytes. Millions of particles belong in a CSV file.
 pub const MAX_BYTES: u64 = 16 << 20;
 
-/// What a scene is, for those who give something else.
+/// The form of a scene, for error messages.
 const SHAPE: &str = "a scene is an object: { \"grid\": …, \"time\": …, \"bodies\": … }";
 
 /// A scene that cannot be used.
@@ -26,7 +26,7 @@ pub enum SceneError {
     File {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The text is too long.
@@ -38,39 +38,39 @@ pub enum SceneError {
     /// The text is not UTF-8.
     #[error("the scene is not UTF-8 text: byte {byte}, in line {line}, cannot be read")]
     NotText {
-        /// Bytes before it.
+        /// Bytes before the invalid one.
         byte: usize,
-        /// Its line, from 1.
+        /// Line of the invalid byte, from 1.
         line: usize,
     },
-    /// The text is not JSON, or a key or type is not that of a scene.
+    /// The text is not JSON, or has a key or type that a scene does not have.
     #[error(transparent)]
     Malformed(#[from] Malformed),
-    /// An override is wrong in itself.
+    /// An override cannot be applied.
     #[error(transparent)]
     Override(#[from] OverrideError),
-    /// The text is a scene, but with values that are not allowed: all of them.
+    /// All values of the scene that are not allowed.
     #[error("{0}")]
     Values(Problems),
 }
 
-/// Text that is not JSON, or not of the types of a scene.
+/// Text that is not JSON, or does not have the types of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct Malformed {
     /// The key, such as `bodies[0].density`; empty if the text is not JSON.
     pub path: String,
-    /// What is wrong.
+    /// Description of the error.
     pub message: String,
-    /// Where.
+    /// Position of the error.
     pub place: Option<Place>,
-    /// What else is wrong of the same kind.
+    /// Further errors of this kind.
     pub others: Vec<Malformed>,
 }
 
 impl Display for Malformed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let separator = if self.path.is_empty() { "" } else { ": " };
-        // A path through a hundred brackets helps nobody.
+        // Nobody reads a path through a hundred brackets, so a long path is cut.
         let path: String = self.path.chars().take(PATH).collect();
         let more = if path.len() < self.path.len() { "…" } else { "" };
         write!(f, "{path}{more}{separator}{}", self.message)?;
@@ -91,7 +91,7 @@ impl Display for Malformed {
 /// ```
 ///
 /// # Errors
-/// Also a file that cannot be read, or is not UTF-8.
+/// The errors of [`read`], and a file that cannot be read or is not UTF-8.
 pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneError> {
     let failed = |source| SceneError::File { path: path.to_owned(), source };
     let mut bytes = Vec::new();
@@ -102,7 +102,7 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
         )));
     }
     let file = File::open(path).map_err(failed)?;
-    // A pipe or a device does not say how long it is; of a file that does, nothing needs to be read.
+    // A file that is too long is refused before it is read. Pipes and devices do not tell their length.
     let length = file.metadata().map_err(failed)?.len();
     if length > MAX_BYTES {
         return Err(SceneError::TooLong(Some(length)));
@@ -121,8 +121,11 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 
 /// Reads and checks a scene, with `overrides` applied in order.
 ///
-/// The text becomes JSON, in which a key given twice is an error; the overrides replace values; what the accuracy sets is laid under
-/// that; JSON becomes a [`Scene`], where unknown keys and wrong types are errors; then all values are checked.
+/// 1. The text is parsed as JSON; a duplicate key is an error.
+/// 2. The overrides replace values.
+/// 3. `accuracy` sets keys that are not given.
+/// 4. JSON becomes a [`Scene`]; unknown keys and wrong types are errors.
+/// 5. All values are checked.
 ///
 /// ```
 /// let text = r#"{"grid": {"size": [1, 1], "spacing": 0.25}, "time": {"step": 0.1, "end": 1},
@@ -137,7 +140,7 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 /// ```
 ///
 /// # Errors
-/// What is wrong, at which key, and where that stands in the text (or in which override).
+/// The error, its key, and its position in the text or in an override.
 pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     if text.len() as u64 > MAX_BYTES {
         return Err(SceneError::TooLong(None));
@@ -173,7 +176,7 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
             others: Vec::new(),
         };
         let (first, said) = (segments(error.path()), error.inner().to_string());
-        // Of one key serde's word is enough; of an object, several keys may be missing.
+        // serde reports one error for each key. Further keys missing from that object are reported here.
         let another = |(steps, message): &(Vec<Step>, String)| {
             *steps != first || (message.starts_with("missing field") && *message != said)
         };
@@ -194,7 +197,7 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     if problems.is_empty() { Ok(Scene { chosen, ..scene.complete() }) } else { Err(placed(problems)) }
 }
 
-/// Whether to open it may wait for somebody who writes: what is given as standard input is open already.
+/// Whether opening the file may block until somebody writes to it. Standard input, below /dev, is open already.
 #[cfg(unix)]
 fn waits(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
@@ -206,13 +209,13 @@ fn waits(_: &Path) -> bool {
     false
 }
 
-/// 2.0 is a whole number in JSON Schema, too.
+/// Makes numbers such as 2.0 integers, as JSON Schema counts them.
 fn make_whole(json: &mut Value) {
     match json {
         Value::Array(list) => list.iter_mut().for_each(make_whole),
         Value::Object(object) => object.values_mut().for_each(make_whole),
         Value::Number(number) => {
-            // All whole numbers below 2⁵³ are there in double precision; -0.0 is no whole number.
+            // Double precision represents all integers below 2⁵³. -0.0 is no integer here.
             let whole = number.as_f64().filter(|x| x.fract() == 0.0 && x.abs() < 9e15 && x.is_sign_positive());
             if let Some(whole) = whole.filter(|_| number.is_f64()) {
                 *number = (whole as u64).into();
@@ -222,8 +225,8 @@ fn make_whole(json: &mut Value) {
     }
 }
 
-/// Where a value was read, but was not written as the schema says: serde also takes the fields of an object as a list in
-/// the order of their declaration, and a word as an object. Such a scene would change its meaning with the next version.
+/// Finds a value that serde accepts but the schema does not. serde also reads a list as an object, with the fields in declaration order,
+/// and an object as a word. The next version could read such a scene differently.
 fn misshapen(written: &Value, read: &Value) -> Option<(Vec<Step>, &'static str)> {
     let within = |step: Step, written, read| {
         misshapen(written, read).map(|(mut steps, message)| {
@@ -246,7 +249,7 @@ fn misshapen(written: &Value, read: &Value) -> Option<(Vec<Step>, &'static str)>
     }
 }
 
-/// Text to JSON, refusing keys given twice.
+/// Parses text as JSON; a duplicate key is an error.
 pub(super) fn parse(text: &str) -> Result<Value, Malformed> {
     let mut json = serde_json::Deserializer::from_str(text);
     let located = |path: String, error: &serde_json::Error| {
@@ -265,7 +268,7 @@ pub(super) fn parse(text: &str) -> Result<Value, Malformed> {
     Ok(value.0)
 }
 
-/// What a text that is not JSON may have meant.
+/// A hint at a common mistake in JSON, by the text at the error.
 fn hint(rest: &str) -> &'static str {
     let starts = |words: &[&str]| words.iter().any(|word| rest.starts_with(word));
     if starts(&["NaN", "nan", "Inf", "inf"]) {
@@ -279,12 +282,12 @@ fn hint(rest: &str) -> &'static str {
     }
 }
 
-/// Where the value at `steps` comes from: the last override that set it, or the text.
+/// The source of the value at `steps`: the last override that set the value, or the text.
 fn find(steps: &[Step], text: &str, overrides: &[Override]) -> Option<Place> {
     let within = |one: &Override| steps.starts_with(&one.steps);
     let found = locate(text, steps);
     let in_text = found.is_some_and(|(_, depth)| depth == steps.len());
-    // An override may also have made the object that lacks a key or has a wrong one.
+    // An override may also have made the object that has the wrong key or lacks one.
     let made = |one: &Override| !in_text && one.steps.starts_with(steps);
     let replaced = overrides.iter().rev().find(|one| within(one) || made(one));
     replaced
@@ -302,13 +305,13 @@ fn segments(path: &serde_path_to_error::Path) -> Vec<Step> {
         .collect()
 }
 
-/// Characters of a path; the longest in a real scene is about half of it.
+/// Maximum characters of a path, about twice the longest path of a real scene.
 const PATH: usize = 160;
 
-/// Characters of a message; it quotes what stands in the text.
+/// Maximum characters of a message, which quotes the text.
 const MESSAGE: usize = 600;
 
-/// serde's message in the words of a scene's author, with the word that a misspelt one was meant to be.
+/// serde's message, reworded for the author of a scene. A suggestion follows a misspelt word.
 fn explain(message: &str) -> String {
     if message.chars().count() > MESSAGE {
         return message.chars().take(MESSAGE).chain("…".chars()).collect();
@@ -337,7 +340,7 @@ fn explain(message: &str) -> String {
     format!("{found}, expected {expected}")
 }
 
-/// JSON in which no object has a key twice.
+/// JSON without duplicate keys.
 struct Unique(Value);
 
 impl<'de> Deserialize<'de> for Unique {
@@ -348,7 +351,7 @@ impl<'de> Deserialize<'de> for Unique {
 
 struct UniqueVisitor;
 
-/// Values without anything in them are kept as they are.
+/// Scalars stay unchanged.
 macro_rules! scalars {
     ($($visit:ident: $scalar:ty),*) => {$(
         fn $visit<E>(self, x: $scalar) -> Result<Value, E> {

@@ -1,4 +1,4 @@
-//! Whether the numbers that a step forms fit into floating point: forces are squared for norms, moduli multiplied by volumes.
+//! Checks that the products formed in a step fit into floating point. Norms square forces, and energies multiply moduli by volumes.
 
 use super::BuildError;
 use super::Scene;
@@ -9,13 +9,14 @@ use crate::mechanics::loads::Pressing;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 
-/// No force may be larger: its square is summed over all nodes.
+/// The largest allowed force: norms sum its square over all nodes.
 const MOST: f64 = 1e120;
 
-/// Of the forces that resist a motion at least one must be larger: Newton's method lowers them by another 1e-15, and squares them.
+/// The smallest allowed value of the largest force that resists a motion. Newton's method reduces forces by a further factor of 1e-15, and
+/// squares them.
 const LEAST: f64 = 1e-120;
 
-/// A quantity, its value, and the least and the most it may be.
+/// A quantity: name, value, smallest and largest allowed value.
 type Quantity = (&'static str, f64, f64, f64);
 
 /// Refuses a simulation whose masses, volumes, forces or energies are not representable.
@@ -91,7 +92,7 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
     Ok(())
 }
 
-/// The least and the most of volume and mass, and the most of the speed.
+/// The smallest and largest particle volume and mass, and the largest speed.
 struct Extremes {
     volume: (f64, f64),
     mass: (f64, f64),
@@ -112,7 +113,7 @@ impl Extremes {
     }
 }
 
-/// The largest factor of a curve in size, 1 without one.
+/// The largest magnitude of the factors of a curve; 1 without a curve.
 fn factor(curve: Option<&Curve>) -> f64 {
     curve.map_or(1.0, |curve| curve.0.iter().fold(0.0, |most: f64, row| most.max(row[1].abs())))
 }

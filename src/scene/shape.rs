@@ -32,11 +32,11 @@ pub enum Shape {
     HalfSpace {
         /// A point of the plane (length).
         point: Vec<f64>,
-        /// The normal that points out of the region, of any length but zero.
+        /// The outward normal of the region, of any length but zero.
         normal: Vec<f64>,
     },
-    /// A polygon (2D only), by its vertices (length) in either order, at least 3; it need not be convex, and is closed from the last
-    /// vertex to the first. Edges meet at the vertex they share and nowhere else.
+    /// A polygon (2D only), by its vertices (length), at least 3, in either order. The polygon need not be convex, and is closed from the
+    /// last vertex to the first. Edges meet only at the vertex that they share.
     Polygon(#[schemars(length(min = 3))] Vec<Vec<f64>>),
     /// A cylinder of any direction (in 2D an oblique rectangle).
     Cylinder {
@@ -57,43 +57,44 @@ pub enum Shape {
         /// The radii (length) at `from` and at `to`, ≥ 0; one of them may be 0.
         radii: [f64; 2],
     },
-    /// What lies in any of these, at least one.
+    /// The union of these shapes, at least one.
     Union(Vec<Shape>),
-    /// What lies in one and not in another: a solid with a hole.
+    /// The part of one shape outside another: a solid with a hole.
     Difference {
         /// The solid.
         of: Box<Shape>,
         /// The hole.
         minus: Box<Shape>,
     },
-    /// What lies in all of these, at least one.
+    /// The intersection of these shapes, at least one.
     Intersection(Vec<Shape>),
-    /// A shape turned about a point (2D and 3D).
+    /// A shape rotated about a point (2D and 3D).
     Rotated {
-        /// The shape before.
+        /// The original shape.
         of: Box<Shape>,
-        /// The point that stays (length).
+        /// The fixed point (length).
         about: Vec<f64>,
         /// The angle (degrees): counter-clockwise in 2D, by the right-hand rule about `axis` in 3D.
         angle: f64,
-        /// The direction of the axis, of any length but zero; in 3D, and only there.
+        /// The direction of the axis, of any length but zero (3D only).
         axis: Option<Vec<f64>>,
     },
-    /// A shape made larger or smaller, seen from a point.
+    /// A shape scaled about a point.
     Scaled {
-        /// The shape before.
+        /// The original shape.
         of: Box<Shape>,
-        /// The point that stays (length).
+        /// The fixed point (length).
         about: Vec<f64>,
         /// The factor (no unit), > 0, the same in all directions.
         #[schemars(extend("exclusiveMinimum" = 0))]
         factor: f64,
     },
-    /// The inside of a closed surface of triangles, from a file (3D only). A file in other units is brought to those of the scene by
-    /// `scaled`.
+    /// The inside of a closed surface of triangles, from a file (3D only). `scaled` converts a file in other units to the units of the
+    /// scene.
     Surface(SurfaceFile),
-    /// The pixels of a picture (2D) or the voxels of a scan (3D) whose value lies in a range; each is a box, and is cut exactly. Their surface
-    /// is a staircase: pressures on it have the right resultant, tractions act on an area that is larger than the smooth one's.
+    /// The pixels of a picture (2D) or the voxels of a scan (3D) whose value lies in a range; each is a box, and is cut exactly. The
+    /// surface of the pixels is a staircase. Pressures on the staircase have the right resultant; tractions act on an area that is larger
+    /// than that of the smooth surface.
     Image(ImageFile),
 }
 
@@ -138,7 +139,7 @@ impl Shape {
         })
     }
 
-    /// Whether the shape is sound.
+    /// Checks the shape, and returns whether it is allowed.
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
         match self {
             Self::Box { min, max } => {
@@ -224,7 +225,7 @@ impl Shape {
         }
     }
 
-    /// Whether pixels are part of it.
+    /// Whether pixels are part of the shape.
     pub(super) fn has_pixels(&self) -> bool {
         let mut any = false;
         let _ = self.each_file("", &mut |_, file| {
@@ -234,7 +235,7 @@ impl Shape {
         any
     }
 
-    /// Visits the files in it, each with its path.
+    /// Visits the files of the shape, each with its path in the scene.
     pub(super) fn each_file<E>(
         &self,
         path: &str,
@@ -261,7 +262,7 @@ impl Shape {
     }
 }
 
-/// A solid turned and scaled; a surface has its corners moved, and keeps what it knows of whole rows of boxes.
+/// A solid, rotated and scaled. A surface of triangles stays a surface with moved vertices, which can still be cut for whole rows of boxes.
 fn similar<const D: usize>(
     of: shape::Shape<D>,
     about: Vector<f64, D>,
@@ -279,7 +280,7 @@ fn refused(problems: &mut Problems, path: &str, value: &str, allowed: &str) -> b
     false
 }
 
-/// The polygon, or what is wrong with it; `None` unless every vertex has `D` components.
+/// The polygon, or the reason why it is not allowed; `None` unless every vertex has `D` components.
 fn polygon<const D: usize>(vertices: &[Vec<f64>]) -> Option<Result<shape::Polygon<D>, PolygonError>> {
     let vertices = vertices.iter().map(|x| vector(x)).collect::<Option<Vec<_>>>()?;
     Some(shape::Polygon::new(vertices))
@@ -308,7 +309,7 @@ fn check_polygon(vertices: &[Vec<f64>], problems: &mut Problems, path: &str, dim
     }
 }
 
-/// The two ends of a cylinder or cone.
+/// Checks the two ends of a cylinder or cone.
 fn check_axis(from: &[f64], to: &[f64], radius: f64, problems: &mut Problems, path: &str, dimension: usize) -> bool {
     if dimension < 2 {
         return refused(problems, path, "a solid around an axis", "a line has none: use a box");
@@ -332,7 +333,7 @@ fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: 
     ok
 }
 
-/// A direction: its largest component between 1e-100 and 1e100 in size, so that its length is a number.
+/// Checks a direction. The largest component must lie between 1e-100 and 1e100 in size, so that the length is finite and not zero.
 pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], dimension: usize) -> bool {
     if !problems.vector(path, normal, dimension) {
         return false;
@@ -343,7 +344,7 @@ pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], 
     ok
 }
 
-/// The components as a vector of `D`, if there are `D`.
+/// The components as a vector; `None` unless there are `D`.
 pub(super) fn vector<const D: usize>(components: &[f64]) -> Option<Vector<f64, D>> {
     (components.len() == D).then(|| Vector::from_column_slice(components))
 }

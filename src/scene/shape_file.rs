@@ -1,4 +1,4 @@
-//! Files that shapes are read from.
+//! Files from which shapes are read.
 
 use super::image_file::{ImageFile, ImageFileError};
 use super::shape::Shape;
@@ -41,7 +41,7 @@ impl ShapeFile<'_> {
 }
 
 impl Scene {
-    /// Reads the files of shapes; and what is wrong with the scene now that they are known.
+    /// Reads the files of all shapes, then returns the problems of the scene with these shapes.
     pub(super) fn read_shapes(&self, folder: &Path) -> Result<Problems, BuildError> {
         let mut any = false;
         let mut read = |path: &str, shape: ShapeFile<'_>| {

@@ -5,13 +5,13 @@ use crate::solver::{Forcing, Krylov as Method, NewtonSettings, Precision, Precon
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the equations of a step are solved.
+/// The solver of the equations of a step.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Solver {
-    /// The outer iteration.
+    /// Newton's method, the outer iteration.
     pub newton: Newton,
-    /// The inner, linear iteration.
+    /// The linear solver, the inner iteration.
     pub krylov: Krylov,
 }
 
@@ -19,11 +19,11 @@ pub struct Solver {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Newton {
-    /// The residual norm at which a step has converged, relative to that of its first iterate, 1e-15 to 0.1. A residual
-    /// that is all round-off has converged, too. Default 1e-9.
+    /// The residual norm at which a step has converged, relative to the norm of its first iterate, 1e-15 to 0.1. A residual at the level of
+    /// round-off has converged, too. Default 1e-9.
     #[schemars(range(min = 1e-15, max = 0.1))]
     pub tolerance: f64,
-    /// Iterations after which a step has failed, 1 to 1000. Default 30.
+    /// Number of iterations after which a step fails, 1 to 1000. Default 30.
     #[schemars(range(min = 1, max = 1000))]
     pub max_iterations: u32,
 }
@@ -39,15 +39,15 @@ impl Default for Newton {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Krylov {
-    /// The method. Default "automatic".
+    /// The Krylov method. Default "automatic".
     pub method: Method,
-    /// Its preconditioner. Default "automatic".
+    /// The preconditioner. Default "automatic".
     pub preconditioner: Preconditioning,
-    /// How far each linear problem is solved.
+    /// The tolerance of each linear solve.
     pub forcing: Forcing,
-    /// The numbers of Krylov vectors and tangent products. Default "double".
+    /// The floating-point precision of Krylov vectors and tangent products. Default "double".
     pub precision: Precision,
-    /// Iterations of one linear solve, at most, 1 to 1000000. Default 2000.
+    /// Maximum number of iterations of one linear solve, 1 to 1000000. Default 2000.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub max_iterations: u32,
 }
@@ -66,7 +66,7 @@ impl Default for Krylov {
 }
 
 impl Solver {
-    /// `unsymmetric` says what makes the tangent so, if something does.
+    /// `unsymmetric` is the cause of an unsymmetric tangent, if there is one.
     pub(super) fn check(&self, problems: &mut Problems, unsymmetric: Option<&str>) {
         problems.between("solver.newton.tolerance", self.newton.tolerance, 1e-15, 0.1);
         problems.whole("solver.newton.max_iterations", self.newton.max_iterations, 1, 1000);

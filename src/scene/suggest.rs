@@ -1,9 +1,9 @@
 //! The allowed word nearest to a misspelt one.
 
-/// The most letters to change, insert or drop.
+/// Maximum number of letters to change, insert or drop.
 const NEAR: usize = 2;
 
-/// No key is longer; comparing longer words would only take time.
+/// Maximum length of a word; no key is longer.
 const LONGEST: usize = 64;
 
 /// The word of `allowed` nearest to `word`, if it is at most two letters away and shares at least one.
@@ -20,7 +20,7 @@ pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
         .map(|(_, candidate)| candidate)
 }
 
-/// Levenshtein's distance, row by row; words that differ by more than the limit in length count as far apart.
+/// Levenshtein's distance, row by row. Words whose lengths differ by more than [`NEAR`] count as far apart.
 fn distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     if a.len().abs_diff(b.len()) > NEAR {

@@ -12,18 +12,18 @@ use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Bytes of a file, at most.
+/// Maximum length of a file in bytes.
 pub const MAX_BYTES: u64 = 1 << 30;
 
 /// A surface from a file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceFile {
-    /// Path of the file, which ends in `.stl` or `.ply`, relative to the scene's folder. Its surface must be closed and may not cross
-    /// itself; corners at the same place are one.
+    /// Path of the file, which ends in `.stl` or `.ply`, relative to the scene's folder. The surface must be closed and must not cross
+    /// itself. Vertices at the same position are merged.
     #[schemars(length(min = 1))]
     pub file: PathBuf,
-    /// What was read.
+    /// The surface, once the file has been read.
     #[serde(skip)]
     pub(super) surface: OnceLock<Surface<3>>,
 }
@@ -31,38 +31,38 @@ pub struct SurfaceFile {
 /// A file that gives no solid.
 #[derive(Debug, thiserror::Error)]
 pub enum SurfaceFileError {
-    /// It cannot be read, or is not of its format.
+    /// The file cannot be read, or does not have the format of its ending.
     #[error("cannot be read: {0}")]
     Io(#[from] io::Error),
-    /// It is a folder, a device or a pipe.
+    /// The path is a folder, a device or a pipe.
     #[error("is no regular file")]
     NoFile,
-    /// It is too long.
+    /// The file is too long.
     #[error("has {0} bytes; at most {MAX_BYTES} are read")]
     TooLong(u64),
-    /// The ending names no format that is read.
+    /// The ending is neither `.stl` nor `.ply`.
     #[error("must end in .stl or .ply")]
     Ending,
-    /// A PLY file without a list of corners or their coordinates.
+    /// A PLY file has no coordinates of its vertices, or no vertices of its faces.
     #[error("has no {0}")]
     Lacks(&'static str),
-    /// A face of a PLY file with fewer than three corners.
+    /// A face of a PLY file has fewer than three vertices.
     #[error("face {face} has {corners} corners (faces are counted from 0)")]
     Face {
-        /// Its number.
+        /// Number of the face.
         face: usize,
-        /// Its corners.
+        /// Number of its vertices.
         corners: usize,
     },
-    /// Its triangles do not bound a solid.
+    /// The triangles do not bound a solid.
     #[error("holds {0}")]
     Surface(#[from] SurfaceError),
 }
 
-/// Corners, and the three numbers of corners of each triangle.
+/// Vertex positions, and the three vertex numbers of each triangle.
 type Triangles = (Vec<[f64; 3]>, Vec<[usize; 3]>);
 
-/// The formats that are read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Stl,
@@ -80,15 +80,15 @@ impl Format {
 }
 
 impl SurfaceFile {
-    /// Whether its name is that of a format.
+    /// Whether the name of the file has the ending of a supported format.
     pub(super) fn has_format(&self) -> bool {
         Format::of(&self.file).is_some()
     }
 
-    /// Reads it, unless that was done.
+    /// Reads the file, unless it has been read.
     ///
     /// # Errors
-    /// As [`read_file`].
+    /// The errors of [`read_file`].
     pub(super) fn read(&self, folder: &Path) -> Result<(), SurfaceFileError> {
         if self.surface.get().is_none() {
             let _ = self.surface.set(read_file(&folder.join(&self.file))?);
@@ -97,7 +97,7 @@ impl SurfaceFile {
     }
 }
 
-/// The solid inside of the surface in a file.
+/// The solid inside the surface in a file.
 ///
 /// ```
 /// use bfree::scene::surface_file::read_file;
@@ -115,11 +115,11 @@ impl SurfaceFile {
 /// ```
 ///
 /// # Errors
-/// A file that cannot be read, or whose surface is open, faces both ways or crosses itself, and where.
+/// The file cannot be read, or its surface is open, faces both ways or crosses itself (with the position).
 pub fn read_file(path: &Path) -> Result<Surface<3>, SurfaceFileError> {
     let format = Format::of(path).ok_or(SurfaceFileError::Ending)?;
     let about = fs::metadata(path)?;
-    // A pipe may wait for ever.
+    // Reading a pipe may block for ever.
     if !about.is_file() {
         return Err(SurfaceFileError::NoFile);
     }
@@ -138,14 +138,14 @@ pub fn read_file(path: &Path) -> Result<Surface<3>, SurfaceFileError> {
     Ok(joined(&corners, &triangles)?)
 }
 
-/// The surface with corners at the same place made one.
+/// The surface, with coincident vertices merged.
 fn joined(corners: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Surface<3>, SurfaceError> {
     if corners.len().max(triangles.len()) >= u32::MAX as usize {
         return Err(SurfaceError::TooMany(triangles.len()));
     }
     let (mut numbers, mut vertices, mut number_of) = (Vec::new(), Vec::new(), HashMap::new());
     for corner in corners {
-        // −0 is 0.
+        // Adding 0 turns −0 into 0.
         let key = corner.map(|x| (x + 0.0).to_bits());
         let number = *number_of.entry(key).or_insert_with(|| {
             vertices.push(Vector::from(*corner));
@@ -153,7 +153,7 @@ fn joined(corners: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Surface<3>, 
         });
         numbers.push(number);
     }
-    // One that is not there keeps its number, and is refused.
+    // A vertex that does not exist keeps its number, and `Surface::new` refuses it.
     let number = |corner: usize| numbers.get(corner).copied().unwrap_or(corner as u32);
     Surface::new(vertices, triangles.iter().map(|triangle| triangle.map(number)).collect())
 }
@@ -188,7 +188,7 @@ impl PropertyAccess for Entry {
     }
 }
 
-/// Corners and triangles of a PLY file; a face of more corners is a fan.
+/// Vertices and triangles of a PLY file. A face with more than three vertices becomes a fan of triangles.
 fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, SurfaceFileError> {
     let ply = Parser::<Entry>::new().read_ply(file).map_err(io::Error::other)?;
     let list = |name| ply.payload.get(name).map_or(&[][..], Vec::as_slice);

@@ -10,7 +10,7 @@ use crate::simulation::InitialGuess;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Time steps of one run, at most.
+/// Maximum number of time steps of one run.
 pub const MAX_STEPS: f64 = 1e9;
 
 /// The time steps and Newmark's constants.
@@ -20,44 +20,45 @@ pub struct Time {
     /// The time step Δt (time), > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub step: f64,
-    /// The end of the simulation (time), at least one step; it starts at 0.
+    /// The end of the simulation (time), at least one step; the simulation starts at 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub end: f64,
-    /// Dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the loads at its end, and keys
-    /// about velocities or the mass matrix are refused. Default: `"newmark"`.
+    /// The time integration scheme: dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the
+    /// loads at its end. Keys of velocities or the mass matrix are then refused. Default: `"newmark"`.
     #[serde(default)]
     pub inertia: Inertia,
     /// Newmark's β (no unit), > 0, with 2β ≥ γ; for `"newmark"` only. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
-    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; above 0.5 it damps; for `"newmark"` only. Default 0.5.
+    /// Newmark's γ (no unit), 0.5 ≤ γ ≤ 2β; values above 0.5 damp; for `"newmark"` only. Default 0.5.
     #[schemars(range(min = 0.5))]
     pub gamma: Option<f64>,
     /// ε of the mass matrix (1 − ε) M + ε lumped(M), 0 (consistent) to 1 (lumped). Default 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lumping: Option<f64>,
-    /// Where Newton's iteration of a step starts. Default: `"last_step"` in load steps, `"zero"` with inertia.
+    /// The starting point of Newton's method in a step. Default: `"last_step"` in load steps, `"zero"` with inertia.
     pub initial_guess: Option<InitialGuess>,
-    /// How nodes get velocity and acceleration from the particles. Default: `"mass"`.
+    /// The transfer of velocity and acceleration from the particles to the nodes. Default: `"mass"`.
     pub projection: Option<Projection>,
-    /// How particles see prescribed nodes in their update. Default: `"literal"`.
+    /// The velocity change that prescribed nodes give to the particles. Default: `"literal"`.
     pub wall_update: Option<WallUpdate>,
-    /// Steps as long as a tolerance allows: `step` is the longest, and it is halved `max_halvings` times at most. Default: all are `step`
-    /// long.
+    /// Adaptive steps, as long as a tolerance allows. `step` is the longest, and is halved at most `max_halvings` times. Default: all steps
+    /// have the length `step`.
     pub adaptive: Option<Adaptive>,
-    /// How often a step that fails may be halved, 0 to 20. Default 10.
+    /// Maximum number of times that a failed step is halved, 0 to 20. Default 10.
     #[serde(default = "Time::default_max_halvings")]
     #[schemars(range(min = 0, max = MAX_HALVINGS))]
     pub max_halvings: u32,
 }
 
-/// Steps as long as a tolerance allows.
+/// Adaptive steps, as long as a tolerance allows.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptive {
-    /// The most that the displacement may err in one step, in grid spacings: (β − 1/6) Δt² |Δa| (Zienkiewicz and Xie; Newmark's method), the root of the
-    /// mean square over the mass, > 0 and at most 1. A step that errs more is taken back and halved; after one that errs a tenth of
-    /// it, the next is twice as long. The time at the end of each whole `step` is met.
+    /// The largest allowed error of the displacement in one step, in grid spacings, > 0 and at most 1. The error is (β − 1/6) Δt² |Δa|
+    /// (Zienkiewicz and Xie; Newmark's method), as the mass-weighted root mean square. A step with a larger error is repeated with half its
+    /// length. After a step with at most a tenth of the allowed error, the next step is twice as long. Steps meet each whole multiple of
+    /// `step`.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub tolerance: f64,
 }
@@ -67,7 +68,7 @@ impl Time {
         10
     }
 
-    /// β and γ.
+    /// Newmark's β and γ.
     ///
     /// ```
     /// use bfree::mechanics::schemes::Newmark;
@@ -92,13 +93,13 @@ impl Time {
         self.lumping.unwrap_or(1.0)
     }
 
-    /// Where Newton's method starts.
+    /// The starting point of Newton's method.
     pub(super) fn initial_guess(&self) -> InitialGuess {
         let by_itself = if self.inertia.has_inertia() { InitialGuess::Zero } else { InitialGuess::LastStep };
         self.initial_guess.unwrap_or(by_itself)
     }
 
-    /// Gives every key its value, of those that mean something.
+    /// Fills in the defaults of all keys that have a meaning for the scheme.
     pub(super) fn complete(&mut self) {
         self.initial_guess = Some(self.initial_guess());
         if self.inertia == Inertia::Newmark {
@@ -112,7 +113,7 @@ impl Time {
         }
     }
 
-    /// The keys that are given and that only inertia gives a meaning.
+    /// The given keys that have a meaning only with inertia, with their values.
     pub(super) fn of_inertia(&self) -> impl Iterator<Item = (&'static str, String)> {
         let number = |x: Option<f64>| x.map(|x| Number(x).to_string());
         [
@@ -128,7 +129,7 @@ impl Time {
         .filter_map(|(key, value)| Some((key, value?)))
     }
 
-    /// The same with the end that the command line asks for, by the option `option`.
+    /// This section with the end `end`, given on the command line by `option`.
     ///
     /// ```
     /// let time = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.time;
@@ -141,13 +142,13 @@ impl Time {
     /// ```
     ///
     /// # Errors
-    /// What the scene's own `end` may not be either.
+    /// A value that `time.end` may not have in a scene either.
     pub fn until(&self, end: f64, option: &str) -> Result<Self, Problems> {
         let time = Self { end, ..self.clone() };
         let mut problems = Problems::default();
         time.check(&mut problems);
         for problem in &mut problems.list {
-            // Whatever is wrong now was right with the scene's own end.
+            // The scene's own end passed all checks, so every problem is one of the option.
             problem.path = option.to_owned();
             problem.value = Number(end).to_string();
         }
@@ -178,7 +179,7 @@ impl Time {
                 problems.refuse(key, Number(given), "belongs to time.inertia \"newmark\": remove one of the two");
             }
         }
-        // 2β ≥ γ ≥ ½, up to the rounding of β = (γ + ½)²/4 and the like
+        // 2β ≥ γ ≥ ½, up to round-off in values such as β = (γ + ½)²/4.
         let Newmark { beta, gamma } = self.newmark();
         let gamma_ok = (0.5..=2.0).contains(&gamma);
         problems.require(
@@ -208,7 +209,7 @@ impl Time {
     }
 }
 
-/// The word of a choice.
+/// The value of a key as JSON, such as `"newmark"`.
 pub(super) fn word(choice: impl Serialize) -> String {
     serde_json::to_string(&choice).unwrap_or_default()
 }

@@ -1,22 +1,23 @@
-//! From nodes to particles.
+//! Transfer from nodes to particles.
 
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How velocity and acceleration go from the nodes to the particles.
+/// The transfer of velocity and acceleration from the nodes to the particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Transfer {
-    /// Increments only, as in the paper. Nothing is damped, and velocities that particles have and nodes do not see stay.
+    /// Particles receive increments only, as in the paper. Nothing is damped, and velocities of the particles that the nodes do not
+    /// represent persist.
     #[default]
     Flip,
-    /// The particles take the velocity of their nodes in every step: the shorter the steps, the more is smoothed away.
+    /// Particles take the velocity of their nodes in every step. Shorter steps smooth more.
     Pic(Pic),
-    /// The particles follow their nodes at a rate: what is smoothed away in a given time does not depend on the time step.
+    /// Particles follow their nodes at a given rate. The smoothing in a given time does not depend on the time step.
     Blend(Blend),
-    /// As a blend of order 2, and where the velocity has a kink or an extremum of order 1 as well: shocks and jumps stay narrow and
-    /// do not ring.
+    /// A blend of order 2, and additionally of order 1 where the velocity has a kink or an extremum. Shocks and jumps stay narrow and do
+    /// not ring.
     Limited(Limited),
 }
 
@@ -24,7 +25,7 @@ pub enum Transfer {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pic {
-    /// Terms of the series for the consistent projection, 1 to 20: 1 is PIC; the more, the less is smoothed away. Default 1.
+    /// Number of terms of the series for the consistent projection, 1 to 20. One term is PIC, and more terms smooth less. Default 1.
     #[serde(default = "default_order")]
     #[schemars(range(min = 1, max = 20))]
     pub order: u32,
@@ -34,11 +35,11 @@ pub struct Pic {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Blend {
-    /// Terms of the series for the consistent projection, 1 to 20: 1 draws towards PIC. Default 1.
+    /// Number of terms of the series for the consistent projection, 1 to 20. One term draws towards PIC. Default 1.
     #[serde(default = "default_order")]
     #[schemars(range(min = 1, max = 20))]
     pub order: u32,
-    /// The rate (1/time), > 0. A front free of ringing needs about 1.2 (c/h) (h/L)^(1/4) of order 1, with c the speed of sound, h the
+    /// The rate (1/time), > 0. With order 1, a front free of ringing needs about 1.2 (c/h) (h/L)^(1/4). Here c is the speed of sound, h the
     /// spacing and L the distance the front travels.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate: f64,
@@ -48,8 +49,8 @@ pub struct Blend {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limited {
-    /// The rate of the second order (1/time), > 0; up to five times as much of the first order is added at kinks. For shocks and
-    /// jumps 0.8 c/h is recommended, with c the speed of sound and h the spacing; see `scenes/riemann_jump.json`.
+    /// The rate of the blend of order 2 (1/time), > 0. At kinks, up to five times as much of order 1 is added. For shocks and jumps 0.8 c/h
+    /// is recommended, with c the speed of sound and h the spacing; see `scenes/riemann_jump.json`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate: f64,
 }

@@ -1,4 +1,4 @@
-//! What a scene may have wrong and still runs: said with numbers by `bfree check` and at the start of a run.
+//! Warnings, with numbers, about scenes that run but may be wrong. `bfree check` and the start of a run print these warnings.
 
 use super::body::Body;
 use super::shape::Shape as Drawn;
@@ -12,41 +12,42 @@ use crate::simulation::Simulation;
 use crate::tensor::{Deformation, Tensor, Vector};
 use std::collections::BTreeSet;
 
-/// Particles nearer to each other, relative to the spacing, lie at one place.
+/// Distance, relative to the spacing, below which two particles coincide.
 const COINCIDENT: f64 = 1e-6;
 
-/// Coincident places that are named.
+/// Maximum number of coincident positions in the message.
 const NAMED: usize = 3;
 
-/// Share of its shape's volume by which a body may miss it. Weight, momentum and energies are wrong by as much, and that is twice what
-/// the accuracy `"standard"` errs by. With `fill: "cut"` it is 1e-4.
+/// Volume difference between a body and its shape, relative to the shape, above which a warning is given. Weight, momentum and energies
+/// have the same relative error. The limit is twice the error of the accuracy `"standard"`; with `fill: "cut"` the difference is 1e-4.
 const MISSED: f64 = 0.01;
 
-/// Volume in a cell that curved surfaces leave unsure, relative to the cell.
+/// Uncertainty of the volume in a cell with curved surfaces, relative to the cell.
 const UNSURE: f64 = 1e-3;
 
-/// Cells across a body, at least, to bend and to press.
+/// Minimum number of cells across a body for correct bending and compression.
 const CELLS: f64 = 2.0;
 
-/// How well a thickness is known, which is twice a depth of particles that need not lie in the middle: no body of two cells is named.
+/// Tolerance of the estimated thickness, which is twice a depth of particles that need not lie in the middle. With this tolerance, a body
+/// of two cells gets no warning.
 const ABOUT: f64 = 0.95;
 
-/// Poisson's ratio from which on a body whose change of volume is not averaged is said to lock.
+/// Poisson's ratio from which on a body with pointwise dilatation is said to lock.
 const LOCKS: f64 = 0.45;
 
-/// Bodies of a scene, as they were built.
+/// The built bodies of a scene.
 struct Bodies<'a, const D: usize> {
     simulation: &'a Simulation<D>,
     scene: &'a [Body],
     shapes: Vec<Option<Shape<D>>>,
-    /// Particles with a volume, body by body.
+    /// Indices of the particles with a volume, for each body.
     particles: Vec<Vec<usize>>,
 }
 
 impl Scene {
-    /// What may be wrong with a simulation of this scene: bodies that overlap, particles at one place, bodies too thin for the grid or of
-    /// another volume than their shape, bodies that lock, prescribed regions without nodes, tractions on surfaces of pixels. Of bodies that are unions
-    /// the thickness is that of one part.
+    /// Warnings about a simulation of this scene: overlapping bodies, coincident particles, locking, prescribed regions without nodes, and
+    /// tractions on surfaces of pixels. Further warnings are about bodies too thin for the grid, or with another volume than their shape.
+    /// The thickness of a union is that of one part.
     ///
     /// ```
     /// // Two discs of radius 1, apart; and moved by 3, so that one lies partly in the other.
@@ -101,7 +102,7 @@ impl Scene {
         all
     }
 
-    /// Bodies whose volume need not be that of their shape, with their numbers.
+    /// Bodies whose volume may differ from that of their shape, with their numbers.
     fn filled_otherwise<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<(usize, BodyUse)> {
         if self.bodies.iter().all(|body| body.fill == Fill::Cut) {
             return Vec::new();
@@ -116,7 +117,7 @@ impl<const D: usize> Bodies<'_, D> {
         self.simulation.grid.spacing
     }
 
-    /// Particles of a body that lie in the shape of another.
+    /// Particles of `body` that lie in the shape of `other`.
     fn inside(&self, body: usize, other: usize) -> Vec<usize> {
         let Some(shape) = &self.shapes[other] else { return Vec::new() };
         let ((min, max), hair) = (shape.bounding_box(), EDGE * self.spacing());
@@ -130,8 +131,8 @@ impl<const D: usize> Bodies<'_, D> {
         self.particles[body].iter().filter(near).filter(inside).copied().collect()
     }
 
-    /// Two bodies in one place. Of two shapes the volume is what they have in common in the cells of such particles, for the centroid of
-    /// a part of a box may lie beside that part.
+    /// Warns of two overlapping bodies. The volume of two shapes is that of their intersection in the cells of the overlapping particles.
+    /// Particle positions alone do not suffice: the centroid of a part of a box may lie outside that part.
     fn overlap(&self, a: usize, b: usize) -> Option<String> {
         let (grid, particles) = (&self.simulation.grid, &self.simulation.particles);
         let found = [self.inside(a, b), self.inside(b, a)].concat();
@@ -154,7 +155,7 @@ impl<const D: usize> Bodies<'_, D> {
         })
     }
 
-    /// Particles at one place.
+    /// Warns of coincident particles.
     fn coincident(&self) -> Option<String> {
         let position = &self.simulation.particles.position;
         let key = |p: usize| -> [i64; D] {
@@ -177,8 +178,8 @@ impl<const D: usize> Bodies<'_, D> {
         })
     }
 
-    /// A body that has no room for two cells: twice the greatest depth of a particle and its own width are less. Of a body without a
-    /// shape, its least extent.
+    /// Warns of a body thinner than two cells. The thickness is twice the greatest depth of a particle plus the width of that particle.
+    /// Without a shape, the thickness is the smallest extent of the body.
     fn thin(&self, body: usize) -> Option<String> {
         let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.spacing());
         let width = |p: usize| particles.volume[p].powf(1.0 / D as f64);
@@ -186,7 +187,7 @@ impl<const D: usize> Bodies<'_, D> {
         let across = match &self.shapes[body] {
             Some(shape) => {
                 let mut most: f64 = 0.0;
-                // From the middle on: the first ones lie at the surface.
+                // The loop starts in the middle of the list, because the first particles lie at the surface.
                 let (first, last) = own.split_at(own.len() / 2);
                 for &p in last.iter().chain(first) {
                     most = most.max(width(p) - 2.0 * shape.signed_distance(&particles.position[p]));
@@ -210,11 +211,11 @@ impl<const D: usize> Bodies<'_, D> {
         })
     }
 
-    /// A body that hardly changes its volume, or flows without changing it, and does not average its dilatation. In uniaxial strain nothing
-    /// locks.
+    /// Warns of a body that may lock: its law is nearly incompressible or has isochoric plastic flow, and its dilatation is pointwise. In
+    /// uniaxial strain nothing locks.
     fn locks(&self, number: usize) -> Option<String> {
         let body = self.simulation.bodies.get(number).filter(|body| D > 1 && !body.averages())?;
-        // To the last digits of ν = 0.45 as it is given.
+        // The tolerance covers the round-off of a given ν = 0.45.
         let (poisson, flows) = (poissons_ratio(&body.law), matches!(body.law, Material::VonMises(_)));
         if poisson < LOCKS - 1e-9 && !flows {
             return None;
@@ -240,7 +241,7 @@ impl<const D: usize> Bodies<'_, D> {
     }
 }
 
-/// A body whose volume, and so its mass, is not that of its shape.
+/// Warns of a body whose volume, and thus mass, differs from that of its shape.
 fn missed(number: usize, body: &BodyUse) -> Option<String> {
     let BodyUse { name, volume, drawn, .. } = body;
     let drawn = drawn.filter(|drawn| (volume / drawn - 1.0).abs() > MISSED)?;
@@ -251,7 +252,7 @@ fn missed(number: usize, body: &BodyUse) -> Option<String> {
     ))
 }
 
-/// Regions in which no node lies.
+/// Warns of regions without nodes.
 fn without_nodes<const D: usize>(grid: &Grid<D>, list: &str, regions: impl Iterator<Item = Shape<D>>) -> Vec<String> {
     let all = regions.enumerate().filter_map(|(i, region)| {
         let (first, count) = around(grid, &region);
@@ -268,7 +269,7 @@ fn without_nodes<const D: usize>(grid: &Grid<D>, list: &str, regions: impl Itera
     all.collect()
 }
 
-/// A traction on more than one side of pixels.
+/// Warns of a traction on sides of pixels with more than one normal.
 fn staircase<const D: usize>(i: usize, load: &SurfaceLoad<D>) -> Option<String> {
     let area: f64 = load.points.iter().map(|point| point.area).sum();
     let flat = load.points.iter().map(|point| point.normal * point.area).sum::<Vector<f64, D>>().amax();

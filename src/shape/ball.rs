@@ -21,7 +21,7 @@ impl<const D: usize> Solid<D> for Ball<D> {
         (length - self.radius, normal)
     }
 
-    /// The tangent plane, which the sphere leaves by r²/2R.
+    /// The tangent plane. Within a radius r the sphere, of radius R, departs from the plane by r²/2R.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         planes.extend(Some(self.nearest(x)).filter(|face| face.0.abs() < radius));
         0.5 * radius * radius / self.radius

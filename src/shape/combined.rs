@@ -3,15 +3,15 @@
 use super::{Face, Shape, Solid, axis};
 use crate::tensor::Vector;
 
-/// What lies in any of the parts.
+/// The union of the parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Union<const D: usize>(pub Vec<Shape<D>>);
 
-/// What lies in all of the parts.
+/// The intersection of the parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Intersection<const D: usize>(pub Vec<Shape<D>>);
 
-/// What lies in `of` and not in `minus`.
+/// The points that lie in `of` and not in `minus`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference<const D: usize> {
     /// The solid.
@@ -20,7 +20,7 @@ pub struct Difference<const D: usize> {
     pub minus: Box<Shape<D>>,
 }
 
-/// The only part of these whose surface comes so near, if all others are all out of reach, on the side of this sign.
+/// The only part with `sign` · d < `radius` at `x`; `None` if several parts or none are so near.
 fn only<'a, const D: usize>(parts: &'a [Shape<D>], x: &Vector<f64, D>, radius: f64, sign: f64) -> Option<&'a Shape<D>> {
     let mut near = parts.iter().filter(|part| sign * part.signed_distance(x) < radius);
     near.next().filter(|_| near.next().is_none())

@@ -1,26 +1,27 @@
-//! Cylinders and cones, truncated or not: a polygon that turns about an axis.
+//! Cylinders and cones, truncated or not: a polygon that revolves about an axis.
 
 use super::{EDGE, Face, Polygon, Solid, axis};
 use crate::tensor::Vector;
 
-/// A cone between two discs, one of which may be a point; between equal ones a cylinder. In 2D a trapezium or a triangle.
+/// A cone between two discs, one of which may be a point. Equal discs make a cylinder. In 2D the solid is a trapezium or a triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cone<const D: usize> {
     /// The centres of the discs.
     ends: [Vector<f64, D>; 2],
-    /// Their radii.
+    /// The radii of the discs.
     radii: [f64; 2],
-    /// The unit vector e from the first to the second.
+    /// The unit vector e from the first centre to the second.
     along: Vector<f64, D>,
-    /// A unit vector across.
+    /// A unit vector perpendicular to e.
     across: Vector<f64, D>,
-    /// The cut along the axis, in distances (s, ρ) along it and from it, ρ of either sign. A point nearest to `x` lies in the same cut.
+    /// The section along the axis, in distances (s, ρ) along the axis and from the axis. ρ has either sign. The point of the surface
+    /// nearest to `x` lies in the section through `x`.
     profile: Polygon<2>,
 }
 
 impl<const D: usize> Cone<D> {
-    /// The cone between the discs around `ends` with these `radii`; `None` in 1D, where the ends coincide (as far as
-    /// 1e-9 of the radius tells), and unless the radii are ≥ 0 and one of them > 0.
+    /// The cone between the discs around `ends` with these `radii`. `None` in 1D, if the ends coincide (within 1e-9 of the larger radius),
+    /// and unless both radii are ≥ 0 and one of them > 0.
     ///
     /// ```
     /// use bfree::shape::{Cone, Shape};
@@ -43,7 +44,7 @@ impl<const D: usize> Cone<D> {
             return None;
         }
         let along = axis_vector / length;
-        // Across is what an axis of space far from e has beside it.
+        // `across` is the part perpendicular to e of a coordinate axis far from e.
         let far: Vector<f64, D> = axis(along.iamin(), 1.0);
         let across = far - along * far.dot(&along);
         let mut outline = Vec::new();
@@ -57,12 +58,13 @@ impl<const D: usize> Cone<D> {
         Some(Self { ends, radii, along, across: across / across.norm(), profile: Polygon::oriented(outline) })
     }
 
-    /// (s, ρ), and the unit vector away from the axis.
+    /// The position (s, ρ) of `x` in the section, and the unit vector away from the axis.
     fn in_profile(&self, x: &Vector<f64, D>) -> (Vector<f64, 2>, Vector<f64, D>) {
         let from_end = x - self.ends[0];
         let s = from_end.dot(&self.along);
         let off_axis = from_end - self.along * s;
-        // What round-off leaves near the axis may point along it: once more; and if little is left then, that is round-off too.
+        // Near the axis, round-off may leave a component along the axis, so project once more. If little is left then, the rest is
+        // round-off, too.
         let radial = off_axis - self.along * off_axis.dot(&self.along);
         let rho = radial.norm();
         (Vector::from([s, rho]), if rho > 0.01 * off_axis.norm() { radial / rho } else { self.across })
@@ -76,7 +78,7 @@ impl<const D: usize> Solid<D> for Cone<D> {
         (d, self.along * n[0] + outward * n[1])
     }
 
-    /// Those of the cut through `x`, which a side leaves by r²/2ρ in 3D, ρ its distance from the axis.
+    /// The planes of the section through `x`. In 3D a side departs from its plane by r²/2ρ, where ρ is the distance from the axis.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let (place, outward) = self.in_profile(x);
         let mut of_profile = Vec::new();

@@ -1,46 +1,46 @@
-//! What of a box lies in a solid: volume, centroid, and the surface in it. A box is halved until the surface in it is nearly flat, and
-//! then cut into simplices by planes, exactly.
+//! Cut cells: the volume and the centroid of the part of a box in a solid, and the surface in the box. A box is halved until the surface in
+//! it is nearly flat. Planes then cut the box into simplices, exactly.
 
 use super::{EDGE, Face, Shape};
 use crate::tensor::{Tensor, Vector, determinant};
 
-/// How far a surface may depart from the planes that stand for it, relative to the spacing. A ball two spacings in radius is filled to
-/// about 1e-4 so; solids with flat faces are cut exactly.
+/// The largest distance between a surface and the planes that approximate it, relative to the spacing. A ball two spacings in radius is
+/// then filled to about 1e-4. Solids with flat faces are cut exactly.
 const FLAT: f64 = 1e-3;
 
-/// Planes in one box, at most: each may double the simplices.
+/// Largest number of planes in one box: each plane may double the number of simplices.
 const MANY: usize = 6;
 
-/// The cosine of the angle between two pieces of surface in a box that are taken as one.
+/// Two pieces of surface in a box count as one side if the cosine of the angle between their normals exceeds this.
 const ALIKE: f64 = 0.9;
 
-/// How far apart two sides of a part are, at least, over what a surface may depart from the planes that stand for them.
+/// The smallest distance between two sides of a thin part, relative to the departure of the surface from its planes.
 const APART: f64 = 8.0;
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet<const D: usize> {
-    /// Its centroid.
+    /// The centroid of the piece.
     pub position: Vector<f64, D>,
-    /// The mean of its outward unit normals: shorter than 1 where it is curved, so that area times normal is ∫ n dA.
+    /// The mean of the outward unit normals, so that area times normal is ∫ n dA. On a curved piece the mean is shorter than 1.
     pub normal: Vector<f64, D>,
-    /// Its area (a length in 2D, 1 in 1D).
+    /// The area of the piece (a length in 2D, 1 in 1D).
     pub area: f64,
-    /// The mean of (x − position) ⊗ (x − position) over it.
+    /// The mean of (x − position) ⊗ (x − position) over the piece.
     pub spread: Tensor<f64, D>,
-    /// The mean of (x − position) ⊗ n: not zero where it is curved.
+    /// The mean of (x − position) ⊗ n over the piece; not zero if the piece is curved.
     pub turn: Tensor<f64, D>,
 }
 
 impl<const D: usize> Facet<D> {
-    /// The simplex with these D corners.
+    /// The facet on the simplex with these D corners.
     pub(super) fn flat(corners: &[Vector<f64, D>], normal: Vector<f64, D>, area: f64) -> Self {
         let position = corners.iter().sum::<Vector<f64, D>>() / D as f64;
         let squares = corners.iter().map(|x| (x - position) * (x - position).transpose()).sum::<Tensor<f64, D>>();
         Self { position, normal, area, spread: squares / (D * (D + 1)) as f64, turn: Tensor::zeros() }
     }
 
-    /// Both together.
+    /// The union of two facets.
     fn and(&self, other: &Self) -> Self {
         let area = self.area + other.area;
         let share = other.area / area;
@@ -65,27 +65,27 @@ pub(super) struct Piece<const D: usize> {
     pub extent: Extent<D>,
 }
 
-/// What a piece is.
+/// The geometry of a piece.
 pub(super) enum Extent<const D: usize> {
-    /// A box, by its edges, of either sign.
+    /// A box with these edges, which may be negative.
     Box(Vector<f64, D>),
     /// A simplex that the surface may bound.
     Simplex(Simplex<D>),
 }
 
-/// A simplex of D corners where the solid ends.
+/// A simplex of D corners in a plane that approximates the surface of the solid.
 pub(super) struct End<const D: usize> {
     pub corners: Vec<Vector<f64, D>>,
     pub outward: Vector<f64, D>,
     pub area: f64,
-    /// How far the surface may be from it.
+    /// The largest distance of the surface from the simplex.
     pub departure: f64,
 }
 
-/// Corners 0 … D.
+/// A simplex with corners 0 … D; further entries are unused.
 pub(super) type Simplex<const D: usize> = [Vector<f64, D>; 4];
 
-/// The planes that cut a box, as seen from its centre, and how far the surface may be from them.
+/// The planes that cut a box, relative to the centre of the box, and the largest distance of the surface from the planes.
 pub(super) struct Cut<const D: usize> {
     center: Vector<f64, D>,
     planes: Vec<Face<D>>,
@@ -93,15 +93,15 @@ pub(super) struct Cut<const D: usize> {
 }
 
 impl<const D: usize> Cut<D> {
-    /// The distance of a point from one of the planes.
+    /// The signed distance of a point from one of the planes.
     fn distance(&self, plane: &Face<D>, x: &Vector<f64, D>) -> f64 {
         plane.0 + plane.1.dot(&(x - self.center))
     }
 }
 
 impl<const D: usize> Shape<D> {
-    /// The volume and the centroid of what lies in the box from `lower` with these `edges`, on a grid of this spacing. Exact but for
-    /// round-off where all faces are flat; else to about 1e-3 `spacing` across the surface.
+    /// The volume and the centroid of the part of the solid in a box on a grid of this spacing. The box begins at `lower` and has these
+    /// `edges`. If all faces are flat, the result is exact up to round-off. Otherwise the error across the surface is about 1e-3 `spacing`.
     ///
     /// ```
     /// use bfree::shape::{HalfSpace, Shape};
@@ -133,8 +133,8 @@ impl<const D: usize> Shape<D> {
         (volume, if volume > 0.0 { moment / volume } else { lower + edges * 0.5 })
     }
 
-    /// As [`Self::part`], of `count` boxes next to each other along the first axis, the first one from `lower`; `None` of a shape that
-    /// does not know them all at once.
+    /// The parts of `count` boxes next to each other along the first axis, as by [`Self::part`]. The first box begins at `lower`. `None`
+    /// for a shape that cannot compute all boxes at once.
     pub(super) fn row(
         &self,
         lower: &Vector<f64, D>,
@@ -144,7 +144,7 @@ impl<const D: usize> Shape<D> {
         self.solid().row(lower, edges, count)
     }
 
-    /// The pieces of surface in that box, and in `region` if there is one: one for each of its sides there.
+    /// The surface in the box of [`Self::part`], and in `region` if given: one facet for each side of the solid there.
     ///
     /// ```
     /// use bfree::shape::{Ball, Shape};
@@ -168,7 +168,7 @@ impl<const D: usize> Shape<D> {
         self.sides(region, lower, edges, spacing, FLAT)
     }
 
-    /// As [`Self::facets`], `flat` in place of 1e-3.
+    /// The facets of [`Self::facets`], with the tolerance `flat` in place of 1e-3.
     pub(super) fn sides(
         &self,
         region: Option<&Self>,
@@ -212,13 +212,13 @@ impl<const D: usize> Shape<D> {
         sides
     }
 
-    /// The sides of a piece that lie in a plane where the solid ends.
+    /// The sides of a piece that lie on the surface of the solid.
     pub(super) fn ends(&self, piece: &Piece<D>, cut: Option<&Cut<D>>, spacing: f64) -> Vec<End<D>> {
         let (Extent::Simplex(simplex), Some(cut)) = (&piece.extent, cut) else { return Vec::new() };
         (0..=D).filter_map(|apex| self.end(simplex, apex, piece.volume, cut, spacing)).collect()
     }
 
-    /// The side of a simplex across from a corner, if it lies in a plane where the solid ends.
+    /// The side of a simplex opposite the corner `apex`, if this side lies on the surface of the solid.
     fn end(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<End<D>> {
         let hair = EDGE * spacing;
         let mut corners = simplex[..=D].to_vec();
@@ -232,16 +232,16 @@ impl<const D: usize> Shape<D> {
         // V = A height / D
         let area = D as f64 * volume / height(plane).abs();
         let middle = corners.iter().sum::<Vector<f64, D>>() / D as f64;
-        // Past a plane that is taken for the same, and not past the next one.
+        // A point past the plane, and past planes that count as equal to it, but not past the next plane.
         let beyond = middle + outward * (2.0 * cut.departure + 8.0 * hair);
         (!self.contains(&beyond)).then_some(End { corners, outward, area, departure: cut.departure })
     }
 
-    /// Whether a piece with this centroid lies in the solid: near a curved surface, by the plane that stands for it.
+    /// Whether a piece with the centroid `x` lies in the solid. Near a curved surface, the plane that approximates the surface decides.
     fn holds_by(&self, cut: &Cut<D>, x: &Vector<f64, D>) -> bool {
         let (distance, normal) = self.distance_and_normal(x);
         let along = |plane: &&Face<D>| plane.1.dot(&normal);
-        // The surface is as near as it departs from its plane.
+        // A plane is near if its distance from `x` is at most twice the departure of the surface.
         let near = |plane: &&Face<D>| cut.distance(plane, x).abs() <= 2.0 * cut.departure;
         let nearest = cut.planes.iter().filter(near).max_by(|a, b| along(a).abs().total_cmp(&along(b).abs()));
         match nearest {
@@ -250,8 +250,8 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Hands over the convex pieces that a box and the solid have in common, and the planes that cut them; `region` cuts them once more. The
-    /// box may lie below `lower`, by edges < 0.
+    /// Visits the convex pieces of the intersection of a box and the solid, with the planes that cut them. The planes of `region` cut the
+    /// pieces once more. Edges may be negative; the box then lies below `lower`.
     pub(super) fn pieces(
         &self,
         region: Option<&Self>,
@@ -275,7 +275,7 @@ impl<const D: usize> Shape<D> {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
         let hair = EDGE * spacing;
-        // Nowhere in the box further from each other than a hair.
+        // Two planes are equal if their distance is at most `hair` everywhere in the box.
         let same = |a: &Face<D>, b: &Face<D>| {
             let along = a.1.dot(&b.1).signum();
             (a.1 - b.1 * along).norm() * radius + (a.0 - b.0 * along).abs() <= hair
@@ -286,7 +286,7 @@ impl<const D: usize> Shape<D> {
                 distinct.push(plane);
             }
         }
-        // The two sides of a thin part must not be taken for each other.
+        // The two sides of a thin part must not be mistaken for each other.
         let close = |a: &Face<D>, b: &Face<D>| {
             let along = a.1.dot(&b.1);
             along.abs() > ALIKE && (a.0 - b.0 * along.signum()).abs() < APART * departure
@@ -321,12 +321,12 @@ impl<const D: usize> Shape<D> {
     }
 }
 
-/// The centre of a box, and how far its corners are; a hair more, for faces that it touches.
+/// The centre of a box, and the distance of its corners from the centre. A small margin includes faces that the box only touches.
 pub(super) fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
     (lower + edges * 0.5, (0.5 + EDGE) * edges.norm())
 }
 
-/// The D! simplices of a box (Kuhn): from the lower corner to the upper one, an axis at a time.
+/// The D! simplices of a box (Kuhn). Each simplex leads from the lower corner to the upper corner, one axis at a time.
 fn halved_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> Vec<Simplex<D>> {
     let orders: &[[usize; 3]] = match D {
         1 => &[[0, 0, 0]],

@@ -7,40 +7,41 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The largest number of particle positions that [`fill`] looks at for one body.
+/// The largest number of particle positions that [`fill`] examines for one body.
 pub const MAX_CANDIDATES: f64 = 134_217_728.0; // 2²⁷
 
-/// What becomes of the places of particles in the cells at the surface.
+/// The treatment of particles in the cells at the surface of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fill {
-    /// Every particle has the volume and the centroid of that part of its box that lies in the shape: volume, mass and first moments
-    /// are those of the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout boxes have half the
-    /// size; but for shapes of triangles, the particles of a cut cell are instead points that integrate products of polynomials of the
-    /// shape functions' degree p over what of it lies in the shape: up to (p + 1)^D of linear functions, of cubic ones and of LME (p = 3),
-    /// and as many in each half, quarter or eighth of a cell of quadratic ones; where no such points are found, as above. A part that is a box
-    /// itself has Gauss's points, as many as a whole cell. A surface that is loaded then has two points for each side in half a cell, and
-    /// three in 3D.
+    /// Each particle has the volume and the centroid of the part of its box in the shape. So volume, mass and first moments are those of
+    /// the shape. Parts of less than a tenth of a box are joined to their neighbour. In Gauss layout, the particles of a cut cell are
+    /// quadrature points found by moment fitting. These points integrate products of polynomials of the shape functions' degree p over the
+    /// part of the cell in the shape. For linear, cubic and LME functions (LME: p = 3), a cut cell has up to (p + 1)^D points. For
+    /// quadratic functions, each half, quarter or eighth of the cell has up to (p + 1)^D points. If moment fitting finds no points, and for
+    /// shapes of triangles, each particle again stands for the part of its box, with boxes of half the size. A part that is itself a box
+    /// has as many Gauss points as a whole cell. In Gauss layout, a loaded surface has two points for each side in half a cell, and three
+    /// in 3D.
     #[default]
     Cut,
-    /// Those that lie in the shape, each for its whole box.
+    /// The particles that lie in the shape, each with the volume of its whole box.
     Particles,
-    /// Those of all cells whose centre lies in the shape, each for its whole box.
+    /// The particles of all cells whose centre lies in the shape, each with the volume of its whole box.
     Cells,
 }
 
-/// How a solid is filled.
+/// The rules by which a solid is filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Filling {
     /// Particles along each axis of a cell, > 0.
     pub per_axis: u32,
-    /// Where they are in a whole cell.
+    /// The positions of the particles in a whole cell.
     pub layout: Layout,
-    /// What becomes of those at the surface.
+    /// The treatment of particles at the surface.
     pub rule: Fill,
-    /// The degree of the shape functions, of their pieces along an axis: in cells that are cut, Gauss layout integrates products of
-    /// polynomials of that degree. Those of even degree, as quadratic B-splines, have their kinks in the middle of cells: Gauss's points
-    /// are then those of the pieces between middles.
+    /// The polynomial degree of the shape functions along an axis. In cut cells, Gauss layout integrates products of polynomials of this
+    /// degree. Functions of even degree, such as quadratic B-splines, have their knots in the middle of cells. Their Gauss points are those
+    /// of the pieces between the middles of cells.
     pub degree: u32,
 }
 
@@ -51,7 +52,7 @@ impl Default for Filling {
 }
 
 impl Filling {
-    /// Boxes along an axis of a cell that is cut, each of which has a particle.
+    /// The number of boxes along an axis of a cut cell. Each box has one particle.
     fn boxes(self) -> u32 {
         match self.layout {
             Layout::Regular => self.per_axis,
@@ -59,12 +60,12 @@ impl Filling {
         }
     }
 
-    /// Pieces along an axis of a cell that have a rule of Gauss's of their own.
+    /// The number of pieces along an axis of a cell. Each piece has its own Gauss rule.
     fn pieces(self) -> u32 {
         if self.layout == Layout::Gauss && self.degree.is_multiple_of(2) { 2 } else { 1 }
     }
 
-    /// Boxes along an axis of a cell, in each of which a surface has points of its own.
+    /// The number of boxes along an axis of a cell. A surface has its own points in each box.
     pub(crate) fn boxes_at_surface(self) -> u32 {
         match self.layout {
             Layout::Regular => self.per_axis,
@@ -73,28 +74,28 @@ impl Filling {
     }
 }
 
-/// A particle to be: its place, and the volume it stands for.
+/// A new particle: its position and its volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed<const D: usize> {
-    /// x
+    /// The position x.
     pub position: Vector<f64, D>,
-    /// V₀
+    /// The initial volume V₀.
     pub volume: f64,
 }
 
 /// Parts of a box smaller than this share of it are joined to their neighbour.
 const SLIVER: f64 = 0.1;
 
-/// As much of a piece that is integrated: what joins a neighbour changes its second moments.
+/// The limit in place of [`SLIVER`] for pieces with quadrature points. Joining changes second moments, so this limit is smaller.
 pub(super) const THIN: f64 = 1e-3;
 
-/// Parts as small as that are round-off, and so is what is missing in a box that is as full.
+/// Parts below this fraction of a box are round-off. A box that lacks no more than this fraction is full.
 const NOTHING: f64 = 1e-9;
 
 /// A shape that cannot be filled.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FillError {
-    /// The box around the shape holds more positions than [`MAX_CANDIDATES`].
+    /// The box around the shape holds more particle positions than [`MAX_CANDIDATES`].
     #[error(
         "the box around the shape holds {candidates:e} particle positions; at most {MAX_CANDIDATES:e} are allowed: \
          use a coarser grid or fewer particles per cell"
@@ -109,15 +110,15 @@ pub enum FillError {
          it is smaller than a cell, or outside the grid"
     )]
     Empty {
-        /// Positions that were looked at.
+        /// Number of positions examined.
         candidates: u64,
     },
 }
 
 /// Fills `shape` with particles, `per_axis` along each axis of a cell.
 ///
-/// Shapes are clipped to the grid. Only cells that overlap the shape's bounding box are visited; cell by cell and within a
-/// cell, the first axis runs fastest.
+/// The grid clips the shape. Only cells that overlap the bounding box of the shape are visited. The first axis runs fastest, over the cells
+/// and within a cell.
 ///
 /// ```
 /// use bfree::grid::Grid;
@@ -138,7 +139,7 @@ pub enum FillError {
 /// ```
 ///
 /// # Errors
-/// More than [`MAX_CANDIDATES`] positions to look at (found before anything is allocated), or no particle.
+/// The shape needs more than [`MAX_CANDIDATES`] positions (found before anything is allocated), or no particle lies in the shape.
 pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> Result<Vec<Seed<D>>, FillError> {
     let h = grid.spacing;
     let (first, count) = around(grid, shape);
@@ -146,11 +147,11 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     if candidates > MAX_CANDIDATES {
         return Err(FillError::TooMany { candidates });
     }
-    // By whether the cell below is full, and the one above.
+    // The points along an axis, indexed by whether the cell below is full and whether the cell above is full.
     let between = how.pieces() > 1;
     let points = [[false, false], [true, false], [false, true], [true, true]]
         .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
-    // As its pieces are below: cells beside each other must agree on which of them is whole.
+    // Each piece is measured as in the loop below: neighbouring cells must agree on which of them is full.
     let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
     let integrated = |lower: Vector<f64, D>, degree: u32| shape.quadrature(&lower, &size, h, degree, how.per_axis);
     let is_full = |cell: [u64; D]| {
@@ -165,7 +166,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         lowers.map(volume).all(|volume| volume >= (1.0 - NOTHING) * size.product())
     };
     let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
-    // Of a box in a cell that is cut, which has one particle, or those of Gauss's rule.
+    // The points of a full box in a cut cell: one particle, or the Gauss points.
     let (middle, gauss) = (Layout::Regular.points(1), how.layout.points(how.per_axis));
     let edges: Vector<f64, D> = Vector::repeat(h / f64::from(how.boxes()));
     let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
@@ -178,7 +179,7 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
         };
         let one = |(volume, centroid): (f64, Vector<f64, D>)| vec![Seed { position: centroid, volume }];
         if how.rule == Fill::Cut && cell[0] == 0 {
-            // The boxes of a row of cells, if the shape knows them all at once.
+            // The boxes of a row of cells, if the shape computes them all at once.
             let along = count[0] as usize * how.boxes() as usize;
             rows = lowers(how.boxes())
                 .step_by(how.boxes() as usize)
@@ -261,13 +262,13 @@ pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> R
     if seeds.is_empty() { Err(FillError::Empty { candidates: candidates as u64 }) } else { Ok(seeds) }
 }
 
-/// The first cell around a shape and how many there are along each axis, clipped to the grid.
+/// The first cell around a shape, and the number of cells along each axis, clipped to the grid.
 pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64; D], [u64; D]) {
     let h = grid.spacing;
     let (min, max) = shape.bounding_box();
     let (mut first, mut count) = ([0_u64; D], [0_u64; D]);
     for k in 0..D {
-        // One cell of margin, so that rounding at a cell face loses nothing; `as` saturates at 0 and at infinity.
+        // A margin of one cell, so that round-off at a cell face loses nothing; `as` saturates at 0 and at infinity.
         let lower = ((min[k] - grid.origin[k]) / h).floor() - 1.0;
         let upper = ((max[k] - grid.origin[k]) / h).ceil() + 1.0;
         first[k] = lower.max(0.0) as u64;
@@ -276,31 +277,31 @@ pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64;
     (first, count)
 }
 
-/// A cell that may be cut.
+/// The parts of a cell that may be cut.
 struct Parts<'a, const D: usize> {
-    /// What lies in each of its boxes.
+    /// The particles in each box of the cell.
     boxes: Vec<Vec<Seed<D>>>,
-    /// How many boxes there are along an axis.
+    /// The number of boxes along an axis.
     along: u32,
-    /// Places and weights along an axis of a box that is full.
+    /// Positions and weights along an axis of a full box.
     full: &'a [(f64, f64)],
-    /// The share of a box below which a part is a sliver.
+    /// A part below this fraction of a box is a sliver.
     sliver: f64,
 }
 
-/// Seeds cell by cell.
+/// The new particles, cell by cell.
 struct Seeds<const D: usize> {
     seeds: Vec<Seed<D>>,
-    /// The cells that have some, in order, and the first seed of each.
+    /// The cells that have seeds, in order, and the first seed of each cell.
     cells: Vec<(u64, usize)>,
-    /// Seeds that are slivers, with their cell.
+    /// The slivers: the cell and the number of each seed.
     slivers: Vec<(u64, usize)>,
     /// Cells along each axis.
     count: [u64; D],
 }
 
 impl<const D: usize> Seeds<D> {
-    /// Adds the seeds of a part of a cell, or one for all of a sliver.
+    /// Adds the seeds of a part of a cell. A sliver becomes a single seed.
     fn add_part(&mut self, cell: u64, part: Vec<Seed<D>>, sliver: bool) {
         if !sliver {
             self.seeds.extend(part);
@@ -312,8 +313,8 @@ impl<const D: usize> Seeds<D> {
         self.seeds.push(Seed { position: moment / volume, volume });
     }
 
-    /// The seeds with each sliver joined to the nearest other one of its cell or of the cells beside it, volume and first moments kept. Places
-    /// before any is joined decide which is nearest, so that the order of cells does not.
+    /// Joins each sliver to the nearest seed that is not a sliver, in its cell or in a neighbouring cell. Volume and first moments are
+    /// kept. The positions before any joining decide which seed is nearest, so the order of cells has no influence.
     fn joined(mut self) -> Vec<Seed<D>> {
         let mut gone = vec![false; if self.slivers.is_empty() { 0 } else { self.seeds.len() }];
         self.slivers.iter().for_each(|&(_, sliver)| gone[sliver] = true);
@@ -339,7 +340,7 @@ impl<const D: usize> Seeds<D> {
         self.seeds
     }
 
-    /// The seeds of a cell and of those that share a face with it.
+    /// The seeds of a cell and of the cells that share a face with it.
     fn beside(&self, cell: u64) -> impl Iterator<Item = usize> {
         let (mut near, mut stride) = (vec![cell], 1);
         for &n in &self.count {

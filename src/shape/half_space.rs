@@ -3,10 +3,10 @@
 use super::{Face, Solid};
 use crate::tensor::Vector;
 
-/// The sine of the angle below which two directions are one: what rotations leave of round-off.
+/// Two directions are parallel if the sine of the angle between them is below this: rotations leave such round-off.
 const PARALLEL: f64 = 1e-14;
 
-/// Everything behind a plane.
+/// All points behind a plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfSpace<const D: usize> {
     /// A point of the plane.
@@ -27,7 +27,7 @@ impl<const D: usize> Solid<D> for HalfSpace<D> {
         0.0
     }
 
-    /// n·p along the normal, without end in all other directions.
+    /// n·p along the normal, infinite in all other directions.
     fn reach(&self, n: &Vector<f64, D>) -> f64 {
         let normal = self.normal / self.normal.norm();
         let along = n.dot(&normal);

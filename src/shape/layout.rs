@@ -1,27 +1,27 @@
-//! Where particles are in cells that a solid fills.
+//! Positions of particles in cells that a solid fills.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where particles are in a whole cell.
+/// The positions of particles in a whole cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
-    /// In the middle of equal boxes.
+    /// Particles in the middle of equal boxes.
     #[default]
     Regular,
-    /// At the points of Gauss's rule, with its weights: smooth stresses are integrated to a higher order. The rule is that of the pieces of
-    /// the shape functions: of cells, and for quadratic B-splines, which are polynomials between the middles of cells, of those pieces,
-    /// and of half cells where the body ends. Of cells that the surface cuts `fill` tells. For grids that are kept: particles that move to
-    /// other cells are no Gauss points there.
+    /// Particles at Gauss points, with Gauss weights, which integrate smooth stresses to a higher order. Each polynomial piece of the shape
+    /// functions has its own Gauss rule. The pieces are cells. Quadratic B-splines are an exception: their pieces lie between the middles
+    /// of cells, with half cells where the body ends. `fill` describes the points in cut cells. Gauss layout is for grids that are not
+    /// reset: particles that move to other cells are no Gauss points there.
     Gauss,
 }
 
-/// Points along an axis and their weights, both in cells.
+/// Points along an axis and their weights, both in units of a cell.
 pub(super) type Points = Vec<(f64, f64)>;
 
 impl Layout {
-    /// The points of a cell.
+    /// The points along an axis of a cell.
     pub(super) fn points(self, n: u32) -> Points {
         let n_f = f64::from(n);
         match self {
@@ -31,10 +31,10 @@ impl Layout {
     }
 }
 
-/// Gauss's points of a cell of functions with kinks in the middle of cells: from the middle of the cell before to that of this one, and on
-/// to that of the next; of half a cell where the body does not go on, below or above.
+/// The Gauss points in a cell for functions with knots in the middle of cells. Each piece leads from the middle of one cell to the middle
+/// of the next. If the body does not go on (`goes_on`: below, above), the piece is half a cell.
 pub(super) fn between_middles(n: u32, goes_on: [bool; 2]) -> Points {
-    // From a node up to the middle. A point on the node is shared.
+    // The points from a node up to the middle. A point on the node is shared by two cells.
     let half = |goes_on: bool| -> Points {
         let whole = |i| if 2 * i + 1 == n { (0.0, 0.5 * gauss(n, i).1) } else { (gauss(n, i).0 - 0.5, gauss(n, i).1) };
         let part = |i| (0.5 * gauss(n, i).0, 0.5 * gauss(n, i).1);
@@ -44,7 +44,8 @@ pub(super) fn between_middles(n: u32, goes_on: [bool; 2]) -> Points {
     lower.into_iter().chain(upper.into_iter().rev().map(|(x, weight)| (1.0 - x, weight))).collect()
 }
 
-/// Point i of Gauss's rule of n on 0 … 1, and its weight: a zero of Legendre's P_n by Newton's method, w = 1/((1 − x²) P_n′²) there.
+/// Point i of the n-point Gauss rule on 0 … 1, and its weight. The point is a zero of Legendre's P_n, found by Newton's method, and
+/// w = 1/((1 − x²) P_n′²) there.
 fn gauss(n: u32, i: u32) -> (f64, f64) {
     let n = f64::from(n);
     let mut x = -(std::f64::consts::PI * (f64::from(i) + 0.75) / (n + 0.5)).cos();

@@ -1,4 +1,4 @@
-//! Solid geometry by signed distances, and its filling with particles: a file for each family of solids, and one list of them.
+//! Solid geometry by signed distances, and filling with particles. Each family of solids has one file, and one list names all families.
 
 mod ball;
 mod block;
@@ -34,39 +34,39 @@ pub use surface::{Surface, SurfaceError};
 
 use crate::tensor::Vector;
 
-/// Round-off in a length that is compared with others, relative to the spacing they have.
+/// Tolerance for comparisons of lengths, relative to the spacing: it covers round-off.
 pub(crate) const EDGE: f64 = 1e-9;
 
-/// How far below a surface its points are, relative to the spacing: in the cell where the body is, whatever the rounding.
+/// The depth of surface points below the surface, relative to the spacing. So the points lie in the cell of the body in spite of round-off.
 pub(crate) const HAIR: f64 = 1e-6;
 
-/// A piece of surface: the signed distance d from it, negative inside, and the outward unit normal n = ∇d.
+/// A piece of surface: its signed distance d, negative inside, and its outward unit normal n = ∇d.
 type Face<const D: usize> = (f64, Vector<f64, D>);
 
-/// What each solid knows of itself.
+/// The geometry that every solid provides.
 trait Solid<const D: usize> {
     /// The surface nearest to `x`.
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D>;
 
-    /// Adds the planes that the surface within `radius` of `x` follows, by their distance from `x` and their normal; returns how far it
-    /// departs from them there, at most.
+    /// Adds the planes that approximate the surface within `radius` of `x`, each by its distance from `x` and its normal. Returns the
+    /// largest distance there between the surface and the planes.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64;
 
-    /// How far it reaches in a direction of any length: the largest n·x, or more.
+    /// The extent in the direction `n`, a vector of any length: the largest n·x in the solid, or an upper bound.
     fn reach(&self, n: &Vector<f64, D>) -> f64;
 
-    /// The part whose surface is the only one within `radius` of `x`, and whether this solid is what lies outside of it there.
+    /// The only part whose surface comes within `radius` of `x`, and whether this solid is the outside of the part there.
     fn alone(&self, _x: &Vector<f64, D>, _radius: f64) -> Option<(&Shape<D>, bool)> {
         None
     }
 
-    /// The surface in a box, in pieces; `None` of a solid whose surface is found by its planes.
+    /// The facets of the surface in a box; `None` for a solid whose surface is approximated by planes.
     fn facets(&self, _lower: &Vector<f64, D>, _edges: &Vector<f64, D>, _planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
         None
     }
 
-    /// Volume and centroid of what lies in each of `count` boxes with these `edges`, the first one from `lower`, each next to the last
-    /// along the first axis; `None` of a solid that is cut by the planes of its surface.
+    /// Volume and centroid of the solid in each of `count` boxes next to each other along the first axis. The first box begins at `lower`,
+    /// and all boxes have these `edges`. `None` for a solid that planes cut.
     fn row(
         &self,
         _lower: &Vector<f64, D>,
@@ -81,8 +81,9 @@ macro_rules! shapes {
     ($($(#[$about:meta])* $name:ident;)*) => {
         /// A solid of `D` dimensions. All lengths are in the user's unit.
         ///
-        /// The signed distance d is negative inside. It is the Euclidean distance, except that for combinations it is the min or max
-        /// of the parts', which has the right sign and the right zero set, and never exceeds the distance in size where it is positive.
+        /// The signed distance d is negative inside. It is the Euclidean distance, except for combinations. For a combination, d is the min
+        /// or max of the parts' distances. This d has the right sign and the right zero set. A positive d never exceeds the Euclidean
+        /// distance.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Shape<const D: usize> {
             $($(#[$about])* $name($name<D>),)*
@@ -109,17 +110,17 @@ shapes! {
     Block;
     /// An interval, a disc or a ball.
     Ball;
-    /// Everything behind a plane.
+    /// All points behind a plane.
     HalfSpace;
     /// A polygon of the plane.
     Polygon;
     /// A cylinder or a cone.
     Cone;
-    /// What lies in any of the parts.
+    /// The union of the parts.
     Union;
-    /// What lies in one solid and not in another.
+    /// The points that lie in one solid and not in another.
     Difference;
-    /// What lies in all of the parts.
+    /// The intersection of the parts.
     Intersection;
     /// A solid turned and scaled.
     Similar;
@@ -146,8 +147,8 @@ impl<const D: usize> Shape<D> {
         self.signed_distance(x) <= 0.0
     }
 
-    /// Whether `x`, a node or a particle of a grid of this spacing, lies in the solid: round-off puts none out that is meant to be on
-    /// its surface.
+    /// Whether `x`, a node or a particle of a grid of this spacing, lies in the solid. A tolerance admits points that round-off moves off
+    /// the surface.
     ///
     /// ```
     /// use bfree::shape::{HalfSpace, Shape};
@@ -177,10 +178,10 @@ impl<const D: usize> Shape<D> {
         self.distance_and_normal(x).0
     }
 
-    /// The outward unit normal ∇d of the surface nearest to `x`; at a hole it points into the hole.
+    /// The outward unit normal ∇d of the surface nearest to `x`; at a hole the normal points into the hole.
     ///
-    /// Where ∇d does not exist (the centre of a ball, points equally near to two faces) it is the normal of one of the
-    /// nearest surfaces.
+    /// Where ∇d does not exist (the centre of a ball, points equally near to two faces) the result is the normal of one of the nearest
+    /// surfaces.
     ///
     /// ```
     /// use bfree::shape::{Ball, Block, Difference, Shape};
@@ -196,7 +197,7 @@ impl<const D: usize> Shape<D> {
         self.distance_and_normal(x).1
     }
 
-    /// d and ∇d together.
+    /// The signed distance d and the normal ∇d.
     ///
     /// ```
     /// use bfree::shape::{Ball, Shape};
@@ -213,9 +214,10 @@ impl<const D: usize> Shape<D> {
         self.solid().nearest(x)
     }
 
-    /// A box `(min, max)` that holds the solid: infinite for half-spaces, with `min > max` where nothing is left.
+    /// A box `(min, max)` that contains the solid: infinite for half-spaces, and with `min > max` for an empty solid.
     ///
-    /// Tight, but for differences and intersections, for which it is an upper bound, and half-spaces whose plane is oblique.
+    /// The box is tight, with two exceptions: half-spaces with an oblique plane, and differences and intersections, which get an upper
+    /// bound.
     ///
     /// ```
     /// use bfree::shape::{Ball, HalfSpace, Intersection, Shape};
@@ -234,7 +236,7 @@ impl<const D: usize> Shape<D> {
     }
 }
 
-/// Whether a signed distance is that of a point less than `depth` below the surface, or above it.
+/// Whether a point at this signed distance lies above the surface, or less than `depth` below it.
 pub(crate) fn is_above(distance: f64, depth: f64) -> bool {
     distance > -depth * (1.0 - EDGE)
 }

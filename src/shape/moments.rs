@@ -1,4 +1,5 @@
-//! Few points with the moments of many: a body's in a box, by its pieces and the gaps between their planes and its surface.
+//! Moment fitting: a few quadrature points with the moments of the part of a body in a box. The moments are sums over the pieces of this
+//! part and over the gaps between their planes and the surface.
 
 use super::Seed;
 use super::cut::{Extent, Piece};
@@ -8,17 +9,17 @@ use crate::solver::NonnegativeLeastSquares;
 use crate::tensor::Vector;
 use nalgebra::DVector;
 
-/// What is left of moments by round-off, relative to the volume.
+/// Round-off in moments, relative to the volume.
 const ROUND_OFF: f64 = 1e-14;
 
-/// What may be left of them.
+/// The largest error allowed in moments, relative to the volume.
 const MET: f64 = 1e-10;
 
-/// Points that are tried for each of the polynomials: more where fewer have not the moments.
+/// Candidate points per polynomial, tried in turn: more candidates where fewer cannot match the moments.
 const TRIED: [usize; 4] = [4, 16, 64, 256];
 
 impl<const D: usize> Piece<D> {
-    /// Gauss's points in it.
+    /// The Gauss points in the piece.
     fn points(&self, rules: &Rules) -> Vec<Seed<D>> {
         match &self.extent {
             Extent::Box(_) => self.in_box(&rules.of_box),
@@ -26,7 +27,7 @@ impl<const D: usize> Piece<D> {
         }
     }
 
-    /// The points of a rule along each axis of the box around it.
+    /// The points of a rule along each axis of the bounding box of the piece.
     pub(super) fn in_box(&self, along: &[(f64, f64)]) -> Vec<Seed<D>> {
         let [low, high] = self.bounds();
         let point = |i: [u64; D]| {
@@ -37,7 +38,7 @@ impl<const D: usize> Piece<D> {
         indices([along.len() as u64; D]).map(point).collect()
     }
 
-    /// Its place for each of a cube: equal volumes have equal volumes.
+    /// The image in the piece of a point of the unit cube. The map takes equal volumes to equal volumes.
     fn place(&self, u: [f64; D]) -> Vector<f64, D> {
         match &self.extent {
             Extent::Box(edges) => Vector::from_fn(|k, _| self.centroid[k] + (u[k] - 0.5) * edges[k]),
@@ -47,7 +48,7 @@ impl<const D: usize> Piece<D> {
         }
     }
 
-    /// The box around it.
+    /// The bounding box of the piece.
     fn bounds(&self) -> [Vector<f64, D>; 2] {
         match &self.extent {
             Extent::Box(edges) => [self.centroid - edges.abs() * 0.5, self.centroid + edges.abs() * 0.5],
@@ -60,7 +61,7 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// The box around some pieces.
+/// The bounding box of some pieces.
 fn bounds<const D: usize>(pieces: &[Piece<D>]) -> [Vector<f64, D>; 2] {
     let nothing: [Vector<f64, D>; 2] = [f64::INFINITY, f64::NEG_INFINITY].map(Vector::repeat);
     let around =
@@ -68,7 +69,7 @@ fn bounds<const D: usize>(pieces: &[Piece<D>]) -> [Vector<f64, D>; 2] {
     pieces.iter().map(Piece::bounds).fold(nothing, around)
 }
 
-/// The box that these pieces fill, if they do: they do not overlap, so that they fill the box around them if they have its volume.
+/// The box that these pieces fill, if they fill one. Pieces do not overlap, so they fill their bounding box if they have its volume.
 pub(super) fn whole_box<const D: usize>(pieces: &[Piece<D>]) -> Option<Piece<D>> {
     let [low, high] = bounds(pieces);
     let (edges, volume) = (high - low, pieces.iter().map(|piece| piece.volume).sum::<f64>());
@@ -76,7 +77,7 @@ pub(super) fn whole_box<const D: usize>(pieces: &[Piece<D>]) -> Option<Piece<D>>
     fills.then(|| Piece { volume: edges.product(), centroid: (low + high) * 0.5, extent: Extent::Box(edges) })
 }
 
-/// Gauss's points along an axis of a piece, for products of polynomials of a degree.
+/// Gauss rules along an axis of a piece, for products of polynomials of a degree p.
 struct Rules {
     of_box: Points,
     of_simplex: Points,
@@ -84,14 +85,14 @@ struct Rules {
 
 impl Rules {
     fn new<const D: usize>(degree: u32) -> Self {
-        // In a simplex they are of degree D p together, and the map from a cube has D − 1 more along one axis.
+        // In a simplex the products have total degree D p, and the map from a cube adds D − 1 along one axis.
         let [of_box, of_simplex] =
             [degree / 2 + 1, (D as u32 * (degree + 1)).div_ceil(2)].map(|n| Layout::Gauss.points(n));
         Self { of_box, of_simplex }
     }
 }
 
-/// Points of the simplex with d + 1 corners and this measure, those of a rule along each of d axes.
+/// Points in the simplex with d + 1 corners and this measure, by a rule along each of d axes.
 pub(super) fn in_simplex<const D: usize>(
     corners: &[Vector<f64, D>],
     measure: f64,
@@ -113,9 +114,9 @@ pub(super) fn in_simplex<const D: usize>(
     })
 }
 
-/// Products of Legendre's polynomials on the box around some points.
+/// Products of Legendre polynomials on the bounding box of some pieces.
 pub(super) struct Legendre<const D: usize> {
-    /// Its middle, and half of its edges.
+    /// The middle of the box; `half` holds half of its edges.
     middle: Vector<f64, D>,
     half: Vector<f64, D>,
     degree: u32,
@@ -131,7 +132,7 @@ impl<const D: usize> Legendre<D> {
         (self.degree as usize + 1).pow(D as u32)
     }
 
-    /// What they are at a place.
+    /// The values of all products at `x`.
     fn at(&self, x: &Vector<f64, D>, values: &mut DVector<f64>) {
         let values = values.as_mut_slice();
         values[0] = 1.0;
@@ -150,7 +151,7 @@ impl<const D: usize> Legendre<D> {
         }
     }
 
-    /// Adds V times what they are at these points.
+    /// Adds the sum over these points of V times the products.
     fn add_moments(&self, points: &[Seed<D>], moments: &mut DVector<f64>) {
         let mut values = DVector::zeros(self.count());
         for point in points {
@@ -159,7 +160,7 @@ impl<const D: usize> Legendre<D> {
         }
     }
 
-    /// ∫ of them over the pieces and the gaps.
+    /// The integrals of the products over the pieces and the gaps.
     pub(super) fn moments(&self, pieces: &[Piece<D>], gaps: &[Seed<D>]) -> DVector<f64> {
         let mut moments = DVector::zeros(self.count());
         let rules = Rules::new::<D>(self.degree);
@@ -169,14 +170,14 @@ impl<const D: usize> Legendre<D> {
     }
 }
 
-/// As many points in the pieces as there are products of polynomials, at most, with volumes > 0 that have the moments of all and of the gaps;
-/// `None` if none are found.
+/// Points in the pieces, with volumes > 0, that have the moments of all pieces and gaps. There are at most as many points as products of
+/// polynomials. `None` if no such points are found.
 pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree: u32) -> Option<Vec<Seed<D>>> {
     let legendre = Legendre::new(pieces, degree);
     let moments = legendre.moments(pieces, gaps);
     let volume = moments[0];
     let mut problem = NonnegativeLeastSquares::new(moments);
-    // How much lies in the pieces up to each.
+    // The cumulative volume of the pieces.
     let sum = |sum: &mut f64, piece: &Piece<D>| {
         *sum += piece.volume;
         Some(*sum)

@@ -1,22 +1,22 @@
-//! Solids of pixels (voxels in 3D), as pictures and scans have them: each pixel is a box that belongs to the solid or does not.
+//! Solids of pixels (voxels in 3D), from pictures and scans. Each pixel is a box that belongs to the solid or does not.
 
 use super::{Face, Solid, axis};
 use crate::tensor::Vector;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Of a pixel: it lies outside of the solid, or inside; of a group of them, whether one does.
+/// Flags of a pixel: outside or inside the solid. A group of pixels has the flags of all its pixels.
 const OUT: u8 = 1;
 const IN: u8 = 2;
 
-/// Planes of faces near a point that are named one by one, at most.
+/// The largest number of planes of faces near a point that are listed one by one.
 const PLANES: usize = 6;
 
-/// Which pixels belong to a solid; in 2D they are one layer of voxels. It is shared, not copied.
+/// The pixels that belong to a solid; in 2D they are one layer of voxels. Clones share the pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask(Arc<Pyramid>);
 
-/// Pixels, groups of 2ᴰ of them, groups of groups, up to one.
+/// The pixels, groups of 2ᴰ pixels, groups of groups, up to a single group.
 #[derive(Debug, PartialEq)]
 struct Pyramid {
     levels: Vec<Level>,
@@ -31,11 +31,11 @@ struct Level {
     flags: Vec<u8>,
 }
 
-/// What is inside of pixels of a picture that covers a box.
+/// The inside pixels of a picture that covers a box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels<const D: usize> {
     lower: Vector<f64, D>,
-    /// Of one pixel.
+    /// The edges of one pixel.
     edges: Vector<f64, D>,
     mask: Mask,
 }
@@ -46,7 +46,7 @@ impl Level {
         self.flags[i + n * (j + m * k)]
     }
 
-    /// Groups of 2 × 2 × 2.
+    /// The next coarser level, with groups of 2 × 2 × 2.
     fn coarser(&self) -> Self {
         let count = self.count.map(|n| n.div_ceil(2));
         let mut flags = vec![0; count.iter().product()];
@@ -64,8 +64,8 @@ impl Level {
 }
 
 impl Mask {
-    /// The mask of pixels for which `inside` is true, so many along each axis, the first axis fastest; `None` if no pixel is inside, or
-    /// there are not as many as `count` says.
+    /// The mask of the pixels for which `inside` is true, with `count` pixels along each axis, the first axis fastest. `None` if no pixel
+    /// is inside, or if the number of pixels differs from `count`.
     pub fn new(count: [usize; 3], inside: impl Iterator<Item = bool>) -> Option<Self> {
         let flags: Vec<u8> = inside.map(|inside| if inside { IN } else { OUT }).collect();
         if Some(flags.len()) != count[0].checked_mul(count[1]).and_then(|n| n.checked_mul(count[2])) {
@@ -92,7 +92,7 @@ impl Mask {
         self.0.levels[0].count
     }
 
-    /// Whether a pixel belongs to the solid; none beyond the picture does.
+    /// Whether a pixel belongs to the solid; pixels beyond the picture do not.
     fn holds<const D: usize>(&self, pixel: &[i64; D]) -> bool {
         let mut place = [0; 3];
         for (k, (&at, place)) in pixel.iter().zip(&mut place).enumerate() {
@@ -106,7 +106,7 @@ impl Mask {
 }
 
 impl<const D: usize> Pixels<D> {
-    /// The solid of a mask that covers the box from `min` to `max`; `None` in 2D if it has more than one layer, and in 1D.
+    /// The solid of a mask that covers the box from `min` to `max`. `None` in 1D, and in 2D if the mask has more than one layer.
     ///
     /// ```
     /// use bfree::shape::{Mask, Pixels, Shape};
@@ -129,17 +129,17 @@ impl<const D: usize> Pixels<D> {
         fits.then_some(Self { lower: min, edges, mask })
     }
 
-    /// Where pixel `i` along axis `k` begins.
+    /// The coordinate at which pixel `i` along axis `k` begins.
     fn face(&self, k: usize, i: f64) -> f64 {
         self.lower[k] + i * self.edges[k]
     }
 
-    /// The pixel along axis `k` that `x` lies in, the first one being 0; `as` saturates far away.
+    /// The number along axis `k` of the pixel that contains `x`, from 0; numbers far outside are clamped.
     fn pixel(&self, k: usize, x: f64) -> i64 {
         ((x - self.lower[k]) / self.edges[k]).floor().clamp(-2.0, self.mask.count()[k] as f64 + 1.0) as i64
     }
 
-    /// What pixels along axis `k` have of the interval: their number, the length, and its middle.
+    /// The overlaps of an interval with the pixels along axis `k`: the number of the pixel, and the length and the middle of the overlap.
     fn overlaps(&self, k: usize, from: f64, to: f64) -> Vec<(usize, f64, f64)> {
         let last = self.mask.count()[k] as i64 - 1;
         let pixels = self.pixel(k, from).max(0)..=self.pixel(k, to).min(last);
@@ -150,7 +150,7 @@ impl<const D: usize> Pixels<D> {
         pixels.filter_map(overlap).collect()
     }
 
-    /// Looks in a group of pixels for the one nearest to `x` that is `wanted`, if it is nearer than what was found.
+    /// Searches a group for the `wanted` pixel nearest to `x`, and keeps that pixel if it is nearer than `found`.
     fn search(&self, x: &Vector<f64, D>, wanted: u8, level: usize, group: [usize; 3], found: &mut Found<D>) {
         let here = &self.mask.0.levels[level];
         if here.at(group) & wanted == 0 {
@@ -168,7 +168,7 @@ impl<const D: usize> Pixels<D> {
             *found = Found { squared, foot, center };
             return;
         }
-        // The half that x is in, or nearer to, first.
+        // Search the half that contains x, or is nearer to x, first.
         let (finer, mut near) = (self.mask.0.levels[level - 1].count, [0_usize; 3]);
         for k in 0..D {
             near[k] = usize::from(x[k] >= self.face(k, ((2 * group[k] + 1) << (level - 1)) as f64));
@@ -182,7 +182,7 @@ impl<const D: usize> Pixels<D> {
     }
 }
 
-/// The nearest pixel so far: how far, where, and its middle.
+/// The nearest pixel so far: squared distance, nearest point and centre of the pixel.
 struct Found<const D: usize> {
     squared: f64,
     foot: Vector<f64, D>,
@@ -190,12 +190,12 @@ struct Found<const D: usize> {
 }
 
 impl<const D: usize> Solid<D> for Pixels<D> {
-    /// The nearest pixel of the other kind.
+    /// The signed distance to the nearest pixel of the other kind: outside if `x` is inside, else inside.
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         let inside = self.mask.holds::<D>(&std::array::from_fn(|k| self.pixel(k, x[k])));
         let mut found = Found { squared: f64::INFINITY, foot: *x, center: *x };
         if inside {
-            // Around the picture is nothing.
+            // Everything around the picture is outside.
             for (k, sign) in (0..D).flat_map(|k| [(k, -1.0), (k, 1.0)]) {
                 let mut foot = *x;
                 foot[k] = self.face(k, if sign > 0.0 { self.mask.count()[k] as f64 } else { 0.0 });
@@ -211,13 +211,13 @@ impl<const D: usize> Solid<D> for Pixels<D> {
         if distance > 0.0 {
             return (sign * distance, away / distance);
         }
-        // On a face: the direction is that in which the pixel beyond lies.
+        // `x` lies on a face: the normal follows the axis along which the pixel beyond lies.
         let beyond = (x - found.center).component_div(&self.edges) * sign;
         let k = beyond.iamax();
         (sign * distance, axis(k, if beyond[k] < 0.0 { -1.0 } else { 1.0 }))
     }
 
-    /// The planes of the faces that come so near; if they are too many, the box is to be halved.
+    /// The planes of the faces within `radius` of `x`. If there are too many, the large departure makes the caller halve the box.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let first: [i64; D] = std::array::from_fn(|k| self.pixel(k, x[k] - radius) - 1);
         let count: [u64; D] = std::array::from_fn(|k| (self.pixel(k, x[k] + radius) - first[k] + 1) as u64);
@@ -258,7 +258,7 @@ impl<const D: usize> Solid<D> for Pixels<D> {
         (0..D).map(along).sum()
     }
 
-    /// Σ over pixels of what they and a box have in common.
+    /// Sums over the inside pixels: volume and first moment of the overlap of a pixel and a box.
     fn row(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, count: usize) -> Option<Vec<(f64, Vector<f64, D>)>> {
         let mut across = [const { Vec::new() }; 2];
         for (k, overlaps) in (1..).zip(&mut across) {

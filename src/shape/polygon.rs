@@ -1,4 +1,4 @@
-//! Polygons: distances from edges, which side of them, and which outlines are none.
+//! Polygons: signed distances from their edges, and the check of outlines.
 
 use super::{Face, Solid};
 use crate::tensor::Vector;
@@ -6,23 +6,23 @@ use crate::tensor::Vector;
 /// Vertices and edges nearer to each other, relative to the size of the polygon, are taken to meet.
 const MEET: f64 = 1e-9;
 
-/// The inside of a closed outline of straight edges in 2D that does not meet itself; it need not be convex.
+/// The inside of a closed outline of straight edges in 2D. The outline must not meet itself; it need not be convex.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon<const D: usize> {
-    /// Counter-clockwise.
+    /// The vertices, counter-clockwise.
     vertices: Vec<Vector<f64, D>>,
 }
 
 /// An outline that bounds no polygon. Vertices are counted from 0; edge i leads from vertex i to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PolygonError {
-    /// Not in the plane.
+    /// The dimension is not 2.
     #[error("a polygon in {0} dimension(s)")]
     Dimension(usize),
     /// Fewer than three vertices.
     #[error("a polygon of {0} vertices")]
     TooFew(usize),
-    /// Two vertices at one place, the later one first.
+    /// Two vertices at one position, the later one first.
     #[error("vertex {0} at the place of vertex {1}")]
     Repeated(usize, usize),
     /// All vertices on a line.
@@ -34,11 +34,11 @@ pub enum PolygonError {
 }
 
 impl PolygonError {
-    /// What is allowed.
+    /// The rules for an outline.
     pub const ALLOWED: &str = "a polygon of the plane has at least 3 vertices, no two at one place and not all on a line, and \
                                edges that meet at the vertex they share and nowhere else (vertices are counted from 0)";
 
-    /// The vertex that makes it wrong, if it is one.
+    /// The vertex to name for this error, if there is one.
     pub fn vertex(&self) -> Option<usize> {
         match self {
             Self::Dimension(_) | Self::TooFew(_) | Self::Flat => None,
@@ -65,7 +65,7 @@ impl<const D: usize> Polygon<D> {
     /// ```
     ///
     /// # Errors
-    /// An outline that meets itself or bounds nothing; the first such place.
+    /// The outline meets itself or bounds nothing. The error names the first such place.
     pub fn new(vertices: Vec<Vector<f64, D>>) -> Result<Self, PolygonError> {
         let n = vertices.len();
         if D != 2 {
@@ -100,7 +100,7 @@ impl<const D: usize> Polygon<D> {
         Ok(Self::oriented(vertices))
     }
 
-    /// Counter-clockwise, which an outline of positive area is; nothing else is checked.
+    /// The polygon of these vertices, reversed if the area of the outline is negative. Nothing else is checked.
     pub(super) fn oriented(mut vertices: Vec<Vector<f64, D>>) -> Self {
         // 2 A = Σ (xᵢ − x₀) × (xᵢ₊₁ − x₀)
         let fan = vertices.windows(2).map(|pair| cross(&(pair[0] - vertices[0]), &(pair[1] - vertices[0])));
@@ -129,7 +129,7 @@ impl<const D: usize> Polygon<D> {
 }
 
 impl<const D: usize> Solid<D> for Polygon<D> {
-    /// The nearest edge says the side, and where that is one of its ends, the two edges there together: d has the sign of
+    /// The nearest edge decides the side. If the nearest point is a vertex v, the two edges at v decide: d has the sign of
     /// (x − v)·(n₁ + n₂).
     fn nearest(&self, x: &Vector<f64, D>) -> Face<D> {
         let n = self.vertices.len();
@@ -153,7 +153,7 @@ impl<const D: usize> Solid<D> for Polygon<D> {
         (distance, if distance == 0.0 { between / between.norm() } else { away / distance })
     }
 
-    /// The lines of the edges that come so near.
+    /// The lines of the edges within `radius` of `x`.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         for i in 0..self.vertices.len() {
             if (x - foot(x, self.edge(i)).1).norm_squared() < radius * radius {
@@ -186,11 +186,12 @@ fn foot<const D: usize>(x: &Vector<f64, D>, [a, b]: [&Vector<f64, D>; 2]) -> (f6
     }
 }
 
-/// Whether two edges, given by the numbers of their vertices, cross, or come within a `hair` of each other off the vertex they share.
+/// Whether two edges cross, or come within `hair` of each other away from a shared vertex. Edges are given by the numbers of their
+/// vertices.
 fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [usize; 2], hair: f64) -> bool {
     let ends = |edge: [usize; 2]| edge.map(|i| &vertices[i]);
     let ([a, b], [c, d]) = (ends(one), ends(other));
-    // Most edges are far from each other.
+    // Most edges are far apart.
     if (0..D).any(|k| a[k].min(b[k]) > c[k].max(d[k]) + hair || c[k].min(d[k]) > a[k].max(b[k]) + hair) {
         return false;
     }

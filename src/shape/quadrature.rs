@@ -1,10 +1,10 @@
-//! Quadrature over what of a box lies in a solid: a few points there, with volumes > 0, that integrate products of polynomials exactly.
-//! Shape functions are such products between their kinks. So a stress that does not vary is in balance with its tractions at the nodes
-//! beside a surface too, and errors there fall with h.
+//! Quadrature over the part of a box in a solid: a few points with volumes > 0 integrate products of polynomials exactly. Shape functions
+//! are such products between their knots. So a uniform stress balances its tractions also at the nodes beside a surface, and errors there
+//! fall with h.
 //!
-//! The moments are sums over the simplices that the box is cut into, and over the gap between their planes and a curved surface. Volumes
-//! with these moments, at no more points than there are products, exist (Tchakaloff's theorem; Davis, Math. Comput. 21, 1967), and
-//! non-negative least squares finds them. Surfaces have D points of the same centroid and the same second moments in each box.
+//! The moments are sums over the simplices of the cut box, and over the gap between their planes and a curved surface. Volumes with these
+//! moments exist at no more points than there are products (Tchakaloff's theorem; Davis, Math. Comput. 21, 1967). Non-negative least
+//! squares finds these volumes. In each box, a surface has D points with the centroid and the second moments of the surface.
 
 use super::cut::{End, Facet, Piece, around};
 use super::fill::THIN;
@@ -13,21 +13,21 @@ use super::{EDGE, Layout, Seed, Shape};
 use crate::grid::indices;
 use crate::tensor::{Tensor, Vector};
 
-/// How far a surface may depart from the planes that stand for it, relative to the spacing, where particles integrate. What lies between is
-/// integrated too: planes of boxes beside each other do not meet, by the square of this.
+/// The largest distance between a surface and its planes, relative to the spacing, where particles are quadrature points. The gap between
+/// surface and planes is integrated, too. Planes of neighbouring boxes do not quite meet, by the square of this number.
 const FINE: f64 = 1e-2;
 
-/// The same of loaded surfaces, which are these planes, in 1D, 2D and 3D.
+/// The largest distance between a loaded surface and its planes, relative to the spacing, in 1D, 2D and 3D. Loads act on the planes.
 const OF_SURFACES: [f64; 3] = [3e-5, 3e-5, 3e-4];
 
-/// Points along an axis of a piece of surface, and across the gap below it.
+/// The number of points along an axis of a piece of surface, and across the gap below the piece.
 const IN_GAP: u32 = 3;
 
 impl<const D: usize> Shape<D> {
-    /// Points and volumes that integrate over what lies in the box every product of polynomials of this degree along each axis; `None`
-    /// where the surface is one of triangles, of which only volumes and centroids are known, and where no such points are found. Of a part
-    /// that is thin it is one point, and of a part that is a box itself these are Gauss's, `per_axis` along an axis or as many as the degree
-    /// needs.
+    /// Points and volumes that integrate, over the part of the solid in a box, every product of polynomials of this degree along each axis.
+    ///
+    /// A thin part has one point. A part that is itself a box has Gauss points: `per_axis` along an axis, or as many as the degree needs.
+    /// `None` for surfaces of triangles, of which only volumes and centroids are known, and if no such points are found.
     pub(super) fn quadrature(
         &self,
         lower: &Vector<f64, D>,
@@ -48,7 +48,7 @@ impl<const D: usize> Shape<D> {
                 None => few(&pieces, &gaps, degree),
             };
         }
-        // It is joined to what is beside it.
+        // A thin part has one point, which the caller joins to a neighbour.
         let moment: Vector<f64, D> = pieces.iter().map(|piece| piece.centroid * piece.volume).sum();
         Some(
             (flat > 0.0 && flat + gap > 0.0)
@@ -58,8 +58,8 @@ impl<const D: usize> Shape<D> {
         )
     }
 
-    /// The pieces of what lies in a box, and points of the gaps between their planes and the surface. The box is seen from the corner that
-    /// is deepest in the solid, so that a mirrored solid has mirrored pieces.
+    /// The pieces of the solid in a box, and points of the gaps between their planes and the surface. The box begins at the corner that is
+    /// deepest in the solid, so a mirrored solid has mirrored pieces.
     fn pieces_and_gaps(
         &self,
         lower: &Vector<f64, D>,
@@ -85,7 +85,7 @@ impl<const D: usize> Shape<D> {
         (pieces, gaps)
     }
 
-    /// Points between a plane and the surface that it stands for, their volumes < 0 where the surface lies below it.
+    /// Points between a plane and the surface that it approximates. Volumes are negative where the surface lies below the plane.
     fn add_gap(&self, end: &End<D>, rule: &[(f64, f64)], spacing: f64, points: &mut Vec<Seed<D>>) {
         if end.departure <= EDGE * spacing {
             return;
@@ -99,7 +99,8 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// How far the surface is from a point of a plane that stands for it, along its normal, by Newton's method; 0 where it is not across.
+    /// The distance of the surface from a point of a plane, along the normal of the plane, by Newton's method. The result is 0 if the
+    /// surface makes more than 60° with the plane.
     fn height(&self, x: &Vector<f64, D>, end: &End<D>) -> f64 {
         let mut height = 0.0;
         for _ in 0..4 {
@@ -113,8 +114,8 @@ impl<const D: usize> Shape<D> {
         height
     }
 
-    /// Points that integrate over the surface in a box as those of [`Fill::Cut`](super::Fill) in Gauss layout do over the volume: D for each
-    /// of its sides there, and in `region` if there is one.
+    /// Quadrature points on the surface in a box, and in `region` if given: D points for each side of the solid there. The points match
+    /// those of [`Fill::Cut`](super::Fill) in Gauss layout.
     ///
     /// ```
     /// use bfree::shape::{HalfSpace, Shape};
@@ -139,7 +140,7 @@ impl<const D: usize> Shape<D> {
         sides.iter().flat_map(Facet::points).collect()
     }
 
-    /// Whether the surface in a box is found by its planes.
+    /// Whether the surface in a box is approximated by planes.
     fn has_planes(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> bool {
         let (center, radius) = around(lower, edges);
         match self.solid().alone(&center, radius) {
@@ -150,8 +151,8 @@ impl<const D: usize> Shape<D> {
 }
 
 impl<const D: usize> Facet<D> {
-    /// D points with equal parts of its area, which they have centroid, spread and turn in common with: on a flat piece exact for polynomials
-    /// of second degree. They lie in it where it is convex.
+    /// D points with equal shares of the area, and with the centroid, spread and turn of the facet. On a flat facet the points are exact
+    /// for polynomials of degree two. On a convex facet the points lie in it.
     fn points(&self) -> Vec<Self> {
         // q, the corners of a regular simplex: Σ q = 0 and Σ q qᵀ = D I.
         let (one, half, third) = (1.0, 0.5_f64.sqrt(), 1.5_f64.sqrt());
@@ -160,7 +161,7 @@ impl<const D: usize> Facet<D> {
             2 => &[[one, 0.0], [-one, 0.0]],
             _ => &[[2.0 * half, 0.0], [-half, third], [-half, -third]],
         };
-        // Across the axis nearest to its normal it is a graph over the others, a and b. Their part of its spread is L Lᵀ: x = L q, and
+        // The facet is a graph over the axes a and b, across the axis nearest to its normal. The spread along a and b is L Lᵀ: x = L q, and
         // n − n̄ = (L⁻¹ turn)ᵀ q.
         let across = self.normal.iamax();
         let [a, b] = [(across + 1) % D, (across + 2) % D];
@@ -195,7 +196,7 @@ mod tests {
     use crate::shape::moments::Legendre;
     use crate::shape::{Ball, Block, Cone, Difference, Similar, rotation};
 
-    /// Volumes stay positive, and no moment changes, in any cell of which there is more than a sliver.
+    /// In every cell with more than a sliver, volumes stay positive and no moment changes.
     fn has_moments_of_all<const D: usize>(shape: &Shape<D>, degree: u32, boxes: u64) {
         let edges = Vector::repeat((boxes as f64).recip());
         for i in indices([boxes; D]) {
@@ -214,7 +215,7 @@ mod tests {
         }
     }
 
-    /// For cells that a surface cuts in all ways, thin parts among them.
+    /// The surface cuts cells in all ways, and some parts are thin.
     #[test]
     fn few_points_have_the_moments_of_all() {
         let hole = Ball { center: Vector::from([0.47, 0.52]), radius: 0.23 };
@@ -233,7 +234,7 @@ mod tests {
         }
     }
 
-    /// In every direction: what is symmetric stays so under loads.
+    /// Solids are mirrored in every direction: a symmetric problem stays symmetric under loads.
     #[test]
     fn mirrored_solids_have_mirrored_points() {
         let edges = Vector::repeat(1.0);
@@ -271,8 +272,8 @@ mod tests {
         points.map(|point| point.volume * f(&point.position)).sum()
     }
 
-    /// ∫ (e·(x − c))² dV = V a²/12 along an edge e of length a, and ∫ x² y² dV = 4π R⁷/105 in a ball: nothing is lost between planes.
-    /// What is joined to neighbours is taken where it is.
+    /// ∫ (e·(x − c))² dV = V a²/12 along an edge e of length a, and ∫ x² y² dV = 4π R⁷/105 in a ball: nothing is lost between planes. Parts
+    /// that `fill` joins to neighbours keep their own position here.
     #[test]
     fn known_integrals_in_space() {
         let Shape::Similar(turned) = turned() else { panic!() };
@@ -289,7 +290,8 @@ mod tests {
         assert!(volume.abs() < 1e-5 && fourth.abs() < 1e-4, "{volume:e}, {fourth:e}");
     }
 
-    /// Planes that stand for one side of a thin shell are not taken for those of the other: a tenth of a box thick, a thirtieth.
+    /// Planes of one side of a thin shell are not mistaken for planes of the other side. The shells are a tenth and a thirtieth of a box
+    /// thick.
     #[test]
     fn thin_shells_have_their_volume() {
         let ball = |radius| Shape::from(Ball { center: Vector::from([0.51, 0.48, 0.53]), radius });

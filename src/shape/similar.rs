@@ -1,4 +1,4 @@
-//! Solids turned and scaled: a similarity keeps distances up to one factor.
+//! Solids turned and scaled: a similarity scales all distances by one factor.
 
 use super::{Face, Shape, Solid};
 use crate::tensor::{Tensor, Vector, identity};
@@ -6,9 +6,9 @@ use crate::tensor::{Tensor, Vector, identity};
 /// A solid turned and scaled about a point, x ↦ c + s R (x − c).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Similar<const D: usize> {
-    /// The solid before.
+    /// The solid before turning and scaling.
     pub of: Box<Shape<D>>,
-    /// The point c that stays.
+    /// The fixed point c.
     pub about: Vector<f64, D>,
     /// The rotation R.
     pub rotation: Tensor<f64, D>,
@@ -17,7 +17,7 @@ pub struct Similar<const D: usize> {
 }
 
 impl<const D: usize> Similar<D> {
-    /// `of` as it was at the place that is now `x`: c + Rᵀ (x − c)/s.
+    /// The point of `of` that is now at `x`: c + Rᵀ (x − c)/s.
     fn before(&self, x: &Vector<f64, D>) -> Vector<f64, D> {
         self.about + self.rotation.tr_mul(&(x - self.about)) / self.factor
     }
@@ -46,8 +46,8 @@ impl<const D: usize> Solid<D> for Similar<D> {
     }
 }
 
-/// The rotation by an angle in degrees, exact for multiples of 90: counter-clockwise in 2D, where there is no axis; about an axis
-/// of any length but zero in 3D, by the right-hand rule. `None` in 1D, and with an axis too few or too many.
+/// The rotation by an angle in degrees, exact for multiples of 90. In 2D the rotation is counter-clockwise, without an axis. In 3D it is
+/// about an axis of any length but zero, by the right-hand rule. `None` in 1D, with an axis in 2D, and without an axis in 3D.
 ///
 /// ```
 /// use bfree::shape::rotation;
@@ -80,7 +80,7 @@ pub fn rotation<const D: usize>(degrees: f64, axis: Option<&Vector<f64, D>>) -> 
     Some(identity() + spin * sin + spin * spin * (1.0 - cos))
 }
 
-/// Sine and cosine of an angle in degrees: 90 is a right angle to the last bit.
+/// Sine and cosine of an angle in degrees, exact for multiples of 90.
 fn sin_cos(degrees: f64) -> (f64, f64) {
     let within = degrees % 360.0;
     let quarters = (within / 90.0).round();

@@ -1,4 +1,4 @@
-//! What solids promise, of each and of all together.
+//! Tests of the contracts of solids, one by one and all together.
 
 mod filling;
 
@@ -51,7 +51,7 @@ fn solids() -> Vec<Shape<3>> {
     ]
 }
 
-/// Voxels with a hole and a notch, of which a layer at each end of the first axis is empty.
+/// Voxels with a hole and a notch. A layer at each end of the first axis is empty.
 fn mask() -> Mask {
     let inside = |i: usize| ![0, 5].contains(&(i % 6)) && i % 11 != 3;
     Mask::new([6, 4, 3], (0..72).map(inside)).unwrap()
@@ -66,7 +66,7 @@ fn regular(per_axis: u32, rule: Fill) -> Filling {
     Filling { per_axis, rule, ..Filling::default() }
 }
 
-/// The places of the particles.
+/// The positions of the particles.
 fn filled<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, per_axis: u32, rule: Fill) -> Vec<Vector<f64, D>> {
     fill(grid, shape, regular(per_axis, rule)).unwrap().iter().map(|seed| seed.position).collect()
 }
@@ -195,7 +195,7 @@ fn what_round_off_puts_beside_an_edge_lies_in_the_shape() {
     let node = grid.position([2, 3]);
     assert!(node[1] > 0.0 && !below.contains(&node) && below.holds(&node, grid.spacing));
     assert!(!below.holds(&(node + vector([0.0, 1e-9])), grid.spacing));
-    // Filled with one particle a cell, whose centres are on the edge to within round-off, in any units.
+    // With one particle a cell, centres of cells lie on the edge to within round-off, in any units.
     for unit in [1e-6, 1.0, 1e6] {
         let grid = Grid { origin: vector([0.0, -0.35 * unit]), spacing: 0.1 * unit, cells: [4, 6] };
         assert_eq!(filled(&grid, &below, 1, Fill::Particles).len(), 4 * 4, "{unit}");
@@ -209,7 +209,7 @@ fn a_right_angle_is_one_to_the_last_bit() {
         let (cos, sin) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][quarters.rem_euclid(4) as usize];
         assert_eq!(turned, Tensor::<f64, 2>::new(cos, -sin, sin, cos), "{quarters}");
     }
-    // A half-space turned so stays bounded on its side.
+    // A half-space turned by a right angle stays bounded on its side.
     let left = HalfSpace { point: vector([0.5, 9.0]), normal: vector([3.0, 0.0]) }.into();
     let rotation = rotation(90.0, None).unwrap();
     let below: Shape<2> = Similar { of: Box::new(left), about: vector([0.0, 0.0]), rotation, factor: 2.0 }.into();
@@ -230,6 +230,6 @@ fn outlines_that_bound_no_polygon_are_refused_with_the_vertices() {
     assert_eq!(refused(&[a, [4.0, 0.0], [4.0, 1.0], [3.0, 0.0], b, c]), PolygonError::Meeting([2, 3], [0, 1]));
     assert_eq!(refused(&[[f64::NAN; 2]; 3]), PolygonError::Flat);
     assert_eq!(Polygon::new(vec![vector([0.0; 3]); 3]), Err(PolygonError::Dimension(3)));
-    // Straight on through a vertex is no fault.
+    // A vertex on a straight line is no fault.
     assert!(Polygon::new([a, [1.0, 0.0], b, c, d].map(vector).to_vec()).is_ok());
 }

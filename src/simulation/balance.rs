@@ -1,4 +1,4 @@
-//! Newton's method at the heart of a step: forces in balance at t_n + θ Δt, or on a path.
+//! Newton's method of a step: force balance at t_n + θ Δt, or at a point on an equilibrium path.
 
 use super::{InitialGuess, Simulation, StepError};
 use crate::approximation::ShapeFunction;
@@ -15,15 +15,15 @@ use crate::pooled::Pooled;
 use crate::solver::{NewtonError, NewtonFailure, NewtonReport, newton};
 use crate::tensor::Vector;
 
-/// Forces in balance.
+/// The converged solution of the force balance.
 pub(super) struct Balance<'a, const D: usize, L> {
     pub equilibrium: Equilibrium<'a, D, L>,
     /// φ_n + θ Δφ
     pub phi: Pooled<Vector<f64, D>>,
     pub newton: NewtonReport,
-    /// The time in whose place the loads acted at t_n, and act now.
+    /// The arguments of the load curves at t_n and at the solution: times, or λ on an equilibrium path.
     pub loads: [f64; 2],
-    /// On a path, the cosine of the angle between Δφ and that of the last step.
+    /// On an equilibrium path, the cosine of the angle between this Δφ and the last one.
     pub straight: Option<f64>,
 }
 
@@ -92,7 +92,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         dphi
     }
 
-    /// Without inertia, a body that nothing holds has no equilibrium; Newton's method can only say that it found none.
+    /// Adds the cause to an error of Newton's method: without inertia, a body that nothing holds has no equilibrium.
     fn explained(
         &self,
         error: NewtonError<Inadmissible>,
@@ -108,7 +108,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// The check a run may ask for: the tangent at the solution against dual numbers, in a direction of its own for each step.
+    /// Compares the tangent at the solution with dual numbers, if the settings ask for it. The direction differs from step to step.
     pub(super) fn check_tangent(
         &self,
         equilibrium: &Equilibrium<'_, D, L>,

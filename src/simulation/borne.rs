@@ -1,5 +1,4 @@
-//! What a load step leaves to a grid that is made anew: all that was in balance, so that what the new grid does not balance of it can be
-//! carried over.
+//! The out-of-balance force after a grid reset in load steps: the residual of the last equilibrium on the new grid, which is carried over.
 
 use super::{Reaction, Simulation};
 use crate::approximation::ShapeFunction;
@@ -14,35 +13,36 @@ use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
-/// What the last load step balanced.
+/// The last converged load step, from which the out-of-balance force on a new grid follows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Borne<const D: usize> {
-    /// The loads.
+    /// The loads of the step.
     pub loads: Loads<D>,
-    /// The reactions, of each prescribed condition.
+    /// The reaction of each prescribed condition.
     pub reactions: Vec<Reaction<D>>,
-    /// Whether bodies moved nodes together.
+    /// Whether two bodies touched or shared nodes.
     pub(crate) together: bool,
-    /// Where the particles were as a field of forces was asked for; empty without one.
+    /// Particle positions at which the force field was evaluated; empty without a force field.
     pub(crate) asked: Vec<Vector<f64, D>>,
 }
 
 impl<const D: usize> Borne<D> {
-    /// As [`Particles::rearrange`](crate::particles::Particles::rearrange).
+    /// Reorders the particle positions like [`Particles::rearrange`](crate::particles::Particles::rearrange).
     pub(crate) fn rearrange(&mut self, order: &[u32]) {
         if !self.asked.is_empty() {
             self.asked = order.iter().map(|&from| self.asked[from as usize]).collect();
         }
     }
 
-    /// The reaction of a condition; none of one that is new.
+    /// The reaction of a condition; zero for a new condition.
     fn reaction(&self, condition: usize) -> Reaction<D> {
         self.reactions.get(condition).copied().unwrap_or(Reaction { force: Vector::zeros(), torque: 0.0 })
     }
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// What a step has balanced whose particles were `asked` there; nothing with inertia, nor where the grid stays.
+    /// Stores the last converged load step, with the force field evaluated at the positions `asked`. Stores nothing with inertia, and
+    /// nothing while the grid is not reset.
     pub(super) fn bear(&mut self, reactions: Vec<Reaction<D>>, asked: Vec<Vector<f64, D>>, supports: &Supports<D>) {
         let carries = self.kept.is_none() && !self.settings.scheme.has_inertia();
         let together = carries && self.together(supports);
@@ -53,8 +53,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.bodies.len() > 1 && touch(&self.particles, &self.grid, supports)
     }
 
-    /// R₀ = R(0) at t_n on a grid that is new, under the loads that were in balance on the one before; at prescribed nodes less the reactions
-    /// that were, which so go on. Nothing where a body has lost what held it, a condition or another body: that must not hold it any longer.
+    /// The out-of-balance force R₀ = R(0) at t_n on a new grid, under the loads of the last equilibrium. At prescribed nodes the last
+    /// reactions are subtracted, so that they persist. Empty where a body has lost a condition or another body that held it: the reaction
+    /// of a lost support must not act any longer.
     pub(super) fn unbalanced(
         &self,
         supports: &Supports<D>,
@@ -70,7 +71,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
         let nodal = Nodal { asked: supports.pool().collect(borne.asked.iter().copied()), ..nodal.clone() };
         let step = self.equilibrium(supports, &nodal, prescribed, Alphas::START, t).step;
-        // Laws are asked what they are at t_n, and not what becomes of them in a step.
+        // With dt = 0, laws give the stress at t_n, without a change of internal variables.
         let at_start = Equilibrium::new(terms::Step { loads: &borne.loads, dt: 0.0, ..step }, prescribed);
         let (still, mut unbalanced): (Pooled<Vector<f64, D>>, Pooled<_>) = (supports.field(), supports.field());
         at_start.residual_into::<f64>(&still, &mut unbalanced)?;
@@ -81,8 +82,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(unbalanced)
     }
 
-    /// Leaves in R₀ what the forces r_I at the nodes of a condition are more than its reaction (f, m): the same at each node, and a turn about
-    /// its axis.
+    /// Replaces the forces r_I at the nodes of a condition by their excess over its reaction (f, m). The excess is spread as a uniform
+    /// force and a turn about the axis. The resultants are Σ r − f and Σ arm · r − m.
     fn leave(
         &self,
         reaction: &Reaction<D>,
@@ -91,7 +92,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         supports: &Supports<D>,
         unbalanced: &mut [Vector<f64, D>],
     ) {
-        // Of m = Σ arm · r, the arms from their mean.
+        // The moment is m = Σ arm · r. The turn uses the arms relative to their mean.
         let rotation = self.loads.prescribed[condition].rotation();
         let arm = |dof: &PrescribedDof| {
             let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node]));

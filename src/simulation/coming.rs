@@ -1,4 +1,4 @@
-//! What the coming step solves, to look at: its equilibrium, and all that it is made from.
+//! The problem of the next step, for inspection: its equilibrium, shape functions, nodal state and prescribed motion.
 
 use super::{Simulation, StepError, Workspace};
 use crate::approximation::{Approximation, ShapeFunction};
@@ -11,7 +11,7 @@ use crate::mechanics::unknowns::Unknowns;
 use crate::nodes::Nodes;
 use crate::tensor::Vector;
 
-/// The coming step of a simulation, which it does not touch.
+/// The problem of the next step, built on a copy of the simulation.
 ///
 /// ```
 /// use bfree::tensor::Vector;
@@ -27,7 +27,7 @@ use crate::tensor::Vector;
 /// ```
 #[derive(Debug)]
 pub struct Coming<const D: usize, L = Material, A = Approximation> {
-    /// With the particles where the grid was new.
+    /// The copy, with the particles in the reference configuration.
     simulation: Simulation<D, L, A>,
     supports: Supports<D>,
     nodal: Nodal<D>,
@@ -35,7 +35,7 @@ pub struct Coming<const D: usize, L = Material, A = Approximation> {
 }
 
 impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, A> {
-    /// The coming step, of the length that the clock has now.
+    /// The problem of the next step, with the present step length of the clock.
     ///
     /// Example: [`Coming`].
     ///
@@ -60,22 +60,22 @@ impl<const D: usize, L: Law, A: ShapeFunction> Coming<D, L, A> {
         self.supports.active()
     }
 
-    /// Their positions.
+    /// The positions of the active nodes.
     pub fn positions(&self) -> impl Iterator<Item = Vector<f64, D>> {
         self.nodes().positions(&self.simulation.grid).map(|(_, x)| x)
     }
 
-    /// What is not solved for; the increments belong to the whole step.
+    /// The prescribed degrees of freedom, with the increments of the whole step.
     pub fn prescribed(&self) -> &[PrescribedDof] {
         &self.prescribed
     }
 
-    /// φ of the nodes since the grid was new, where they have moved by Δφ since t_n.
+    /// The nodal motion φ since the last grid reset, for an increment Δφ since t_n.
     pub fn motion(&self, dphi: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         dphi.iter().zip(self.nodal.moved(dphi.len())).map(|(dphi, before)| dphi + before).collect()
     }
 
-    /// The equilibrium, as a function of φ, at the instant where forces are in balance: the end of the step, but for generalised-α.
+    /// The equilibrium, as a function of φ, at the instant of force balance: the end of the step, except in generalised-α.
     pub fn equilibrium(&self) -> Equilibrium<'_, D, L> {
         let simulation = &self.simulation;
         let (dt, scheme) = (simulation.clock.step(), &simulation.settings.scheme);
@@ -86,7 +86,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Coming<D, L, A> {
         simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, scheme.balance(dt), load)
     }
 
-    /// Which part of the step ends where forces are in balance, θ.
+    /// The instant of force balance, as a fraction θ of the step.
     pub fn instant(&self) -> f64 {
         self.simulation.settings.scheme.instant()
     }

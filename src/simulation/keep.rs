@@ -1,4 +1,4 @@
-//! What stays after a step: the grid, unless something makes it anew, and its shape functions.
+//! The end of a step: the grid reset, and the shape functions stored for the next step.
 
 use super::{Reaction, Simulation};
 use crate::approximation::ShapeFunction;
@@ -9,8 +9,8 @@ use crate::mechanics::sweep::Supports;
 use crate::tensor::Vector;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Keeps the grid, unless a strain, a wall or another body makes it anew; and its functions, or their memory, with the particles in
-    /// their order.
+    /// Keeps the grid, unless a strain, a wall or another body makes a reset necessary. Stores the shape functions, or their memory alone.
+    /// Reorders the particles if passes over the particles leap too often in memory.
     pub(super) fn keep(
         &mut self,
         kept: Kept<D>,
@@ -33,12 +33,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let leaping = supports.leaping();
         leaping.iter().for_each(|order| self.rearrange(order));
         self.workspace.supports = Some(if leaping.is_some() { supports.rearranged() } else { supports });
-        // Those of particles that lie elsewhere now are good for their memory alone.
+        // After the reordering, only the memory of the shape functions is of use.
         self.workspace.serves = keeps && leaping.is_none();
     }
 
-    /// Whether a body has come to a wall, or in load steps to another body; with inertia also whether it feels one still: on a grid that is
-    /// kept it would never leave.
+    /// Whether a body has come to a wall, or in load steps to another body. With inertia, also whether a body still feels a wall or touches
+    /// another body: without a grid reset, it would never leave.
     fn in_contact(&mut self, kept: &Kept<D>, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
         let Self { particles, grid, loads, held, joined, .. } = self;
         let comes = kept.met(&particles.position, &loads.prescribed, grid, supports.active());
@@ -52,7 +52,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L, A> Simulation<D, L, A> {
-    /// Whether a strain, a wall or another body may make the grid anew.
+    /// Whether a strain, a wall or another body may cause a grid reset.
     pub(crate) fn may_renew(&self) -> bool {
         self.settings.renewal != Renewal::Never || !self.loads.prescribed.is_empty() || self.bodies.len() > 1
     }

@@ -1,4 +1,4 @@
-//! A simulation: the state at the last converged step, and how it goes on (`step.rs`).
+//! A simulation: the state at the last converged step, and the step that advances this state (`step.rs`).
 
 mod balance;
 mod borne;
@@ -66,41 +66,45 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub particles: Particles<D>,
     /// Gravity, surface loads, prescribed motion.
     pub loads: Loads<D>,
-    /// How a step is taken.
+    /// Numerical settings of a step.
     pub settings: Settings,
-    /// Where in time.
+    /// Time and step length.
     pub clock: Clock,
     /// Work of gravity, tractions, pressure and moving walls since the start.
     pub external_work: f64,
-    /// Energy that damping has taken since the start.
+    /// Energy dissipated by damping since the start.
     pub dissipated: f64,
-    /// Where on its path it is, for a scheme that follows one.
+    /// The point on the equilibrium path, for a scheme that follows one.
     pub path: Path,
-    /// The grid that is kept over steps, if there is one. The next step starts from it: whoever writes positions or deformations into the
-    /// particles by hand must put `None` here, or they are ignored.
+    /// The reference configuration and the nodal motion since the last grid reset; `None` at the start and after a reset. The next step
+    /// starts from the reference configuration. Code that writes positions or deformations into the particles must put `None` here, or
+    /// these values are ignored.
     pub kept: Option<Kept<D>>,
-    /// Prescribed conditions that bodies felt in the first step, by number, without those that one has come to since: the others are contacts.
+    /// Numbers of the prescribed conditions that had active nodes in the first step. A condition leaves the set once a body comes to a new
+    /// part of it. The conditions outside the set are contacts.
     pub held: BTreeSet<usize>,
-    /// Bodies that touched as the first step began, by number, the lower one first: in load steps they stay joined as they are, and others are
-    /// contacts.
+    /// Pairs of bodies that touched at the start of the first step, the lower number first. In load steps these pairs stay bonded; all
+    /// other pairs are contacts.
     pub joined: BTreeSet<[u32; 2]>,
-    /// What the last load step balanced, where the next grid is new. What that does not balance of it is carried over, as long as it lasts.
-    /// Whoever changes particles or laws by hand puts `None` here, too, or what that brings out of balance is carried over as well.
+    /// The last equilibrium of the load steps, if the grid is reset after it. The out-of-balance force of this state on the new grid is
+    /// carried over, as long as that grid lasts. Code that changes particles or laws must put `None` here, too. Otherwise the
+    /// out-of-balance force of the change is carried over as well.
     pub borne: Option<Borne<D>>,
-    /// What the next step uses again; nothing depends on it.
+    /// Memory that the next step reuses. Results do not depend on this memory.
     pub workspace: Workspace<D>,
 }
 
-/// The share of Λ + 2G that resists changes of volume from which on multigrid is taken, about that of ν = 0.4998: at 0.4999 diagonal blocks find no step.
+/// Above this ratio of the volumetric stiffness to Λ + 2G, a body is nearly incompressible, and multigrid is the default preconditioner.
+/// The ratio is about that of ν = 0.4998: at 0.4999, no step is found with block-Jacobi.
 const ISOCHORIC: f64 = 0.999;
 
-/// The shape functions of the last step, in whose memory the next one makes its own, and from whose order of particles it starts to
-/// sort, and memory for its vectors. They are no state: a clone has none, no checkpoint holds them, and a step that fails leaves no shape
-/// functions.
+/// Memory that the next step reuses: the shape functions of the last step, and a pool of vectors. The next step overwrites the shape
+/// functions, and starts to sort particles from their last order. The workspace is no state: a clone has an empty one, and no checkpoint
+/// holds it. A step that fails leaves no shape functions.
 #[derive(Debug, Default)]
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
-    /// Whether they serve again as they are: those of a grid that is kept.
+    /// Whether the next step uses the shape functions unchanged, because the grid was not reset.
     serves: bool,
     pool: Pool,
 }
@@ -112,7 +116,7 @@ impl<const D: usize> Clone for Workspace<D> {
 }
 
 impl<const D: usize, L, A> Simulation<D, L, A> {
-    /// Bodies at their start, with no loads and [`Settings::default`]: what is to be otherwise is written beside it.
+    /// A simulation at its start, without loads and with [`Settings::default`]. Struct update syntax sets other values, as in the example.
     ///
     /// ```
     /// use bfree::approximation::Bspline;
@@ -157,9 +161,9 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
         }
     }
 
-    /// Puts the particle that lies at `order[i]` in memory to the place `i`, wherever places are known; `order` must be a permutation.
-    /// [`Self::step`] does it where it saves time. Sums over nodes do not depend on it, sums over all particles, such as energies, in their
-    /// last bits.
+    /// Moves the particle at index `order[i]` to index `i`, in all arrays that refer to particles by index. `order` must be a permutation.
+    /// [`Self::step`] calls this function where it saves time. Sums at nodes do not depend on the order. Sums over all particles, such as
+    /// energies, depend on it in their last bits.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
@@ -193,12 +197,12 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
-    /// Whether a law remembers a number by this name.
+    /// Whether a law has an internal variable of this name.
     pub(crate) fn remembers(&self, name: &str) -> bool {
         self.bodies.iter().any(|body| body.law.memory().iter().any(|one| one.name == name))
     }
 
-    /// Σ V₀ of what each law says it has taken: energy lost to flow and relaxation since the start.
+    /// Energy dissipated by plastic flow and relaxation since the start: Σ V₀ times the density that each law records.
     pub fn dissipated_by_laws(&self) -> f64 {
         if !self.remembers(DISSIPATED) {
             return 0.0;
@@ -211,7 +215,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         (0..particles.len()).map(lost).sum()
     }
 
-    /// The method that solves the linear systems, and why it does.
+    /// The method that solves the linear systems, and the reason for the choice.
     ///
     /// ```
     /// use bfree::solver::Krylov;
@@ -237,7 +241,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The preconditioner of the linear systems, and why it is.
+    /// The preconditioner of the linear systems, and the reason for the choice.
     ///
     /// ```
     /// use bfree::solver::Preconditioning;
@@ -266,7 +270,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         })
     }
 
-    /// The same simulation with other laws, one for each body; particles remember what these do at rest.
+    /// The simulation with other laws, one for each body. Internal variables take their values at rest.
     ///
     /// ```
     /// use bfree::material::{Energy, FromEnergy};
@@ -311,7 +315,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             kept: self.kept,
             held: self.held,
             joined: self.joined,
-            // Other laws have to be balanced.
+            // The last equilibrium was that of the old laws.
             borne: None,
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
@@ -373,12 +377,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(())
     }
 
-    /// Gives the particles the acceleration that the loads and the damping present at the start ask for, a₀ = (f_ext − f_int − C v₀)/m_I
-    /// on the nodes, g̈ where the motion is prescribed. Without it they act half a step late.
+    /// Sets the initial acceleration of the particles from loads and damping. At the nodes, the acceleration is a₀ = (f_ext − f_int − C
+    /// v₀)/m_I, and g̈ where the motion is prescribed. Without this acceleration, loads and damping act half a step late.
     ///
-    /// The lumped mass serves for every ε: it is exact for uniform loads, and of second order in h for others.
+    /// The lumped mass is used for every ε. The acceleration is exact for uniform loads, and of second order in h for others.
     ///
-    /// Without inertia it does nothing.
+    /// Without inertia, this function does nothing.
     ///
     /// ```
     /// use bfree::mechanics::loads::{Curve, Gravity};
@@ -412,7 +416,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if self.loads.damping.is_some() {
             nodal.velocity = self.project(&supports)?.with_prescribed(&prescribed).extended(&unknowns).velocity;
         }
-        // Δφ and a_n are zero, and with them the inertia; damping acts on v_n.
+        // Δφ = 0 and a_n = 0, so the inertia force is zero; damping acts on v_n.
         let equilibrium = self.equilibrium(&supports, &nodal, &prescribed, Alphas::START, self.clock.time());
         let unbalanced = equilibrium.residual::<f64>(&nodal.acceleration)?;
         nodal.accelerate(&self.particles, &supports, &unbalanced);

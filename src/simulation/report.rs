@@ -1,4 +1,4 @@
-//! What a step did, or why it failed.
+//! Reports and errors of a step.
 
 use super::Sharing;
 use crate::causes;
@@ -10,65 +10,64 @@ use crate::phases::Stopwatch;
 use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
 use crate::tensor::Vector;
 
-/// What a condition does to the bodies: the reaction at t_{n+1}, and spread over the step the impulse with which a wall takes along nodes
-/// that do not move with it yet.
+/// The reaction of a condition at t_{n+1}, plus impulse / Δt. A wall gives this impulse to nodes that do not move with it yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reaction<const D: usize> {
-    /// Σ r_I
+    /// The force Σ r_I.
     pub force: Vector<f64, D>,
-    /// The moment about its axis, if it rotates; else 0.
+    /// The moment about the axis of a rotation; 0 for other conditions.
     pub torque: f64,
 }
 
-/// What a step did.
+/// The report of a step.
 #[derive(Clone, Debug)]
 pub struct StepReport<const D: usize> {
-    /// Its length.
+    /// Length Δt of the step.
     pub dt: f64,
-    /// Active nodes.
+    /// Number of active nodes.
     pub active_nodes: usize,
     /// Newton's iterations and residuals.
     pub newton: NewtonReport,
     /// Iterations of the projection (42), 0 for a lumped mass.
     pub projection_iterations: usize,
-    /// Of each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed).
+    /// Reactions, one for each of [`Loads::prescribed`](crate::mechanics::loads::Loads::prescribed).
     pub reactions: Vec<Reaction<D>>,
-    /// Its local error in units of the grid spacing, where a tolerance asks for it; above the tolerance only if it could not be halved.
+    /// Local error in grid spacings, if a tolerance is set. The error exceeds the tolerance only if the step could not be halved.
     pub error: Option<f64>,
-    /// Whether the grid was new.
+    /// Whether the grid was reset before the step.
     pub renewed: bool,
-    /// Whether a body feels a wall or a prescribed region that no body felt in the first step.
+    /// Whether a contact, a prescribed condition outside `Simulation::held`, has active nodes in this step.
     pub feels_wall: bool,
     /// Bodies that share nodes.
     pub sharing: Vec<Sharing>,
-    /// On a path of equilibria, the cosine of the angle between Δφ and that of the step before; `None` of the first step on a grid.
+    /// On an equilibrium path, the cosine of the angle between this Δφ and the last one; `None` in the first step after a grid reset.
     pub straight: Option<f64>,
-    /// Share of the volume of bodies with a plastic law that has flowed in it.
+    /// Share of the volume of plastic bodies that flowed plastically in this step.
     pub yielding: f64,
     /// Seconds, and passes over the particles, by phase.
     pub seconds: Stopwatch,
-    /// The attempts before it, each of which failed or was too long, and was repeated with half of its length.
+    /// Failed attempts at this step. Each failed or had too large an error, and was repeated with half its length.
     pub failed: Vec<FailedAttempt>,
 }
 
-/// An attempt at a step that failed.
+/// A failed attempt at a step.
 #[derive(Clone, Debug)]
 pub struct FailedAttempt {
-    /// Its length.
+    /// Length Δt of the attempt.
     pub dt: f64,
-    /// Whether all that was wrong is its error.
+    /// Whether the local error is the only cause.
     pub inaccurate: bool,
-    /// Why it failed, on one line.
+    /// Cause of the failure, on one line.
     pub why: String,
     /// Iterations of the projection (42).
     pub projection_iterations: usize,
-    /// What Newton's method did; empty if it was not reached.
+    /// History of Newton's method; empty if the attempt failed before.
     pub newton: NewtonHistory,
     /// Seconds, by phase.
     pub seconds: Stopwatch,
 }
 
-/// What an attempt has spent so far.
+/// Time and iterations of an attempt so far.
 pub(super) struct Spent {
     pub watch: Stopwatch,
     pub projection_iterations: usize,
@@ -96,67 +95,67 @@ impl FailedAttempt {
     }
 }
 
-/// Why a step failed. The particles are untouched.
+/// Errors of a step. The particles are unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     /// Shape functions could not be evaluated.
     #[error("the shape functions cannot be evaluated")]
     Support(#[from] SupportError),
-    /// Velocities so large that their projection overflows.
+    /// Velocities are so large that their projection overflows.
     #[error("the projection to the nodes failed")]
     Projection(#[from] LinearError),
-    /// Newton found no equilibrium.
+    /// Newton's method found no equilibrium.
     #[error("no equilibrium was found")]
     Newton(#[from] NewtonError<Inadmissible>),
-    /// Without inertia, Newton found no equilibrium.
+    /// Without inertia, Newton's method found no equilibrium.
     #[error(
         "no equilibrium was found; without inertia there may be none, where a load is larger than the bodies bear: prescribe the \
          motion there, follow the path (time.inertia = \"arc_length\"), or give the scene inertia"
     )]
     Unbalanced {
-        /// What Newton's method says.
+        /// The error of Newton's method.
         source: NewtonError<Inadmissible>,
     },
-    /// What was kept is not of these particles and functions.
+    /// The stored reference configuration does not belong to these particles and shape functions.
     #[error(
         "the grid that was kept has {kept} nodes, and the particles have {nodes}: after a change by hand, put None into \
          Simulation::kept"
     )]
     OtherGrid {
-        /// Nodes that have moved.
+        /// Number of nodes with a stored motion.
         kept: usize,
-        /// Active nodes.
+        /// Number of active nodes.
         nodes: usize,
     },
-    /// A path of equilibria, along which loads no longer change.
+    /// The equilibrium path ends, because the loads no longer change.
     #[error(
         "the path ends at load = {load}: no load changes there; give the curves of the loads points on both sides of it"
     )]
     PathEnds {
-        /// λ
+        /// The load parameter λ at the end.
         load: f64,
     },
-    /// Without inertia, bodies are pushed where nothing holds them.
+    /// Without inertia, loads push bodies that nothing holds.
     #[error(
         "{loose}: without inertia there is no equilibrium; hold them with a boundary condition, or give the scene inertia"
     )]
     Loose {
-        /// Which bodies, and where.
+        /// The bodies, and the direction in which nothing holds them.
         loose: Loose,
-        /// What Newton's method says.
+        /// The error of Newton's method.
         source: NewtonError<Inadmissible>,
     },
-    /// The step is too long for the tolerance, and can be halved.
+    /// The local error exceeds the tolerance, and the step can be halved.
     #[error("the local error is {error:.2e} grid spacings; {tolerance:.2e} are allowed")]
     Inaccurate {
         /// The error.
         error: f64,
-        /// The most allowed.
+        /// The largest allowed error.
         tolerance: f64,
-        /// What Newton's method did.
+        /// History of Newton's method.
         newton: Box<NewtonHistory>,
     },
-    /// The state at the start of the step is impossible.
+    /// A particle has det F ≤ 0 at the start of the step or at its end.
     #[error(transparent)]
     Inadmissible(#[from] Inadmissible),
     /// The tangent is not the derivative of the residual.
@@ -169,23 +168,23 @@ pub enum StepError {
     LeftGrid {
         /// Id of the particle.
         particle: usize,
-        /// Where it would be.
+        /// Position that the particle would reach.
         position: Vec<f64>,
     },
 }
 
 impl StepError {
-    /// Whether it was [stopped](crate::solver::Stop).
+    /// Whether the step was [stopped](crate::solver::Stop).
     pub fn is_stopped(&self) -> bool {
         matches!(self, Self::Newton(error) if matches!(error.cause, NewtonFailure::Stopped { .. }))
     }
 }
 
-/// The simulation cannot go on. The particles are as after the last good step.
+/// The simulation cannot continue. The particles have the state after the last successful step.
 #[derive(Debug, thiserror::Error)]
 #[error("the step from t = {time} failed, the last time with dt = {dt:e} (attempts: {})", failed.len())]
 pub struct AdvanceError {
-    /// t_n
+    /// The time t_n at the start of the step.
     pub time: f64,
     /// Δt of the last attempt.
     pub dt: f64,

@@ -1,4 +1,4 @@
-//! How a step is taken.
+//! Numerical settings of a step.
 
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::schemes::{Newmark, Scheme};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::num::NonZeroU64;
 use std::sync::Arc;
 
-/// Where Newton's iteration of a step starts.
+/// The starting point of Newton's method in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialGuess {
@@ -19,41 +19,42 @@ pub enum InitialGuess {
     Zero,
     /// Δφ = Δt v.
     Velocity,
-    /// The Δφ of the last step on a grid that is kept; Δφ = 0 on a new one.
+    /// The Δφ of the last step; Δφ = 0 after a grid reset.
     LastStep,
 }
 
-/// How a step is taken.
+/// Numerical settings of a step.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The time scheme. If it has no inertia, neither lumping nor walls in the update, smoothing or any velocity means anything, and none of
-    /// them is looked at.
+    /// The time integration scheme. Without inertia, `lumping`, `wall_update`, `smoothing` and all velocities are ignored.
     pub scheme: Arc<dyn Scheme>,
     /// ε of M̃ = (1−ε) M + ε lumped(M), in [0, 1].
     pub lumping: f64,
-    /// How nodes get velocity and acceleration from the particles.
+    /// The transfer of velocity and acceleration from the particles to the nodes.
     pub projection: Projection,
-    /// Whether nodes with little of a body follow well-supported ones ([`aggregation`](crate::aggregation)). Without inertia nothing else
-    /// holds such nodes.
+    /// Whether nodes with little support from a body follow well-supported nodes ([`aggregation`](crate::aggregation)). Without inertia
+    /// nothing else holds such nodes.
     pub aggregation: bool,
-    /// When the grid is made anew.
+    /// When the grid is reset.
     pub renewal: Renewal,
-    /// Where Newton starts.
+    /// The starting point of Newton's method.
     pub initial_guess: InitialGuess,
-    /// What resting walls do to particle velocities.
+    /// The change that resting walls make to particle velocities.
     pub wall_update: WallUpdate,
-    /// What is taken from the particles beside the increments of eqs. 50 and 51; nothing in the paper.
+    /// Smoothing of particle velocities and accelerations, beside the increments of eqs. 50 and 51; none in the paper.
     pub smoothing: Option<Smoothing>,
-    /// Newton and Krylov.
+    /// Settings of Newton's method and of the Krylov method.
     pub newton: NewtonSettings,
-    /// What preconditions its linear systems, made anew each step.
+    /// The preconditioner of the linear systems, built anew in each step.
     pub preconditioner: Preconditioning,
-    /// The most a step may err, see [`Update::local_error`](crate::mechanics::transfer::Update::local_error), in units of the grid spacing: a longer one is taken back and halved, as
-    /// often as the clock allows, and it grows back only when its error is small. `None` for steps as given, and without inertia.
+    /// The largest allowed local error of a step, in grid spacings: see
+    /// [`Update::local_error`](crate::mechanics::transfer::Update::local_error). A step with a larger error is repeated with half its
+    /// length, as often as the clock allows. The step grows back only when its error is small. `None` for steps of given length, and
+    /// without inertia.
     pub error_tolerance: Option<f64>,
-    /// Compare the tangent with dual numbers at the end of every so many steps.
+    /// The tangent is compared with dual numbers at the end of every so many steps.
     pub check_tangent: Option<NonZeroU64>,
-    /// Who may want a step to end before it is done.
+    /// A function that may stop a step early.
     pub stop: Option<Stop>,
 }
 

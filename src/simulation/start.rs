@@ -1,4 +1,4 @@
-//! What a step starts from: shape functions, prescribed motion, the state of the nodes, and the equilibrium that is to be found.
+//! The start of a step: shape functions, prescribed motion, nodal state, and the equilibrium problem.
 
 use super::{Simulation, StepError};
 use crate::approximation::{AtSurface, Separable, ShapeFunction};
@@ -15,7 +15,7 @@ use crate::nodes::Nodes;
 use crate::solver::LinearError;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The shape functions of a step, those of the last one if the grid is kept.
+    /// The shape functions of a step; those of the last step if the grid was not reset.
     pub(super) fn supports(&mut self, kept: bool) -> Result<Supports<D>, SupportError> {
         match self.workspace.supports.take() {
             Some(supports) if kept && self.workspace.serves => Ok(supports.again()),
@@ -23,7 +23,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// The shape functions at the present positions, in the memory of others that are no longer needed.
+    /// The shape functions at the present positions, in the memory of `spare`, which is no longer needed.
     pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
         let Self { particles, loads, approximation, grid, settings, workspace, .. } = self;
         let mut points = Points { ids: Some(&particles.id), ..Points::at(&particles.position) };
@@ -36,7 +36,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(self.aggregated(supports))
     }
 
-    /// The same supports, where nodes with little of a body follow others if they are to.
+    /// The shape functions with [`aggregation`](crate::aggregation), if the settings ask for it: nodes with little support from a body then
+    /// follow other nodes.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -60,7 +61,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         supports.with_extension(extension)
     }
 
-    /// The degrees of freedom prescribed in the coming step.
+    /// The degrees of freedom prescribed in the next step.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -88,7 +89,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, moved, self.clock.time(), self.clock.step())
     }
 
-    /// The state of the nodes at t_n: projected from the particles, or what the nodes of a grid that is kept have had since.
+    /// The nodal state at t_n: projected from the particles after a grid reset, otherwise stored since the last step.
     pub(super) fn nodal(
         &self,
         supports: &Supports<D>,
@@ -102,7 +103,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 Ok(Nodal { unbalanced: self.unbalanced(supports, &nodal, prescribed)?, ..nodal })
             }
             Some(kept) if kept.motion.len() == nodes => {
-                // The particles are where the grid was new, and it remembers where they are.
+                // The particles are in the reference configuration, and `kept` stores their present positions.
                 let asked = self.loads.field.iter().flat_map(|_| kept.position.iter().copied());
                 let state = kept.state(self.masses(supports), supports.pool());
                 Ok(Nodal { asked: supports.pool().collect(asked), ..state })
@@ -111,7 +112,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
     }
 
-    /// What the nodes inherit from the particles; without inertia their mass at most, and that for gravity alone.
+    /// The nodal state, projected from the particles. Without inertia it holds at most the mass, and that for gravity alone.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -138,13 +139,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Ok(self.masses(supports))
     }
 
-    /// The mass of the nodes, where something asks for it.
+    /// The nodal mass, if inertia or gravity needs it.
     pub(super) fn masses(&self, supports: &Supports<D>) -> Nodal<D> {
         let weighs = self.settings.scheme.has_inertia() || self.loads.gravity.is_some();
         if weighs { Nodal::mass_alone(&self.particles, supports) } else { Nodal::default() }
     }
 
-    /// The equilibrium at time `t` on given supports.
+    /// The equilibrium problem at time `t`, with given shape functions.
     ///
     /// ```
     /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
@@ -171,9 +172,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         t: f64,
     ) -> Equilibrium<'a, D, L> {
         let Self { particles, bodies, loads, settings, .. } = self;
-        // Without inertia nothing is consistent.
+        // Without inertia there is no consistent mass.
         let lumping = if nodal.is_static() { 1.0 } else { settings.lumping };
-        // At t_n, too, laws are asked about a step.
+        // At t_n, too, laws need the length of a step.
         let dt = if alphas.dt > 0.0 { alphas.dt } else { self.clock.step() };
         Equilibrium::new(
             terms::Step { particles, bodies, loads, supports, nodal, alphas, lumping, time: t, dt },

@@ -12,7 +12,7 @@ use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
 
-/// A step grows only if its error is at most this part of the tolerance: one of twice the length has eight times the error.
+/// A step grows only if its error is at most this part of the tolerance. A step of twice the length has eight times the error.
 const ROOM: f64 = 0.1;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
@@ -31,14 +31,14 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// ```
     ///
     /// # Errors
-    /// No equilibrium found, or a particle would leave the grid; the simulation is then as before the call.
+    /// No equilibrium was found, or a particle would leave the grid. The simulation is then as before the call.
     pub fn step(&mut self) -> Result<StepReport<D>, StepError> {
         self.attempt(&mut Spent::nothing())
     }
 
-    /// As [`Self::step`]; a step that fails leaves what it has spent.
+    /// Like [`Self::step`]. A failed step leaves its time and iterations in `spent`.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
-        // Over a grid that is kept, a step starts where that was new.
+        // Without a grid reset, a step starts from the reference configuration.
         let mut kept = self.kept.take();
         kept.iter_mut().for_each(|kept| kept.exchange(&mut self.particles));
         let report = self.attempt_from(&mut kept, spent);
@@ -67,7 +67,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             self.balance(&supports, &nodal, &prescribed, kept.as_ref())?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &phi)?;
-        // Forces are in balance at t_n + θ Δt; from there on to t_{n+1}.
+        // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
 
@@ -122,15 +122,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         })
     }
 
-    /// Whether a step of twice the length would be as good.
+    /// Whether the next step may be twice as long.
     fn may_grow(&self, error: Option<f64>, newton: &NewtonReport) -> bool {
         let small = |error| self.settings.error_tolerance.is_none_or(|most| error <= ROOM * most);
-        // What took Newton's method long would take it longer in a longer step.
+        // A step that took many Newton iterations would take more if it were longer.
         let easy = 2 * newton.history.iterations.len() <= self.settings.newton.max_iterations;
         easy && error.is_none_or(small)
     }
 
-    /// The error of a step that ends in `update`, where somebody asks for it.
+    /// The local error of a step in grid spacings, if a tolerance is set. Fails if the error exceeds the tolerance and the step can be
+    /// halved.
     fn local_error(
         &self,
         update: &Update<'_, D>,
@@ -141,14 +142,15 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let Some(tolerance) = self.settings.error_tolerance else { return Ok(None) };
         let error = update.local_error(&self.particles, supports, self.settings.scheme.error_constant(), dt);
         let error = error / self.grid.spacing;
-        // Not a number is no small error.
+        // NaN is not a small error.
         if (error.is_nan() || error > tolerance) && self.clock.can_halve() {
             return Err(StepError::Inaccurate { error, tolerance, newton: Box::new(newton.history.clone()) });
         }
         Ok(Some(error))
     }
 
-    /// As [`Self::step`], halving Δt while Newton fails or the error is too large, down to the clock's limit; Δt grows back afterwards.
+    /// Like [`Self::step`], but halves Δt while Newton's method fails or the error is too large, down to the clock's limit. Δt grows back
+    /// afterwards.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -180,9 +182,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let mended = match cause {
                 ref stopped if stopped.is_stopped() => false,
                 StepError::Newton(_) | StepError::Unbalanced { .. } | StepError::Inaccurate { .. } => true,
-                // A step too long to see a wall.
+                // The step may be too long to meet a wall.
                 StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
-                // In balance before its end, and inside out there.
+                // Forces are in balance before the end of the step, but det F ≤ 0 at its end.
                 StepError::Inadmissible(_) => self.settings.scheme.instant() < 1.0,
                 _ => false,
             };

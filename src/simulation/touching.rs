@@ -1,4 +1,4 @@
-//! Contacts of bodies in a step: with walls that they have come to, and with each other.
+//! Contacts of bodies in a step, with walls and with each other.
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;
@@ -9,39 +9,39 @@ use crate::mechanics::sweep::Supports;
 use crate::tensor::{Deformation, Tensor, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Below this |N| a particle has no part in a node.
+/// Particles with |N| below this value do not contribute to a node.
 const NO_PART: f64 = 1e-9;
 
-/// Cells over which the gap between two bodies is searched.
+/// Number of cells over which the gap between two bodies is searched.
 const FARTHEST: u64 = 4;
 
 /// The mean normal stress across an interface is a tension above this share of the mean stress there.
 const TENSION: f64 = 0.1;
 
-/// The strain below which a stress counts as none.
+/// The strain below which a stress counts as zero.
 const NO_STRAIN: f64 = 1e-6;
 
-/// The distance of two bodies' middles at their interface, in spacings, below which the interface has no one direction.
+/// Distance in spacings between the centroids of both sides of an interface, below which its normal is undefined.
 const ENCLOSED: f64 = 0.25;
 
 /// Two bodies that share nodes, at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sharing {
-    /// Their numbers, the lower one first.
+    /// Numbers of the bodies, the lower one first.
     pub bodies: [u32; 2],
-    /// The distance between their surfaces where they are nearest, in grid spacings: that of the two nearest particles less half of
-    /// both widths. `None` from four spacings on.
+    /// The smallest distance between the surfaces, in grid spacings: the distance of the two nearest particles less half of both widths.
+    /// `None` from four spacings on.
     pub gap: Option<f64>,
-    /// The mean normal stress between them where it is a tension (force per area): the shared nodes hold the bodies together. `None` under
-    /// pressure, at rest, and where one body encloses the other.
+    /// The mean normal stress between the bodies where it is a tension (force per area): the shared nodes hold the bodies together. `None`
+    /// under pressure, at rest, and where one body encloses the other.
     pub tension: Option<f64>,
 }
 
-/// The particles of two bodies that share nodes, of each body.
+/// The particles of each of two bodies that contribute to shared nodes.
 type Interface = [BTreeSet<usize>; 2];
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Bodies that share nodes, two by two.
+    /// All pairs of bodies that share nodes.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
@@ -70,13 +70,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         interfaces.iter().map(of).collect()
     }
 
-    /// Whether a prescribed condition that no body felt in the first step has nodes in this one.
+    /// Whether a contact, a prescribed condition outside `held`, has active nodes in this step.
     pub(super) fn feels_wall(&self, prescribed: &[PrescribedDof]) -> bool {
         let begins = self.clock.steps() == 0;
         !begins && prescribed.iter().any(|dof| !self.held.contains(&dof.owner))
     }
 
-    /// The particles that have a part in nodes of another body, by pairs of bodies.
+    /// The particles that contribute to nodes of another body, by pairs of bodies.
     fn interfaces(&self, supports: &Supports<D>) -> BTreeMap<[u32; 2], Interface> {
         let mut found: BTreeMap<[u32; 2], Interface> = BTreeMap::new();
         if self.bodies.len() < 2 {
@@ -110,7 +110,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         found
     }
 
-    /// The least distance between particles of both sides, less half of their widths, in spacings.
+    /// The smallest distance between particles of both sides, less half of their widths, in spacings.
     fn gap(&self, [one, other]: &Interface) -> Option<f64> {
         let (grid, particles) = (&self.grid, &self.particles);
         let mut cells: HashMap<u64, Vec<usize>> = HashMap::new();
@@ -130,7 +130,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                     least = least.min(apart / grid.spacing);
                 }
             }
-            // Particles of farther rings are farther apart; half of their widths is less than a spacing.
+            // Particles of outer rings are farther apart, and half of both widths is less than a spacing.
             if least + 1.0 <= ring as f64 {
                 break;
             }
@@ -138,7 +138,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Some(least).filter(|gap| gap.is_finite())
     }
 
-    /// The mean of n·σ·n over the particles of both sides, n leading from the one to the other, where it is a tension.
+    /// The mean of n·σ·n over the particles of both sides, if it is a tension. The normal n points from the first side to the second.
     fn tension(&self, bodies: [u32; 2], sides: &Interface) -> Option<f64> {
         let (particles, h) = (&self.particles, self.grid.spacing);
         let middle = |side: &BTreeSet<usize>| {
@@ -160,7 +160,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         Some(normal).filter(|&normal| normal > TENSION * mean && normal > some)
     }
 
-    /// σ in the plane or the line of the scene; `None` where det F ≤ 0.
+    /// The Cauchy stress σ in the plane or along the line of the scene; `None` where det F ≤ 0.
     fn cauchy_stress(&self, p: usize) -> Option<Tensor<f64, D>> {
         let particles = &self.particles;
         let body = &self.bodies[particles.body[p] as usize];

@@ -1,4 +1,4 @@
-//! What a step costs the outside: reactions, and the work of all external forces.
+//! Reactions of a step, and the work of all external forces.
 
 use super::{Reaction, Simulation, StepError};
 use crate::approximation::ShapeFunction;
@@ -11,8 +11,10 @@ use crate::pooled::Pooled;
 use crate::tensor::Vector;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// Reactions at t_{n+1} and impulses J over Δt, summed over each prescribed condition, and the work of the step,
-    /// Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ over all external forces, the reactions of moving walls among them.
+    /// The reactions, the work of the step, and the energy dissipated by damping.
+    ///
+    /// A reaction is the force at t_{n+1} plus J/Δt, with J the impulse, summed over a prescribed condition. The work of all external
+    /// forces, including the reactions of moving walls, is Σ [½ (f_n + f_{n+1}) + J/Δt]·Δφ.
     pub(super) fn reactions_and_work(
         &self,
         balanced: &Equilibrium<'_, D, L>,
@@ -26,7 +28,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let after;
         if self.settings.scheme.instant() < 1.0 {
             after = self.equilibrium(supports, nodal, balanced.prescribed, self.settings.scheme.end(dt), t + dt);
-            // Nothing has asked yet whether this end is possible.
+            // The stress at the end is evaluated here for the first time, and fails where det F ≤ 0.
             after.forces(Role::Stores, phi)?;
             end = &after;
         }
@@ -66,7 +68,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 }
 
-/// The work of a force along Δφ, by the mean of its values at the ends of the step.
+/// The work of a force along Δφ, with the mean of its values at both ends of the step.
 fn mean_work<const D: usize>(end: &[Vector<f64, D>], start: &[Vector<f64, D>], dphi: &[Vector<f64, D>]) -> f64 {
     end.iter().zip(start).zip(dphi).map(|((end, start), dphi)| 0.5 * (end + start).dot(dphi)).sum()
 }

@@ -4,10 +4,10 @@ use super::vector::{Entry, axpy, dot, norm, xpby};
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
-/// A curvature below this part of the largest one seen, in units of round-off: neither its size nor its sign means anything.
+/// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
 const UNRESOLVED: f64 = 16.0;
 
-/// Iterations beyond n without a better residual after which nothing more is expected: exact arithmetic ends at n.
+/// The iteration ends after n plus this many iterations without a better residual. Exact arithmetic ends at n.
 const PATIENCE: usize = 50;
 
 /// Settings of [`conjugate_gradient`].
@@ -30,16 +30,16 @@ impl Default for ConjugateGradientSettings {
 /// 1. r = b − A x, z = M⁻¹ r, p = z.
 /// 2. α = r·z / p·Ap; x ← x + α p, r ← r − α Ap.
 /// 3. z = M⁻¹ r; p ← z + β p with β the ratio of the new r·z to the old.
-/// 4. Curvature is measured as p·Ap / p·Mp, a Rayleigh quotient of M⁻¹A, against the largest one met: clearly negative ends the
-///    iteration as [`LinearOutcome::NegativeCurvature`], zero up to round-off as [`LinearOutcome::Stagnated`].
-/// 5. When the recurrence meets the tolerance the residual is computed anew; if that one does not meet it, back to 1 as
-///    long as this halves the true residual.
+/// 4. The curvature is p·Ap / p·Mp, a Rayleigh quotient of M⁻¹A. It is compared with the largest curvature so far. A clearly negative
+///    one ends the iteration as [`LinearOutcome::NegativeCurvature`], a zero up to round-off as [`LinearOutcome::Stagnated`].
+/// 5. When the recurrence meets the tolerance, the residual is computed anew. If the true residual does not meet the tolerance, the
+///    method goes back to 1 as long as this halves the true residual.
 ///
-/// Returned is the iterate with the least residual, at negative curvature the last one or, before there is one, M⁻¹b times the inverse of
-/// its curvature's size: directions in which ½ x·Ax − b·x falls (Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, Numerical
-/// Optimization, 2nd ed., alg. 7.1). `solution` is overwritten; b = 0 gives x = 0 without iterating.
-/// If A is singular and b in its range, x is the solution of least norm x·Mx (least length for M = I), for the iteration never
-/// leaves M⁻¹ range(A).
+/// The solution is the iterate with the least residual. At negative curvature it is the last iterate. Before the first iterate it is
+/// M⁻¹b divided by the magnitude of its curvature. Along both, ½ x·Ax − b·x falls (Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and
+/// Wright, Numerical Optimization, 2nd ed., alg. 7.1). `solution` is overwritten, and b = 0 gives x = 0 without iterating.
+/// If A is singular and b lies in its range, x is the solution of least norm x·Mx (least length for M = I). The iteration never leaves
+/// M⁻¹ range(A).
 ///
 /// ```
 /// use bfree::pooled::Pool;
@@ -54,7 +54,7 @@ impl Default for ConjugateGradientSettings {
 ///     }
 /// }
 ///
-/// // Pulled apart by forces in balance; of all solutions x₁ − x₀ = 3, the shortest.
+/// // Forces in balance pull the masses apart. Of all solutions x₁ − x₀ = 3, the shortest is found.
 /// let mut x = [0.0; 2];
 /// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &ConjugateGradientSettings::default(), &Pool::default())?;
 /// assert!(report.converged());
@@ -63,7 +63,7 @@ impl Default for ConjugateGradientSettings {
 /// ```
 ///
 /// # Errors
-/// A setting out of range, lengths that differ, NaN or infinity.
+/// A setting is out of range, the lengths differ, or a number is NaN or infinite.
 pub fn conjugate_gradient<S: Entry>(
     operator: &dyn LinearOperator<S>,
     preconditioner: &dyn LinearOperator<S>,
@@ -95,7 +95,7 @@ pub fn conjugate_gradient<S: Entry>(
         } else if run.outcome != LinearOutcome::Converged {
             run.outcome
         } else if reached < 0.5 * r_norm {
-            // The recurrence has drifted from the truth, which still improves.
+            // The residual of the recurrence has drifted, but the true residual still improves.
             r_norm = reached;
             continue;
         } else {
@@ -105,7 +105,7 @@ pub fn conjugate_gradient<S: Entry>(
     }
 }
 
-/// What one run of the recurrence did.
+/// The outcome and the counts of one run of the recurrence.
 struct Run {
     outcome: LinearOutcome,
     iterations: usize,
@@ -153,7 +153,7 @@ fn descend<S: Entry>(
         let unresolved = UNRESOLVED * S::EPSILON * largest;
         if curvature < -unresolved {
             if x.iter().all(|x| *x == S::zero()) {
-                // As far as if the curvature had the other sign.
+                // The step length for a curvature of the opposite sign.
                 axpy(-rz / p_a_p, &p, &mut x);
             }
             solution.copy_from_slice(&x);
@@ -190,7 +190,7 @@ mod tests {
     use super::super::testing::{Dense, distance, irregular};
     use super::*;
 
-    /// In memory of its own.
+    /// Solves with a memory pool of its own.
     fn conjugate_gradient(
         operator: &dyn LinearOperator,
         preconditioner: &dyn LinearOperator,
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn reports_the_true_residual() {
-        // Condition 1e10: the recurrence drifts, the reported residual must not.
+        // Condition 1e10: the recurrence drifts, but the reported residual must not.
         let n = 60;
         let a = Dense::from_fn(n, |i, j| if i == j { 10.0_f64.powf(i as f64 / 5.9) } else { 0.0 });
         let b = irregular(n);
@@ -257,11 +257,11 @@ mod tests {
             let mut x = vec![0.0; n];
             let report = conjugate_gradient(&a, &Identity, &b, &mut x, &TIGHT).unwrap();
             assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
-            // Along what it has found ½ x·Ax − b·x falls from the start.
+            // Along the returned x, ½ x·Ax − b·x falls from the start.
             let (along, curvature) = (dot(&b, &x), dot(&x, &a.times(&x)));
             assert!(along > 0.0 && 0.5 * curvature < along, "{along} {curvature}");
         }
-        // Where there is nothing before it, M⁻¹b over the size of its curvature.
+        // Before the first iterate: M⁻¹b divided by the magnitude of its curvature.
         let a = Dense::from_fn(n, |i, j| if i == j { -4.0 } else { 0.0 });
         let mut x = vec![0.0; n];
         let report = conjugate_gradient(&a, &Identity, &exact, &mut x, &TIGHT).unwrap();
@@ -286,7 +286,7 @@ mod tests {
     fn singular_consistent_system_gives_the_least_norm() {
         for (n, ring) in [(30, true), (31, false), (200, true)] {
             let a = free(n, ring);
-            // Of all solutions, which differ by constants, the one with mean zero is shortest.
+            // Solutions differ by constants. The solution with mean zero is the shortest.
             let mut exact = irregular(n);
             let mean = exact.iter().sum::<f64>() / n as f64;
             exact.iter_mut().for_each(|x| *x -= mean);
@@ -298,7 +298,7 @@ mod tests {
             let report = conjugate_gradient(&a, &a.jacobi(), &b, &mut x, &TIGHT).unwrap();
             let weighted: f64 = (0..n).map(|i| a.0[i][i] * x[i]).sum();
             assert!(report.converged() && weighted.abs() < 1e-9 * n as f64, "{weighted}");
-            // Beyond what round-off allows it ends all the same, and no worse.
+            // With a tolerance below round-off the iteration still ends, and its residual is no worse.
             let settings = ConjugateGradientSettings { relative_tolerance: 0.0, max_iterations: 100_000 };
             let report = conjugate_gradient(&a, &Identity, &b, &mut x, &settings).unwrap();
             assert!(report.relative_residual < 1e-12 && report.iterations < 20 * n, "{report:?}");
@@ -313,7 +313,7 @@ mod tests {
         let report = conjugate_gradient(&a, &Identity, &irregular(30), &mut x, &TIGHT).unwrap();
         assert!(matches!(report.outcome, LinearOutcome::Stagnated | LinearOutcome::NegativeCurvature), "{report:?}");
         assert!(report.relative_residual < 1.0 && report.iterations < 200);
-        // b wholly in the null space.
+        // b lies in the null space.
         let report = conjugate_gradient(&a, &Identity, &[1.0; 30], &mut x, &TIGHT).unwrap();
         assert_eq!((report.outcome, report.relative_residual), (LinearOutcome::Stagnated, 1.0));
         assert_eq!(x, [0.0; 30]);

@@ -1,10 +1,10 @@
-//! How accurately each linear system of Newton's method is solved.
+//! The accuracy to which each linear system of Newton's method is solved.
 
 use super::InvalidSetting;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The factor γ of choice 2.
+/// The factor γ of Eisenstat and Walker's choice 2.
 const GAMMA: f64 = 0.9;
 
 /// A forcing term is never looser than this.
@@ -16,14 +16,14 @@ const FIRST: f64 = 0.5;
 /// The fall in η is limited only while γ η² is above this (Eisenstat and Walker, sec. 2.1).
 const SAFEGUARD: f64 = 0.1;
 
-/// How far each linear problem is solved: η of ‖R + K d‖ ≤ η ‖R‖.
+/// The forcing term η: each linear system is solved to ‖R + K d‖ ≤ η ‖R‖.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Forcing {
-    /// To this relative residual, 1e-15 to 0.9, at every iteration. Small values keep Newton's convergence quadratic.
+    /// This η at every iteration, from 1e-15 to 0.9. Small values keep Newton's convergence quadratic.
     Fixed(#[schemars(range(min = 1e-15, max = 0.9))] f64),
-    /// As Newton's method progresses (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9, α = 2): loose
-    /// at first, tighter as the residual falls, never tighter than the end of the iteration needs.
+    /// An η that follows the progress of Newton's method (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996, choice 2 with γ = 0.9,
+    /// α = 2). It is loose at first and tightens as the residual falls. It is never tighter than the end of the iteration needs.
     EisenstatWalker,
 }
 
@@ -33,7 +33,7 @@ impl Default for Forcing {
     }
 }
 
-/// What the forcing term of the next iteration follows from.
+/// The data of the last iteration that determine the next forcing term.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
     /// The last forcing term.
@@ -52,7 +52,7 @@ impl Forcing {
         }
     }
 
-    /// The next forcing term; `wanted` is the residual norm that ends Newton's iteration over the present one.
+    /// The next forcing term. `wanted` is the residual norm that ends Newton's iteration, divided by the present one.
     pub(super) fn next(self, last: Option<Progress>, wanted: f64) -> f64 {
         match self {
             Self::Fixed(η) => η,
@@ -63,7 +63,7 @@ impl Forcing {
                     let η = GAMMA * last.ratio * last.ratio;
                     if limit > SAFEGUARD { η.max(limit) } else { η }
                 });
-                // Half of what is left to do is enough (Kelley 1995, eq. 6.20).
+                // Half of the remaining reduction is enough (Kelley 1995, eq. 6.20).
                 choice.max(0.5 * wanted).min(LOOSEST)
             }
         }
@@ -79,11 +79,11 @@ mod tests {
         let next = |forcing, ratio, wanted| Forcing::EisenstatWalker.next(Some(Progress { forcing, ratio }), wanted);
         assert_eq!(Forcing::EisenstatWalker.next(None, 0.0), 0.5);
         assert_eq!(next(0.1, 0.1, 0.0), 0.9 * 0.1 * 0.1);
-        // After a loose step γ η² = 0.225 holds it back.
+        // After a loose step, γ η² = 0.225 limits the fall of the next term.
         assert_eq!(next(0.5, 1e-3, 0.0), 0.9 * 0.5 * 0.5);
-        // A residual that grew does not ask for a step that is no solution at all.
+        // After a residual that grew, the term is limited, so that the step still solves the system in part.
         assert_eq!(next(0.5, 7.0, 0.0), 0.9);
-        // At the end no more than needed.
+        // Near the end the term is no tighter than needed.
         assert_eq!(next(0.01, 1e-4, 0.02), 0.01);
         assert_eq!(Forcing::Fixed(1e-8).next(Some(Progress { forcing: 0.5, ratio: 0.5 }), 0.5), 1e-8);
     }

@@ -1,7 +1,7 @@
 //! Krylov and Newton methods on plain vectors: operators and vectors, no mechanics.
 //!
-//! A nodal field of `D` components per node is one flat `&[f64]`, node after node. No constant in here has a unit: a
-//! problem whose unknowns and residual are multiplied by powers of two takes the same iterations with the same bits.
+//! A nodal field of `D` components per node is one flat `&[f64]`, node after node. No constant in this folder has a unit. A problem whose
+//! unknowns and residual are multiplied by powers of two takes the same iterations with the same bits.
 
 mod conjugate_gradient;
 mod forcing;
@@ -31,7 +31,7 @@ pub use stop::Stop;
 
 use vector::Entry;
 
-/// A square matrix known by its product, in double or single precision.
+/// A square matrix that is known by its product with a vector, in double or single precision.
 ///
 /// ```
 /// use bfree::solver::LinearOperator;
@@ -66,7 +66,7 @@ impl<S, T: LinearOperator<S> + ?Sized> LinearOperator<S> for &T {
     }
 }
 
-/// The derivative of a residual frozen at one x, over a power of two: its product, and what preconditioners are made from.
+/// The linearisation of a residual at one x, divided by a power of two: its product with a vector, and the data for preconditioners.
 ///
 /// ```
 /// use bfree::pooled::Pooled;
@@ -98,19 +98,18 @@ impl<S, T: LinearOperator<S> + ?Sized> LinearOperator<S> for &T {
 /// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7);
 /// ```
 pub trait Linearization<S = f64>: LinearOperator<S> + DiagonalBlocks {
-    /// The factor that entries are divided by: in single precision a power of two that keeps entries near 1, whatever the units.
+    /// The factor by which entries are divided. In single precision it is a power of two that keeps entries near 1 in any units.
     fn scale(&self) -> f64;
 }
 
-/// In double precision as it is.
+/// In double precision entries are not scaled.
 impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
     fn scale(&self) -> f64 {
         1.0
     }
 }
 
-/// A square system R(x) = 0 that is defined for admissible x only. The state is the argument: nothing is remembered
-/// between calls.
+/// A square system R(x) = 0 that is defined for admissible x only. The state is the argument, and nothing is stored between calls.
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
@@ -171,7 +170,7 @@ impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait NonlinearProblem {
-    /// Why R has no value somewhere, such as det F ≤ 0 at a particle.
+    /// The reason why R has no value at x, such as det F ≤ 0 at a particle.
     type Inadmissible: std::error::Error + 'static;
 
     /// `r = R(x)`; `r` is overwritten, and unspecified on error.
@@ -180,14 +179,14 @@ pub trait NonlinearProblem {
     /// x is not admissible.
     fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible>;
 
-    /// Norm of the vector of the sums of the magnitudes of all contributions to R(x): what its round-off is relative to.
+    /// The scale of the round-off of R(x): the magnitudes of all contributions are summed at each entry, and the norm of the sums is taken.
     ///
     /// # Errors
     /// x is not admissible.
     fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible>;
 
-    /// The same with what rounding x, and the state that R starts from, changes in R(x), in units of eps. It is asked for only where ‖R‖ no
-    /// longer falls.
+    /// The round-off bound of R(x) in units of eps: the [`magnitude`](Self::magnitude), together with the change of R when x and the state
+    /// at t_n are rounded. It is evaluated only where ‖R‖ no longer falls.
     ///
     /// # Errors
     /// x is not admissible.
@@ -195,16 +194,16 @@ pub trait NonlinearProblem {
         self.magnitude(x)
     }
 
-    /// The potential Π whose gradient is R, and the sum of the magnitudes of its contributions; `None` if there is no
-    /// potential (follower loads).
+    /// The potential Π whose gradient is R, and the sum of the magnitudes of its contributions; `None` if there is no potential, as with
+    /// follower loads.
     fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>>;
 
-    /// Whether every tangent is symmetric; nothing less than certainty counts.
+    /// Whether every tangent is symmetric for certain.
     fn is_symmetric(&self) -> bool {
         false
     }
 
-    /// Whether the search is to end without a solution: asked before every iteration.
+    /// Whether the iteration is to end without a solution. It is called before every iteration.
     fn is_stopped(&self) -> bool {
         false
     }
@@ -224,16 +223,16 @@ pub trait NonlinearProblem {
     }
 }
 
-/// What a Krylov method did.
+/// The outcome and the counts of a Krylov solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearReport {
-    /// How it ended.
+    /// The outcome.
     pub outcome: LinearOutcome,
     /// Krylov iterations taken, over all restarts.
     pub iterations: usize,
-    /// Products with the operator, those for true residuals included.
+    /// Products with the operator, including the products for true residuals.
     pub products: usize,
-    /// The true ‖b − A x‖ / ‖b‖ of the solution handed back, computed anew from that solution (0 if b = 0).
+    /// The true ‖b − A x‖ / ‖b‖ of the returned solution, computed anew from it (0 if b = 0).
     pub relative_residual: f64,
 }
 
@@ -264,7 +263,7 @@ impl LinearReport {
     }
 }
 
-/// How a Krylov method ended. The solution is the best one it has seen, but for negative curvature.
+/// The reason why a Krylov method ended. The solution is the best iterate, except at negative curvature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinearOutcome {
     /// The true residual meets the tolerance.
@@ -274,11 +273,12 @@ pub enum LinearOutcome {
     /// The residual no longer falls: round-off, a singular operator, or a restart that is too short.
     Stagnated,
     /// Conjugate gradients only: the operator (pᵀAp < 0) or the preconditioner (rᵀM⁻¹r ≤ 0) is not positive definite. The solution is
-    /// then an x along which ½ x·Ax − b·x falls, the first direction if it has negative curvature; zero if not even that falls.
+    /// then an x along which ½ x·Ax − b·x falls. If the first direction has negative curvature already, x is along that direction.
+    /// If no such x was found, the solution is zero.
     NegativeCurvature,
 }
 
-/// Why a Krylov method has no solution to hand back; the contents of the solution vector are then unspecified.
+/// The reason why a Krylov method returns no solution. The contents of the solution vector are then unspecified.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinearError {
     /// A setting outside its range.
@@ -297,13 +297,13 @@ pub enum LinearError {
     NotFinite {
         /// The quantity.
         what: &'static str,
-        /// Krylov iterations completed before.
+        /// Krylov iterations completed before it was met.
         iteration: usize,
     },
 }
 
 impl LinearError {
-    /// The same error with `earlier` iterations counted before it.
+    /// This error with `earlier` iterations added to its iteration number.
     fn after(self, earlier: usize) -> Self {
         match self {
             Self::NotFinite { what, iteration } => Self::NotFinite { what, iteration: iteration + earlier },
@@ -320,7 +320,7 @@ pub struct InvalidSetting {
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// What is allowed, in words.
+    /// The allowed values, in words.
     pub allowed: &'static str,
 }
 
@@ -338,10 +338,10 @@ impl InvalidSetting {
     }
 }
 
-/// The report of no iterations at the solution 0, and ‖b‖.
+/// Sets the solution to 0. Returns the report of no iterations, and ‖b‖.
 ///
 /// # Errors
-/// Lengths that differ, or a right-hand side that is not finite.
+/// The lengths differ, or the right-hand side is not finite.
 fn begin<S: Entry>(rhs: &[S], solution: &mut [S]) -> Result<(LinearReport, f64), LinearError> {
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
@@ -351,7 +351,7 @@ fn begin<S: Entry>(rhs: &[S], solution: &mut [S]) -> Result<(LinearReport, f64),
     Ok((LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 }, b_norm))
 }
 
-/// Lets only finite numbers pass.
+/// The value, or an error if it is not finite.
 fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, LinearError> {
     if value.is_finite() { Ok(value) } else { Err(LinearError::NotFinite { what, iteration }) }
 }

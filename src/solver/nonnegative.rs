@@ -1,28 +1,29 @@
-//! Non-negative least squares: min |A x − b| over x ≥ 0, by Lawson and Hanson's active sets (Solving Least Squares Problems, 1974, ch. 23).
+//! Non-negative least squares, min |A x − b| over x ≥ 0, by Lawson and Hanson's active-set method (Solving Least Squares Problems, 1974,
+//! ch. 23).
 
 use nalgebra::DVector;
 
-/// What is left of a column of length 1 by those before it, if it is independent of them.
+/// A column of length 1 is independent of the free columns if orthogonalisation against them leaves more than this length.
 const INDEPENDENT: f64 = 1e-8;
 
-/// The problem, and its solution over the columns that were offered so far.
+/// The problem, and its solution over the columns offered so far.
 pub(crate) struct NonnegativeLeastSquares {
-    /// Of length 1: the one that is taken next is the one that by itself leaves least, whatever its size was.
+    /// The offered columns, scaled to length 1. So the next column is chosen by how far it alone reduces |A x − b|, whatever its size.
     columns: Vec<DVector<f64>>,
-    /// How long they were.
+    /// Lengths of the columns before scaling.
     sizes: Vec<f64>,
     /// b − A x
     rest: DVector<f64>,
-    /// The columns with x > 0.
+    /// The free columns, with x > 0, and their x.
     free: Vec<usize>,
     x: Vec<f64>,
-    /// Their columns are Q R: those of Q, and those of R down to its diagonal.
+    /// The factors Q R of the free columns: the columns of Q, and the columns of R down to its diagonal.
     q: Vec<DVector<f64>>,
     r: Vec<Vec<f64>>,
 }
 
 impl NonnegativeLeastSquares {
-    /// No column yet: x = 0.
+    /// A problem without columns: x = 0.
     pub(crate) fn new(b: DVector<f64>) -> Self {
         Self {
             columns: Vec::new(),
@@ -35,23 +36,23 @@ impl NonnegativeLeastSquares {
         }
     }
 
-    /// One more column of A, not 0.
+    /// Adds a column of A, which must not be 0.
     pub(crate) fn offer(&mut self, column: DVector<f64>) {
         let size = column.norm();
         self.columns.push(column / size);
         self.sizes.push(size);
     }
 
-    /// The columns with x > 0, in the order they were offered, and their x.
+    /// The columns with x > 0, numbered in the order they were offered, and their x.
     pub(crate) fn solution(&self) -> impl Iterator<Item = (usize, f64)> {
         self.free.iter().zip(&self.x).map(|(&column, x)| (column, x / self.sizes[column]))
     }
 
-    /// Solves with all columns that were offered, from the last solution, until |A x − b| ≤ `least`; returns what it is.
+    /// Solves with all offered columns, from the last solution, until |A x − b| ≤ `least`. Returns |A x − b|.
     pub(crate) fn solve(&mut self, least: f64) -> f64 {
         let mut refused = vec![false; self.columns.len()];
         self.free.iter().for_each(|&column| refused[column] = true);
-        // Each step lowers |A x − b|; round-off may not.
+        // Each step lowers |A x − b| in exact arithmetic. The limit guards against round-off.
         for _ in 0..10 * self.rest.len() {
             if self.rest.norm() <= least {
                 break;
@@ -64,7 +65,7 @@ impl NonnegativeLeastSquares {
             }
             refused[best] = true;
             if self.free_one(best) && self.descend() {
-                // It is in: what was refused before may be of use now.
+                // The column is free now, so columns refused before may be of use.
                 refused.fill(false);
                 self.free.iter().for_each(|&column| refused[column] = true);
             }
@@ -72,11 +73,11 @@ impl NonnegativeLeastSquares {
         self.rest.norm()
     }
 
-    /// Adds a column to those with x > 0; `false` if it depends on them.
+    /// Frees a column; `false` if it depends on the free columns.
     fn free_one(&mut self, column: usize) -> bool {
         let mut direction = self.columns[column].clone();
         let mut above = vec![0.0; self.q.len()];
-        // Gram and Schmidt, twice is enough.
+        // Gram–Schmidt; twice is enough.
         for _ in 0..2 {
             for (q, r) in self.q.iter().zip(&mut above) {
                 let along = q.dot(&direction);
@@ -96,8 +97,8 @@ impl NonnegativeLeastSquares {
         true
     }
 
-    /// To the least squares over the columns that are free; those that would become negative on the way are no longer. `false` if the
-    /// last one is not free after all.
+    /// Moves x to the least-squares solution over the free columns. A column whose x would become negative on the way is bound.
+    /// `false` if the newest column is bound too.
     fn descend(&mut self) -> bool {
         let newest = self.free.last().copied();
         while !self.free.is_empty() {
@@ -127,7 +128,7 @@ impl NonnegativeLeastSquares {
         step
     }
 
-    /// Takes a column from those with x > 0.
+    /// Binds the free column at `place`: x = 0.
     fn bind(&mut self, place: usize) {
         let gone = self.free.remove(place);
         let x = self.x.remove(place);
@@ -152,7 +153,8 @@ impl NonnegativeLeastSquares {
 mod tests {
     use super::*;
 
-    /// |A x − b| of all subsets of columns with a solution > 0, the least of them: x ≥ 0 is a least squares of one of them.
+    /// The solution x ≥ 0 is the least-squares solution over some subset of columns. So the least |A x − b| over all subsets with a
+    /// non-negative solution is the reference.
     #[test]
     fn no_subset_of_columns_does_better() {
         let mut seed = 1_u64;
@@ -164,7 +166,7 @@ mod tests {
             let columns: Vec<_> = (0..7).map(|_| DVector::from_fn(5, |_, _| random())).collect();
             let b = DVector::from_fn(5, |_, _| random());
             let mut problem = NonnegativeLeastSquares::new(b.clone());
-            // Some are there from the start, others come to a solution that is there.
+            // Some columns are offered at the start, others after a first solution.
             columns[..4].iter().for_each(|column| problem.offer(column.clone()));
             problem.solve(0.0);
             columns[4..].iter().for_each(|column| problem.offer(column.clone()));

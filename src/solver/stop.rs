@@ -1,9 +1,10 @@
-//! The wish that a step that takes long should end: Ctrl-C.
+//! A request to end a long step, such as Ctrl-C.
 
 use std::fmt::{self, Debug};
 use std::sync::Arc;
 
-/// Whether somebody wants a step to end, asked before every iteration of Newton's method. The step then fails, and loses nothing.
+/// A function that tells whether the step is to end. It is called before every Newton iteration. If it returns true, the step fails and
+/// nothing is lost.
 #[derive(Clone)]
 pub struct Stop(pub Arc<dyn Fn() -> bool + Send + Sync>);
 

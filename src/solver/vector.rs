@@ -1,13 +1,13 @@
-//! Operations on long vectors whose results do not depend on the number of threads.
+//! Operations on long vectors. The results do not depend on the number of threads.
 //!
-//! A reduction is cut into chunks of fixed length; the sums of the chunks are added in their order, whichever thread made
-//! them. Every function takes vectors of one length (the shorter one counts if they differ). Products are formed as they
-//! are: in [`dot`], entries should lie between 1e-150 and 1e150 in magnitude, or be zero; [`norm`] takes any.
+//! A reduction is cut into chunks of fixed length. The sums of the chunks are added in the order of the chunks, whichever thread made them.
+//! Every function takes vectors of one length; if lengths differ, the shorter one counts. [`dot`] does not scale its products, so its
+//! entries should be zero or lie between 1e-150 and 1e150 in magnitude. [`norm`] takes entries of any magnitude.
 //!
 //! ```
 //! use bfree::solver::vector::{axpy, dot, norm, scaled, xpby};
 //!
-//! // One step of Gram and Schmidt: what is left of y is orthogonal to x.
+//! // One step of Gram and Schmidt: the remainder of y is orthogonal to x.
 //! let (mut x, mut y) = (vec![0.0; 3], vec![2.0, 1.0, 5.0]);
 //! scaled(1.0 / norm(&[1.0, 2.0, 2.0]), &[1.0, 2.0, 2.0], &mut x);
 //! let along = dot(&x, &y);
@@ -24,7 +24,7 @@ use crate::parallel;
 use crate::pooled::Element;
 use crate::scalar::Real;
 
-/// What vectors are made of: `f64` or `f32`. Reductions are added up in double precision in both.
+/// An entry of a vector: `f64` or `f32`. Reductions of both are added up in double precision.
 pub trait Entry: Real + Element + Sync {
     /// The unit of round-off.
     const EPSILON: f64;
@@ -41,7 +41,7 @@ impl Entry for f32 {
 /// Entries per partial sum.
 const CHUNK: usize = 4096;
 
-/// Below this length waking the threads costs more than the work.
+/// Below this length, waking the threads costs more than the work.
 const PARALLEL: usize = 8 * CHUNK;
 
 /// Independent accumulators inside a chunk, so that the compiler may use vector instructions without changing the order.
@@ -67,7 +67,7 @@ fn dot_chunk<S: Entry>(x: &[S], y: &[S]) -> f64 {
     lanes.iter().sum()
 }
 
-/// A sum of squares that is smaller may have lost digits, or all, to underflow.
+/// A smaller sum of squares may have lost some or all digits to underflow.
 const SAFE_SQUARE: f64 = 1e-280;
 
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
@@ -76,12 +76,12 @@ pub fn norm<S: Entry>(x: &[S]) -> f64 {
     if (SAFE_SQUARE..=f64::MAX).contains(&square) {
         return square.sqrt();
     }
-    // Squares under- or overflow, all entries are zero, or one is not finite.
+    // Squares underflow or overflow, all entries are zero, or one entry is not finite.
     let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.value().abs()));
     if largest == 0.0 || !largest.is_finite() || square.is_nan() {
         return square.sqrt();
     }
-    // ‖x‖ = 2ᵏ ‖x/2ᵏ‖ with 2ᵏ near the largest entry: exact. 2ᵏ in two factors, neither of which over- or underflows.
+    // ‖x‖ = 2ᵏ ‖x/2ᵏ‖ with 2ᵏ near the largest entry is exact. Two factors make up 2ᵏ, so that neither overflows or underflows.
     let k = largest.log2() as i32;
     let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
     let scaled: Vec<f64> = x.iter().map(|x| x.value() * half * rest).collect();
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn every_entry_counts_once() {
-        // Sums of integers are exact in any order: Σ i = n(n+1)/2, at lengths around lanes, chunks and the switch.
+        // Sums of integers are exact in any order: Σ i = n(n+1)/2. The lengths lie around lanes, chunks and the switch to threads.
         for n in [0, 1, 7, 8, 9, CHUNK - 1, CHUNK, CHUNK + 1, PARALLEL - 1, PARALLEL, PARALLEL + 5] {
             let x: Vec<f64> = (1..=n).map(|i| i as f64).collect();
             assert_eq!(dot(&x, &vec![1.0; n]), (n * (n + 1) / 2) as f64, "{n}");
@@ -179,7 +179,7 @@ mod tests {
             let scaled: Vec<f64> = x.iter().map(|x| factor * x).collect();
             assert_eq!(norm(&scaled).to_bits(), (factor * norm(&x)).to_bits(), "2^{exponent}");
         }
-        // 3-4-5 among the smallest and the largest numbers there are
+        // 3-4-5 triangles of the smallest and the largest numbers
         let tiny = f64::from_bits(1);
         assert_eq!(norm(&[3.0 * tiny, 4.0 * tiny]), 5.0 * tiny);
         assert_eq!(norm(&[0.6 * f64::MAX, 0.8 * f64::MAX]).log2(), f64::MAX.log2());

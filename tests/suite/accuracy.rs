@@ -1,4 +1,4 @@
-//! The key `accuracy`: what it sets, what it leaves, and what it refuses.
+//! The key `accuracy`: the values it sets, the values it leaves, and the values it refuses.
 
 use crate::support::Failure;
 use bfree::scene::accuracy::levels;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A block of 1 × 0.5 on a floor, without any knob; c = √(12/3) = 2.
+/// A block of 1 × 0.5 on a floor, without any setting; c = √(12/3) = 2.
 fn open_scene() -> Value {
     json!({
         "grid": { "size": [2, 1] },
@@ -41,7 +41,7 @@ fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
     for level in levels() {
         let asked = level.name.map_or(json!({ "error": level.error }), |name| name.into());
         let scene = read(&with(&[("/accuracy", asked)]))?;
-        // The least extent is 0.5; the box and the block allow h = 0.5/n.
+        // The smallest extent is 0.5; the box and the block allow h = 0.5/n.
         let cells = 0.5 / scene.grid.spacing;
         assert!(cells >= level.cells - 1e-9 && cells < level.cells + 1.0 + 1e-9, "{cells} cells for {level:?}");
         let courant = 2.0 * scene.time.step / scene.grid.spacing;
@@ -61,7 +61,7 @@ fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
         }
         assert_eq!(written["solver"]["newton"]["tolerance"], level.tolerance);
         assert_eq!(scene.bodies[0].particles_per_cell, level.particles_per_cell);
-        // What it says it has set, given by hand, is the same scene.
+        // The settings that `accuracy` reports, given by hand, make the same scene.
         assert!(!scene.chosen.is_empty());
         let set = scene.chosen.iter().map(|chosen| format!("{}={}", chosen.key, chosen.value).parse());
         let given = scene::read(&open_scene().to_string(), &set.collect::<Result<Vec<_>, _>>()?)?;
@@ -70,7 +70,7 @@ fn each_word_sets_what_its_row_of_the_table_says() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Steps that a template takes as it is, and as a draft that chooses its spacing and its step.
+/// A template with its own settings takes at least as many steps as the same template as a draft, which chooses spacing and step.
 #[test]
 fn a_draft_takes_no_more_steps_than_the_templates() -> Result<(), Failure> {
     let dynamic =
@@ -86,7 +86,7 @@ fn a_draft_takes_no_more_steps_than_the_templates() -> Result<(), Failure> {
         let draft = read(&open)?;
         let [own_steps, steps] = [&own, &draft].map(|scene| (scene.time.end / scene.time.step - 1e-9).ceil());
         assert!(steps <= own_steps, "{name}: {steps} steps, {own_steps} of its own");
-        // Nothing it sets adds a linear system to a step.
+        // No value that `draft` sets adds a linear system to a step.
         assert_eq!((own.time.lumping, &own.approximation), (draft.time.lumping, &draft.approximation), "{name}");
     }
     Ok(())
@@ -109,7 +109,7 @@ fn it_yields_to_every_key_that_is_given() -> Result<(), Failure> {
     without["accuracy"] = Value::Null;
     assert_eq!(Scene { accuracy: None, ..scene }, read(&without)?);
 
-    // Given one by one, from the text or from an override; the step then follows the spacing that is given.
+    // Each key given alone, from the text or from an override; the step then follows the given spacing.
     let scene = scene::read(&with(&[("/accuracy", "draft".into())]).to_string(), &["grid.spacing=0.125".parse()?])?;
     assert_eq!(scene.grid.spacing, 0.125);
     assert!(scene.chosen.iter().all(|chosen| chosen.key != "grid.spacing"));

@@ -1,4 +1,4 @@
-//! Steps as long as a tolerance allows.
+//! Steps whose length follows an error tolerance.
 
 use crate::support::{Failure, scene};
 use bfree::approximation::{Approximation, Bspline};
@@ -11,8 +11,8 @@ use bfree::simulation::{Settings, Simulation};
 use bfree::tensor::Vector;
 use std::f64::consts::PI;
 
-/// A bar of length 1 and wave speed 1 between two walls, at rest in its straight state, with the speed V sin πx: it swings as
-/// u = (V/ω) sin(πx) sin(ωt) with ω = π, as long as V is tiny.
+/// A bar of length 1 and wave speed 1 between two walls. It starts undeformed, with the speed V sin πx. For tiny V it vibrates with u =
+/// (V/ω) sin(πx) sin(ωt), ω = π.
 const SPEED: f64 = 1e-6;
 
 fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
@@ -42,8 +42,8 @@ fn bar(dt: f64) -> Result<Simulation<1>, Failure> {
     })
 }
 
-/// The trapezoidal rule errs by Δt³ u‴/12 in a step, in the mean square by V ω² cos(ωt) √½ of it: the estimate says so, and is of third
-/// order.
+/// In one step the trapezoidal rule has the error Δt³ u‴/12, in the mean square with u‴ = V ω² cos(ωt) √½. The estimate must equal this
+/// error, and is of third order.
 #[test]
 fn the_estimate_is_the_local_error_of_an_oscillation() -> Result<(), Failure> {
     let mut last = None;
@@ -69,7 +69,7 @@ fn the_estimate_is_the_local_error_of_an_oscillation() -> Result<(), Failure> {
 
 #[test]
 fn a_step_that_errs_too_much_is_taken_back_and_the_next_ones_grow_when_they_may() -> Result<(), Failure> {
-    // The error of a step of 0.1 is near 0.1³ V π² √½ / 12 / h = 3.7e-8 spacings at first.
+    // At first a step of 0.1 has the error 0.1³ V π² √½ / 12 / h = 3.7e-8 spacings, approximately.
     let mut simulation = bar(0.1)?;
     let tolerance = 1e-9;
     simulation.settings.error_tolerance = Some(tolerance);
@@ -82,10 +82,10 @@ fn a_step_that_errs_too_much_is_taken_back_and_the_next_ones_grow_when_they_may(
         assert!(report.failed.iter().all(|attempt| attempt.inaccurate && attempt.why.contains("grid spacings")));
         (shortest, longest) = (shortest.min(report.dt), longest.max(report.dt));
     }
-    // u‴ vanishes at the turning point, t = ½: steps there are longer. Every whole step is met.
+    // u‴ vanishes at the turning point, t = ½, so steps are longer there. The steps still end at every whole step.
     assert!(longest >= 2.0 * shortest, "{shortest} {longest}");
     assert_eq!(simulation.clock.time(), 1.0);
-    // At the limit of halvings the step is taken all the same, and says what it errs.
+    // At the limit of halvings the step is accepted and reports its error.
     let mut limited = bar(0.1)?;
     limited.settings.error_tolerance = Some(tolerance);
     limited.clock = Clock::new(0.1, 1);
@@ -93,8 +93,8 @@ fn a_step_that_errs_too_much_is_taken_back_and_the_next_ones_grow_when_they_may(
     Ok(())
 }
 
-/// Up to the turning point errors fall, and a step that is allowed stays so: none that has grown is taken back. A quarter of 0.1 errs 0.58 of this
-/// tolerance at first, so that twice its length errs 4.6 times the tolerance.
+/// Errors fall up to the turning point, so an accepted step length stays admissible and no longer step is rejected. At first a quarter of
+/// 0.1 has 0.58 of this tolerance as its error; twice that length would have 4.6 times the tolerance.
 #[test]
 fn a_step_that_errs_more_than_an_eighth_of_the_tolerance_does_not_grow() -> Result<(), Failure> {
     let tolerance = 1e-9;
@@ -110,7 +110,7 @@ fn a_step_that_errs_more_than_an_eighth_of_the_tolerance_does_not_grow() -> Resu
     Ok(())
 }
 
-/// An impact needs short steps, the flight before it none.
+/// An impact needs short steps; the flight before it does not.
 #[test]
 fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failure> {
     let end = 25.6;
@@ -139,7 +139,7 @@ fn an_impact_takes_fewer_steps_than_short_ones_all_the_way() -> Result<(), Failu
         distance(&uniform, &exact)
     );
     assert!(3 * few < 2 * all, "{few} attempts, {all} steps");
-    // Once more, the same bits.
+    // A second run gives the same bits.
     let (again, same) = run(&adaptive)?;
     assert_eq!((again.particles, same), (one.particles, few));
     Ok(())

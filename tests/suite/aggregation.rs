@@ -1,4 +1,4 @@
-//! Aggregation: outer nodes follow inner ones. What it keeps exact, and what it mends.
+//! Aggregation: outer nodes follow inner ones. Tests of the quantities that aggregation keeps exact, and of the errors that it removes.
 
 use crate::support::{Failure, Random, moved_in_column, scene};
 use bfree::aggregation::{Extension, Occupied, Pieces};
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 const AGGREGATION: &str = "aggregation=true";
 
-/// All kinds of pieces.
+/// All kinds of polynomial pieces.
 fn pieces() -> Vec<Pieces> {
     let of = |(degree, extension)| Pieces { degree, extension, ..Pieces::LINEAR };
     let mut all: Vec<Pieces> = [(1, 1), (2, 1), (2, 2), (3, 1), (3, 3)].map(of).into();
@@ -24,7 +24,7 @@ fn pieces() -> Vec<Pieces> {
 fn nodes(pieces: Pieces, cells: &[([u32; 3], f64)], grid: [u32; 3]) -> Vec<[u32; 3]> {
     let along = |cell: u32, cells: u32| {
         let first = i64::from(cell) - i64::from(pieces.degree / 2);
-        // Where functions curve at walls, their first nodes act in the first two cells.
+        // If functions curve at walls, their first nodes act in the first two cells.
         let last = i64::from(cells) - i64::from(pieces.degree);
         let first = if pieces.curves_at_walls { first.clamp(0, last) } else { first };
         (first..=first + i64::from(pieces.degree)).filter(move |node| (0..=i64::from(cells)).contains(node))
@@ -40,7 +40,7 @@ fn nodes(pieces: Pieces, cells: &[([u32; 3], f64)], grid: [u32; 3]) -> Vec<[u32;
     all
 }
 
-/// Bodies drawn at random in a grid of 12 × 9 cells: in corners, at walls, in pieces.
+/// Bodies drawn at random in a grid of 12 × 9 cells: in corners, at walls, in several parts.
 fn drawn(pieces: Pieces, random: &mut Random) -> (Vec<[u32; 3]>, Extension) {
     let grid = [12, 9, 0];
     let more = u32::from(pieces.degree == 2);
@@ -67,7 +67,7 @@ fn linear_fields_are_continued_exactly_and_so_are_polynomials_away_from_walls() 
         for _ in 0..200 {
             let (nodes, extension) = drawn(pieces, &mut random);
             let linear = |node: [u32; 3]| 3.0 + 0.7 * f64::from(node[0]) - 1.3 * f64::from(node[1]);
-            // Coefficients of a polynomial are a polynomial of the node's index, but for walls.
+            // The coefficients of a polynomial are a polynomial of the node's index, except at walls.
             let power = if pieces.extension == pieces.degree { pieces.degree as i32 } else { 1 };
             let inside = |node: [u32; 3]| (2..=9).contains(&node[0]) && (2..=7).contains(&node[1]);
             let curved = |node: [u32; 3]| f64::from(node[0]).powi(power) * f64::from(node[1]).powi(power);
@@ -91,7 +91,7 @@ fn linear_fields_are_continued_exactly_and_so_are_polynomials_away_from_walls() 
     assert!(followed > 1000, "{followed} outer nodes were drawn");
 }
 
-/// Tractions, follower pressures, mean dilatation, plastic flow, damping and inertia, with prescribed nodes among the outer ones.
+/// Tractions, follower pressures, mean dilatation, plastic flow, damping and inertia, with prescribed nodes among the outer nodes.
 #[test]
 fn the_tangent_is_the_derivative_of_the_aggregated_residual() -> Result<(), Failure> {
     let cases: [(&str, &[&str]); 6] = [
@@ -123,7 +123,7 @@ fn the_tangent_is_the_derivative_of_the_aggregated_residual() -> Result<(), Fail
     Ok(())
 }
 
-/// A bar between planes of symmetry, pulled at its end, which lies anywhere in its cell.
+/// A bar between planes of symmetry, pulled at its end. The end lies anywhere in its cell.
 fn bar(family: Value, offset: f64, traction: f64) -> Result<Simulation<2>, Failure> {
     let (h, end) = (0.125, 1.0 + 0.125 * offset);
     let scene = json!({
@@ -138,7 +138,8 @@ fn bar(family: Value, offset: f64, traction: f64) -> Result<Simulation<2>, Failu
     Ok(scene::read(&scene.to_string(), &[])?.build(".".as_ref())?)
 }
 
-/// The penalty left the end of such a bar 10 % too long on grid lines, and a stress of thirty times the traction in its points.
+/// Under the former ghost penalty, a bar that ended on a grid line was 10 % too long. Its surface points had thirty times the stress of the
+/// traction.
 #[test]
 fn a_bar_under_tension_is_strained_evenly_wherever_its_end_lies() -> Result<(), Failure> {
     for family in [json!("gimp"), json!("linear")] {
@@ -169,7 +170,7 @@ fn a_kept_grid_gives_one_answer_in_any_number_of_load_steps() -> Result<(), Fail
     Ok(())
 }
 
-/// In flight, with a lumped, a mixed and a consistent mass, by both projections.
+/// In flight, with a lumped, a mixed and a consistent mass, and with both projections.
 #[test]
 fn momentum_is_that_of_the_particles() -> Result<(), Failure> {
     for (lumping, more) in [
@@ -179,7 +180,7 @@ fn momentum_is_that_of_the_particles() -> Result<(), Failure> {
         ("time.lumping=1", r#"time.projection="affine""#),
     ] {
         let mut simulation = scene::<2>("collision.json", &[AGGREGATION, lumping, more])?;
-        // Apart for as long as the test looks.
+        // The discs stay apart during the test.
         simulation.settings.renewal = Renewal::EveryStep;
         let random = direction::<2>(simulation.particles.len(), 3);
         simulation.particles.velocity.iter_mut().zip(&random).for_each(|(v, random)| *v += random * 0.01);
@@ -194,7 +195,8 @@ fn momentum_is_that_of_the_particles() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A node across the corner of a block of full cells is further from their centres than one along an axis, and follows all the same.
+/// A node diagonally across the corner of a block of full cells is further from their centres than a node along an axis. It must follow all
+/// the same.
 #[test]
 fn a_node_across_a_corner_follows() {
     let nodes: Vec<[u32; 3]> = (0..81).map(|i| [i % 9, i / 9, 0]).collect();
@@ -222,7 +224,8 @@ fn a_plan_says_which_nodes_follow() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Without inertia, with a consistent mass, under loads on the surface of a shape, and in long steps of one length. The key of an earlier version is read, with a note.
+/// Nodes follow without inertia, with a consistent mass, under loads on the surface of a shape, and in long steps of equal length. The key of
+/// an earlier version is read, with a note.
 #[test]
 fn nodes_follow_where_mass_does_not_hold_them() -> Result<(), Failure> {
     let asked = |name: &str, overrides: &[&str]| -> Result<bool, Failure> {
@@ -239,7 +242,7 @@ fn nodes_follow_where_mass_does_not_hold_them() -> Result<(), Failure> {
         assert_eq!(asked("column_static.json", overrides)?, follow, "{overrides:?}");
     }
     assert!(asked("cantilever.json", &[])?);
-    // √((Λ + 2G)/ρ) is 14.5 cells a second.
+    // √((Λ + 2G)/ρ) is 14.5 cells per second.
     for (step, follow) in [("time.step=0.05", false), ("time.step=0.6", false), ("time.step=0.8", true)] {
         assert_eq!(asked("rebound.json", &[step])?, follow, "{step}");
     }
@@ -251,8 +254,8 @@ fn nodes_follow_where_mass_does_not_hold_them() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The column under its weight, which hangs over cell faces by any share of a cell: exact by integrating λ of the law. Where every node is an unknown, the
-/// top is wrong by a tenth and more with LME 3, and conjugate gradients take hundreds of iterations.
+/// The top of the column lies at any fraction of a cut cell. The exact displacement integrates the stretch λ of the law. If every node is
+/// an unknown, the top is wrong by a tenth and more with LME 3, and conjugate gradients take hundreds of iterations.
 #[test]
 fn statics_with_smooth_functions_is_right_wherever_cells_are_cut() -> Result<(), Failure> {
     for family in
@@ -263,7 +266,7 @@ fn statics_with_smooth_functions_is_right_wherever_cells_are_cut() -> Result<(),
         for cut in [1e-9, 0.1, 0.4, 0.8, 1.0 - 1e-9] {
             let overrides = [&*approximation, "grid.size=[0.4,1.2]", "time.step=1", "output.probes=[]"];
             let mut simulation = scene::<2>("column_static.json", &overrides)?;
-            // A column of height one, of 20 cells, in one that has 19 and a share.
+            // The cells become wider, so that a column of 20 cells fills 19 cells and the fraction `cut` of another.
             let wider = 20.0 / (19.0 + cut);
             simulation.grid.spacing *= wider;
             let particles = &mut simulation.particles;
@@ -284,12 +287,13 @@ fn statics_with_smooth_functions_is_right_wherever_cells_are_cut() -> Result<(),
     Ok(())
 }
 
-/// Linear functions have nodes that only points of the loaded end see. As unknowns they gave way in every step, and the run stopped.
+/// Some nodes of linear functions have only points of the loaded end in their support. When these nodes were unknowns they moved away in
+/// every step, and the run stopped.
 #[test]
 fn points_of_a_loaded_surface_stay_with_their_body() -> Result<(), Failure> {
     let reset = r#"grid.renewed="every_step""#;
     let mut simulation = scene::<2>("cantilever.json", &["approximation=\"linear\"", reset])?;
-    // A sixteenth at the start, and the free end is hardly strained.
+    // The points start a sixteenth from the body, and the free end has little strain.
     let depth = |simulation: &Simulation<2>| {
         let (particles, solid) = (&simulation.particles, simulation.particles.solid_places());
         let nearest = |p: usize| {
@@ -305,7 +309,7 @@ fn points_of_a_loaded_surface_stay_with_their_body() -> Result<(), Failure> {
         let now = depth(&simulation);
         assert!(now < 1.5 * start, "t = {}: {now} instead of {start}", simulation.clock.time());
     }
-    // Nothing is taken.
+    // Aggregation dissipates no energy.
     assert_eq!(simulation.dissipated, 0.0);
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What every shape function promises, for every family in 1, 2 and 3 dimensions.
+//! The properties that every shape function must have, for every family in 1, 2 and 3 dimensions.
 
 use bfree::approximation::{
     Approximation, ApproximationError, AxisWeights, Bspline, Gimp, Linear, Lme, LmeCircle, NotAKnotBspline, Scratch,
@@ -30,8 +30,8 @@ fn support<const D: usize>(
     Ok(found)
 }
 
-/// The largest error in Σ N = 1, Σ N (x_I − x) = 0, Σ h∇N = 0, Σ (x_I − x) ⊗ ∇N = I, lengths in units of h.
-/// Not-a-number counts as infinite.
+/// The largest error in Σ N = 1, Σ N (x_I − x) = 0, Σ h∇N = 0, Σ (x_I − x) ⊗ ∇N = I, with lengths in units of h. Not-a-number counts as
+/// infinite.
 fn inconsistency<const D: usize>(grid: &Grid<D>, x: &Vector<f64, D>, found: &Support<D>) -> f64 {
     let mut errors = vec![found.values.iter().sum::<f64>() - 1.0];
     let arm = |i: usize, k: usize| (grid.position(found.nodes[i])[k] - x[k]) / grid.spacing;
@@ -75,7 +75,7 @@ fn grids<const D: usize>() -> Vec<Grid<D>> {
     vec![at(0.0, [5, 4, 3]), at(1.0, [5, 4, 3]), at(0.0, [1, 1, 1]), at(0.0, [2, 1, 6])]
 }
 
-/// Walls and what is next to them, nodes, faces, and the inside of cells.
+/// Coordinates on walls and next to them, on nodes, on faces, and inside cells.
 fn coordinates<const D: usize>(grid: &Grid<D>, k: usize) -> Vec<f64> {
     let (lower, upper) = (grid.origin[k], grid.origin[k] + f64::from(grid.cells[k]) * H);
     let mut list = vec![lower, upper, lower + 1e-300, lower + 1e-17, upper - 1e-300, upper - 1e-17];
@@ -155,7 +155,7 @@ fn walls_are_nodal<const D: usize>() {
                 let there = f64::from(node[0]) * H == wall;
                 assert!(there || n.abs() < 1e-13, "{D}D {family:?}: node {node:?} has N = {n:e} on the wall {wall}");
             }
-            // The normal derivative has its one-sided limit.
+            // At a wall the normal derivative is its one-sided limit.
             let step = 1e-7 * H;
             x[0] = wall + inward * step;
             let inside = support(&family, &grid, &x).expect("inside the box");
@@ -176,7 +176,8 @@ fn values_are_nodal_at_walls_and_the_normal_derivative_has_its_limit() {
     walls_are_nodal::<3>();
 }
 
-/// x² of quadratic and x³ of cubic ones, whose coefficients are x² − h²/4 and x³ − h² x; at the walls they are values.
+/// Quadratic splines reproduce x² and cubic ones x³, with the coefficients x² − h²/4 and x³ − h² x; at the walls the coefficients are the
+/// values.
 #[test]
 fn splines_without_a_knot_at_walls_reproduce_polynomials_of_their_degree() {
     let axis = Axis { origin: 0.0, spacing: H, cells: 9 };
@@ -205,7 +206,7 @@ fn a_node_without_value_but_with_gradient_is_kept() {
     assert_eq!(on_face.nodes, [[1, 1], [2, 1], [1, 2], [2, 2]]);
     assert_eq!(on_face.values[1], 0.0);
     assert!((on_face.gradients[1][0] - 0.8 / H).abs() < 1e-14);
-    // On a node: the node diagonally across has nothing at all.
+    // On a node, the node diagonally opposite has neither value nor gradient.
     let on_node = support(&Linear.into(), &grid, &Vector::from([H, H])).expect("inside the box");
     assert_eq!(on_node.nodes, [[1, 1], [2, 1], [1, 2]]);
 }
@@ -325,7 +326,7 @@ fn impossible_parameters_are_refused() {
     for half_width in [0.0, -0.1, 0.5001, f64::NAN] {
         refused(Gimp { half_width }.validate(2), "the half-width of a GIMP particle over the spacing");
     }
-    // −ln 1e-6 / 1.25 = 11.05: the limit the reference program found in the plane.
+    // −ln 1e-6 / 1.25 = 11.05, the limit that the reference program found in 2D.
     assert!(LmeCircle::new(11.05, 1e-6).validate(2).is_ok());
     let too_local = LmeCircle::new(11.06, 1e-6);
     assert!(matches!(too_local.validate(2), Err(ApproximationError::SupportTooSmall { dimension: 2, .. })));
@@ -335,7 +336,7 @@ fn impossible_parameters_are_refused() {
     assert!(LmeCircle::new(10.0, 1e-6).validate(3).is_err() && LmeCircle::new(10.0, 1e-6).validate(1).is_ok());
 }
 
-/// A coordinate of an axis 0 … `length`, often on a node or extremely close to one or to a wall.
+/// A coordinate of an axis 0 … `length`, often on a node, or extremely close to a node or a wall.
 fn coordinate(cells: u32) -> impl Strategy<Value = f64> {
     let length = f64::from(cells);
     prop_oneof![
@@ -379,7 +380,7 @@ proptest! {
     }
 }
 
-/// Cubic splines that say they reach no further than quadratic ones.
+/// Cubic splines that claim the reach of quadratic splines.
 struct Understated;
 
 impl Validate for Understated {
@@ -401,7 +402,7 @@ impl Separable for Understated {
 #[test]
 fn a_family_that_lists_more_nodes_than_it_says_is_refused() {
     let grid = Grid { origin: Vector::zeros(), spacing: H, cells: [8, 8] };
-    // Next to the walls there are no more than three.
+    // Next to the walls there are at most three nodes along each axis.
     let positions = [[0.2, 0.3], [0.3, 0.2], [2.1, 2.2], [2.2, 2.1]].map(Vector::from);
     for supports in [Supports::new, Supports::plain] {
         assert!(supports(&Understated, &grid, &positions[..2]).is_ok());

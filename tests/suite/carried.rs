@@ -1,5 +1,4 @@
-//! What a grid that is made anew takes over from the one before, besides the state of particles: the force that it does not balance, and the
-//! reactions.
+//! Grid resets: the state of the particles, the out-of-balance force and the reactions that the new grid takes over from the old one.
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::loads::Pressing;
@@ -31,16 +30,16 @@ fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
     scene("elastica.json", &[&short, more].concat())
 }
 
-/// Loaded up to t = 0.5, and resting from then on.
+/// The load grows up to t = 0.5 and is constant from then on.
 const RESTS: &str = "[[0,0],[0.5,1]]";
 
-/// The largest difference of places.
+/// The largest distance between the positions of a particle in the two simulations.
 fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
     let (a, b) = (a.particles.by_id(), b.particles.by_id());
     a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
-/// On a new grid stresses are out of balance. That is carried over: under loads that rest nothing moves.
+/// On a reset grid the stresses are out of balance. This out-of-balance force is carried over, so under constant loads nothing moves.
 #[test]
 fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
     for renewed in [EVERY_STEP, r#"grid.renewed={"strain": 0.05}"#] {
@@ -52,7 +51,7 @@ fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
         assert!(renewals > 1, "{renewals}");
         let loaded = simulation.clone();
         for _ in 0..4 {
-            // What can be looked at beforehand is what the step solves: at Δφ = 0 it is in balance.
+            // The equilibrium of the next step, as the step solves it: at Δφ = 0 its residual vanishes.
             let coming = simulation.coming()?;
             let still = coming.motion(&vec![Vector::zeros(); coming.nodes().len()]);
             let mut residual = coming.equilibrium().residual(&still)?;
@@ -61,13 +60,13 @@ fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
             assert!(largest < 1e-9, "{renewed}: {largest:e}");
             simulation.advance()?;
         }
-        // Newton's tolerance of 1e-12 in residuals, of a beam 6 long and soft in bending.
+        // Newton's tolerance of 1e-12 in residuals, for a beam of length 6 that is soft in bending.
         assert!(apart(&loaded, &simulation) < 1e-8, "{renewed}: {:e}", apart(&loaded, &simulation));
     }
     Ok(())
 }
 
-/// What is carried over is what the step before left: loads that are changed by hand act in full.
+/// The step carries over the out-of-balance force of the last step only: loads that are changed by hand act in full.
 #[test]
 fn loads_changed_between_steps_are_not_taken_for_what_was_in_balance() -> Result<(), Failure> {
     let mut by_hand = beam(RESTS, &[EVERY_STEP])?;
@@ -78,7 +77,7 @@ fn loads_changed_between_steps_are_not_taken_for_what_was_in_balance() -> Result
     }
     let before = by_hand.clone();
     by_hand.loads.surface[0].pressing = Pressing::Traction(Vector::from([0.0, -20.0]));
-    // A copy in another order of its particles.
+    // A copy with another order of its particles.
     let mut reversed = by_hand.clone();
     reversed.rearrange(&(0..by_hand.particles.len() as u32).rev().collect::<Vec<_>>());
     for simulation in [&mut by_hand, &mut doubled, &mut reversed] {
@@ -90,7 +89,7 @@ fn loads_changed_between_steps_are_not_taken_for_what_was_in_balance() -> Result
     Ok(())
 }
 
-/// … and so do laws.
+/// Laws that are changed by hand act in full, too.
 #[test]
 fn other_laws_have_to_be_balanced() -> Result<(), Failure> {
     let mut simulation = beam(RESTS, &[EVERY_STEP])?;
@@ -105,7 +104,7 @@ fn other_laws_have_to_be_balanced() -> Result<(), Failure> {
     Ok(())
 }
 
-/// On every grid: Σ r + Σ f = 0.
+/// Σ r + Σ f = 0 on every grid.
 #[test]
 fn reactions_balance_loads_after_renewals() -> Result<(), Failure> {
     for family in [r#""linear""#, r#"{"bspline": {"degree": 3}}"#] {
@@ -122,7 +121,7 @@ fn reactions_balance_loads_after_renewals() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A bar that is held at one end and turned at the other, up to t = 0.5: what turns it goes on as it was, whatever the grid.
+/// A bar fixed at one end and rotated at the other up to t = 0.5. Forces and torques then stay constant, whatever the grid.
 #[test]
 fn reactions_go_on_over_renewals() -> Result<(), Failure> {
     let turned = json!({
@@ -152,7 +151,7 @@ fn reactions_go_on_over_renewals() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A stretched block whose grip is taken away.
+/// A stretched block. Its prescribed displacement is removed, and the force of that condition must not remain.
 #[test]
 fn what_a_body_has_lost_does_not_hold_it() -> Result<(), Failure> {
     let mut simulation = build::<2>(&pressed(&["left"], -0.05))?;
@@ -163,12 +162,12 @@ fn what_a_body_has_lost_does_not_hold_it() -> Result<(), Failure> {
     let grip = simulation.loads.prescribed.len() - 1;
     simulation.loads.prescribed.truncate(grip);
     simulation.step()?;
-    // What grids made anew have left of their own is small.
+    // The residuals of the reset grids themselves are small.
     assert!(simulation.strain_energy() < 1e-2 * before, "{} of {before}", simulation.strain_energy());
     Ok(())
 }
 
-/// A block that another one pressed on, which is taken away.
+/// A block pressed on by another one, which is then taken away.
 #[test]
 fn a_body_that_has_parted_does_not_hold_another() -> Result<(), Failure> {
     let mut simulation = build::<2>(&pressed(&["left", "right"], 0.1))?;
@@ -192,7 +191,7 @@ fn a_body_that_has_parted_does_not_hold_another() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Blocks of length 1 in a row, the first fixed at x = 0, whose last half is moved by −`by` up to t = 0.5.
+/// Blocks of length 1 in a row, the first fixed at x = 0. The last half of the row is moved by −`by` up to t = 0.5.
 fn pressed(names: &[&str], by: f64) -> serde_json::Value {
     let block = |(k, name): (usize, &&str)| {
         json!({"name": name, "shape": {"box": {"min": [k, 1], "max": [k + 1, 2]}}, "density": 1,
@@ -210,8 +209,8 @@ fn pressed(names: &[&str], by: f64) -> serde_json::Value {
     })
 }
 
-/// Gravity that grows along x, on a block that is moved along x without strain: what holds it says which force acts on it, with x as it
-/// was at the beginning of the step, on every grid.
+/// Gravity that grows along x, on a block moved along x without strain. The reaction shows which force acts on the block: x is the position
+/// at the beginning of the step, on every grid.
 #[test]
 fn a_field_acts_where_a_body_has_come_to() -> Result<(), Failure> {
     for renewed in [json!("never"), json!("every_step"), json!({"strain": 0.1})] {

@@ -1,12 +1,12 @@
-//! How far apart the surfaces of two bodies are when they begin to feel each other: the table of `docs/src/limits.md`, measured.
+//! The distance between the surfaces of two bodies when contact begins: the table of `docs/src/limits.md`, measured.
 
 use crate::support::{Failure, restored};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use serde_json::json;
 
-/// Two bars of 8 cells, 5 cells apart at the start, run into each other at half a cell in a unit of time each. How far apart they are
-/// when the first hundredth of their kinetic energy is gone, in cells; `place` shifts both along the grid.
+/// Two bars of 8 cells collide. They start 5 cells apart, each with half a cell per unit of time. Returns their distance in cells when they
+/// have lost the first hundredth of their kinetic energy; `place` shifts both along the grid.
 fn distance(approximation: &str, place: f64) -> Result<f64, Failure> {
     let bar = |name: &str, start: f64, velocity: f64| {
         let (from, to) = (start + place, start + 8.0 + place);
@@ -40,11 +40,11 @@ fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
         let places = (0..10).map(|tenth| distance(approximation, 0.1 * f64::from(tenth)));
         let found = places.collect::<Result<Vec<_>, Failure>>()?;
         let range = found.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &x| (low.min(x), high.max(x)));
-        // As it is written there: in tenths of a cell, rounded.
+        // The manual gives tenths of a cell, rounded.
         for (found, said) in [(range.0, least), (range.1, most)] {
             assert!((found - said.parse::<f64>()?).abs() < 0.06, "{row}: {found}");
         }
-        // And as `bfree check` says it.
+        // `bfree check` gives the same numbers.
         let functions: bfree::approximation::Parameters = serde_json::from_str(approximation)?;
         assert_eq!(functions.contact_distance(), Some([least.parse()?, most.parse()?]), "{row}");
         rows += 1;
@@ -53,7 +53,8 @@ fn bodies_touch_as_far_apart_as_the_manual_says() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Two blocks, one on the other, without inertia: they are bonded from the start, and a restart does not take them for bodies that have met.
+/// Two blocks, one on the other, without inertia. They are bonded from the start; a restart must not treat them as bodies that have met
+/// later.
 #[test]
 fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
     let block = |name: &str, low: f64| {

@@ -1,4 +1,4 @@
-//! Rayleigh damping: what it takes, at which rate, and what it leaves alone.
+//! Rayleigh damping: the energy it dissipates, its rate, and the quantities it must leave unchanged.
 
 use crate::support::{Failure, scene};
 use bfree::approximation::{Approximation, Bspline};
@@ -19,14 +19,14 @@ use num_dual::Dual64;
 use std::f64::consts::PI;
 use std::num::NonZeroU64;
 
-/// Tight, so that what is left is round-off.
+/// Tight tolerances, so that only round-off remains.
 fn tight() -> NewtonSettings {
     NewtonSettings { relative_tolerance: 1e-13, forcing: Forcing::Fixed(1e-13), ..NewtonSettings::default() }
 }
 
 #[test]
 fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Failure> {
-    // A mass that is not lumped is inverted to a tolerance of 1e-12, twice a step.
+    // A mass that is not lumped is inverted twice per step, to a tolerance of 1e-12.
     for (lumping, bound) in [("time.lumping=1", 1e-12), ("time.lumping=0.4", 80.0 * 1e-12)] {
         let mut simulation = scene::<2>("rebound.json", &[lumping])?;
         let (a, dt) = (0.8, simulation.clock.step());
@@ -58,8 +58,8 @@ fn a_free_rigid_body_slows_down_as_the_trapezoidal_rule_says() -> Result<(), Fai
     Ok(())
 }
 
-/// A bar of Λ + 2G = ρ = 1 and length 1 in its lowest mode, of ω = π: at the beginning it has the velocity `speed`
-/// times its shape. Between two walls that is sin πx; a free bar has cos πx, and flies.
+/// A bar of Λ + 2G = ρ = 1 and length 1 in its lowest mode, ω = π. It starts with the velocity `speed` times the mode shape: sin πx between
+/// two walls; cos πx for a free bar, which also flies.
 fn bar(dt: f64, damping: Rayleigh, speed: f64, free: bool) -> Result<Simulation<1>, Failure> {
     const CELLS: u32 = 32;
     let h = 1.0 / f64::from(CELLS);
@@ -91,7 +91,7 @@ fn bar(dt: f64, damping: Rayleigh, speed: f64, free: bool) -> Result<Simulation<
     })
 }
 
-/// The rate at which the kinetic energy falls from one of its maxima to the next but one: over a whole period.
+/// The rate at which the kinetic energy falls over a whole period: from one of its maxima to the next but one.
 fn rate(steps: u32, damping: Rayleigh) -> Result<f64, Failure> {
     let share = 0.5 * (damping.mass / PI + damping.stiffness * PI);
     let period = 2.0 / (1.0 - share * share).sqrt();
@@ -111,7 +111,7 @@ fn the_lowest_mode_of_a_bar_decays_as_theory_says() -> Result<(), Failure> {
         let exact = damping.mass + damping.stiffness * PI * PI;
         let [coarse, fine] = [40, 160].map(|steps| rate(steps, damping).map(|rate| (rate / exact - 1.0).abs()));
         let (coarse, fine) = (coarse?, fine?);
-        // A quarter of the step, a sixteenth of the error, until that of 32 cells is left.
+        // A quarter of the step gives a sixteenth of the error, until the error of the 32 cells remains.
         assert!(coarse < 1e-2 && fine < 1e-3 && fine < 0.15 * coarse, "{damping:?}: off by {coarse:e} and {fine:e}");
     }
     Ok(())
@@ -134,8 +134,8 @@ fn the_stiffness_part_takes_no_momentum() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The largest defect of kinetic + strain + dissipated − work in a free bar under gravity, over its energy at the
-/// start; and what was dissipated.
+/// The largest defect of kinetic + strain + dissipated − work in a free bar under gravity, over its energy at the start; and the dissipated
+/// energy.
 fn defect(steps: u32, damping: Rayleigh, speed: f64) -> Result<[f64; 2], Failure> {
     let mut simulation = bar(1.0 / f64::from(steps), damping, speed, true)?;
     let g = Vector::from([-0.5 * speed]);
@@ -164,7 +164,7 @@ fn what_damping_takes_is_counted() -> Result<(), Failure> {
     // The trapezoidal rule is of second order.
     let [coarse, middle, fine] = orders(mass, 1e-3)?;
     assert!(coarse < 1e-6 && middle < 0.3 * coarse && fine < 0.3 * middle, "{coarse:e} {middle:e} {fine:e}");
-    // K_n changes from step to step with the strain: of first order, and the less the smaller the motion.
+    // K_n changes with the strain from step to step, so the defect is of first order. It falls with the size of the motion.
     let stiffness = Rayleigh { mass: 0.0, stiffness: 0.04 };
     let [coarse, middle, fine] = orders(stiffness, 1e-3)?;
     assert!(coarse < 1e-5 && middle < 0.6 * coarse && fine < 0.6 * middle, "{coarse:e} {middle:e} {fine:e}");
@@ -173,7 +173,7 @@ fn what_damping_takes_is_counted() -> Result<(), Failure> {
     Ok(())
 }
 
-/// St. Venant and Kirchhoff's solid by its energy alone: without a closed form.
+/// St. Venant–Kirchhoff's law from its energy alone, without a closed form.
 struct Quadratic;
 
 impl Energy for Quadratic {
@@ -219,7 +219,7 @@ fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), F
     let forces = |velocity: &dyn Fn(&Vector<f64, 2>) -> Vector<f64, 2>| -> Result<_, Failure> {
         let mut nodal = Nodal::at_rest(&simulation.particles, &supports);
         nodal.velocity.iter_mut().zip(&positions).for_each(|(v, x)| *v = velocity(x));
-        // v_{n+1} = v_n, also of the dual numbers' real part.
+        // v_{n+1} = v_n, for the real part of the dual numbers too.
         let dphi: Vec<_> = nodal.velocity.iter().map(|v| v * dt).collect();
         let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
         let pieces = equilibrium.terms.pieces();

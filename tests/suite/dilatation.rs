@@ -1,4 +1,4 @@
-//! The mean dilatation of cells: what it is, what is remembered of it, and that bodies with it do not lock.
+//! The mean dilatation of cells: its value, its internal variable, and the absence of locking.
 
 use crate::support::{Failure, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
@@ -35,7 +35,7 @@ fn run(simulation: &mut Simulation<2>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How far the middle of the free edge has come: the mean of the loaded points beside it.
+/// The displacement of the middle of the free edge: the displacement of the loaded point nearest to it.
 fn tip(simulation: &Simulation<2>, start: &Simulation<2>) -> f64 {
     let (now, before) = (simulation.particles.by_id(), start.particles.by_id());
     let away = |p: &usize| (before.position[*p] - Vector::from([48.0, 52.0])).norm();
@@ -43,7 +43,8 @@ fn tip(simulation: &Simulation<2>, start: &Simulation<2>) -> f64 {
     now.position[nearest][1] - before.position[nearest][1]
 }
 
-/// Pressed by its top without moving sideways, a block has one stress: at the loaded surface too, whose points have no volume.
+/// A block is pressed on its top and cannot move sideways, so its stress is uniform. The points of the loaded surface have no volume, and
+/// must show the same stress.
 #[test]
 fn a_loaded_surface_shows_the_stress_of_the_body() -> Result<(), Failure> {
     let given = [
@@ -68,7 +69,7 @@ fn a_loaded_surface_shows_the_stress_of_the_body() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Over several grids, particles that all change their volume alike have their own volume for a mean: θ = J, and the energy is that of the law.
+/// Over several grids, a motion with the same change of volume at all particles: the mean θ equals J, and the energy is that of the law.
 #[test]
 fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Failure> {
     let mut averaged = membrane(0.49, 4.0, 1, &[MEAN, LINEAR])?;
@@ -86,7 +87,7 @@ fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Fail
             let (energy, _) = equilibrium.potential::<f64>(&dphi).ok_or("a potential")??;
             let (at_rest, _) =
                 equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
-            // What a step begins with is what the last one has left.
+            // The energy at the start of a step equals the energy at the end of the last step.
             assert!((at_rest / simulation.strain_energy() - 1.0).abs() < 1e-11 || k == 0, "{at_rest}");
             energies.push(energy);
             let update = Update::new(&Alphas::START, &nodal, &nodal, &[], WallUpdate::Literal, &dphi);
@@ -101,12 +102,12 @@ fn the_mean_of_a_uniform_motion_is_what_every_particle_does() -> Result<(), Fail
         let worst = solid.map(|p| (particles.dilatation[p] - (determinant(&f) - 1.0)).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-12, "grid {k}: {worst}");
     }
-    // A body without it has no room for it.
+    // A body without mean dilatation stores none.
     assert!(pointwise.particles.dilatation.is_empty());
     Ok(())
 }
 
-/// On a grid that is kept the answer does not depend on the steps; on one that is renewed, energies go on as they were.
+/// With one reference configuration the answer does not depend on the number of steps. After a grid reset the energy is continuous.
 #[test]
 fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> {
     let tight = "solver.newton.tolerance=1e-12";
@@ -125,7 +126,7 @@ fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> 
     let equilibrium = renewed.equilibrium(&supports, &nodal, &[], Alphas::START, 0.0);
     let (energy, _) = equilibrium.potential::<f64>(&vec![Vector::zeros(); nodes.len()]).ok_or("a potential")??;
     assert!((energy / renewed.strain_energy() - 1.0).abs() < 1e-11, "{energy} {}", renewed.strain_energy());
-    // And θ is not J.
+    // θ differs from J.
     let particles = &renewed.particles;
     let jacobian = |p: usize| determinant(&(identity::<f64, 2>() + particles.displacement_gradient[p]));
     assert!((0..particles.len()).any(|p| (jacobian(p) - 1.0 - particles.dilatation[p]).abs() > 1e-2));
@@ -194,7 +195,7 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
     Ok(())
 }
 
-/// On a grid that is kept and was new when θ was no longer 1: particles may be put elsewhere in memory between two steps.
+/// A total Lagrangian grid whose reference configuration has θ ≠ 1. The particles may be reordered in memory between two steps.
 #[test]
 fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
     let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.05}"#])?;
@@ -211,7 +212,7 @@ fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The stress that is read at a loaded edge is the body's: its points have the mean dilatation of the cell nearest to them.
+/// The stress shown at a loaded edge is the stress of the body: the points of the edge have the mean dilatation of the nearest cell.
 #[test]
 fn points_of_a_loaded_edge_have_the_dilatation_of_the_nearest_cell() -> Result<(), Failure> {
     let mut simulation = membrane(0.49, 4.0, 1, &[LINEAR, MEAN])?;
@@ -229,7 +230,7 @@ fn points_of_a_loaded_edge_have_the_dilatation_of_the_nearest_cell() -> Result<(
     Ok(())
 }
 
-/// Against nine-node elements with three volumes each, 32 × 32 of them: see the study `locking`, which does it in full.
+/// The reference is a mesh of 32 × 32 nine-node elements with three volumes each. The study `locking` makes the comparison in full.
 #[test]
 fn a_membrane_that_keeps_its_volume_does_not_lock() -> Result<(), Failure> {
     for (shape, bound) in [(LINEAR, 0.02), ("approximation={\"bspline\":{\"degree\":3}}", 0.01)] {
@@ -246,7 +247,8 @@ fn a_membrane_that_keeps_its_volume_does_not_lock() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The end of the membrane of ν = 0.499 by 32 × 32 nine-node elements with a volume linear in each (`verification/reference/cook_mixed.py`).
+/// The displacement of the end of the membrane with ν = 0.499: 32 × 32 nine-node elements with a linear volume in each
+/// (`verification/reference/cook_mixed.py`).
 const KNOWN: f64 = 12.003;
 
 #[test]

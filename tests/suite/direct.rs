@@ -1,4 +1,4 @@
-//! The direct solve: what it may not change, and where it is.
+//! The direct solver: the results that it must not change, and the builds that have it.
 
 #[cfg(not(feature = "direct"))]
 #[test]

@@ -50,7 +50,7 @@ fn corner(reference: &Value, approximation: Approximation) -> Result<Simulation<
             ..Loads::default()
         },
         settings: Settings {
-            // Tight, so that every iterate is that of a direct solver.
+            // Tight tolerances, so that every iterate equals that of a direct solver.
             newton: NewtonSettings {
                 relative_tolerance: 3e-14,
                 forcing: Forcing::Fixed(1e-13),
@@ -124,8 +124,8 @@ fn five_steps_agree_with_an_independent_program() -> Result<(), Failure> {
 /// transfer matrix, with the shear coefficient 10 (1 + ν')/(12 + 11 ν'), ν' = ν/(1 − ν).
 const TIMOSHENKO: f64 = 0.518_973_722_897;
 
-/// A cantilever that its weight sets in motion, over ten periods: what its balance of energy is at the end, beside the largest energy, and its
-/// period beside Timoshenko's.
+/// A cantilever set in motion by its weight, over ten periods. Returns the energy balance at the end over the largest energy, and the
+/// period over Timoshenko's.
 fn vibrated(settings: &[&str]) -> Result<[f64; 2], Failure> {
     let text = r#"{"grid": {"size": [10, 4], "spacing": 0.25}, "time": {"step": 0.1, "end": 121},
              "bodies": [{"name": "beam", "shape": {"box": {"min": [0, 1.5], "max": [8, 2.5]}}, "density": 1,
@@ -156,7 +156,7 @@ fn vibrated(settings: &[&str]) -> Result<[f64; 2], Failure> {
 fn a_cantilever_that_vibrates_keeps_its_energy_and_its_frequency_by_default() -> Result<(), Failure> {
     let [balance, period] = vibrated(&[])?;
     assert!(balance.abs() < 5e-3 && period.abs() < 3e-3, "{balance} {period}");
-    // The manual describes a grid that is reset in every step, of which a run warns.
+    // The manual describes a grid that is reset in every step; a run warns of it.
     let [balance, period] = vibrated(&[r#"grid.renewed="every_step""#])?;
     assert!((balance + 0.025).abs() < 0.002 && (period - 0.009).abs() < 0.001, "{balance} {period}");
     Ok(())

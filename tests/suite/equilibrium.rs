@@ -1,4 +1,5 @@
-//! The equilibrium of one step, asked directly: whether its own check sees a wrong tangent, and what its magnitudes are.
+//! The equilibrium of one step, used directly: does its own check detect a wrong tangent, and which round-off bounds (magnitudes) does it
+//! give?
 
 use crate::support::Failure;
 use bfree::approximation::{Approximation, Linear};
@@ -17,13 +18,13 @@ use bfree::solver::{NonlinearProblem, Precision};
 use bfree::tensor::{Deformation, Tensor, Vector, outer, scaled};
 use std::sync::Arc;
 
-/// Where a law lies.
+/// The function of a law that is wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Nothing,
     /// S is larger than the S of the tangents.
     Stress,
-    /// The same, of plain numbers alone.
+    /// S is larger for plain numbers only.
     PlainStress,
     /// ℂ is larger than ∂S/∂E.
     Elasticity,
@@ -33,7 +34,7 @@ enum Fault {
     Closed,
 }
 
-/// Ciarlet's law, with a closed form or without, and a millionth too much where it lies.
+/// Ciarlet's law, with a closed form or without. The function named by `fault` is a millionth too large.
 #[derive(Clone, Copy, Debug)]
 struct Faulty {
     law: NeoHookean,
@@ -45,7 +46,7 @@ struct Faulty {
 const EXCESS: f64 = 1.0 + 1e-6;
 
 impl Faulty {
-    /// The factor on what lies.
+    /// The factor on the result of the function `here`.
     fn factor(&self, here: Fault) -> f64 {
         if self.fault == here { self.factor } else { 1.0 }
     }
@@ -72,7 +73,7 @@ impl Elastic for Faulty {
         v: &Vector<T, D>,
         b: &Vector<T, D>,
     ) -> Tensor<T, D> {
-        // As it follows from ℂ.
+        // ℂmat as it follows from ℂ.
         let mut density = Tensor::<T, D>::zeros();
         for k in 0..D {
             let a = Vector::<T, D>::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
@@ -108,7 +109,7 @@ struct Cloud<const D: usize> {
 
 const SECOND: usize = 7;
 
-/// A cloud whose second body has a law that lies.
+/// A cloud whose second body has a wrong law.
 fn cloud<const D: usize>(stress: f64, fault: Fault, closed: bool, factor: f64) -> Result<Cloud<D>, Failure> {
     let law = NeoHookean::ciarlet(Lame::new(1.5 * stress, stress)?);
     let body = |fault| Body {
@@ -159,12 +160,12 @@ impl<const D: usize> Cloud<D> {
         Equilibrium::new(self.step(lumping), prescribed)
     }
 
-    /// A small increment without pattern.
+    /// A small irregular increment.
     fn increment(&self) -> Vec<Vector<f64, D>> {
         direction(self.nodes(), 5).iter().map(|u: &Vector<f64, D>| u * 0.03).collect()
     }
 
-    /// Nothing moves and nothing is deformed.
+    /// The cloud without velocity and without deformation.
     fn at_rest(mut self) -> Self {
         self.particles.displacement_gradient.fill(Tensor::zeros());
         self.nodal.velocity.fill(Vector::zeros());
@@ -180,8 +181,7 @@ fn mismatch(result: Result<(), CheckError>) -> Result<TangentMismatch, Failure> 
     }
 }
 
-/// The pieces whose products are not the derivatives of their residuals, by a hundredth of the excess of a law that
-/// lies.
+/// The pieces whose products differ from the derivatives of their residuals by a hundredth of the excess of a wrong law.
 fn wrong_pieces<const D: usize>(
     equilibrium: &Equilibrium<'_, D, Faulty>,
     dphi: &[Vector<f64, D>],
@@ -202,8 +202,8 @@ fn wrong_pieces<const D: usize>(
 }
 
 fn a_wrong_law_is_found<const D: usize>(stress: f64) -> Result<(), Failure> {
-    // Where the law of the second body lies, whether it has a closed form, and the pieces that are wrong then: the
-    // first is reported.
+    // The fault in the law of the second body, whether the law has a closed form, and the pieces that are wrong. The check reports the
+    // first wrong piece.
     let both: &[&str] = &["stress", "material"];
     for (fault, closed, wrong) in [
         (Fault::Nothing, true, &[][..]),
@@ -251,7 +251,7 @@ fn a_run_that_checks_its_tangent_finds_a_wrong_law_in_every_unit_of_stress() -> 
 }
 
 fn numbers_without_room_are_found<const D: usize>() -> Result<(), Failure> {
-    // ℂ says how large a tangent in single precision is, and no more if there is a closed form.
+    // ℂ only sets the scale of a tangent in single precision if there is a closed form.
     for factor in [1e60, 1e-60] {
         let mut cloud = cloud::<D>(1.0, Fault::Elasticity, true, factor)?;
         cloud.bodies[0].law.fault = Fault::Elasticity;
@@ -293,7 +293,7 @@ fn blocks_are_columns<const D: usize>() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Frozen once, product and blocks share their numbers: no law can make one wrong and not the other.
+/// The linearisation is computed once, and product and blocks share its numbers. So no law can make one wrong and leave the other right.
 #[test]
 fn diagonal_blocks_are_the_columns_of_products_with_unit_vectors() -> Result<(), Failure> {
     blocks_are_columns::<1>()?;
@@ -355,7 +355,7 @@ fn flat<const D: usize>(field: &[Vector<f64, D>]) -> Vec<f64> {
     field.iter().flat_map(|x| x.iter().copied().collect::<Vec<_>>()).collect()
 }
 
-/// The magnitude over the norm of the residual; Newton's method is told the same one.
+/// The magnitude over the norm of the residual. Newton's method must receive the same magnitude.
 fn share<const D: usize>(equilibrium: &Equilibrium<'_, D, Faulty>, dphi: &[Vector<f64, D>]) -> Result<f64, Failure> {
     let mut residual = equilibrium.residual::<f64>(dphi)?;
     equilibrium.clear_prescribed(&mut residual);
@@ -366,7 +366,7 @@ fn share<const D: usize>(equilibrium: &Equilibrium<'_, D, Faulty>, dphi: &[Vecto
 
 fn magnitudes<const D: usize>() -> Result<(), Failure> {
     let moving = truthful::<D>(3.0)?;
-    // Many contributions of both signs: more than what is left of them.
+    // Contributions of both signs cancel, so the magnitude exceeds the residual.
     assert!(share(&moving.equilibrium(1.0, &[]), &moving.increment())? > 1.0);
     let mut cloud = moving.at_rest();
     let rest = vec![Vector::zeros(); cloud.nodes()];
@@ -378,10 +378,10 @@ fn magnitudes<const D: usize>() -> Result<(), Failure> {
     cloud.loads = Loads { surface, ..Loads::default() };
     alone("pressure", share(&cloud.equilibrium(1.0, &[]), &rest)?);
     cloud.loads = Loads::default();
-    // α₁ Δφ: the same Δφ everywhere strains nothing.
+    // α₁ Δφ: a uniform Δφ causes no strain.
     let carried = vec![Vector::repeat(-0.1); cloud.nodes()];
     alone("α₁", share(&cloud.equilibrium(1.0, &[]), &carried)?);
-    // α₂ v_n and α₃ a_n, α₃ of either sign.
+    // α₂ v_n and α₃ a_n, with both signs of α₃.
     for a3 in [0.7, -0.7] {
         for velocity in [true, false] {
             let mut nodal = cloud.nodal.clone();
@@ -410,7 +410,7 @@ fn the_potential_without_loads_is_a_sum_of_nothing_negative() -> Result<(), Fail
         let of = |equilibrium: &Equilibrium<'_, 2, Faulty>| equilibrium.potential::<f64>(&dphi).ok_or("no potential");
         let (potential, magnitude) = of(&cloud.equilibrium(lumping, &[]))??;
         assert!(potential > 0.0 && (magnitude / potential - 1.0).abs() < 1e-14, "{potential} {magnitude}");
-        // A load adds minus its work to the one and the magnitudes of its parts to the other.
+        // A load subtracts its work from the potential and adds the magnitudes of its parts to the bound.
         let forces = direction::<2>(cloud.particles.len(), 9);
         cloud.loads.field = Some(ForceField(Arc::new(move |id, _, _| forces[id])));
         let equilibrium = cloud.equilibrium(lumping, &[]);
@@ -423,7 +423,7 @@ fn the_potential_without_loads_is_a_sum_of_nothing_negative() -> Result<(), Fail
         assert!(work.abs() > 1e-3 * potential, "{work}");
         assert!((loaded - (potential - work)).abs() < 1e-13 * potential, "{loaded}");
         assert!((larger - (magnitude + size)).abs() < 1e-13 * magnitude, "{larger}");
-        // Under follower pressure there is none.
+        // Under follower pressure there is no potential.
         cloud.loads.surface = pressures(&[0], Vector::zeros());
         assert!(cloud.equilibrium(lumping, &[]).potential::<f64>(&dphi).is_none());
     }

@@ -1,4 +1,4 @@
-//! The programs of `examples/`, as modules: what is generic in them is compiled with the rest of the tests.
+//! The programs of `examples/`, as modules: their generic code is compiled together with the rest of the tests.
 
 use crate::support::Failure;
 

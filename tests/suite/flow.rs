@@ -1,4 +1,4 @@
-//! Laws that flow: closed forms at a point, and whole bodies that yield.
+//! Laws with plastic or viscous flow: closed forms at a point, and whole bodies that yield.
 
 use crate::support::{Failure, Random, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
@@ -16,7 +16,7 @@ use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity};
 use serde_json::Value;
 use std::num::NonZeroU64;
 
-/// A point that is deformed step by step, and remembers.
+/// A material point, deformed step by step, with its internal variables.
 struct Point<L> {
     law: L,
     memory: Vec<f64>,
@@ -52,8 +52,8 @@ fn von_mises(yield_stress: Hardening) -> Result<Plastic<VonMises>, Failure> {
     Ok(Plastic { solid: solid()?, criterion: VonMises { yield_stress } })
 }
 
-/// Uniaxial strain ε = ln λ: q = 2G ε until σ₀; then Δp = (2G ε − σ₀)/(3G + H), q = σ₀ + H p, and τ = K ε + ⅔ q. Back, q falls by 2G for a strain
-/// of 1 until it is −σ_y.
+/// Uniaxial strain ε = ln λ: q = 2G ε until σ₀; then Δp = (2G ε − σ₀)/(3G + H), q = σ₀ + H p, and τ = K ε + ⅔ q. On unloading, q falls with
+/// the slope 2G until it reaches −σ_y.
 #[test]
 fn uniaxial_yield_and_reversal_have_a_closed_form() -> Result<(), Failure> {
     let (initial, linear) = (20.0, 50.0);
@@ -75,7 +75,8 @@ fn uniaxial_yield_and_reversal_have_a_closed_form() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Proportional stretching at constant volume, by one step or by many: radial return is exact, and Voce's strength is met at its own p.
+/// Proportional stretching at constant volume, in one step or in many: radial return is exact, and the stress satisfies Voce's hardening at
+/// its own p.
 #[test]
 fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
     let hardening = Hardening { initial: 20.0, linear: 10.0, saturation: 30.0, rate: 8.0 };
@@ -96,7 +97,7 @@ fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
         let flowed = &point.memory[2..];
         let volume = (1.0 + flowed[0]) * (1.0 + flowed[1]) * (1.0 + flowed[2]);
         assert!((volume - 1.0).abs() < 1e-13, "det C_p = 1: {volume}");
-        // All that was spent: ∫ σ_y dp.
+        // The plastic work: ∫ σ_y dp.
         let lost = point.recall("dissipated").unwrap_or(f64::NAN);
         assert!((lost / hardening.work(p) - 1.0).abs() < 1e-12);
         results.push(q);
@@ -105,7 +106,8 @@ fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
     Ok(())
 }
 
-/// On the cone √J₂ + η p = ξ c, and the flow dilates by η̄/√… of its shear: tr Δε_p = η̄ Δγ with ε̄ = ξ Δγ. Beyond, the apex p = c ξ/η.
+/// On the cone √J₂ + η p = ξ c. The plastic flow dilates by η̄/√… of its shear: tr Δε_p = η̄ Δγ with ε̄ = ξ Δγ. Beyond the cone, the apex p
+/// = c ξ/η.
 #[test]
 fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure> {
     let (phi, psi, c) = (35.0_f64, 12.0_f64, 5.0);
@@ -146,8 +148,8 @@ fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure>
     Ok(())
 }
 
-/// Sheared in plane strain until nothing but flow is left, soil is as strong as Mohr and Coulomb say: (τ₁ − τ₂)/2 + (τ₁ + τ₂)/2 sin φ = c cos φ in the
-/// plane. The cone through the compressive edges is stronger, by 6/(√3 (3 − sin φ)).
+/// Plane-strain shear up to pure plastic flow. The strength of the soil is then Mohr–Coulomb's: (τ₁ − τ₂)/2 + (τ₁ + τ₂)/2 sin φ = c cos φ
+/// in the plane. The cone through the compressive edges is stronger, by 6/(√3 (3 − sin φ)).
 #[test]
 fn the_cone_of_plane_strain_has_mohr_and_coulomb_s_strength_there() -> Result<(), Failure> {
     let (phi, c) = (25.0_f64, 5.0);
@@ -170,7 +172,7 @@ fn the_cone_of_plane_strain_has_mohr_and_coulomb_s_strength_there() -> Result<()
     Ok(())
 }
 
-/// G∞ + Σ G e^{−t/τ_r} of what is held, however long the steps.
+/// Relaxation at constant strain: G∞ + Σ G e^{−t/τ_r}, for steps of any length.
 #[test]
 fn relaxation_is_exact() -> Result<(), Failure> {
     let branches = vec![Branch { shear: 3.0, relaxation_time: 0.5 }, Branch { shear: 2.0, relaxation_time: 20.0 }];
@@ -185,7 +187,7 @@ fn relaxation_is_exact() -> Result<(), Failure> {
         let exact = branches.iter().fold(1.0, |sum, one| sum + one.shear * (-time / one.relaxation_time).exp());
         assert!((modulus / exact - 1.0).abs() < 1e-8, "{modulus} instead of {exact} at {time}");
     }
-    // At large strain, in the axes of the strain: the difference of two principal stresses of a branch falls by e^{−t/τ_r}.
+    // At large strain, along the principal axes of the strain: in one branch, the difference of two principal stresses falls by e^{−t/τ_r}.
     let only = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?), vec![branches[0]]).ok_or("elastic")?;
     let base = Point::new(Material::from(NeoHookean::ciarlet(Lame::new(10.0, 1.0)?)));
     let f = Tensor::<f64, 3>::new(1.5, 0.3, 0.0, -0.2, 0.8, 0.1, 0.0, 0.0, 1.1);
@@ -196,7 +198,8 @@ fn relaxation_is_exact() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Under a constant shear stress γ(t) = (τ/G∞) (1 − G₁/(G∞ + G₁) e^{−t/τ_c}), τ_c = τ_r (G∞ + G₁)/G∞: of first order in Δt, and its limit exact.
+/// Under a constant shear stress γ(t) = (τ/G∞) (1 − G₁/(G∞ + G₁) e^{−t/τ_c}), τ_c = τ_r (G∞ + G₁)/G∞: of first order in Δt. The
+/// extrapolated limit is exact.
 #[test]
 fn creep_converges_to_its_closed_form() -> Result<(), Failure> {
     let (base, shear, relaxation_time, time, stress) = (1.0, 3.0, 0.5, 1.5, 1e-8);
@@ -204,7 +207,7 @@ fn creep_converges_to_its_closed_form() -> Result<(), Failure> {
         let branch = Branch { shear, relaxation_time };
         let law = Viscoelastic::new(NeoHookean::ciarlet(Lame::new(10.0, base)?), vec![branch]).ok_or("elastic")?;
         let (mut point, mut strain) = (Point::new(law), 0.0);
-        // The load comes at once.
+        // The first step has Δt = 0: the load acts at once.
         for dt in std::iter::once(0.0).chain(std::iter::repeat_n(time / f64::from(steps), steps as usize)) {
             for _ in 0..4 {
                 let f = identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0);
@@ -251,8 +254,8 @@ fn run(simulation: &mut Simulation<2>) -> Result<(Vec<usize>, f64), Failure> {
     Ok((iterations, yielding))
 }
 
-/// What a new grid carries over is what is out of balance at t_n, and not what will relax in the step: a bar under a load that rests creeps
-/// on a grid that is new in every step as on one that is kept.
+/// A reset grid carries over the out-of-balance force at t_n, without the relaxation of the coming step. So a bar under a constant load
+/// creeps equally with a reset in every step and without one.
 #[test]
 fn a_bar_creeps_on_new_grids_as_on_one_that_is_kept() -> Result<(), Failure> {
     let crept = |renewed: &str| -> Result<[f64; 2], Failure> {
@@ -295,7 +298,7 @@ fn bodies_that_flow_have_exact_tangents_and_converge() -> Result<(), Failure> {
     Ok(())
 }
 
-/// stored + lost − work: the trapezoidal rule of the work, and Δt of relaxation, go with the steps.
+/// stored + lost − work. Its error comes from the trapezoidal rule for the work and from the relaxation per step, and falls with the step.
 #[test]
 fn energy_is_stored_or_lost() -> Result<(), Failure> {
     for (material, order) in [(METAL, 1.5), (SOIL, 0.7), (POLYMER, 0.7)] {
@@ -430,7 +433,7 @@ fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
         assert!(message.contains(key) && message.contains(words), "{text}: {message}");
         assert_eq!(problems.list.len(), 1, "{message}");
     }
-    // A criterion as a scene writes it is the one in code.
+    // A criterion read from a scene equals the criterion in code.
     let given: Parameters =
         serde_json::from_str(r#"{"von_mises":{"elastic":{"young":1000,"poisson":0.3},"yield_stress":{"initial":2}}}"#)?;
     let law = given.law(&mut Problems::default(), "material").ok_or("good constants")?;

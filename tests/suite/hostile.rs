@@ -1,4 +1,4 @@
-//! What nobody should give to the program, and somebody will.
+//! Invalid and malicious input to the program.
 
 use crate::images;
 use crate::support::{Failure, Random};
@@ -22,7 +22,7 @@ fn shipped() -> Result<Vec<String>, Failure> {
     paths.iter().map(|path| Ok(std::fs::read_to_string(path)?)).collect()
 }
 
-/// What takes the place of a value. None of it makes a sound scene much larger.
+/// A value that replaces another one. No such value makes a valid scene much larger.
 fn junk(random: &mut Random) -> Value {
     let list = [
         Value::Null,
@@ -90,7 +90,7 @@ fn change(value: &mut Value, pick: &mut u64, random: &mut Random) -> bool {
             let key = random.of(&keys).clone();
             let inner = object.remove(&key);
             match what {
-                // without it, misspelt, with another's name, with an unknown one beside it
+                // The key is removed, misspelt, replaced by another key, or joined by an unknown one.
                 0 => {}
                 1 => drop(object.insert(key.chars().rev().collect(), inner.unwrap_or_default())),
                 2 => drop(object.insert(random.of(&keys).clone(), inner.unwrap_or_default())),
@@ -156,7 +156,7 @@ fn check(scene: &Path) -> Result<Output, Failure> {
     Ok(Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_bfree")]).arg(scene).output()?)
 }
 
-/// 0, or 2 with a message that names the file, and the key or the line.
+/// Exit code 0, or 2 with a message that names the file and the key or the line.
 #[cfg(unix)]
 fn judged(path: &Path, text: &str) -> Result<bool, Failure> {
     let output = check(path)?;
@@ -218,7 +218,7 @@ fn two_hundred_mutated_scenes_are_judged_within_a_second() -> Result<(), Failure
 fn a_gigabyte_is_refused_before_it_is_read() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("large.json");
-    // Sparse: it takes no room on the disk, but reading it would take a while.
+    // A sparse file takes no space on the disk, but reading it would take a while.
     std::fs::File::create(&path)?.set_len(1 << 30)?;
     let start = Instant::now();
     let error = scene::read_file(&path, &[]).expect_err("a gigabyte");
@@ -228,7 +228,7 @@ fn a_gigabyte_is_refused_before_it_is_read() -> Result<(), Failure> {
     let message = String::from_utf8(output.stderr)?;
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("large.json") && message.contains("1073741824 bytes"), "{message}");
-    // One line of a gigabyte in a particle file is left after four kilobytes.
+    // A particle file with one line of a gigabyte: reading stops after four kilobytes.
     let text = r#"{"grid": {"size": [4, 4], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "bodies": [{"name": "a",
         "particles": {"file": "large.json"}, "density": 1, "material": {"neo_hookean": {"bulk": 1, "shear": 1}}}]}"#;
     let scene = folder.path().join("scene.json");
@@ -293,7 +293,7 @@ fn moduli_and_densities_near_the_least_number_run_or_are_refused_by_key() -> Res
             );
         }
     }
-    // In free flight, soft or not so stiff that a step is nothing but round-off beside it.
+    // Free flight of a soft body, or of one whose stiffness does not reduce the step to round-off.
     let values = ["1e-99", "1e-60", "1", "1e60", "1e99"];
     for (i, density) in values.iter().enumerate() {
         for young in &values[..=i] {
@@ -302,14 +302,14 @@ fn moduli_and_densities_near_the_least_number_run_or_are_refused_by_key() -> Res
                 simulation.step().map_err(|error| format!("{density} {young}: {error}"))?;
             }
             let off = simulation.particles.velocity.iter().map(|v| (v[0] - 1.0).abs()).fold(0.0, f64::max);
-            // Newton's method stops at 1e-9 of what it began with.
+            // Newton's method stops at 1e-9 of the initial residual.
             assert!(off < 1e-8, "{density} {young}: {off}");
         }
     }
     Ok(())
 }
 
-/// Whether the particles of a scene are so few that building it is a matter of milliseconds.
+/// Whether a scene has few enough particles to be built in milliseconds.
 fn small(scene: &Scene) -> bool {
     let cells: f64 = scene.grid.cells().into_iter().flatten().map(f64::from).product();
     let dimension = scene.dimension() as i32;
@@ -348,7 +348,7 @@ fn checkpointed(folder: &Path) -> Result<(Identity, Simulation<2>, Vec<u8>), Fai
     Ok((identity, simulation, bytes))
 }
 
-/// More inputs, and what became of them: `BFREE_FUZZ=1000000 cargo test --release --test suite hostile::fuzz -- --nocapture`
+/// More inputs, with counts of the outcomes: `BFREE_FUZZ=1000000 cargo test --release --test suite hostile::fuzz -- --nocapture`
 #[test]
 fn fuzz() -> Result<(), Failure> {
     let inputs = std::env::var("BFREE_FUZZ").map_or(Ok(10_000), |inputs| inputs.parse::<u64>())?;

@@ -1,4 +1,4 @@
-//! Pictures and scans as shapes: against sums over their pixels, and files that are none.
+//! Pictures and scans as shapes: comparison with sums over their pixels, and invalid files.
 
 use crate::support::{Failure, Random};
 use bfree::grid::Grid;
@@ -25,7 +25,7 @@ pub(crate) fn grey(size: [u32; 2], bytes: &[u8]) -> Result<Vec<u8>, Failure> {
     png(size, png::ColorType::Grayscale, png::BitDepth::Eight, bytes)
 }
 
-/// A body of pixels of the values, for a grid of two or three dimensions.
+/// A body made of the pixels with the given values, for a grid of two or three dimensions.
 pub(crate) fn body(name: &str, image: &Value) -> Value {
     json!({"name": name, "shape": {"image": image}, "density": 2, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
 }
@@ -38,7 +38,7 @@ pub(crate) fn scene_of(size: &[u32], bodies: &[Value], more: Value) -> String {
     scene.to_string()
 }
 
-/// What reading and building says.
+/// The error message of reading or building the scene.
 fn refusal<const D: usize>(text: &str, folder: &Path) -> Result<String, Failure> {
     match scene::read(text, &[]) {
         Err(error) => Ok(error.to_string()),
@@ -55,7 +55,7 @@ fn random_mask<const D: usize>(random: &mut Random, count: [usize; 3]) -> Option
     Some((Pixels::new(Vector::repeat(1.0), max, mask)?, inside))
 }
 
-/// The distance from the nearest pixel of the other kind, one by one; around the picture is nothing.
+/// The distance to the nearest pixel of the other kind, by a search over all pixels. Outside the picture there is no body.
 fn distance<const D: usize>(inside: &[bool], count: [usize; 3], x: &Vector<f64, D>) -> f64 {
     let edge = |k: usize| [2.0, 1.5, 3.0][k] / count[k] as f64;
     let padded = count.map(|n| n + 2);
@@ -68,7 +68,7 @@ fn distance<const D: usize>(inside: &[bool], count: [usize; 3], x: &Vector<f64, 
     for i in 0..padded.iter().product::<usize>() {
         let place = [i % padded[0], i / padded[0] % padded[1], i / padded[0] / padded[1]];
         let away = Vector::<f64, D>::from_fn(|k, _| {
-            // Padding has no end.
+            // The empty surroundings of the picture have no end.
             let from = if place[k] == 0 { f64::NEG_INFINITY } else { 1.0 + (place[k] as f64 - 1.0) * edge(k) };
             let to = if place[k] == padded[k] - 1 { f64::INFINITY } else { 1.0 + place[k] as f64 * edge(k) };
             (from - x[k]).max(x[k] - to).max(0.0)
@@ -90,7 +90,7 @@ fn distances_in<const D: usize>(count: [usize; 3]) -> Result<(), Failure> {
             let expected = distance(&inside, count, &x);
             assert!((d - expected).abs() < 1e-13, "{x}: {d} for {expected}");
             assert!((normal.norm() - 1.0).abs() < 1e-13);
-            // The foot lies on the surface, and the normal leads out of it.
+            // The foot point lies on the surface, and the normal points outward.
             assert!(shape.signed_distance(&(x - normal * d)).abs() < 1e-13);
             assert!(shape.signed_distance(&(x + normal * (1e-9 - d))) > 0.0);
         }
@@ -109,7 +109,7 @@ fn parts_of_boxes_by_pixels_and_by_the_planes_of_their_faces_agree() -> Result<(
     let mut random = Random(6);
     let (pixels, _) = random_mask::<2>(&mut random, [13, 8, 1]).ok_or("a mask")?;
     let direct = Shape::from(pixels);
-    // Turned by nothing, it no longer knows its rows.
+    // Inside `Similar`, even with no rotation, the shape no longer uses its rows of pixels.
     let planes = Shape::from(Similar {
         of: Box::new(direct.clone()),
         about: Vector::zeros(),
@@ -146,7 +146,7 @@ fn a_picture_turned_and_cut_keeps_its_area() -> Result<(), Failure> {
 #[test]
 fn bodies_by_label_have_the_volume_of_their_pixels_and_lie_where_one_sees_them() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
-    // A grain of 7 at the top left, one of 9 around it, and nothing at the lower edge.
+    // A grain of label 7 at the top left, a grain of label 9 around it, and no grain at the lower edge.
     let size = [50_u32, 40];
     let label = |i: u32| match (i % size[0], i / size[0]) {
         (_, 30..) => 0,
@@ -198,7 +198,7 @@ fn voxels_run_along_x_first_and_have_their_volume() -> Result<(), Failure> {
     assert!((filled.volume / (0.125 * 4.0 * 3.0 * 3.0) - 1.0).abs() < 1e-12, "{filled}");
     let shape = scene.bodies[0].shape.as_ref().and_then(|shape| shape.build::<3>()).ok_or("a shape")?;
     assert_eq!(shape.bounding_box(), (Vector::from([1.0, 2.0, 1.0]), Vector::from([3.0, 3.5, 2.5])));
-    // Gauss's points, too.
+    // Gauss points as well.
     let gauss = Filling { per_axis: 2, layout: Layout::Gauss, ..Filling::default() };
     let volume: f64 = fill(&simulation.grid, &shape, gauss)?.iter().map(|seed| seed.volume).sum();
     assert!((volume / filled.volume - 1.0).abs() < 1e-12, "{volume}");
@@ -248,7 +248,7 @@ fn files_that_give_no_shape_are_refused_with_what_is_allowed() -> Result<(), Fai
     write("cut.png", &good[..good.len() - 20])?;
     write("text.png", b"not a picture")?;
     write("short.raw", &[1; 7])?;
-    // Its header promises 10⁸ pixels, and there are 70 bytes.
+    // The header promises 10⁸ pixels, but the file has 70 bytes.
     let mut huge = good.clone();
     huge[16..24].copy_from_slice(&[0, 0, 39, 16, 0, 0, 39, 16]);
     let crc = crc32fast::hash(&huge[12..29]).to_be_bytes();
@@ -294,7 +294,7 @@ fn files_that_give_no_shape_are_refused_with_what_is_allowed() -> Result<(), Fai
         let message = deep("short.raw", size)?;
         assert!(message.contains(words), "{message}");
     }
-    // A pipe is not waited for, a folder not read.
+    // The program does not wait for a pipe and does not read a folder.
     std::fs::create_dir(folder.path().join("folder.png"))?;
     assert!(flat("folder.png", [7, 7])?.contains("is no regular file"));
     Ok(())
@@ -319,7 +319,7 @@ fn damaged_pictures_are_refused_or_read_and_nothing_worse() -> Result<(), Failur
                 _ => damaged[at] = random.below(256) as u8,
             }
         }
-        // The checksum of the header is made right again, so that what it says is believed.
+        // The checksum of the header is corrected, so that the reader accepts the damaged header.
         if damaged.len() > 33 && random.below(2) == 0 {
             let crc = crc32fast::hash(&damaged[12..29]).to_be_bytes();
             damaged[29..33].copy_from_slice(&crc);

@@ -1,4 +1,4 @@
-//! A grid that is kept: answers that do not depend on the number of steps, and when it is made anew all the same.
+//! Total Lagrangian steps on one grid: the answer does not depend on the number of steps. Tests of the conditions for a grid reset.
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::kept::Renewal;
@@ -55,7 +55,7 @@ fn run<const D: usize>(simulation: &mut Simulation<D>) -> Result<Vec<bool>, Fail
     Ok(renewed)
 }
 
-/// The largest difference of places.
+/// The largest distance between the positions of a particle in the two simulations.
 fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
     let (a, b) = (a.particles.by_id(), b.particles.by_id());
     a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
@@ -73,12 +73,12 @@ fn the_answer_does_not_depend_on_the_number_of_load_steps() -> Result<(), Failur
             let mut more = beam(steps, &[&family])?;
             let renewed = run(&mut more)?;
             assert_eq!(renewed.iter().filter(|&&renewed| renewed).count(), 1, "the first one alone");
-            // Newton's tolerance of 1e-12 in residuals, of a beam 6 long and soft in bending.
+            // Newton's tolerance of 1e-12 in residuals, for a beam of length 6 that is soft in bending.
             assert!(apart(&one, &more) < 1e-8, "{family}, {steps} steps: {:e}", apart(&one, &more));
             let ratio = more.strain_energy() / one.strain_energy();
             assert!((ratio - 1.0).abs() < 1e-8, "{family}, {steps} steps: {ratio}");
         }
-        // Renewed, it does.
+        // With a grid reset in every step, the answer depends on the number of steps.
         let mut renewed = beam(7, &[&family, r#"grid.renewed="every_step""#])?;
         assert!(run(&mut renewed)?.iter().all(|&renewed| renewed) && renewed.kept.is_none());
         assert!(apart(&one, &renewed) > 1e-5, "{family}: {:e}", apart(&one, &renewed));
@@ -88,7 +88,6 @@ fn the_answer_does_not_depend_on_the_number_of_load_steps() -> Result<(), Failur
 
 #[test]
 fn the_work_along_the_path_is_what_is_stored() -> Result<(), Failure> {
-    // Ghost stiffness stores too, and gives it back: it is in `dissipated`.
     let balance = |steps| -> Result<f64, Failure> {
         let mut simulation = beam(steps, &[])?;
         run(&mut simulation)?;
@@ -96,7 +95,7 @@ fn the_work_along_the_path_is_what_is_stored() -> Result<(), Failure> {
         Ok((stored / work - 1.0).abs())
     };
     let (few, many) = (balance(8)?, balance(16)?);
-    // The trapezoidal rule in the load.
+    // The error of the trapezoidal rule for the work of the load.
     assert!(few < 0.02 && few / many > 3.0, "{few} {many}");
     Ok(())
 }
@@ -113,7 +112,7 @@ fn a_strain_makes_it_anew() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A block that hangs from its top and is lowered onto a floor at which nothing was.
+/// A block hangs from its top and is lowered onto a floor. At the start no particle has nodes of the floor.
 #[test]
 fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
     let lowered = r#"prescribed=[{"region":{"half_space":{"point":[0,1.3],"normal":[0,-1]}},"displacement":[[0,[0,0]],[1,[0,-0.4]]]}]"#;
@@ -134,7 +133,7 @@ fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
         by_floor.push((step.renewed, step.reactions[0].force[1]));
     }
     let renewals: Vec<usize> = (0..by_floor.len()).filter(|&step| by_floor[step].0).collect();
-    // Within a cell of the floor after 0.2 and some, and from the next step on the floor carries.
+    // The block comes within a cell of the floor after t = 0.2. From the next step on, the floor carries load.
     assert!(renewals.len() >= 2 && renewals.len() <= 4 && (10..=13).contains(&renewals[1]), "{renewals:?}");
     assert!(by_floor[..renewals[1]].iter().all(|(_, force)| *force == 0.0), "{by_floor:?}");
     assert!(by_floor[renewals[1]..].windows(2).all(|pair| 0.0 < pair[0].1 && pair[0].1 < pair[1].1), "{by_floor:?}");
@@ -143,8 +142,7 @@ fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A punch that is driven onto a block, each of its own nodes as the grid was new. Blocks that touch at the start are joined, and that makes
-/// nothing anew.
+/// A punch is driven onto a block. At the start they share no node. Blocks that touch at the start are bonded, which causes no grid reset.
 #[test]
 fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
     let driven = |gap: f64| -> Result<_, Failure> {
@@ -155,7 +153,7 @@ fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
         };
         let (below, above) = ([[0.5, 0.0], [1.5, 0.5]], [[0.8, 0.5 + gap], [1.2, 0.9 + gap]]);
         let bodies = format!("bodies=[{},{}]", block("block", below), block("punch", above));
-        // Where the punch is all the time.
+        // The region of the punch during the whole run.
         let grip = r#"prescribed=[{"region":{"half_space":{"point":[0,0.65],"normal":[0,-1]}},"displacement":[[0,[0,0]],[1,[0,-0.4]]]}]"#;
         let onto = [
             "grid={\"size\":[2,2],\"spacing\":0.1}",
@@ -175,7 +173,7 @@ fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
         }
         let end = |body: u32, best: fn(f64, f64) -> f64, start| {
             let particles = &simulation.particles;
-            // The block below the punch.
+            // The part of the block below the punch.
             let under = |(x, of): &(&Vector<f64, 2>, &u32)| **of == body && (x[0] - 1.0).abs() < 0.15;
             let of_body = particles.position.iter().zip(&particles.body).filter(under);
             of_body.map(|(x, _)| x[1]).fold(start, best)
@@ -185,12 +183,12 @@ fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
     };
     let (by_floor, apart) = driven(0.3)?;
     let first = by_floor.iter().skip(1).position(|(renewed, _)| *renewed).ok_or("not made anew")? + 1;
-    // Particles 0.025 above the end of the punch come to the cell above the block after 0.225.
+    // Particles 0.025 above the lower end of the punch reach the cell above the block after 0.225.
     assert_eq!(first, 12, "{by_floor:?}");
     assert!(by_floor[..first].iter().all(|(_, force)| force.abs() < 1e-9), "{by_floor:?}");
     assert!(by_floor[by_floor.len() - 1].1 > 1.0 && apart > 0.0, "{apart}, {by_floor:?}");
     let (by_floor, _) = driven(0.0)?;
-    // Until the block bulges to where the floor had felt nothing.
+    // No reset occurs until the block bulges to nodes of the floor that had no load before.
     assert!(by_floor[1..10].iter().all(|(renewed, _)| !renewed) && by_floor[9].1 > 1.0, "{by_floor:?}");
     Ok(())
 }
@@ -203,7 +201,7 @@ fn a_step_that_fails_leaves_it_as_it_was() -> Result<(), Failure> {
     simulation.settings.newton.max_iterations = 1;
     assert!(matches!(simulation.step(), Err(StepError::Unbalanced { .. })));
     assert_eq!((&simulation.particles, &simulation.kept), (&particles, &kept));
-    // And goes on to the same bits, with functions that are there or made again, and particles in another order.
+    // The next step gives the same bits, with stored or recomputed shape functions, and with particles in another order.
     simulation.settings.newton.max_iterations = 30;
     let mut other = simulation.clone();
     let backwards: Vec<u32> = (0..other.particles.len() as u32).rev().collect();
@@ -218,7 +216,7 @@ fn a_step_that_fails_leaves_it_as_it_was() -> Result<(), Failure> {
 fn particles_may_lie_in_any_order() -> Result<(), Failure> {
     let mut simulation = beam(4, &[])?;
     let mut shuffled = simulation.clone();
-    // Every seventh: so far from the order of the cells that the first step puts them into it.
+    // Every seventh particle: an order so far from that of the cells that the first step sorts the particles.
     let count = shuffled.particles.len();
     let order: Vec<u32> = (0..7).flat_map(|start| (start..count).step_by(7)).map(|p| p as u32).collect();
     shuffled.rearrange(&order);
@@ -248,7 +246,8 @@ fn what_was_changed_by_hand_is_noticed() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Every piece of the tangent, on a grid that is kept, by dual numbers: with both masses, damping and a scheme that balances within the step.
+/// Every piece of the tangent on a total Lagrangian grid, by dual numbers: with both masses, with damping, and with a scheme that balances
+/// within the step.
 #[test]
 fn the_tangent_is_the_derivative_on_a_grid_that_is_kept() -> Result<(), Failure> {
     for scheme in [r#""newmark""#, r#"{"generalized_alpha": {"spectral_radius": 0.6}}"#] {
@@ -264,7 +263,8 @@ fn the_tangent_is_the_derivative_on_a_grid_that_is_kept() -> Result<(), Failure>
     Ok(())
 }
 
-/// A disc in flight that turns and vibrates: the same with a grid that is kept and with a new one in every step, but for what projections take.
+/// A disc in flight rotates and vibrates. With one reference configuration and with a reset in every step the results agree, except for the
+/// losses of the projection.
 #[test]
 fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
     let damped = r#"damping={"mass": 0.3, "stiffness": 0.01}"#;
@@ -296,7 +296,7 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
         };
         let (kept, renewed) = (flown("never")?, flown("every_step")?);
         let mass: f64 = kept.particles.mass.iter().sum();
-        // Momentum: weight times time, less what damping takes of it, whatever the grid.
+        // Momentum: weight times time, less the momentum taken by damping, whatever the grid.
         let change = kept.particles.momentum() - renewed.particles.momentum();
         assert!(change.norm() < 1e-9 * mass, "{scheme}: {change}");
         let gained = kept.particles.momentum() / mass - Vector::from([1.0, -0.1]);
@@ -311,8 +311,8 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where a body is in contact the grid is made anew in every step, and it is kept in flight: a disc comes back from a wall, with as much
-/// momentum as with a new grid in every step, but for what is lost in flight there.
+/// In contact the grid is reset in every step; in flight it is not. A disc rebounds from a wall. Its momentum equals that of a run with a
+/// reset in every step, except for the losses of that run in flight.
 #[test]
 fn a_body_leaves_the_wall_that_it_has_hit() -> Result<(), Failure> {
     let thrown = |renewed: &str| -> Result<_, Failure> {
@@ -325,12 +325,12 @@ fn a_body_leaves_the_wall_that_it_has_hit() -> Result<(), Failure> {
     };
     let ((kept, renewals), (renewed, _)) = (thrown("never")?, thrown("every_step")?);
     assert!((kept / renewed - 1.0).abs() < 0.05 && kept < -0.85, "{kept} and {renewed} of what it had");
-    // It touches the wall for some 3 of 40 units of time.
+    // The disc touches the wall for about 3 of 40 units of time.
     assert!((2..200).contains(&renewals), "{renewals}");
     Ok(())
 }
 
-/// Two discs meet, turn each other back, and part.
+/// Two discs collide, rebound, and separate.
 #[test]
 fn bodies_that_meet_do_not_pass_through_each_other() -> Result<(), Failure> {
     let soft = |renewed: &str| -> Result<_, Failure> {
@@ -349,8 +349,8 @@ fn bodies_that_meet_do_not_pass_through_each_other() -> Result<(), Failure> {
     Ok(())
 }
 
-/// With a consistent mass, Σ m x × v of the particles is that of the nodes; forces turn nothing halfway through the step, where they are in
-/// balance, and the midpoint rule keeps every quadratic invariant of its equations.
+/// With a consistent mass, Σ m x × v of the particles equals that of the nodes. The internal forces are in balance halfway through the
+/// step, and have no moment there. The midpoint rule conserves every quadratic invariant of its equations.
 #[test]
 fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
     let angular = |simulation: &Simulation<2>| -> f64 {
@@ -377,13 +377,13 @@ fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
         let change = angular(&simulation) / start - 1.0;
         assert!(change.abs() < 1e-10, "step {step}: {change:e}");
     }
-    // More than two turns.
+    // More than two revolutions.
     assert!(simulation.clock.time() > 4.0 * std::f64::consts::PI);
     Ok(())
 }
 
-/// One block stands on the floor, another falls on it beside: from then on the floor is a contact, and the grid is renewed, so that the block may
-/// leave again.
+/// One block stands on the floor, another one falls beside it. The floor is a contact from the impact on, and the grid is reset, so that a
+/// block may leave the floor again.
 #[test]
 fn a_wall_that_is_met_holds_nobody_from_the_start() -> Result<(), Failure> {
     let block = |name: &str, min: [f64; 2], speed: f64| {

@@ -1,5 +1,5 @@
-//! Only what a scene requires: each thing left out makes a step cheaper in passes over the particles or in bytes, and dearer in
-//! neither; and the box around a body costs nothing.
+//! A scene costs only what it requires. Each feature that is left out saves passes over the particles or bytes, and increases neither. The
+//! size of the box around a body costs nothing.
 
 use crate::support::{Failure, scene};
 use bfree::field::Field;
@@ -15,7 +15,7 @@ use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What a step costs, iterations apart.
+/// The cost of a step, without iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cost {
     /// Passes over the particles outside Newton's method.
@@ -24,12 +24,12 @@ struct Cost {
     bytes: u64,
 }
 
-/// What the first step costs.
+/// The cost of the first step.
 fn cost<const D: usize>(simulation: &Simulation<D>) -> Result<Cost, Failure> {
     let plan = Plan::of(simulation)?;
     let report = simulation.clone().advance()?;
     let passes = report.seconds.passes();
-    // An iteration of the projection takes two passes for each of the two fields it is run for; how many there are is no plan.
+    // An iteration of the projection takes two passes for each of its two fields. The number of iterations is not part of the plan.
     let iterations = 2 * report.projection_iterations as u64;
     let outside = passes.iter().sum::<u64>() - passes[Phase::Newton as usize] - iterations;
     Ok(Cost { passes: outside, bytes: plan.arrays.iter().map(|array| array.bytes).sum() })
@@ -47,9 +47,9 @@ const LADDER: [(&str, &str); 9] = [
     ("restarts after 30 vectors", r#"solver.krylov.method="conjugate_gradient""#),
 ];
 
-/// A block with everything.
+/// A block with every feature.
 const ALL: [&str; 6] = [
-    // Load steps would keep it by themselves.
+    // In load steps the grid would not be reset by default.
     r#"grid.renewed="every_step""#,
     r#"transfer={"limited":{"rate":1}}"#,
     "time.lumping=0.5",
@@ -64,7 +64,7 @@ fn each_step_down_the_ladder_is_cheaper() -> Result<(), Failure> {
     let mut above = cost(&scene::<2>("compaction_confined.json", &overrides)?)?;
     for (without, key) in LADDER {
         if without == "inertia" {
-            // It takes the keys with it that speak of it.
+            // Without inertia, the keys that require inertia are dropped too.
             overrides.retain(|key| !key.starts_with("transfer") && !key.starts_with("time"));
         }
         overrides.push(key);
@@ -73,7 +73,7 @@ fn each_step_down_the_ladder_is_cheaper() -> Result<(), Failure> {
         assert!(below != above, "without {without} nothing is cheaper: {above:?}");
         above = below;
     }
-    // What is left: one pass to see whether a particle would leave the grid, one to move them, one for the reactions of the walls.
+    // Three passes remain: one checks that no particle leaves the grid, one moves the particles, one computes the reactions of the walls.
     assert_eq!(above.passes, 3);
     Ok(())
 }
@@ -91,16 +91,16 @@ fn a_dimension_less_is_fewer_bytes_of_each_particle() -> Result<(), Failure> {
         particles_of(&scene::<2>("rebound.json", &[])?)?,
         particles_of(&scene::<3>("ball_drop.json", &[])?)?,
     ];
-    // x, v and a; H; volume, mass, body, id; cell, id and place in the order of the sweep.
+    // x, v and a; H; volume, mass, body, id; cell, id and position in the order of the transfer.
     let expected = |d: f64| 8.0 * (3.0 * d + d * d) + 24.0 + 16.0;
-    // The bar has a mass that is partly consistent: two more vectors.
+    // The bar has a partly consistent mass, which adds two vectors.
     assert_eq!([one, two, three], [expected(1.0) + 16.0, expected(2.0), expected(3.0)]);
     Ok(())
 }
 
 #[test]
 fn the_box_around_a_body_costs_nothing() -> Result<(), Failure> {
-    // Two discs in flight, in a box, and in one a hundred times as large.
+    // Two discs in flight, in a box and in a box a hundred times as large.
     let mut small = scene::<2>("collision.json", &[])?;
     let mut large = scene::<2>("collision.json", &["grid.size=[100, 50]"])?;
     let (of_small, of_large) = (Plan::of(&small)?, Plan::of(&large)?);
@@ -116,7 +116,7 @@ fn the_box_around_a_body_costs_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ciarlet's law, counting how often energies and stresses are asked for.
+/// Ciarlet's law with counters of energy and stress evaluations.
 #[derive(Clone, Debug)]
 struct Counting {
     law: NeoHookean,
@@ -140,7 +140,7 @@ impl Elastic for Counting {
     }
 }
 
-/// A law of the list, counting how often the sweep asks which one it is.
+/// A law of the list that counts how often the transfer asks for its kind.
 #[derive(Clone, Debug)]
 struct Asked {
     law: Material,
@@ -180,7 +180,8 @@ impl Law for Asked {
     }
 }
 
-/// What the first step of the falling block asks for the law, and its passes over the particles; the block in two halves, or whole.
+/// For the first step of the falling block, in two halves or whole: the number of times the law is asked for its kind, and the passes over
+/// the particles.
 fn asked(bodies: &str, spacing: f64) -> Result<(u64, u64, u64), Failure> {
     let overrides = [format!("bodies={bodies}"), format!("grid.spacing={spacing}"), "output={}".to_owned()];
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
@@ -205,7 +206,7 @@ fn a_law_is_chosen_once_a_pass_and_not_for_every_particle() -> Result<(), Failur
     let halves = json!([body("left", [0.0, 0.5]), body("right", [0.5, 1.0])]).to_string();
     for spacing in [0.1, 0.025] {
         let (one_law, passes, particles) = asked(&whole, spacing)?;
-        // Eight particles at a time are more than all passes: as little as a question for each such group would show.
+        // There are more groups of eight particles than passes, so one question per group would exceed the count.
         assert!(spacing > 0.05 || particles / 8 > passes, "{particles} particles, {passes} passes");
         assert!(one_law > 0 && one_law < passes, "{one_law} in {passes} passes");
         let (two_laws, same_passes, _) = asked(&halves, spacing)?;

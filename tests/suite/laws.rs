@@ -1,4 +1,4 @@
-//! Laws in vector lanes against the same laws one particle at a time.
+//! Laws evaluated in vector lanes against the same laws evaluated one particle at a time.
 
 use crate::support::{Failure, closed_laws, piola};
 use bfree::approximation::{Approximation, Linear, Lme};
@@ -16,8 +16,7 @@ use bfree::solver::Precision;
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 use num_dual::Dual64;
 
-/// A law of the list that the library does not know as such: it takes the plain loop, and without a closed form its
-/// tangent is that of ℂmat.
+/// A law of the list, hidden from the library. It takes the plain loop; without a closed form its tangent comes from ℂmat.
 #[derive(Clone, Debug)]
 struct Unknown {
     law: Material,
@@ -67,10 +66,10 @@ fn irregular(i: usize) -> f64 {
     2.0 * ((i + 1) as f64 * 0.618_033_988_749_894_9).fract() - 1.0
 }
 
-/// J at which the particles begin, and the size of what else deforms them.
+/// J at the start, and the size of the further deformation.
 const REGIMES: [(f64, f64); 4] = [(1.0, 1e-8), (1.0, 0.2), (0.05, 0.02), (20.0, 0.3)];
 
-/// Jittered particles in some cells, groups full and not, bodies in turn, each strained about `REGIMES`.
+/// Jittered particles in some cells, in full and partly filled groups. Bodies alternate. Each particle is strained about `REGIMES`.
 fn particles<const D: usize>(bodies: u32, regimes: &[(f64, f64)]) -> Particles<D> {
     let mut particles = Particles::default();
     for p in 0..5_usize.pow(D as u32) * 3 {
@@ -111,17 +110,17 @@ fn alphas() -> Alphas {
     Newmark::default().alphas(DT)
 }
 
-/// What a step computes for its laws.
+/// The results of a step that depend on the laws.
 #[derive(Debug, PartialEq)]
 struct Results<const D: usize> {
     residual: Vec<Vector<f64, D>>,
     product: Vec<Vector<f64, D>>,
     blocks: Vec<Tensor<f64, D>>,
-    /// The product in single precision and what it is divided by, where the supports have it.
+    /// The product in single precision and its scale, if the shape-function values have that precision.
     single: Option<(Vec<Vector<f32, D>>, f64)>,
 }
 
-/// As in a step; that the tangent is the derivative of the residual is checked on the way.
+/// Computes the results as a step does, and checks that the tangent is the derivative of the residual.
 fn results<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
@@ -137,7 +136,7 @@ fn results<const D: usize, L: Law>(
     let residual = equilibrium.residual(dphi)?;
     let seeded: Vec<_> = dphi.iter().zip(u).map(|(x, u)| x.zip_map(u, Dual64::new)).collect();
     let real: Vec<_> = equilibrium.residual(&seeded)?.iter().map(|r| r.map(|x| x.re)).collect();
-    // A quotient of dual numbers is a product with the reciprocal: rounded twice, where a law divides.
+    // A quotient of dual numbers is a product with the reciprocal: two roundings, where a law divides.
     let (same, apart) = (bits(&real) == bits(&residual), difference(&real, &residual));
     assert!(same || divides && apart < 1e-14, "the real part of dual numbers: {apart:e}");
     equilibrium.check_tangent(dphi, u)?;
@@ -152,7 +151,7 @@ fn results<const D: usize, L: Law>(
     Ok(Results { residual, product, blocks: tangent.diagonal_blocks().to_vec(), single })
 }
 
-/// The same by the formulas of one particle, and loops over the entries of every particle.
+/// The results by the formulas of one particle, with loops over the connectivity of every particle.
 fn by_formulas<const D: usize>(
     particles: &Particles<D>,
     bodies: &[Body<Unknown>],
@@ -162,7 +161,7 @@ fn by_formulas<const D: usize>(
 ) -> Result<[Vec<Vector<f64, D>>; 2], Failure> {
     let (nodal, alphas) = (Nodal::project(particles, supports, LUMPING)?, alphas());
     let (mut residual, mut product) = (vec![Vector::zeros(); u.len()], vec![Vector::zeros(); u.len()]);
-    // a = α₁ (Δφ − Δφ̂), and ε of the mass is lumped.
+    // a = α₁ (Δφ − Δφ̂), and the share ε of the mass is lumped.
     let a = |node: usize| (dphi[node] - alphas.predicted(&nodal.velocity[node], &nodal.acceleration[node])) * alphas.a1;
     for (node, m) in nodal.mass.iter().enumerate() {
         residual[node] += a(node) * (LUMPING * m);
@@ -190,7 +189,7 @@ fn by_formulas<const D: usize>(
             },
             |closed| closed.apply(&l),
         );
-        // δP = δF S + F [ℂ : Fᵀ δF] with δF = L F_n is the same, with more rounding.
+        // δP = δF S + F [ℂ : Fᵀ δF] with δF = L F_n is equal, with more rounding.
         let delta_f = l * f_n;
         let material = at.f * law.elasticity(&at, &Start::NONE, &(at.f.transpose() * delta_f));
         let delta_p = delta_f * law.stress(&at, &Start::NONE) + material;
@@ -221,12 +220,12 @@ fn compare<const D: usize>() -> Result<(), Failure> {
     let regimes = REGIMES.iter().map(std::slice::from_ref).chain([REGIMES.as_slice()]);
     for (list, regime) in lists.iter().flat_map(|list| regimes.clone().map(move |regime| (list, regime))) {
         let particles = particles::<D>(list.len() as u32, regime);
-        // In its ln J.
+        // The logarithmic law divides in its ln J.
         let divides = list.iter().any(|law| matches!(law, Material::NeoHookeanLogarithmic(_)));
         let unknown = |closed: &dyn Fn(usize) -> bool| {
             bodies(list.iter().enumerate().map(|(k, law)| Unknown { law: law.clone(), closed: closed(k) }))
         };
-        // All with closed forms, none, and in turns.
+        // Bodies that all have closed forms, bodies without, and both in turn.
         let (known, closed) = (bodies(list.clone()), unknown(&|_| true));
         let others = [unknown(&|_| false), unknown(&|k| k % 2 == 1)];
         for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
@@ -299,7 +298,7 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failur
     Ok(())
 }
 
-/// Residual, tangents and potential are refused with the same error.
+/// Residual, tangents and potential return the same error.
 fn fails<L: Law>(
     particles: &Particles<2>,
     bodies: &[Body<L>],

@@ -55,7 +55,7 @@ fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<()
         assert!((velocity - Vector::from([v, 0.0])).amax() < 1e-11, "v = {velocity}");
     }
     assert!(simulation.strain_energy() < 1e-20);
-    // No force, no work: round-off of the reactions, against the energy of the motion.
+    // Without force there is no work: the bound is round-off of the reactions against the kinetic energy.
     let work = simulation.external_work.abs();
     assert!(work < 1e-9 * simulation.particles.kinetic_energy(), "work {work:e}");
     Ok(())
@@ -63,7 +63,7 @@ fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<()
 
 #[test]
 fn accelerating_walls_take_the_body_along_and_their_work_is_its_energy() -> Result<(), Failure> {
-    // V(t) = 0.1 t: slow against waves that cross the box in 2/√3000 = 0.037.
+    // V(t) = 0.1 t is slow compared with waves, which cross the box in 2/√3000 = 0.037.
     let mut simulation: Simulation<2> = build(&carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01))?;
     let mut reactions = Vector::zeros();
     for _ in 0..100 {
@@ -113,7 +113,7 @@ fn a_load_present_at_the_start_acts_from_the_start() -> Result<(), Failure> {
 
 #[test]
 fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Result<(), Failure> {
-    // A body of one cell: every node is prescribed, so that v_p = Σ N V(t_{n+1}) = V(t_{n+1}) exactly.
+    // A body of one cell: every node is prescribed, so v_p = Σ N V(t_{n+1}) = V(t_{n+1}) exactly.
     let moving = json!({"velocity": [[0, [0, 0]], [1, [3, 1]]]});
     let mut simulation: Simulation<2> = build(&json!({
         "grid": {"size": [1, 1], "spacing": 1}, "time": {"step": 0.01, "end": 1}, "approximation": "linear",
@@ -125,7 +125,7 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
     for _ in 0..10 {
         simulation.advance()?;
         let t = simulation.clock.time();
-        // The walls have moved by the integral of their velocity, whatever the step.
+        // The walls have moved by the integral of their velocity, for any step.
         for (x, x0) in simulation.particles.by_id().position.iter().zip(&start) {
             assert!((x - x0 - Vector::from([1.5, 0.5]) * t * t).amax() < 1e-13, "x = {x} at t = {t}");
         }
@@ -160,14 +160,14 @@ fn the_blow_of_walls_that_start_at_once_is_in_their_reactions_and_their_work() -
     for step in [2e-3, 5e-4] {
         let [momentum, impulse, energy, work] = struck(step)?;
         assert!((impulse - momentum).abs() < 0.02 * momentum, "step {step}: {impulse} for the momentum {momentum}");
-        // The nodes are taken along without a rebound: part of the work is lost, and none is won.
+        // The walls accelerate their nodes without a rebound: part of the work is lost, and none is gained.
         assert!(energy < work && work < 4.0 * energy, "step {step}: work {work}, energy {energy}");
     }
     Ok(())
 }
 
-/// A quarter of a ring of radii 1 and 1.5 between planes of symmetry, its hole under pressure: the mean radial displacement of the hole
-/// over Lamé's.
+/// A quarter of a ring of radii 1 and 1.5 between planes of symmetry, with pressure in its hole. Returns the relative error of the mean
+/// radial displacement of the hole against Lamé's solution.
 fn inflation(cells: u32, functions: &str) -> Result<f64, Failure> {
     // Small strains.
     let pressure = 0.02;
@@ -184,7 +184,7 @@ fn inflation(cells: u32, functions: &str) -> Result<f64, Failure> {
         "boundary": {"left": "sliding", "bottom": "sliding"},
         "pressures": [{"body": "ring", "pressure": pressure, "region": disc(1.2)}]
     }))?;
-    // A quarter of a circle: what lies in the planes of symmetry is no surface.
+    // A quarter of a circle: faces in the planes of symmetry are not part of the surface.
     let points = &simulation.loads.surface[0].points;
     let area: f64 = points.iter().map(|point| point.area).sum();
     assert!((area / std::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-3, "{area}");
@@ -213,9 +213,9 @@ fn follower_pressure_inflates_a_ring_by_lame_s_solution() -> Result<(), Failure>
         r#"{"lme": {"gamma": 1.4}}"#,
     ] {
         let errors = [inflation(4, functions)?, inflation(8, functions)?, inflation(16, functions)?].map(f64::abs);
-        // Two cells across the wall: linear functions, whose forces are now integrated, measure 1.28 %.
+        // With two cells across the wall, linear functions with integrated forces have an error of 1.28 %.
         assert!(errors[0] < 0.013, "{functions}: {errors:?}");
-        // Of order 3/2 at least, down to what the area of a curved surface is known to.
+        // The order is at least 3/2, down to the error of the area of a curved surface.
         for pair in errors.windows(2) {
             assert!(pair[1] < 4e-4 || pair[1] < pair[0] * 0.5_f64.powf(1.5), "{functions}: {errors:?}");
         }
@@ -226,7 +226,7 @@ fn follower_pressure_inflates_a_ring_by_lame_s_solution() -> Result<(), Failure>
 #[test]
 fn a_traction_pulls_a_bar_to_its_static_stretch() -> Result<(), Failure> {
     // Uniaxial strain, P(F) = (Λ/2 + G)(F − 1/F) = T at rest.
-    // Small enough that the outermost particle, which carries all of it, does not break off.
+    // The traction is small enough for the outermost particle, which carries all of it, to stay attached.
     let traction = 25.0;
     let mut simulation: Simulation<1> = build(&json!({
         "grid": {"size": [3], "spacing": 0.125},
@@ -294,7 +294,7 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A falling stone, its weight by gravity and by the same field given in code; with inertia and without.
+/// A falling stone. Its weight comes from gravity, or from the same field given in code; with inertia and without.
 #[test]
 fn a_uniform_field_is_gravity() -> Result<(), Failure> {
     let held = json!({"grid": {"size": [2, 2], "spacing": 0.5}, "time": {"inertia": "none", "step": 0.5, "end": 1},
@@ -327,7 +327,7 @@ fn a_uniform_field_is_gravity() -> Result<(), Failure> {
 fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
     let mut simulation: Simulation<2> = build(&falling(0.02, 1.0))?;
     let gravity = simulation.loads.gravity.clone().ok_or("gravity")?;
-    // Who, where and when: not one of the three may be another's.
+    // The field depends on particle, position and time; the test detects an exchange of any of the three.
     let b = |id: usize, x: &Vector<f64, 2>, t: f64| Vector::from([0.1 * id as f64 + t, x[0] * x[1] - 2.0 * t]);
     simulation.loads.field = Some(ForceField(Arc::new(b)));
     let order: Vec<u32> = (0..simulation.particles.len() as u32).rev().collect();
@@ -356,8 +356,8 @@ fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Gravity that varies along a line: in free fall the momentum grows by Σ m b Δt, b as the table says at each particle; where the table is
-/// one everywhere, it is plain gravity.
+/// Gravity that varies along a line. In free fall the momentum grows by Σ m b Δt, with b from the table at each particle. With a table of
+/// ones the load equals plain gravity.
 #[test]
 fn gravity_follows_its_profile() -> Result<(), Failure> {
     let falling = |profile: serde_json::Value| {

@@ -1,4 +1,4 @@
-//! Promises of the library, in one program: what is generic is compiled once.
+//! The tests of the library in one program, so that generic code is compiled once.
 
 mod accuracy;
 mod adaptive;

@@ -1,4 +1,4 @@
-//! The manual: links lead somewhere, files that are named are there, the book lists its pages, and its page of keys is that of the schema.
+//! The manual: links are valid, named files exist, the book lists its pages, and its page of keys matches the schema.
 
 use crate::support::Failure;
 use bfree::scene;
@@ -29,18 +29,18 @@ pub fn in_repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// What the tests look for in a document.
+/// The contents of a document that the tests check.
 #[derive(Default)]
 pub struct Page {
-    /// Where links and pictures lead.
+    /// Targets of links and pictures.
     links: Vec<String>,
-    /// Links to labels that nothing defines.
+    /// Links to undefined labels.
     undefined: Vec<String>,
-    /// What links may lead to in it.
+    /// Anchors of the document.
     anchors: BTreeSet<String>,
     /// Code in running text.
     code: Vec<String>,
-    /// Fenced blocks: what stands behind the fence, and their text.
+    /// Fenced blocks: the word behind the fence, and the text.
     pub blocks: Vec<(String, String)>,
 }
 
@@ -128,7 +128,7 @@ fn every_link_leads_somewhere() -> Result<(), Failure> {
             followed += 1;
             match target {
                 Err(error) => refuse(link, &error.to_string()),
-                // The book is a folder of its own when it is built.
+                // The book is a separate folder when it is built, so its links must not lead outside.
                 Ok(target) if file.starts_with(&source) && !target.starts_with(&source) => {
                     refuse(link, "not in the book")
                 }
@@ -201,7 +201,7 @@ fn the_manual_gives_the_levels_of_accuracy() -> Result<(), Failure> {
     Ok(())
 }
 
-/// What stands above the keys.
+/// The text above the keys.
 const ABOUT_SCENES: &str = "\
 # Scenes
 
@@ -217,7 +217,7 @@ Units are your own consistent set, such as m, kg, s or mm, t, s. Lists of number
 `--set grid.spacing=0.25`, `--set bodies.0.density=2`.
 ";
 
-/// The page: the scene, then every type in the order in which it is met.
+/// The page: the scene, then every type in the order of first mention.
 fn keys() -> String {
     let schema = scene::schema().to_value();
     let mut writer = Writer { text: ABOUT_SCENES.to_owned(), met: BTreeSet::new(), next: VecDeque::new() };
@@ -257,7 +257,7 @@ impl Writer {
         }
     }
 
-    /// A word, or an object with one key.
+    /// A variant is a word, or an object with one key.
     fn variant(&mut self, variant: &Value) {
         let key = variant["properties"].as_object().and_then(|keys| keys.iter().next());
         match (variant["const"].as_str(), key) {
@@ -276,12 +276,12 @@ impl Writer {
     }
 
     fn row(&mut self, first: &str, second: &str, third: &str) {
-        // A bar would end the cell, in code too.
+        // A bar would end the table cell, in code too.
         let cell = |text: &str| text.replace('|', "\\|");
         let _ = writeln!(self.text, "| {} | {} | {} |", cell(first), cell(second), cell(third));
     }
 
-    /// What may be written for a value; a type with a section of its own is linked, and its section is due.
+    /// The allowed forms of a value. A type with a section of its own becomes a link, and its section is queued.
     fn kind(&mut self, schema: &Value) -> String {
         if let Some(name) = schema["$ref"].as_str().and_then(|name| name.strip_prefix("#/$defs/")) {
             if self.met.insert(name.to_owned()) {

@@ -1,4 +1,4 @@
-//! A law with memory: what its particles remember, and where it must come through.
+//! A law with internal variables: restarts, failed steps and reordering must keep them.
 
 use crate::support::{Failure, Random, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
@@ -11,9 +11,9 @@ use bfree::tensor::{Deformation, Tensor, contract, scaled};
 use serde_json::Value;
 use std::num::NonZeroU64;
 
-/// Ciarlet's solid that softens by the strain energy W it has met: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt)
-/// where W > κ, so that it takes about the time τ. It remembers κ, and for the test how long it has been there. A solid
-/// that does not soften remembers nothing.
+/// Ciarlet's solid softens with the largest strain energy W so far: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ. The
+/// softening takes about the time τ. Internal variables: κ and, for the test, the age of the particle. A solid that does not soften has
+/// none.
 #[derive(Clone, Copy, Debug)]
 struct Softening {
     solid: NeoHookean,
@@ -91,7 +91,7 @@ impl Law for Softening {
     }
 }
 
-/// Two discs side by side that run into each other at once; the soft one softens.
+/// Two adjacent discs collide at once; the soft one softens.
 fn collision(overrides: &[&str]) -> Result<Simulation<2, Softening>, Failure> {
     let near = ["bodies.1.shape.ball.center=[5.4, 2.75]", "output.probes=[]"];
     let solids =
@@ -105,7 +105,7 @@ fn collision(overrides: &[&str]) -> Result<Simulation<2, Softening>, Failure> {
 
 const STEPS: usize = 30;
 
-/// What each particle remembers.
+/// The internal variables of each particle.
 fn remembered(particles: &Particles<2>) -> Vec<[f64; 2]> {
     (0..particles.len()).map(|p| std::array::from_fn(|i| particles.start(p, 0.0).memory[i])).collect()
 }
@@ -133,7 +133,7 @@ fn particles_remember_at_the_end_of_every_step_what_their_law_says() -> Result<(
     }
     let most = expected.iter().map(|[met, _]| *met).fold(0.0, f64::max);
     assert!(most > 0.1 * LIMIT, "the test is meant to see softening: {most}");
-    // It acts on the motion: without it the discs part with other velocities.
+    // Softening changes the motion: without it the discs separate with other velocities.
     let mut elastic = collision(&[])?.with_laws(|body| Softening { softens: false, ..body.law });
     assert!(elastic.particles.memory.is_empty());
     for _ in 0..STEPS {
@@ -188,7 +188,7 @@ fn a_restart_knows_what_particles_remember() -> Result<(), Failure> {
         continued.advance()?;
     }
     assert_eq!(continued.particles, simulation.particles);
-    // The same scene with laws that remember nothing is another run.
+    // The same scene with laws without internal variables is another run.
     let mut forgetful = start.with_laws(|body| Softening { softens: false, ..body.law });
     let refused = restore(folder.path(), &identity, &mut forgetful).err().ok_or("another law")?;
     assert!(bfree::causes::on_one_line(&refused).contains("of memory instead of 0"), "{refused:?}");
@@ -206,7 +206,7 @@ fn a_step_that_fails_is_forgotten() -> Result<(), Failure> {
             assert_eq!(simulation.particles, before.particles);
             failed += simulation.advance()?.failed.len();
         }
-        // Of an attempt that failed, no Δt is counted.
+        // A failed attempt adds no Δt to the age.
         for ([_, age], body) in remembered(&simulation.particles.by_id()).iter().zip(&body) {
             let expected = if *body == 0 { 3.0 + simulation.clock.time() } else { 0.0 };
             assert!((age - expected).abs() < 1e-13, "{age} at t = {}", simulation.clock.time());

@@ -1,4 +1,4 @@
-//! Multigrid: what it may not change, and what it saves.
+//! Multigrid: it must not change the results, and must save iterations.
 
 use crate::support::Failure;
 use bfree::mechanics::check::direction;
@@ -10,7 +10,7 @@ use bfree::simulation::Simulation;
 use bfree::solver::{LinearOperator, Multigrid, Precision, Preconditioner, Preconditioning};
 use serde_json::{Value, json};
 
-/// A block that hangs between cell faces, on a fixed floor, under its weight.
+/// A block on a fixed floor under its weight. Its sides lie between cell faces.
 pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Value) -> Result<Simulation<D>, Failure> {
     let (low, high) = (0.53, 1.53);
     let (mut min, mut max, mut down) = (vec![low; D], vec![high; D], vec![0.0; D]);
@@ -34,7 +34,7 @@ pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Va
     Ok(scene::read(&scene.to_string(), &[])?.build(".".as_ref())?)
 }
 
-/// One step: Krylov iterations a Newton iteration.
+/// Takes one step. Returns the Krylov iterations per Newton iteration.
 pub fn iterations<const D: usize>(
     mut simulation: Simulation<D>,
     with: Preconditioning,
@@ -55,7 +55,7 @@ pub fn families() -> [Value; 5] {
     ]
 }
 
-/// Where the particles are does not depend on the preconditioner, by more than the tolerance of Newton's method.
+/// The positions of the particles do not depend on the preconditioner, within the tolerance of Newton's method.
 pub fn same<const D: usize>(one: &Simulation<D>, other: &Simulation<D>) -> bool {
     let (one, other) = (one.particles.by_id(), other.particles.by_id());
     one.position.iter().zip(&other.position).all(|(a, b)| (a - b).norm() < 1e-8)
@@ -66,7 +66,7 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
     fn compare<const D: usize>(cells: u32, share: f64) -> Result<(), Failure> {
         for family in families() {
             for inertia in ["none", "newmark"] {
-                // In steps of many wave times cuts are as bad as in statics.
+                // In steps much longer than the wave time, cut cells are as hard as in statics.
                 let scene = || block::<D>(&family, cells, inertia, json!({"aggregation": true}));
                 let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
                 let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
@@ -77,7 +77,7 @@ fn it_changes_no_result_in_any_dimension_and_saves_most_iterations() -> Result<(
         }
         Ok(())
     }
-    // Smoothing alone needs a tenth of the iterations, too, and its own double with each refinement.
+    // Smoothing alone also needs only a tenth of the iterations, but twice as many after each refinement.
     compare::<1>(512, 0.04)?;
     compare::<2>(20, 0.5)?;
     compare::<3>(6, 0.8)
@@ -120,8 +120,8 @@ fn applied<const D: usize>(
     [r, z]
 }
 
-/// M⁻¹ is symmetric and positive, as conjugate gradients need it; and a system that single precision gave up comes again in double, in
-/// another scale, which the levels made in single precision serve as well as their own.
+/// M⁻¹ is symmetric and positive, as conjugate gradients require. If single precision fails, the same system returns in double precision
+/// with another scale. The levels made in single precision must serve it as well as levels made in double precision.
 #[test]
 fn a_cycle_is_symmetric_and_positive_and_of_no_scale() -> Result<(), Failure> {
     let simulation = block::<2>(&json!({"lme": {}}), 15, "newmark", json!({}))?;
@@ -145,13 +145,14 @@ fn a_cycle_is_symmetric_and_positive_and_of_no_scale() -> Result<(), Failure> {
     assert!(scale > 2.0, "nothing to see at {scale}");
     drop(of_single.prepare_single(&single));
     let [_, again] = of(&*of_single.prepare(&tangent), 1);
-    // M⁻¹ of K/s, to a hundredth: single precision knows 1e-7 of K, whose softest motions have a thousandth of its stiffness or less.
+    // M⁻¹ of K/s, to a hundredth. Single precision resolves K to 1e-7, and the softest modes have a thousandth of its stiffness or less.
     let apart: Vec<f64> = again.iter().zip(&of_a).map(|(again, z)| again / scale - z).collect();
     assert!(dot(&apart, &apart) < 1e-4 * dot(&of_a, &of_a), "{} of {}", dot(&apart, &apart), dot(&of_a, &of_a));
     Ok(())
 }
 
-/// At the surface of a ball whose lower part is held, held nodes lead others. The matrix of the coarsest grid must have no entries of them.
+/// At the surface of a ball whose lower part is held, prescribed nodes lead others. The matrix of the coarsest grid must have no entries of
+/// prescribed nodes.
 #[test]
 fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Failure> {
     let scene = json!({
@@ -167,7 +168,7 @@ fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Fa
     let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
     let history = simulation.step()?.newton.history;
     let iterations = history.counts.krylov_iterations as f64 / history.iterations.len() as f64;
-    // 6 to 8 where the coarsest grid is solved, 20 where its matrix is singular.
+    // 6 to 8 iterations if the coarsest grid is solved, 20 if its matrix is singular.
     assert!(iterations <= 10.0, "{iterations}");
     Ok(())
 }

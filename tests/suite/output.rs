@@ -1,4 +1,4 @@
-//! What a run leaves on disk agrees with the simulation and with itself.
+//! The output files of a run agree with the simulation and with each other.
 
 use bfree::approximation::{Approximation, Linear};
 use bfree::clock::Clock;
@@ -56,7 +56,7 @@ fn settings<const D: usize>(directory: &Path) -> OutputSettings<D> {
     }
 }
 
-/// From a particle to a point beside it.
+/// The offset from a particle to a point beside it.
 const ASIDE: Vector<f64, 2> = Vector::<f64, 2>::new(0.03, 0.06);
 
 fn at_particle<const D: usize>(simulation: &Simulation<D>, field: Field) -> Result<Vec<f64>, OutputError> {
@@ -207,7 +207,7 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
     assert_eq!(summary.counts.steps, 20);
     assert!(!file("newton.jsonl").exists() && !file("particles_000099.vtu").exists());
 
-    // t = 0, 0.05, 0.1, 0.15, 0.2; the last is due and the end at once, and written once
+    // t = 0, 0.05, 0.1, 0.15, 0.2. At the last time an output is due and the run ends; the snapshot is written once.
     let series = std::fs::read_to_string(file("particles.pvd"))?;
     assert_eq!(series.matches("<DataSet").count(), 5);
     let last = Snapshot::read(&file("particles_000004.vtu"))?;
@@ -245,7 +245,7 @@ fn a_run_that_dies_leaves_what_it_did() -> Result<(), Failure> {
     assert_eq!(names, [&drawn.map(|name| [name; 2]).concat()[..], &["report"]].concat());
     let page = std::fs::read_to_string(directory.path().join("report.html"))?;
     assert!(page.contains("killed") && page.matches("<svg").count() == 5 && page.ends_with("</html>\n"));
-    // The player has all snapshots, two at least, and every number: 16 bits of each that varies.
+    // The player contains all snapshots, at least two, and every number: 16 bits for each one that varies.
     let between = |start: &str, end: &str| page.split(start).nth(1).and_then(|rest| rest.split(end).next());
     let meta: Value = serde_json::from_str(between("id=\"snapshots\">", "</script>").ok_or("no snapshots")?)?;
     let times = meta["times"].as_array().ok_or("no times")?.len();
@@ -258,7 +258,7 @@ fn a_run_that_dies_leaves_what_it_did() -> Result<(), Failure> {
     let numbers = between("id=\"numbers\">", "</script>").ok_or("no numbers")?;
     let bytes = 2 * 64 * (varying(true) + times * varying(false));
     assert!(times > 1 && numbers.len() == bytes.div_ceil(3) * 4, "{bytes} bytes, {} letters", numbers.len());
-    // A movie has a frame for each.
+    // A movie has one frame per snapshot.
     let frames = plot_frames(directory.path(), &directory.path().join("frames"), &Look::default())?;
     assert_eq!(frames.len(), times);
     assert!(frames.iter().all(|frame| std::fs::read(frame).is_ok_and(|png| png.starts_with(b"\x89PNG"))));
@@ -287,7 +287,7 @@ fn one_and_three_dimensions_are_drawn_too() -> Result<(), Failure> {
         assert!(message.contains("from t = 0") && message.contains("particle 0 leaves the grid at [7.0]"), "{message}");
         Ok(plot_run(directory.path(), &Look::default())?.len())
     }
-    // No step was taken, and nothing moves: there is nothing to show of Newton's method, and no momentum.
+    // No step was taken and nothing moves: there is no history of Newton's method and no momentum to show.
     assert_eq!((run::<1>()?, run::<3>()?), (7, 7));
     Ok(())
 }

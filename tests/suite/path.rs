@@ -1,4 +1,5 @@
-//! A path of equilibria with two turning points (the study `robust` compares it with its closed form): Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid joint.
+//! An equilibrium path with two turning points: Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid
+//! joint. The study `robust` compares it with its closed form.
 
 use crate::support::{Failure, scene};
 use bfree::output::warnings::Kind;
@@ -23,7 +24,7 @@ fn toggle(more: &[&str]) -> Result<Simulation<2>, Failure> {
         r#"tractions=[{"body":"beam","region":{"box":{"min":[9.75,2],"max":[10,3]}},"traction":[0,-400],"curve":[[-10,-10],[10,10]]}]"#,
     ];
     let mut simulation: Simulation<2> = scene("elastica.json", &[&overrides, more].concat())?;
-    // The bars rise: sheared, so that their ends stay on the walls.
+    // The bars rise. They are sheared, so that their ends stay on the walls.
     simulation.particles.position.iter_mut().for_each(|x| x[1] += RISE / LENGTH * x[0]);
     Ok(simulation)
 }
@@ -45,7 +46,7 @@ fn a_load_is_followed_down_and_up_again() -> Result<(), Failure> {
     assert!(start - height(&simulation) > RISE, "the frame hangs: {}", start - height(&simulation));
     let turns = path.windows(3).filter(|load| (load[1] - load[0]) * (load[2] - load[1]) < 0.0).count();
     assert_eq!(turns, 2, "up, down and up again: {path:?}");
-    // What the load has done, up and down, is stored: by the trapezoidal rule.
+    // The work of the load, up and down, equals the stored energy, within the error of the trapezoidal rule.
     let (work, stored) = (simulation.external_work, simulation.strain_energy() + simulation.dissipated);
     assert!((work / stored - 1.0).abs() < 0.01, "{work} {stored}");
     Ok(())

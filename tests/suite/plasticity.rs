@@ -1,10 +1,10 @@
-//! Metal and soil at their limits and beyond, beside published results. More of metals: `tutorial.rs`.
+//! Metal and soil up to and beyond their limit loads, against published results. More tests of metals: `tutorial.rs`.
 
 use crate::support::{Failure, scene};
 use bfree::causes;
 use bfree::simulation::Simulation;
 
-/// How far the crest of the slope sinks with its strength divided by `factor`: c/F, tan φ/F (m).
+/// The displacement (m) of the crest of the slope with the strength divided by `factor`: c/F, tan φ/F.
 fn sinking(factor: f64) -> Result<f64, Failure> {
     let friction = (20.0_f64.to_radians().tan() / factor).atan().to_degrees();
     let law = "bodies.0.material.drucker_prager";
@@ -20,8 +20,9 @@ fn sinking(factor: f64) -> Result<f64, Failure> {
     Ok(start[crest][1] - simulation.particles.by_id().position[crest][1])
 }
 
-/// Griffiths and Lane (Géotechnique 49, 1999), example 1: finite elements with Mohr and Coulomb's criterion fail at a factor of 1.4,
-/// Bishop and Morgenstern's charts say 1.380. Here every strength has an equilibrium at finite strain, and the motion turns up.
+/// Griffiths and Lane (Géotechnique 49, 1999), example 1: finite elements with Mohr–Coulomb's criterion fail at a factor of 1.4. Bishop and
+/// Morgenstern's charts give 1.380. At finite strain every strength has an equilibrium, so failure shows as a sudden growth of the
+/// displacement.
 #[test]
 fn a_slope_fails_at_the_factor_of_griffiths_and_lane() -> Result<(), Failure> {
     let [safe, before, after] = [1.0, 1.35, 1.45].map(sinking);
@@ -30,7 +31,8 @@ fn a_slope_fails_at_the_factor_of_griffiths_and_lane() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A tube bears 2/√3 Y ln(b/a) = 0.1921 GPa (Hill): steps are halved up to there, and the end says what may be wrong.
+/// The limit pressure of a tube is 2/√3 Y ln(b/a) = 0.1921 GPa (Hill). Steps are halved up to this pressure, and the error names the
+/// possible cause.
 #[test]
 fn a_pressure_that_a_tube_cannot_bear_is_found_and_said() -> Result<(), Failure> {
     let mut simulation: Simulation<2> = scene("tube.json", &["time.end=1", "grid.spacing=24"])?;
@@ -46,9 +48,9 @@ fn a_pressure_that_a_tube_cannot_bear_is_found_and_said() -> Result<(), Failure>
     Ok(())
 }
 
-/// The experiments of Nguyen and others with aluminium rods (arXiv:1512.05180): columns of less than 0.65 times their width in height keep
-/// the height of what does not move. The front is between that of sand (Lube and others, Phys. Rev. E 72, 2005: width (1 + 1.2 a), of a = 0.5) and
-/// that of rods with 0.65 < a < 1.5 (width (1 + 3.25 a^0.96)).
+/// Experiments by Nguyen and others with aluminium rods (arXiv:1512.05180): in columns lower than 0.65 times their width, the part at rest
+/// keeps its height. The front lies between two measured widths: that of sand (Lube and others, Phys. Rev. E 72, 2005: width (1 + 1.2 a),
+/// with a = 0.5), and that of rods with 0.65 < a < 1.5 (width (1 + 3.25 a^0.96)).
 #[test]
 fn a_column_collapses_and_comes_to_rest() -> Result<(), Failure> {
     let mut simulation: Simulation<2> = scene("collapse.json", &[])?;

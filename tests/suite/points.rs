@@ -1,4 +1,4 @@
-//! The pointwise results of an independent program (`reference/points.json`): shape functions and laws.
+//! Results at single points, against an independent program (`reference/points.json`): shape functions and laws.
 
 use bfree::approximation::{Approximation, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction, Support};
 use bfree::grid::Grid;
@@ -19,7 +19,7 @@ struct Reference {
 struct ReferenceGrid {
     origin: [f64; 2],
     h: f64,
-    /// Nodes along each axis.
+    /// Number of nodes along each axis.
     n: [u32; 2],
 }
 
@@ -130,7 +130,7 @@ fn law_is_that_of_the_reference(law: &impl Elastic, point: &Point) {
     // The reference gives the block for gradients in the reference configuration.
     let closed = Elastic::closed(law, &identity(), &at, 1.0).expect("a closed form");
     check("K", closed.block(&v, &b), point.K_vb_per_unit_volume);
-    // The same by ℂmat: F ℂmat{v, b} Fᵀ + (v · S b) I.
+    // The same block by ℂmat: F ℂmat{v, b} Fᵀ + (v · S b) I.
     let geometric = identity::<f64, 2>() * v.dot(&(Elastic::stress(law, &at) * b));
     let material = f * Elastic::tangent_density(law, &at, &v, &b) * f.transpose();
     check("K by ℂmat", material + geometric, point.K_vb_per_unit_volume);

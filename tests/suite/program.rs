@@ -1,4 +1,4 @@
-//! The program as its user meets it: exit codes, signals, closed pipes, directories that are in use.
+//! The command-line program: exit codes, signals, closed pipes, directories that are in use.
 
 mod refusals;
 mod reports;
@@ -37,7 +37,7 @@ fn a_reader_who_has_seen_enough_is_no_failure() -> Result<(), Failure> {
     let again: &[&str] = &["run", &rebound, "--steps", "1", "--discard", "--out", &run];
     let commands: [&[&str]; 4] = [&["check", &rebound], &["schema"], &["plot", &run], again];
     for arguments in commands {
-        // Both pipes are closed before the program starts, so that its first line meets a broken one.
+        // Both pipes are closed before the program starts, so its first line meets a closed pipe.
         let (_, out) = std::io::pipe()?;
         let (_, err) = std::io::pipe()?;
         let status = program().args(arguments).stdout(out).stderr(err).status()?;
@@ -66,7 +66,7 @@ fn ctrl_c_ends_the_run_after_a_step_with_everything_written() -> Result<(), Fail
         .arg(scene("rebound.json"))
         .arg("--out")
         .arg(directory.path())
-        // Longer than any machine needs to send the signal.
+        // A run longer than any machine needs to send the signal.
         .args(["--until", "1e6"])
         .stderr(Stdio::piped())
         .stdout(Stdio::piped())
@@ -101,7 +101,7 @@ fn ctrl_c_ends_the_run_after_a_step_with_everything_written() -> Result<(), Fail
     Ok(())
 }
 
-/// A run with further arguments that ends by itself: its code, and what it told.
+/// Runs two steps with further arguments. Returns the exit code and the text on standard error.
 fn told(arguments: &[&str], directory: &Path) -> Result<(Option<i32>, String), Failure> {
     let output = rebound(directory, &[&["--steps", "2"], arguments].concat())?;
     Ok((output.status.code(), String::from_utf8(output.stderr)?))
@@ -129,7 +129,7 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     );
     assert!(text.contains("--discard"), "{text}");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
-    // What a link leads to is somebody else's.
+    // The target of a link is not a file of the run.
     let foreign = folder.path().join("foreign");
     std::fs::write(&foreign, "mine")?;
     std::fs::remove_file(out.join("history.csv"))?;
@@ -137,9 +137,9 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     assert_eq!(told(&["--discard"], &out)?.0, Some(0));
     assert_eq!(std::fs::read_to_string(&foreign)?, "mine");
     assert_eq!(std::fs::read(out.join("history.csv"))?, history);
-    // No picture of what is gone stays beside it.
+    // No picture of the deleted results remains.
     assert_eq!((drawn, pictures(&out)?), (13, 0));
-    // Nor is what a run did not write taken for its own.
+    // Files that no run wrote are not treated as results of a run.
     let own = folder.path().join("own");
     std::fs::create_dir(&own)?;
     for name in ["energies.png", "particles_000007.vtu", "history.csv"] {
@@ -156,7 +156,7 @@ fn what_is_there_is_not_lost() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A run of many steps without a checkpoint, in `directory`, of which at least five are written.
+/// A run of many steps without a checkpoint, in `directory`. At least five of its steps are written.
 #[cfg(unix)]
 fn long_run(directory: &Path) -> Result<std::process::Child, Failure> {
     let mut run = program();
@@ -189,14 +189,14 @@ fn steps_of_a_killed_run_without_a_checkpoint_are_lost_on_request_only() -> Resu
     let row: Vec<&str> = whole.lines().next_back().ok_or("no row")?.split(',').collect();
     let (code, text) = told(&[], &out)?;
     assert!(code == Some(2) && text.contains(&format!("{} steps until t = {}", row[0], row[1])), "{text}");
-    // A newcomer is told both ways out, and the second works as it stands.
+    // The message names both ways out, and the second command works as printed.
     let free = folder.path().join("run-2");
     assert!(text.contains("--discard") && text.contains(&format!("--out {}", free.display())), "{text}");
     assert!(files(&out)? == before, "a refusal changes nothing");
     assert_eq!(told(&[], &free)?.0, Some(0));
     assert!(told(&[], &out)?.1.contains("run-3"));
     assert_eq!(told(&["--discard"], &out)?.0, Some(0));
-    // The steps of a run that failed are results; a run that failed in its first step has none.
+    // A run that failed leaves the steps before the failure as results. A run that failed in its first step has none.
     for (key, lost) in [("boundary={}", true), ("solver.newton.max_iterations=1", false)] {
         let failed = folder.path().join(key);
         let fails = ["--quiet", "--set", key, "--set", "time.max_halvings=1"];
@@ -255,7 +255,7 @@ fn a_run_ends_at_its_end_between_steps_too() -> Result<(), Failure> {
         assert!((time - until.parse::<f64>()?).abs() < 1e-15, "{time}");
         assert_eq!(report["counts"]["steps"].as_u64(), Some(steps));
     }
-    // Steps that are counted are whole ones.
+    // `--steps` counts whole steps.
     rebound(directory.path(), &["--until", "0.22", "--steps", "4", "--discard"])?;
     assert_eq!(report(directory.path())?["time"].as_f64(), Some(0.2));
     let check = |set: &str| -> Result<String, Failure> {

@@ -1,4 +1,4 @@
-//! A run that was killed continues with the same bits, and what is wrong with a checkpoint is said.
+//! A killed run continues with the same bits, and a faulty checkpoint is reported.
 
 use crate::support::{Failure, Random};
 use serde_json::Value;
@@ -35,7 +35,8 @@ fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// All files of a run but its checkpoints, and the report without what may differ: seconds, and where and how far it ran at first.
+/// All files of a run except its checkpoints. The report lacks the entries that may differ: seconds, and the place and extent of the first
+/// run.
 fn files(directory: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(directory)? {
@@ -84,7 +85,7 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
     assert!(history.lines().last().is_some_and(|row| row.starts_with("7,0.32,0.0")), "{history}");
     assert!(run("rebound.json", &parts, &[&common, &["--until", "0.73", "--restart"]])?.status.success());
     assert_same(&whole, &parts)?;
-    // What has been reached is not given back.
+    // A restart cannot end before the time already reached.
     let earlier = run("rebound.json", &parts, &[&common, &["--until", "0.3", "--restart"]])?;
     let text = String::from_utf8_lossy(&earlier.stderr);
     assert!(!earlier.status.success() && text.contains("beyond the end, t = 0.3"), "{text}");
@@ -94,7 +95,7 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
 #[test]
 fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
-    // Walls and smoothing; a prescribed motion with work and a load; halved steps in the middle of whole ones.
+    // Walls and smoothing; a prescribed motion with work and a load; halved steps among whole ones.
     let scenes: [(&str, &[&str]); 8] = [
         ("rebound.json", &SMOOTHED),
         ("compaction.json", &["--set", "output.checkpoint=0.1", "--until", "0.5", "--threads", "2"]),
@@ -111,7 +112,7 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
                 "6",
             ],
         ),
-        // Along a path, whose loads fall.
+        // Along an equilibrium path, whose loads fall.
         (
             "elastica.json",
             &[
@@ -125,9 +126,9 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
                 "output.checkpoint=0.1",
             ],
         ),
-        // A grid kept with inertia, and renewed when it is met by a wall.
+        // Inertia with one reference configuration, reset when the body meets a wall.
         ("rebound.json", &["--set", r#"grid.renewed="never""#, "--set", "output.checkpoint=1", "--until", "12"]),
-        // Load steps, on a grid that is kept; and steps that grow and shrink.
+        // Load steps without a grid reset; and steps of adaptive length.
         ("column_static.json", &["--set", "output.checkpoint=0.2", "--set", "time.step=0.04"]),
         (
             "rebound_fast.json",
@@ -142,7 +143,7 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
                 "10",
             ],
         ),
-        // Load steps, with a grid made anew now and then, and what it does not balance carried over.
+        // Load steps with occasional grid resets, which carry over the out-of-balance force.
         (
             "elastica.json",
             &[
@@ -172,7 +173,7 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Killed at any moment, also while it restarts. `BFREE_KILLS=50` kills more often.
+/// Runs killed at any moment, also during a restart. `BFREE_KILLS=50` kills more often.
 #[test]
 fn a_run_killed_at_any_moment_ends_in_the_same_bits() -> Result<(), Failure> {
     let kills = std::env::var("BFREE_KILLS").map_or(Ok(5), |kills| kills.parse::<usize>())?;
@@ -209,7 +210,7 @@ fn a_run_killed_at_any_moment_ends_in_the_same_bits() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A run of 60 of 240 steps, with its checkpoints: the newer is of step 60, the other of step 40.
+/// A run of 60 of 240 steps, with its checkpoints: the newer one at step 60, the other at step 40.
 fn cut(directory: &Path) -> Result<(), Failure> {
     let output = run("rebound.json", directory, &[&SMOOTHED, &["--steps", "59"]])?;
     assert!(output.status.success(), "{}", message(&output));
@@ -263,7 +264,7 @@ fn the_last_good_checkpoint_is_used_and_said_so() -> Result<(), Failure> {
         assert!(text.contains(words) && text.contains("step 40, from"), "{words}: {text}");
         assert_same(&whole, &damaged)?;
     }
-    // The files have lost what the newer checkpoint counts on, but not the older one.
+    // The table has lost rows that the newer checkpoint needs, but none that the older one needs.
     let shorter = folder.path().join("shorter");
     copy(&first, &shorter)?;
     let history = std::fs::read_to_string(shorter.join("history.csv"))?;
@@ -289,7 +290,7 @@ fn a_missing_snapshot_is_named_and_the_run_goes_on() -> Result<(), Failure> {
         text.contains("snapshots of the run are not there any more") && text.contains("particles_000001.vtu"),
         "{text}"
     );
-    // Everything else is that of an undisturbed run; pictures leave the snapshot out.
+    // All other files equal those of an undisturbed run; pictures omit the snapshot.
     std::fs::remove_file(whole.join("particles_000001.vtu"))?;
     assert_same(&whole, &first)?;
     let mut plot = Command::new(env!("CARGO_BIN_EXE_bfree"));
@@ -318,7 +319,7 @@ fn what_cannot_be_continued_is_refused_with_its_reason() -> Result<(), Failure> 
     refused(&[&set("bodies.0.density=5")], &["bodies[0].density was 4.0 and is 5.0"])?;
     refused(&[&set("gravity.acceleration=[0, 1]")], &["gravity was null and is {"])?;
     refused(&[&set("output.probes=[]")], &["output.probes[0] was {"])?;
-    // A digit of a row is another.
+    // One digit of a row is changed.
     let history = directory.join("history.csv");
     let rows = std::fs::read_to_string(&history)?;
     std::fs::write(&history, rows.replacen("0.05,", "0.06,", 1))?;
@@ -328,7 +329,7 @@ fn what_cannot_be_continued_is_refused_with_its_reason() -> Result<(), Failure> 
         std::fs::write(directory.join(name), "rubbish")?;
     }
     refused(&[&SMOOTHED, &["--restart"]], &["no checkpoint in", "checkpoint_0.bfree: it is no", "checkpoint_1.bfree"])?;
-    // A new run in the same directory does not leave them to be continued from.
+    // A new run in the same directory removes the old checkpoints, so that no restart continues from them.
     assert!(run("rebound.json", &directory, &[&["--steps", "1", "--quiet", "--discard"]])?.status.success());
     assert_eq!(checkpoints(&directory).len(), 0);
     Ok(())
@@ -356,7 +357,7 @@ fn a_changed_particle_file_is_noticed() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The shell's limit on the size of files stands for a disk that is full: writing fails in the middle of a file.
+/// The shell's limit on the size of files stands for a full disk: writing fails in the middle of a file.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_leaves_the_checkpoint_before() -> Result<(), Failure> {
@@ -369,7 +370,7 @@ fn a_full_disk_leaves_the_checkpoint_before() -> Result<(), Failure> {
     let length = std::fs::metadata(full.join("checkpoint_0.bfree"))?.len();
     let limited = program("rebound.json", &full, &[&scene[..], &["--restart"]].concat());
     let mut shell = Command::new("sh");
-    // In blocks of 512 bytes; the tables are much shorter than a checkpoint at that time.
+    // The limit is in blocks of 512 bytes; the tables are much shorter than a checkpoint at that time.
     let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", length / 512 - 2);
     shell.args(["-c", &script]).arg(limited.get_program()).args(limited.get_args());
     let output = shell.output()?;
@@ -387,7 +388,7 @@ fn a_run_that_could_be_continued_is_lost_on_request_only() -> Result<(), Failure
     let folder = tempfile::tempdir()?;
     let directory = folder.path().join("killed");
     assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "50"]])?.status.success());
-    // It ended, and is given up on request, too. Without the report it is one that was killed.
+    // The run has ended, and `--discard` may delete it too. Without the report, it counts as a killed run.
     assert!(run("rebound.json", &directory, &[&SMOOTHED, &["--steps", "60", "--discard"]])?.status.success());
     std::fs::remove_file(directory.join("report.json"))?;
     let kept: Vec<Vec<u8>> = checkpoints(&directory).iter().map(std::fs::read).collect::<Result<_, _>>()?;

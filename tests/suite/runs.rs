@@ -1,4 +1,4 @@
-//! Facts about whole runs: units, threads, failures.
+//! Whole runs: units, threads, failures.
 
 use crate::support::{Failure, scene};
 use bfree::simulation::{AdvanceError, Simulation, StepError};
@@ -6,7 +6,7 @@ use bfree::solver::{NewtonSettings, Stop};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Everything a particle carries, as bits.
+/// The complete state of the particles, as bits.
 fn bits<const D: usize>(simulation: &Simulation<D>) -> Vec<u64> {
     let particles = &simulation.particles;
     let vectors = particles.position.iter().chain(&particles.velocity).chain(&particles.acceleration);
@@ -78,7 +78,7 @@ fn any_number_of_threads_gives_the_same_bits() -> Result<(), Failure> {
 
 #[test]
 fn mixed_precision_meets_the_same_residual_and_takes_the_same_path() -> Result<(), Failure> {
-    // Through the first impact of the hard rebound, with inertia half consistent, by both Krylov methods.
+    // The run passes the first impact of the hard rebound, with half of the inertia consistent, by both Krylov methods.
     let end = 5.0;
     let common = ["time.lumping=0.5", "solver.newton.tolerance=1e-10"];
     for method in ["{\"gmres\":{}}", "\"conjugate_gradient\""] {
@@ -127,7 +127,7 @@ fn a_step_that_fails_is_halved_and_leaves_the_particles_alone() -> Result<(), Fa
         let dt = simulation.clock.step();
         let report = simulation.advance()?;
         halvings += report.failed.len();
-        // Every attempt is half as long as the one before, says why it failed, and its work is known.
+        // Every attempt is half as long as the one before, and reports its cause of failure and its work.
         for (k, failed) in report.failed.iter().enumerate() {
             assert_eq!(failed.dt, dt * 0.5_f64.powi(k as i32));
             assert!(failed.why.contains("after the 3 allowed iterations"), "{}", failed.why);
@@ -152,7 +152,8 @@ fn a_run_that_cannot_go_on_says_why() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ctrl-C in the middle of a step: it is given up at once and not halved, nothing has moved, and what comes after has the same bits.
+/// Ctrl-C in the middle of a step: the program abandons the step at once without halving it, and no particle has moved. The following steps
+/// have the same bits.
 #[test]
 fn a_step_that_is_stopped_loses_nothing() -> Result<(), Failure> {
     for (name, overrides) in [("rebound.json", &[][..]), ("elastica.json", &["time.step=0.5"])] {
@@ -172,7 +173,7 @@ fn a_step_that_is_stopped_loses_nothing() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The printed lattice of the rebound lies on cell faces. Moved by some roundings, it is on the same side of them.
+/// The printed lattice of the rebound lies on cell faces. Shifted by some roundings, its particles must lie on the same side of them.
 #[test]
 fn round_off_does_not_decide_in_which_cell_a_particle_on_a_face_is() -> Result<(), Failure> {
     for family in [r#"approximation="linear""#, r#"approximation="gimp""#] {

@@ -1,4 +1,4 @@
-//! Scenes: the shipped ones are sound, wrong ones are refused with a message that helps, and no text brings the reader down.
+//! Scenes: the shipped ones are valid, wrong ones are refused with a helpful message, and no text makes the reader panic.
 
 mod random;
 mod wrong;
@@ -12,7 +12,7 @@ use bfree::simulation::Simulation;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Every kind of key at least once; the wrong scenes are this one with one word replaced.
+/// Every kind of key at least once. Each wrong scene is this one with one word replaced.
 const GOOD: &str = r#"{
   "title": "two blocks",
   "grid": { "origin": [0, 0], "size": [4, 2], "spacing": 0.5 },
@@ -34,7 +34,7 @@ const GOOD: &str = r#"{
   "output": { "every": 0.1, "checkpoint": 0.2, "fields": ["velocity", "stress"], "probes": [{ "name": "tip", "field": "stress", "body": "soft", "at": { "particle": [3.9, 1] } }, { "name": "mid", "field": "velocity", "at": { "point": [2, 1] } }] }
 }"#;
 
-/// The same with velocities given to nodes, which then no body may have.
+/// The same scene with velocities given to nodes, so that no body has one.
 fn good_on_nodes() -> String {
     let nodes = r#""initial_velocity": { "nodes": [{ "region": { "box": { "min": [0, 0], "max": [1, 1] } }, "velocity": [10, 0] }] }"#;
     GOOD.replace(r#""velocity": [1, 0], "#, "").replace(r#""solver""#, &format!(r#"{nodes}, "solver""#))
@@ -123,7 +123,7 @@ fn a_scene_too_large_for_the_memory_is_refused() {
     let scene = scene::read_file(&folder("scenes").join("compaction.json"), &[]).unwrap();
     let simulation = scene.build::<2>(&folder("scenes")).unwrap();
     let plan = Plan::of(&simulation).unwrap();
-    // Before room is made for the particles, and not where the whole plan would fit.
+    // The memory check precedes the allocation of the particles. It accepts a limit below the bytes of the whole plan.
     let least = 3 * 400 * Particles::<2>::BYTES as u64;
     assert!(least < plan.bytes());
     assert!(scene.build_within::<2>(&folder("scenes"), least).is_ok());
@@ -159,7 +159,7 @@ fn the_good_scene_is_good_and_defaults_are_the_documented_ones() {
         let with = |family: &str| scene::read(least, &[format!("approximation.{family}").parse().unwrap()]);
         assert_eq!(with(short).unwrap(), with(long).unwrap());
     }
-    // what is written back is the same scene
+    // A scene that is written can be read again, unchanged.
     let written = serde_json::to_string(&scene).unwrap();
     assert_eq!(scene, scene::read(&written, &[]).unwrap_or_else(|error| panic!("{error}")));
 }
@@ -201,7 +201,7 @@ fn scenes_whose_numbers_do_not_fit_are_refused_with_the_number() {
         |path: &'static str, value: Value| move |scene: &mut Value| *scene.pointer_mut(path).unwrap() = value.clone();
     let add = |key: &'static str, value: Value| move |scene: &mut Value| scene["bodies"][0][key] = value.clone();
     built::<3>(&block(3, 1.0, |_| {})).unwrap();
-    // Λ V / h of 1e-80 in size, squared by the norm of the residual, vanishes: everything would be in equilibrium.
+    // Λ V / h is about 1e-80. Its square in the norm of the residual underflows, so that every state would be an equilibrium.
     refused(block(3, 1e-80, |_| {}), &["bodies[0]: the smallest force that resists", "1e-120"]);
     refused(block(3, 1e-75, set("/bodies/0/density", json!(1e-99))), &["bodies[0]: the smallest particle mass is 0e0"]);
     refused(block(3, 1e40, set("/time/step", json!(1e-9))), &["in one step", "1e120"]);
@@ -233,14 +233,14 @@ fn every_face_of_a_box_is_loaded_with_its_whole_area() -> Result<(), Box<dyn std
             }
         }
     };
-    // all of the surface: the perimeter of the unit square, 2 particles a cell and 4 along each side
+    // The whole surface: the perimeter of the unit square, 2 particles per cell and 4 along each side.
     let points = built::<2>(&block(2, 1.0, pressed(None)))?.loads.surface.remove(0).points;
     assert_eq!(points.len(), 4 * 4);
     assert_eq!(points.iter().map(|point| point.area).sum::<f64>(), 4.0);
     assert!(points.iter().all(|point| point.normal.amax() == 1.0));
     let points = built::<3>(&block(3, 1.0, pressed(None)))?.loads.surface.remove(0).points;
     assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (6 * 16, 6.0));
-    // the top alone, by a region that begins at it; of a region that reaches below, what it holds of the sides too
+    // The top alone, with a region that begins at it. A region that reaches further down also contains a part of the sides.
     let top = json!({"half_space": {"point": [0, 1.5], "normal": [0, -1]}});
     let points = built::<2>(&block(2, 1.0, pressed(Some(top))))?.loads.surface.remove(0).points;
     assert_eq!((points.len(), points.iter().map(|point| point.area).sum::<f64>()), (4, 1.0));
@@ -316,7 +316,7 @@ fn all_wrong_keys_and_types_are_told_at_once() {
     ] {
         assert_eq!(message.matches(words).count(), 1, "{words}\n{message}");
     }
-    // each with its place, and nothing else
+    // Each message has its place in the file, and nothing else.
     assert_eq!(message.matches("--> line").count(), 9, "{message}");
     let SceneError::Malformed(first) = scene::read(&text, &[]).expect_err("wrong") else { panic!("{message}") };
     assert_eq!(first.others.len(), 8, "{message}");

@@ -1,4 +1,4 @@
-//! Time schemes in whole steps: what holds for each of them.
+//! Time schemes in whole steps: properties that each of them has.
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
@@ -17,7 +17,7 @@ fn advance(simulation: &mut Simulation<2>, steps: usize) -> Result<(), Failure> 
     (0..steps).try_for_each(|_| simulation.advance().map(drop)).map_err(Into::into)
 }
 
-/// Uniform acceleration is in the span of every scheme: x = ½ g t², v = g t, and nothing is strained.
+/// Every scheme is exact for uniform acceleration: x = ½ g t², v = g t, without strain.
 #[test]
 fn free_fall_is_exact_for_every_spectral_radius() -> Result<(), Failure> {
     for rho in [0.0, 0.5, 1.0] {
@@ -41,7 +41,8 @@ fn free_fall_is_exact_for_every_spectral_radius() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Nodes that are told to move as the body does are at their end when the step is, not at the instant of the balance: nothing is strained.
+/// Nodes with the prescribed motion of the body reach their target at the end of the step, not at the instant of the balance. So there is
+/// no strain.
 #[test]
 fn a_region_that_moves_with_the_body_strains_nothing() -> Result<(), Failure> {
     let region = r#"prescribed=[{"region":{"box":{"min":[0,0],"max":[15,2.6]}},"velocity":[[0,[0.5,0]]]}]"#;
@@ -53,15 +54,15 @@ fn a_region_that_moves_with_the_body_strains_nothing() -> Result<(), Failure> {
         let end = simulation.particles.by_id();
         let moved = |p: usize| end.position[p] - start.position[p] - Vector::from([0.5, 0.0]);
         let most = (0..end.len()).map(|p| moved(p).norm()).fold(0.0, f64::max);
-        // To what Newton's method leaves.
+        // The bound is the tolerance of Newton's method.
         assert!(most < 1e-9, "ρ = {rho}: {most}");
         assert!(simulation.strain_energy() < 1e-16, "ρ = {rho}: {}", simulation.strain_energy());
     }
     Ok(())
 }
 
-/// A wall is where it was told to be at the end of each step, and what it did is work: a block pressed slowly from above is nearly static, so
-/// that Newmark's method finds the same.
+/// A wall reaches its prescribed position at the end of each step, and its work is counted. A block pressed slowly from above is nearly
+/// static, so Newmark's method gives the same result.
 #[test]
 fn a_moving_wall_arrives_and_its_work_is_counted() -> Result<(), Failure> {
     let run = |scheme: &str| -> Result<Simulation<2>, Failure> {
@@ -77,13 +78,13 @@ fn a_moving_wall_arrives_and_its_work_is_counted() -> Result<(), Failure> {
         let other = run(&generalized(rho))?;
         let (place, work) = (top(&other) - top(&newmark), other.external_work / newmark.external_work - 1.0);
         assert!(place.abs() < 1e-3 * newmark.grid.spacing, "ρ = {rho}: the top is {place} away");
-        // The jolt of the wall's start rings on without damping alone.
+        // Without damping, the jolt of the wall's start keeps ringing.
         assert!(rho < 1.0 || work.abs() < 1e-3, "ρ = {rho}: work differs by {work}");
     }
     Ok(())
 }
 
-/// After a jump of the load, the fastest vibrations are there with the trapezoidal rule and gone with ρ∞ = 0; the slow one stays.
+/// After a jump of the load, the trapezoidal rule keeps the fastest vibrations and ρ∞ = 0 removes them. The slow vibration stays.
 #[test]
 fn it_damps_what_steps_do_not_resolve() -> Result<(), Failure> {
     let energies = |scheme: &str| -> Result<f64, Failure> {
@@ -99,7 +100,7 @@ fn it_damps_what_steps_do_not_resolve() -> Result<(), Failure> {
     Ok(())
 }
 
-/// A scheme of one's own is one `impl`: backward Euler, as a user would write it.
+/// A user's own scheme is one `impl`: here backward Euler.
 #[derive(Debug)]
 struct BackwardEuler;
 
@@ -123,14 +124,14 @@ impl Scheme for BackwardEuler {
 #[test]
 fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
     let mut own = scene::<2>("rebound.json", &[])?;
-    // Another scheme of order one.
+    // Newmark's scheme below is also of order one.
     own.settings.scheme = Arc::new(BackwardEuler);
     let mut newmark = own.clone();
     newmark.settings.scheme = Arc::new(Newmark { beta: 0.5, gamma: 1.0 });
     let energy = own.particles.kinetic_energy();
     advance(&mut own, 100)?;
     advance(&mut newmark, 100)?;
-    // In free flight both are exact.
+    // Both schemes are exact in free flight.
     assert!((own.particles.kinetic_energy() / energy - 1.0).abs() < 1e-9);
     let (own, newmark) = (own.particles.by_id(), newmark.particles.by_id());
     assert!(own.position.iter().zip(&newmark.position).all(|(a, b)| (a - b).norm() < 1e-9));

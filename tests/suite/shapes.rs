@@ -1,4 +1,4 @@
-//! Shapes as drawn, against slow and simple geometry; and what a scene is told that draws them wrong.
+//! Shapes as drawn, against slow and simple geometry; and the messages for shapes that are drawn wrong.
 
 use crate::support::{self, Failure};
 use bfree::scene::{self, SceneError};
@@ -29,7 +29,7 @@ fn along(vertices: &[Point<2>], n: u32) -> impl Iterator<Item = Point<2>> {
     (0..vertices.len()).flat_map(edge)
 }
 
-/// Whether two edges that share no vertex cross: solved for both places.
+/// Whether two edges without a common vertex cross; solves for the position along both.
 fn crossing(vertices: &[Point<2>]) -> bool {
     let n = vertices.len();
     let edge = |i: usize| (vertices[i], vertices[(i + 1) % n] - vertices[i]);
@@ -44,7 +44,7 @@ fn crossing(vertices: &[Point<2>]) -> bool {
     })
 }
 
-/// A star of many points: simple, mostly not convex, in either order.
+/// A star of many points: simple, mostly not convex, in either orientation.
 fn star() -> impl Strategy<Value = Vec<Point<2>>> {
     (prop::collection::vec((0.3..2.0, 0.1..1.0), 3..12), any::<bool>()).prop_map(|(points, reversed)| {
         let whole: f64 = points.iter().map(|point| point.1).sum();
@@ -67,7 +67,7 @@ fn point<const D: usize>(size: f64) -> impl Strategy<Value = Point<D>> {
     prop::array::uniform::<_, D>(-size..size).prop_map(Vector::from)
 }
 
-/// The foot of `x` lies on the surface, and the normal is that of d.
+/// The foot point of `x` lies on the surface, and the normal is the gradient of d.
 fn foot_and_normal<const D: usize>(shape: &Shape<D>, x: &Point<D>) -> Result<(), TestCaseError> {
     let (d, n) = shape.distance_and_normal(x);
     prop_assert!((n.norm() - 1.0).abs() < 1e-13, "{n}");
@@ -75,7 +75,7 @@ fn foot_and_normal<const D: usize>(shape: &Shape<D>, x: &Point<D>) -> Result<(),
     Ok(())
 }
 
-/// What lies inside lies in the bounding box; and the box touches the solid, as far as `surface` does.
+/// The bounding box contains the shape. It also touches the solid, to the resolution `hair` of `surface`.
 fn bounded<const D: usize>(shape: &Shape<D>, surface: &[Point<D>], hair: f64) -> Result<(), TestCaseError> {
     let (min, max) = shape.bounding_box();
     for k in 0..D {
@@ -87,7 +87,7 @@ fn bounded<const D: usize>(shape: &Shape<D>, surface: &[Point<D>], hair: f64) ->
     Ok(())
 }
 
-/// Volume, centroid, area and ∫ n dA of a solid in the box from −r to r, cut by so many cells along each axis.
+/// Volume, centroid, area and ∫ n dA of a solid in the box from −r to r, cut by `cells` cells along each axis.
 fn by_cells<const D: usize>(shape: &Shape<D>, r: f64, cells: usize) -> (f64, Vector<f64, D>, f64, Vector<f64, D>) {
     let h = 2.0 * r / cells as f64;
     let (mut volume, mut moment, mut area, mut normals) = (0.0, Vector::zeros(), 0.0, Vector::zeros());
@@ -118,11 +118,12 @@ proptest! {
             let d = shape.signed_distance(x);
             prop_assert_eq!(d <= 0.0, inside(&vertices, x), "{} at {}", d, x);
             let nearest = outline.iter().map(|y| (x - y).norm()).fold(f64::INFINITY, f64::min);
-            // Places along an edge are at most 4/200 apart.
+            // Points along an edge are at most 4/200 apart.
             prop_assert!(d.abs() <= nearest + 1e-14 && nearest <= d.abs() + 0.01, "{d} {nearest}");
             foot_and_normal(&shape, x)?;
         }
-        // What is cut out of boxes is all of it: area and first moment by the trapezia under its edges, and the length of its outline.
+        // The parts in all cells sum to the whole polygon: area and first moment by the trapezia under its edges, and the length of its
+        // outline.
         let (area, moment) = vertices.iter().zip(vertices.iter().cycle().skip(1)).fold((0.0, Vector::zeros()), |(area, moment), (a, b)| {
             let twice = a[0] * b[1] - a[1] * b[0];
             (area + 0.5 * twice, moment + (a + b) * (twice / 6.0))
@@ -131,7 +132,7 @@ proptest! {
         let (cut, centroid, surface, normals) = by_cells(&shape, 3.0, 12);
         prop_assert!((cut - area.abs()).abs() < 1e-9 && (centroid * cut - moment * area.signum()).norm() < 1e-9, "{cut} {area}");
         prop_assert!((surface - length).abs() < 1e-6 && normals.norm() < 1e-6, "{surface} {length}");
-        // At a vertex, and on an edge, too.
+        // The same holds at vertices and on edges.
         for x in &outline {
             prop_assert!(shape.signed_distance(x).abs() < 1e-14);
             prop_assert!((shape.normal(x).norm() - 1.0).abs() < 1e-13);
@@ -168,7 +169,7 @@ proptest! {
         let shape = Shape::from(cone);
         let (length, e) = ((to - from).norm(), (to - from).normalize());
         prop_assume!(length > 0.1);
-        // Its surface: rings along the side, and on both discs.
+        // The surface of the cylinder: rings along the side and on both discs.
         let one = e.cross(&if e[0].abs() < 0.7 { Vector::x() } else { Vector::y() }).normalize();
         let other = e.cross(&one);
         let ring = |s: f64, r: f64| {
@@ -190,7 +191,7 @@ proptest! {
             foot_and_normal(&shape, x)?;
         }
         bounded(&shape, &surface, 3e-3)?;
-        // On the axis, too, where no direction across is better than another.
+        // The same holds on the axis, where no radial direction is preferred.
         for k in 0..=20 {
             let x = from + e * (length * (f64::from(k) * 0.1 - 0.5));
             foot_and_normal(&shape, &x)?;
@@ -238,7 +239,7 @@ proptest! {
         let corner = |i: u32| Vector::from([[-0.5, 0.5][i as usize % 2], [-0.25, 1.0][i as usize / 2 % 2], [0.0, 0.75][i as usize / 4]]);
         let corners: Vec<_> = (0..8).map(|i| after(&corner(i))).collect();
         bounded(&moved, &corners, 1e-12)?;
-        // A ball has no direction: turned and scaled it is another ball, in a box without margin.
+        // A ball has no orientation: rotated and scaled it is another ball, with an exact bounding box.
         let ball = |center: Point<3>, radius| Shape::from(Ball { center, radius });
         let moved = Shape::from(Similar { of: Box::new(ball(places[0], 0.5)), about, rotation, factor });
         let (expected, found) = (ball(after(&places[0]), 0.5 * factor).bounding_box(), moved.bounding_box());
@@ -246,7 +247,7 @@ proptest! {
     }
 }
 
-/// A scene with one body of this shape in a box of 4, in as many dimensions.
+/// A scene with one body of this shape, in a box of edge 4 with `dimension` dimensions.
 fn with_shape(dimension: usize, shape: &Value) -> Value {
     json!({
         "grid": {"size": vec![4; dimension], "spacing": 0.25},
@@ -282,7 +283,7 @@ fn bodies_have_the_volume_of_what_is_drawn() -> Result<(), Failure> {
 
 #[test]
 fn a_region_that_ends_on_nodes_holds_them_whatever_the_round_off() -> Result<(), Failure> {
-    // The node row at −0.3 + 3 · 0.1 = 5.6e-17, held by the half-space y ≤ 0.
+    // The row of nodes at −0.3 + 3 · 0.1 = 5.6e-17 belongs to the half-space y ≤ 0, which is held.
     let scene = json!({
         "grid": {"origin": [0, -0.3], "size": [0.4, 0.6], "spacing": 0.1}, "approximation": "linear",
         "time": {"step": 1, "end": 1, "inertia": "none"},
@@ -293,7 +294,7 @@ fn a_region_that_ends_on_nodes_holds_them_whatever_the_round_off() -> Result<(),
     });
     let mut simulation = built::<2>(&scene)?;
     simulation.advance()?;
-    // It stands, pressed down by ρ g H²/2E = 2e-4 at the top, and does not fall.
+    // The body stands, pressed down by ρ g H²/2E = 2e-4 at the top, and does not fall.
     let now = simulation.particles.by_id().position;
     let lowest = now.iter().map(|x| x[1]).fold(f64::INFINITY, f64::min);
     assert!((lowest - 0.025).abs() < 1e-4, "{lowest}");
@@ -397,8 +398,8 @@ fn tip(simulation: &Simulation<2>, start: &[Point<2>]) -> Point<2> {
     (0..2).map(|i| now.position[points[i]] - start[points[i]]).sum::<Point<2>>() * 0.5
 }
 
-/// Nine-node elements of the same law, 32 × 32, end at (−9.130, 14.505); those of the benchmark's, with
-/// W = G/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J), at 14.737.
+/// Nine-node elements of the same law, 32 × 32, end at (−9.130, 14.505). The benchmark's law, W = G/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J),
+/// gives 14.737.
 #[test]
 fn cook_s_membrane_does_not_ask_how_many_steps() -> Result<(), Failure> {
     let bent = |h: f64, steps: u32| {

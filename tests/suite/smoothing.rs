@@ -1,4 +1,4 @@
-//! Smoothing of the particles: what it keeps, what it takes, and its limits.
+//! Smoothing of the particle velocities: the quantities it conserves, the energy it dissipates, and its limits.
 
 use crate::support::{Failure, scene};
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme};
@@ -33,7 +33,7 @@ fn after<const D: usize>(particles: &Particles<D>, change: &[Vector<f64, D>]) ->
     (changed.momentum(), changed.kinetic_energy())
 }
 
-/// What smoothing changes the velocities by.
+/// The change of the velocities by smoothing.
 fn velocity_change<const D: usize>(
     smoothing: &Smoothing,
     particles: &Particles<D>,
@@ -58,7 +58,7 @@ fn keeps_momentum_and_gains_no_energy<const D: usize>() -> Result<(), Failure> {
             let change = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
             let (momentum, energy) = after(&particles, &change);
             assert!((momentum - particles.momentum()).norm() < 1e-14 * scale, "{family:?} {smoothing:?}");
-            // M_L − M has no negative eigenvalue, so each term takes energy, and the more terms the less.
+            // M_L − M has no negative eigenvalue, so each term dissipates energy, and more terms dissipate less.
             assert!(energy < particles.kinetic_energy(), "{family:?} {smoothing:?}");
             if smoothing.rate == f64::INFINITY && smoothing.at_kinks == 0.0 {
                 assert!(energy > energy_before, "{family:?} {smoothing:?}");
@@ -119,7 +119,7 @@ fn limited_smoothing_sees_neither_the_motion_of_the_frame_nor_its_axes() -> Resu
         let nodal = Nodal::project(&particles, &supports, 1.0)?;
         let still = velocity_change(&smoothing, &particles, &supports, &nodal.mass, 0.1);
         let rest = particles.velocity.clone();
-        // Seen from a train on other rails: v' = Q v + c.
+        // The same motion in another frame: v' = Q v + c.
         let (sin, cos) = 0.7_f64.sin_cos();
         let turned = |v: &Vector<f64, 2>| Vector::from([cos * v[0] - sin * v[1], sin * v[0] + cos * v[1]]);
         particles.velocity = rest.iter().map(|v| turned(v) + Vector::from([300.0, -20.0])).collect();
@@ -145,12 +145,12 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
         let (supports, nodes) = Supports::new(&family, &grid, &particles.position)?;
         let nodal = Nodal::project(&particles, &supports, 1.0)?;
         let places: Vec<f64> = nodes.positions(&grid).map(|(_, x)| x[0]).collect();
-        // min(1, (2q)³), from the shares of a step so short that they are proportional to it.
+        // min(1, (2q)³), from the shares of a step so short that the shares are proportional to it.
         let mut strength = |velocity: &dyn Fn(f64) -> f64| -> Result<Vec<(f64, f64)>, Failure> {
             particles.velocity = particles.position.iter().map(|x| x.map(velocity)).collect();
             let shares = smoothing.shares_at_kinks(&particles, &supports, &nodal.mass, 1e-6);
             let shares = shares.ok_or("limited smoothing has shares")?;
-            // Away from the ends of the bar.
+            // Nodes away from the ends of the bar.
             let inside = places.iter().zip(shares.to_vec()).filter(|(x, _)| (0.2..0.8).contains(*x));
             Ok(inside.map(|(&x, share)| (x - 0.5, share / (5.0 * 1e-6))).collect())
         };
@@ -161,7 +161,7 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
         let tent = |x: f64| (x - 0.5).abs();
         let parabola = |x: f64| (x - 0.5).powi(2);
         for (x, s) in strength(&tent)?.into_iter().chain(strength(&parabola)?) {
-            // Full at the vertex, nothing four cells away.
+            // The share is 1 at the vertex and 0 four cells away.
             assert!(!near(x) || s > 0.99, "{family:?}: at the vertex {s}");
             assert!(x.abs() < 0.1 || s < 1e-2, "{family:?}: on the flank, at {x}: {s}");
         }
@@ -171,7 +171,7 @@ fn kinks_and_extrema_are_told_from_slopes() -> Result<(), Failure> {
 
 #[test]
 fn a_limited_front_does_not_ring_and_is_hardly_wider_than_one_that_does() -> Result<(), Failure> {
-    // 1000 m/s into a bar at rest, until the shocks have gone 4.3 m; the middle state is 500 m/s.
+    // 1000 m/s into a bar at rest, until the shocks have travelled 4.3 m; the middle state is 500 m/s.
     let profile = |transfer: &str| -> Result<Vec<(f64, f64)>, Failure> {
         let overrides = ["bodies.0.shape.box.min=[44]", "bodies.0.shape.box.max=[56]", transfer];
         let mut bar: Simulation<1> = scene("riemann_jump.json", &overrides)?;
@@ -190,7 +190,7 @@ fn a_limited_front_does_not_ring_and_is_hardly_wider_than_one_that_does() -> Res
     let highest = |profile: &[(f64, f64)]| profile.iter().map(|(_, v)| *v).fold(0.0, f64::max);
     let (limited, flip) = (profile(r#"transfer={"limited":{"rate":40700}}"#)?, profile(r#"transfer="flip""#)?);
     let (over, without) = (highest(&limited) - 500.0, highest(&flip) - 500.0);
-    // Without smoothing it rings by more than a quarter of the jump of 500 m/s (149.6 here).
+    // Without smoothing the front overshoots by more than a quarter of the jump of 500 m/s (149.6 here).
     assert!(over < 20.0 && without > 125.0, "{over} {without}");
     assert!(width(&limited) < 1.5 * width(&flip), "{} {}", width(&limited), width(&flip));
     Ok(())
@@ -198,7 +198,7 @@ fn a_limited_front_does_not_ring_and_is_hardly_wider_than_one_that_does() -> Res
 
 #[test]
 fn the_shipped_jump_lies_in_the_middle_as_that_of_the_study() -> Result<(), Failure> {
-    // Half of the mass moves: the node under the jump has the mean velocity, and not that of the left.
+    // Half of the mass moves: the node at the jump has the mean velocity, not the velocity of the left side.
     let bar: Simulation<1> = scene("riemann_jump.json", &[])?;
     let mean = bar.particles.momentum()[0] / bar.particles.mass.iter().sum::<f64>();
     assert!((mean - 500.0).abs() < 1e-9, "{mean}");
@@ -226,13 +226,13 @@ fn with_a_lumped_mass_pic_gives_particles_the_velocity_of_their_nodes() -> Resul
     let accelerated = supports.values(&nodal.acceleration);
     let largest = accelerated.iter().map(Vector::norm).fold(0.0, f64::max);
     assert!(largest > 0.0);
-    // No step has put particles elsewhere, which the comparison needs.
+    // The comparison requires that no step has reordered the particles.
     assert!(pic.particles.id == before.particles.id && flip.particles.id == before.particles.id);
     for p in 0..before.particles.len() {
         // v_p = Σ N (v_n + Δv), and FLIP is v_p + Σ N Δv.
         let expected = at_start[p] + (flip.particles.velocity[p] - before.particles.velocity[p]);
         assert!((pic.particles.velocity[p] - expected).norm() < 1e-9, "particle {p}");
-        // The same for the acceleration.
+        // The acceleration follows the same formula.
         let expected = accelerated[p] + (flip.particles.acceleration[p] - before.particles.acceleration[p]);
         assert!((pic.particles.acceleration[p] - expected).norm() < 1e-9 * largest, "particle {p}");
     }
@@ -263,7 +263,7 @@ fn a_bar_keeps_its_momentum_and_loses_as_much_energy_in_two_half_steps_as_in_one
 
 #[test]
 fn a_node_without_mass_does_not_disturb_its_particle() -> Result<(), Failure> {
-    // On a face between two cells the far node has N = 0 and ∇N ≠ 0: it is active, and weighs nothing.
+    // On a face between two cells the far node has N = 0 and ∇N ≠ 0: it is active, but has no mass.
     let grid = Grid::<1> { origin: Vector::zeros(), spacing: 1.0, cells: [3] };
     let mut particles = Particles::default();
     particles.push(Vector::from([1.0]), Vector::from([4.0]), 1.0, 1.0, 0);

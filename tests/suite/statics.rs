@@ -13,7 +13,7 @@ use bfree::tensor::{Tensor, Vector};
 const COLUMN: &str = "column_static.json";
 const FREE: &str = r#"boundary={"left":"free"}"#;
 
-/// Runs to `end`; Newton iterations of each step.
+/// Runs to `end`. Returns the Newton iterations of each step.
 fn run<const D: usize>(simulation: &mut Simulation<D>, end: u64) -> Result<Vec<usize>, Failure> {
     let mut iterations = Vec::new();
     while simulation.clock.nominal_steps() < end {
@@ -22,11 +22,11 @@ fn run<const D: usize>(simulation: &mut Simulation<D>, end: u64) -> Result<Vec<u
     Ok(iterations)
 }
 
-/// P(X) = −ρ₀ g (H − X): nothing but the weight above, whatever the law; λ(X) from the law, u(X) = ∫ (λ − 1) dX.
+/// P(X) = −ρ₀ g (H − X): the stress is the weight above, for any law. The law gives λ(X), and u(X) = ∫ (λ − 1) dX.
 #[test]
 fn a_column_carries_the_weight_above() -> Result<(), Failure> {
     let (density, height) = (2700.0, 1.0);
-    // St. Venant–Kirchhoff's stress in compression has an extremum, 0.385 (Λ/2 + G), which is less than the whole weight.
+    // The compressive stress of St. Venant–Kirchhoff's law has an extremum, 0.385 (Λ/2 + G), which is less than the whole weight.
     let laws = [
         ("neo_hookean", "double", 9.81),
         ("neo_hookean_logarithmic", "mixed", 9.81),
@@ -37,7 +37,7 @@ fn a_column_carries_the_weight_above() -> Result<(), Failure> {
             &format!(r#"bodies.0.material={{"{law}":{{"lambda":5e4,"shear":3e4}}}}"#),
             &format!("solver.krylov.precision=\"{precision}\""),
             &format!("gravity.acceleration=[0,-{g}]"),
-            // In one step from rest: the particles are where the quadrature wants them.
+            // One step from rest, so that the particles are at the quadrature points.
             "time.step=1",
             "gravity.curve=null",
         ];
@@ -46,12 +46,12 @@ fn a_column_carries_the_weight_above() -> Result<(), Failure> {
         run(&mut simulation, 1)?;
         let particles = simulation.particles.by_id();
         let law = &simulation.bodies[0].law;
-        // Quadratic B-splines err by a part of (h/H)².
+        // The error of quadratic B-splines is a fraction of (h/H)².
         let bound = (simulation.grid.spacing / height).powi(2);
         let strain = |x: f64| stretch(law, -density * g * (height - x)) - 1.0;
         for (p, x) in start.iter().enumerate() {
             let h = particles.displacement_gradient[p];
-            // Confined: no strain across.
+            // The column is confined: no strain across.
             assert!(h[(0, 0)].abs() < 1e-12 && h[(0, 1)].abs() < 1e-12 && h[(1, 0)].abs() < 1e-12, "{h}");
             assert!((h[(1, 1)] - strain(x[1])).abs() < bound, "H = {} at {}, {}", h[(1, 1)], x[1], strain(x[1]));
         }
@@ -59,7 +59,7 @@ fn a_column_carries_the_weight_above() -> Result<(), Failure> {
         let u = particles.position[top][1] - x[1];
         let exact = moved_in_column(law, density * g, height, x[1]);
         assert!((u - exact).abs() < bound * exact.abs(), "{u} instead of {exact}");
-        // A weight put on at once does about twice the work that is stored: exactly twice for a linear law.
+        // A weight that acts at once does about twice the work that is stored: exactly twice for a linear law.
         let ratio = simulation.external_work / simulation.strain_energy();
         assert!((1.8..2.2).contains(&ratio), "{ratio}");
     }
@@ -76,7 +76,7 @@ fn nothing_of_motion_is_stored_and_newton_is_quadratic() -> Result<(), Failure> 
     assert_eq!((particles.velocity.capacity(), particles.acceleration.capacity()), (0, 0));
     let velocity = Field::Velocity.values(&simulation, &Reference::of(&simulation)).expect_err("there is none");
     assert_eq!(velocity.to_string(), "particles without inertia have no velocity");
-    // A slow load does the work that is stored.
+    // The work of a slow load equals the stored energy.
     let (work, stored) = (simulation.external_work, simulation.strain_energy());
     assert!((work - stored).abs() < 5e-3 * stored, "{work} {stored}");
     Ok(())
@@ -84,8 +84,8 @@ fn nothing_of_motion_is_stored_and_newton_is_quadratic() -> Result<(), Failure> 
 
 #[test]
 fn a_load_on_the_end_of_a_bar_is_its_stress() -> Result<(), Failure> {
-    // P = T; and P = −p under a follower pressure, since uniaxial strain leaves the area as it is. The load enters at the particles of
-    // the surface, so through the last cell the stress grows to that.
+    // P = T; and P = −p under a follower pressure, since uniaxial strain does not change the area. The load acts on the particles of the
+    // surface, so the stress grows to this value through the last cell.
     let end = r#""body":"column","region":{"box":{"min":[0,0.999],"max":[0.4,1.1]}}"#;
     let traction = format!(r#"tractions=[{{{end},"traction":[0,2e4]}}]"#);
     let pressure = format!(r#"pressures=[{{{end},"pressure":2e4}}]"#);
@@ -125,7 +125,7 @@ fn a_column_pressed_by_its_end_has_one_strain_and_the_end_carries_its_stress() -
         (top[1] - force).abs() < 1e-9 * force.abs() && (bottom[1] + force).abs() < 1e-9 * force.abs(),
         "{top} {bottom}"
     );
-    // The trapezoid of a force that grows from nothing.
+    // The trapezoidal rule for a force that grows from zero.
     assert!((simulation.external_work + 0.5 * force * 0.02).abs() < 1e-9 * force.abs());
     Ok(())
 }
@@ -145,7 +145,7 @@ fn what_nothing_holds_is_said() -> Result<(), Failure> {
         assert!(text.contains(words) && text.contains("boundary condition"), "{text}");
         assert_eq!(simulation.particles, before);
     }
-    // On a hinge below a corner.
+    // A body on a hinge below a corner.
     let hinge = r#"prescribed=[{"region":{"box":{"min":[-0.01,-0.01],"max":[0.01,0.01]}},"displacement":[[0,[0,0]]]}]"#;
     let mut simulation = scene::<2>(COLUMN, &[FREE, hinge])?;
     let error = simulation.advance().expect_err("it would turn");
@@ -155,7 +155,8 @@ fn what_nothing_holds_is_said() -> Result<(), Failure> {
 
 #[test]
 fn what_nothing_pushes_needs_no_hold() -> Result<(), Failure> {
-    // A block too flat to buckle, on a smooth floor between no walls: the tangent is singular, and the loads ask nothing of its null space.
+    // A block too flat to buckle, on a smooth floor without side walls: the tangent is singular, and the loads have no component in its
+    // null space.
     let floor = r#"boundary={"bottom":"sliding"}"#;
     let mut found: Vec<f64> = Vec::new();
     for method in [r#"{"gmres":{}}"#, r#""conjugate_gradient""#] {
@@ -193,10 +194,10 @@ fn keys_of_inertia_are_refused() -> Result<(), Failure> {
         let error = scene::<2>(COLUMN, &[key]).expect_err(key).to_string();
         let words = "time.inertia is \"none\", and without inertia it means nothing";
         assert!(error.contains(path) && error.contains(words) && error.contains(key), "{key}: {error}");
-        // With inertia they are welcome.
+        // With inertia these keys are allowed.
         scene::<2>(COLUMN, &[key, "time.inertia=\"newmark\""])?;
     }
-    // What is not given is not there, and what is written can be read again.
+    // Keys that are not given are absent, and the written scene can be read again.
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(COLUMN);
     let read = scene::read_file(&path, &["output.fields=null".parse()?])?;
     assert_eq!((read.time.beta, read.transfer), (None, None));
@@ -207,7 +208,7 @@ fn keys_of_inertia_are_refused() -> Result<(), Failure> {
 
 #[test]
 fn units_do_not_matter_to_load_steps() -> Result<(), Failure> {
-    // Length and stress by powers of two, time by any factor: without inertia it is a name of the load alone.
+    // Length and stress scale by powers of two, time by any factor: without inertia, time only labels the load.
     let (length, stress) = (2.0_f64.powi(-20), 2.0_f64.powi(30));
     let mut plain = scene::<2>(COLUMN, &[])?;
     let mut scaled = plain.clone();
@@ -243,9 +244,9 @@ fn end_of_beam(simulation: &Simulation<2>, start: &[Vector<f64, 2>]) -> [f64; 2]
     [-end[0] / length, -end[1] / length]
 }
 
-/// PL²/EI = 1, 2, 5, 10 on the way: the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J. Numer. Methods Eng. 17,
-/// 1981). One with L/h = 20 shears and stretches, too, by h²/5L² PL²/EI of its length at first: at 8 cells deep a percent of w is allowed,
-/// at the scene's 4 a fifth more.
+/// PL²/EI = 1, 2, 5, 10 along the path: the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J. Numer. Methods Eng.
+/// 17, 1981). A beam of L/h = 20 also shears and stretches, at first by h²/5L² PL²/EI of its length. The bound is a percent of w with 8
+/// cells over the depth, and a fifth more with the scene's 4.
 #[test]
 fn the_elastica_is_reached_with_what_a_scene_has_that_says_nothing() -> Result<(), Failure> {
     let exact = [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (5, 0.38763, 0.71379), (10, 0.55500, 0.81061)];
@@ -262,7 +263,7 @@ fn the_elastica_is_reached_with_what_a_scene_has_that_says_nothing() -> Result<(
         }
         right(0.012, end_of_beam(&simulation, &start), case);
     }
-    // And at once: the residual grows thirtyfold on the way, and only the potential finds it.
+    // One load step: the residual grows thirtyfold on the way, and the line search reaches the solution only by the potential.
     let mut at_once = scene::<2>("elastica.json", &["time.step=1", "grid.spacing=0.125", "output.probes=[]"])?;
     let start = at_once.particles.by_id().position;
     let step = at_once.advance()?;
@@ -313,7 +314,7 @@ fn splines_curve_at_walls_where_sums_are_integrals_and_no_mass_is_lumped() -> Re
 
 #[test]
 fn a_step_that_was_hard_is_not_made_longer() -> Result<(), Failure> {
-    // A column that is given its weight at once, in quarters of a step.
+    // A column with its whole weight at once, in quarters of a step.
     let mut simulation = scene::<2>(COLUMN, &["time.step=1"])?;
     assert!(simulation.clock.halve() && simulation.clock.halve());
     simulation.advance()?;

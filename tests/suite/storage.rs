@@ -1,4 +1,4 @@
-//! Where particles lie in memory: near the order of the sweep, and without any influence on the results.
+//! The order of the particles in memory is near that of the transfer, and has no influence on the results.
 
 use crate::support::{Failure, Random, scene};
 use bfree::checkpoint::{Checkpoints, Identity, restore};
@@ -7,7 +7,7 @@ use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 
-/// A dead load and a follower pressure on some particles each, of two bodies with two laws.
+/// A dead load and a follower pressure, each on some particles of two bodies with two laws.
 const LOADED: [&str; 2] = [
     r#"tractions=[{"body":"soft","region":{"box":{"min":[0,0],"max":[2.4,10]}},"traction":[0.1,0]}]"#,
     r#"pressures=[{"body":"stiff","region":{"box":{"min":[7.6,0],"max":[10,10]}},"pressure":0.1}]"#,
@@ -73,7 +73,7 @@ fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
     let mut simulation = shuffled(&start);
     let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
     simulation.advance()?;
-    // A step puts the particles in the order that `continued` has; out of it, a restart that forgets where they lay is seen.
+    // The step has sorted the particles into the order of `continued`. A second shuffle reveals a restart that does not store the order.
     let mut simulation = shuffled(&simulation);
     let mut checkpoints =
         Checkpoints::new(folder.path().to_owned(), identity.clone(), serde_json::Value::Null, 1.0, None);
@@ -87,8 +87,8 @@ fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Bytes that a block of `cells`³ cells under its weight holds in a step, and bytes allocated in one by the thread that takes it; the
-/// least of some steps, as other tests may have taken the memory left for this one.
+/// Two numbers for a block of `cells`³ cells under its weight: the bytes that it holds in a step, and the bytes that its thread allocates
+/// in a step. The second is the least of some steps, since other tests may have taken the memory left for this one.
 fn held_and_allocated(cells: u32, method: &str) -> Result<[f64; 2], Failure> {
     let side = f64::from(cells) * 0.1;
     let overrides = [
@@ -103,7 +103,7 @@ fn held_and_allocated(cells: u32, method: &str) -> Result<[f64; 2], Failure> {
     let mut simulation = scene::<3>("ball_drop.json", &overrides)?;
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut step = || alone.install(|| allocation_counter::measure(|| assert!(simulation.step().is_ok())).bytes_total);
-    // The first steps make room, and put the particles in order.
+    // The first steps allocate the arrays and sort the particles.
     step();
     step();
     let least = (0..4).map(|_| step()).min().ok_or("no steps")?;
@@ -114,7 +114,7 @@ fn held_and_allocated(cells: u32, method: &str) -> Result<[f64; 2], Failure> {
 fn a_step_that_writes_nothing_allocates_none_of_its_arrays() -> Result<(), Failure> {
     for method in [r#"{"method":{"gmres":{}}}"#, r#"{"method":"conjugate_gradient","precision":"mixed"}"#] {
         let (small, large) = (held_and_allocated(10, method)?, held_and_allocated(18, method)?);
-        // What grows are lists of blocks, partial sums, and the nodes on walls.
+        // The growing part consists of lists of blocks, partial sums, and the nodes on walls.
         let share = (large[1] - small[1]) / (large[0] - small[0]);
         assert!(share < 0.01, "{method}: {share} of the arrays, {small:?} and {large:?} bytes");
     }

@@ -1,4 +1,4 @@
-//! What the tests of whole runs share.
+//! Shared code of the tests of whole runs.
 
 use bfree::checkpoint::{Checkpoints, Identity, restore};
 use bfree::material::{Lame, Law, Material, NonPositiveJacobian, Start, admissible};
@@ -17,7 +17,7 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
 }
 
-/// `start` as the checkpoint of a simulation continues it that began the same way.
+/// Continues `start` from a checkpoint of `simulation`, which began in the same way.
 pub fn restored<const D: usize>(simulation: &Simulation<D>, start: &Simulation<D>) -> Result<Simulation<D>, Failure> {
     let folder = tempfile::tempdir()?;
     let identity = Identity::new(serde_json::Value::Null, &start.particles);
@@ -38,14 +38,14 @@ pub fn restored<const D: usize>(simulation: &Simulation<D>, start: &Simulation<D
     Ok(continued)
 }
 
-/// The shipped laws whose tangent has a closed form: it is these that vector lanes freeze.
+/// The shipped laws whose tangent has a closed form. Vector lanes linearise only these.
 pub fn closed_laws(lame: Lame) -> Vec<Material> {
     let at_rest = Deformation::new(Tensor::zeros());
     let closed = |law: &Material| law.closed(&identity::<f64, 1>(), &at_rest, 1.0).is_some();
     Material::examples(lame).into_iter().map(|(_, law)| law).filter(closed).collect()
 }
 
-/// P = F S of a law that remembers nothing.
+/// P = F S of a law without internal variables.
 pub fn piola<const D: usize>(law: &impl Law, h: Tensor<f64, D>) -> Result<Tensor<f64, D>, NonPositiveJacobian> {
     let at = admissible(h)?;
     Ok(at.f * law.stress(&at, &Start::NONE))
@@ -62,7 +62,8 @@ pub fn stretch(law: &impl Law, stress: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// How far the point X of a column of this height moves under its weight ρ₀ g, by Simpson's rule: P = −ρ₀ g (H − X), u = ∫ (λ − 1) dX.
+/// The displacement of the point X of a column of this height under its weight ρ₀ g, by Simpson's rule: P = −ρ₀ g (H − X), u = ∫ (λ − 1)
+/// dX.
 pub fn moved_in_column(law: &impl Law, weight: f64, height: f64, x: f64) -> f64 {
     let n = 200;
     let share = |k: usize| if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };

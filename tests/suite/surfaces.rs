@@ -1,4 +1,4 @@
-//! Surfaces of triangles: against the same solids drawn otherwise, against formulas, and files that are none.
+//! Surfaces of triangles: against the same solids in other forms, against formulas, and invalid files.
 
 use crate::support::Failure;
 use bfree::grid::Grid;
@@ -18,7 +18,8 @@ fn point(x: [f64; 3]) -> Point {
     Vector::from(x)
 }
 
-/// A closed sheet of n × m quadrilaterals, each in two triangles; `place` of two angles, counter-clockwise as seen from outside.
+/// A closed sheet of n × m quadrilaterals, each in two triangles. `place` maps two angles to a point, counter-clockwise as seen from
+/// outside.
 fn sheet(n: u32, m: u32, place: impl Fn(f64, f64) -> Point) -> Triangles {
     let angle = |i: u32, of: u32| TAU * f64::from(i) / f64::from(of);
     let vertices = (0..n * m).map(|i| place(angle(i / m, n), angle(i % m, m))).collect();
@@ -35,13 +36,13 @@ fn torus(n: u32, m: u32, center: Point, [large, small]: [f64; 2]) -> Triangles {
     })
 }
 
-/// Radius of a bone at s from 0 to 1 along it: thin in the middle, thick at its ends, which are round.
+/// The radius of a bone at s from 0 to 1 along it: thin in the middle, thick at its round ends.
 fn bone_radius(s: f64) -> f64 {
     let t = 2.0 * s - 1.0;
     (1.0 - t.powi(8)).max(0.0).sqrt() * (0.15 + 0.2 * t * t)
 }
 
-/// A bone of length 2.4 along z with elliptic sections that wind about a curved axis, by rings and two poles.
+/// A bone of length 2.4 along z, made of rings and two poles. Its elliptic sections follow a curved axis.
 fn bone(rings: u32, around: u32, start: Point) -> Triangles {
     let axis = |s: f64| start + point([0.15 * (PI * s).sin(), 0.0, 2.4 * s]);
     let along = |i: u32| 0.5 - 0.5 * (PI * f64::from(i) / f64::from(rings + 1)).cos();
@@ -68,7 +69,7 @@ fn bone(rings: u32, around: u32, start: Point) -> Triangles {
     (vertices, triangles)
 }
 
-/// A box with a corner at each place of its bits, x first.
+/// A box; the bits of a corner's number give its coordinates, x first.
 fn cuboid(min: Point, max: Point) -> Triangles {
     let corner = |i: usize| Vector::from_fn(|k, _| if (i >> k) & 1 == 1 { max[k] } else { min[k] });
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -147,7 +148,7 @@ fn a_box_of_triangles_is_the_box() -> Result<(), Failure> {
 
 #[test]
 fn the_side_of_a_point_is_right_at_edges_that_bend_inwards() -> Result<(), Failure> {
-    // A cross of two bars, whose corners bend in: the outline of a plus sign, as a prism.
+    // A cross of two bars with re-entrant corners: the outline of a plus sign, as a prism.
     let outline = [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 2], [0, 2], [0, 1], [1, 1]];
     let n = outline.len() as u32;
     let at = |z: f64| outline.map(|[x, y]: [i32; 2]| point([f64::from(x), f64::from(y), z]));
@@ -221,7 +222,7 @@ fn the_facets_of_a_surface_are_all_of_it() -> Result<(), Failure> {
             }
         }
         assert!((area / (share * exact) - 1.0).abs() < 1e-9, "{area} of {exact}");
-        // Closed, ∫ n dA = 0; its upper half has the normals of the ring's shadow, seen from below.
+        // A closed surface has ∫ n dA = 0. The upper half has the integral of the ring's shadow, seen from below.
         let shadow = if share == 1.0 { 0.0 } else { 4.0 * PI * large * small };
         assert!((normals - point([0.0, 0.0, shadow])).norm() < 1e-2 * shadow.max(1e-9), "{normals}");
     }
@@ -248,7 +249,7 @@ fn surfaces_that_bound_nothing_are_refused_with_the_place() {
     let mut lost = vertices.clone();
     lost[3][1] = f64::NAN;
     assert!(matches!(new(&lost, triangles.clone()), Err(SurfaceError::NotFinite(_))));
-    // Two boxes that overlap, through faces and, exactly, through a diagonal; apart they are one solid in two parts.
+    // Two boxes that overlap, through faces and exactly through a diagonal; apart they are one solid in two parts.
     let both = |by: Point| {
         let (others, more) = cuboid(by, by + point([1.0; 3]));
         let all: Vec<Point> = vertices.iter().copied().chain(others).collect();
@@ -265,7 +266,7 @@ fn surfaces_that_bound_nothing_are_refused_with_the_place() {
     }
 }
 
-/// A box in a box is a cavity if it faces the other way, and a second solid in the same place if not.
+/// A box in a box is a cavity if its faces point the other way, and otherwise a second solid in the same place.
 #[test]
 fn parts_of_a_surface_are_inside_and_outside_by_turns() {
     let boxes = |sizes: &[(f64, bool)]| {
@@ -339,7 +340,7 @@ fn a_body_has_the_shape_in_a_file() -> Result<(), Failure> {
         let near = |(x, y): (&Point, &Point)| (x - y).norm() < 1e-12;
         assert!(one.position.iter().zip(&other.position).all(near), "{name}");
         assert!(one.volume.iter().zip(&other.volume).all(|(v, w)| (v - w).abs() < 1e-12));
-        // All of its nodes are held: it is a region, too.
+        // All nodes of the body are held: the surface serves as a region, too.
         let before = read.particles.position.clone();
         read.advance()?;
         assert_eq!(read.particles.position, before);

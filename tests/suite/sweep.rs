@@ -1,4 +1,4 @@
-//! The fast sweep against the plain one, which is its specification.
+//! The fast particle–grid transfer against the plain one, which is its specification.
 
 mod stored;
 
@@ -41,11 +41,11 @@ impl Irregular {
 fn shapes() -> Vec<Approximation> {
     let products =
         Approximation::examples().into_iter().map(|(_, shape)| shape).filter(|shape| shape.separable().is_some());
-    // Weights that underflow in a product.
+    // Weights whose product underflows.
     products.chain([Lme::new(40.0, 1e-100).into()]).collect()
 }
 
-/// A small box with a block of jittered particles in it, some on walls, faces and nodes, some crowded, some alone.
+/// A small box with a block of jittered particles: some on walls, faces and nodes, some crowded, some alone.
 fn case<const D: usize>() -> (Grid<D>, Vec<Vector<f64, D>>) {
     let cells: [u32; D] = std::array::from_fn(|k| [23, 11, 7][k]);
     let grid = Grid { origin: Vector::repeat(-0.3), spacing: 0.1, cells };
@@ -53,7 +53,7 @@ fn case<const D: usize>() -> (Grid<D>, Vec<Vector<f64, D>>) {
     let mut random = Irregular(0);
     let mut positions = Vec::new();
     let inside = |x: Vector<f64, D>| x.zip_map(&grid.origin, f64::max).zip_map(&upper, f64::min);
-    // Eight a cell in 3D, moderately jittered; the order of the particles is not that of the cells.
+    // In 3D eight particles per cell, moderately jittered; the order of the particles is not that of the cells.
     let side: [usize; D] = std::array::from_fn(|k| if D == 3 { [14, 12, 8][k] } else { [30, 14, 1][k] });
     let count: usize = side.iter().product();
     for i in 0..count {
@@ -65,7 +65,7 @@ fn case<const D: usize>() -> (Grid<D>, Vec<Vector<f64, D>>) {
         });
         positions.push(inside(x + random.vector() * 0.02));
     }
-    // Anywhere, many a cell, and a crowd in one cell.
+    // Particles anywhere, many per cell, and a crowd in one cell.
     for i in 0..60 {
         let scale = if i < 30 { 0.35 } else { 0.049 };
         positions.push(inside(grid.origin + Vector::repeat(0.35) + random.vector() * scale));
@@ -84,7 +84,7 @@ fn case<const D: usize>() -> (Grid<D>, Vec<Vector<f64, D>>) {
     (grid, positions)
 }
 
-/// A point function without symmetry, that names particle and state.
+/// A point function without symmetry that depends on particle and state.
 fn point<const D: usize>(
     p: usize,
     u: Vector<f64, D>,
@@ -94,7 +94,7 @@ fn point<const D: usize>(
     Ok((u * 2.0 + l * u, l * a + a * l.transpose() + a))
 }
 
-/// A point function that is no linear one.
+/// A nonlinear point function.
 fn square<T: Real, const D: usize>(
     _: usize,
     u: Vector<T, D>,
@@ -103,7 +103,7 @@ fn square<T: Real, const D: usize>(
     Ok((l * u, l * l))
 }
 
-/// Fields of one number a node, and sums with |N| and N², against loops over the entries of every particle.
+/// Scalar nodal fields, and sums with |N| and N², against loops over the connectivity of every particle.
 fn scalars_and_weights<const D: usize>(fast: &Supports<D>, plain: &Supports<D>, u: &[Vector<f64, D>], case: &str) {
     let first: Vec<_> = u.iter().map(|u| Vector::from([u[0]])).collect();
     let value = |p: usize| Vector::from([1.0 - 1e-3 * p as f64]);
@@ -200,10 +200,10 @@ fn compare<const D: usize>() {
         let worst = difference(&fast.values(&u), &plain.values(&u));
         assert!(worst < 1e-12, "{D}D {shape:?}: values {worst:e}");
         scalars_and_weights(&fast, &plain, &u, &format!("{D}D {shape:?}"));
-        // A dual number is two fields through the same kernels.
+        // A dual number is two fields in the same kernels.
         let seeded: Vec<Vector<Dual64, D>> = u.iter().map(|u| u.map(|x| Dual64::new(x, 0.5 - x))).collect();
         let duals = |supports: &Supports<D>| {
-            // Also where something is there already.
+            // Sums that are added to nonzero output.
             let (mut out, mut real) = (seeded.clone(), u.clone());
             supports.assemble(&seeded, &mut out, square).unwrap();
             supports.assemble(&u, &mut real, square).unwrap();
@@ -256,7 +256,7 @@ fn regular<const D: usize>(cells: [u32; D], per_axis: u32) -> (Grid<D>, Vec<Vect
     (grid, (0..side.iter().product()).map(at).collect())
 }
 
-/// A particle in each of the cells, jittered, and a law.
+/// One jittered particle in each of the cells, and a law.
 fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>, [Body<Material>; 1]), Failure> {
     let (grid, positions) = regular(cells, 1);
     let grid = Grid { cells: cells.map(|n| n + 1), ..grid };
@@ -268,7 +268,7 @@ fn one_a_cell<const D: usize>(cells: [u32; D]) -> Result<(Grid<D>, Particles<D>,
     Ok((grid, particles, [Body { name: "body".into(), law, density: 1.0, dilatation: Default::default() }]))
 }
 
-/// What a step computes by sums over blocks.
+/// The results of a step that are sums over blocks.
 fn computed<const D: usize>(
     supports: &Supports<D>,
     nodes: &Nodes,
@@ -329,14 +329,14 @@ fn several_waves<const D: usize>(cells: [u32; D]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Blocks are 16² or 4³ cells, and a wave has 64 of them: here are 72 and 150.
+/// Blocks have 16² or 4³ cells, and a batch (wave) has 64 blocks: here there are 72 and 150 blocks.
 #[test]
 fn several_waves_of_blocks_sum_the_same_bits_and_those_of_the_plain_sweep() -> Result<(), Failure> {
     several_waves([144, 128])?;
     several_waves([20, 20, 24])
 }
 
-/// What is left of other supports, with other blocks, widths and precision, is not seen.
+/// Reused memory leaves no trace of the former shape-function values, with other blocks, widths and precision.
 fn renewal<const D: usize>() {
     let (grid, after) = case::<D>();
     let mut random = Irregular(7);
@@ -354,7 +354,7 @@ fn renewal<const D: usize>() {
             for p in 0..after.len() {
                 assert!(renewed.0.of(p).eq(anew.0.of(p)), "{shape:?} after {other:?}: particle {p}");
             }
-            // Every lane is summed here, also those that belong to no particle.
+            // The sum includes every lane, also lanes without a particle.
             let u = field::<D>(&anew.1);
             assert_eq!(sums(&renewed.0, &u), sums(&anew.0, &u));
         }

@@ -1,4 +1,4 @@
-//! Scenes that must agree, drawn at random, and their images: those of the study `symmetry` that are mirrored and turned.
+//! Random scenes and their images, which must agree: the mirrored and rotated scenes of the study `symmetry`.
 
 use shared::{Devices, Disagreement, SymmetryError, Transformation, compare, draw};
 
@@ -6,10 +6,10 @@ use shared::{Devices, Disagreement, SymmetryError, Transformation, compare, draw
 #[allow(dead_code, unused_imports, reason = "the study judges the other transformations, and scenes with all devices")]
 mod shared;
 
-/// Scenes of each transformation.
+/// Scenes per transformation.
 const SCENES: u64 = 60;
 
-/// With `Devices::Default` loads on surfaces of shapes are judged, too, and aggregation with inertia.
+/// `Devices::Default` also tests loads on surfaces of shapes, and aggregation with inertia.
 const DEVICES: Devices = Devices::Off;
 
 fn judge(transformation: Transformation) {
@@ -27,7 +27,7 @@ fn judge(transformation: Transformation) {
         }
     }
     assert!(wrong.is_empty(), "{} of {compared} scenes: {wrong:#?}", transformation.name());
-    // Without inertia and with nothing that holds nodes of which a body has little, some scenes have no equilibrium.
+    // Without inertia and without stabilisation of nodes with little mass, some scenes have no equilibrium.
     assert!(4 * compared >= 3 * SCENES, "{}: {compared} of {SCENES} scenes", transformation.name());
 }
 

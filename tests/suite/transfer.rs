@@ -1,4 +1,4 @@
-//! Particles to nodes: what the projection solves, and which nodes are too light for it.
+//! Particle-to-grid transfer: the equation of the projection, and nodes whose mass is too small for it.
 
 use crate::support::Failure;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
@@ -93,7 +93,7 @@ fn only_a_node_of_next_to_no_mass_gets_no_velocity_in_any_unit_of_mass() -> Resu
 
 #[test]
 fn nodes_with_the_least_mass_there_is_leave_the_projection_finite() -> Result<(), Failure> {
-    // 1e-300 off a wall: products of the other nodes' functions are numbers that have no inverse.
+    // 1e-300 off a wall: the products of the other nodes' functions have no finite inverse.
     let mut particles = Particles::<3>::default();
     particles.push(Vector::from([1e-300, 1.5, 1.5]), Vector::from([0.0, 0.3, -0.2]), 0.125, 1.0, 0);
     particles.acceleration[0] = Vector::from([0.0, -2.0, 1.0]);
@@ -111,8 +111,8 @@ fn nodes_with_the_least_mass_there_is_leave_the_projection_finite() -> Result<()
     Ok(())
 }
 
-/// A square that cuts cells and spins: a mean over the particles lags behind at its edges, where the node lies beyond their centre of mass.
-/// Σ m (v − ω × x)² of the nodes says by how much.
+/// A rotating square that cuts cells. At its edges the node lies beyond the centre of mass of its particles, so a mean over the particles
+/// is too slow. The error is Σ m (v − ω × x)² of the nodes.
 #[test]
 fn affine_fits_meet_a_rotation_and_keep_momentum() -> Result<(), Failure> {
     let grid = GRID();
@@ -137,10 +137,10 @@ fn affine_fits_meet_a_rotation_and_keep_momentum() -> Result<(), Failure> {
         let (mean, fit) = (Nodal::project(&square, &supports, 1.0)?, Nodal::fit(&square, &supports));
         let velocity = [&mean, &fit].map(|nodal| off(nodal, &nodal.velocity, 1.0));
         let acceleration = [&mean, &fit].map(|nodal| off(nodal, &nodal.acceleration, 3.0));
-        // What is left is of nodes beyond the edges that see a single row of particles: no slope across it.
+        // The remaining error comes from nodes beyond the edges with a single row of particles: their fit has no slope across the row.
         let less = [velocity, acceleration].iter().all(|[mean, fit]| *fit < 0.25 * mean);
         assert!(less, "{family:?}: {velocity:?}, {acceleration:?}");
-        // Fields of any kind keep their momentum.
+        // The momentum of any field is conserved.
         let any = cloud(1.0, 50.0);
         let (supports, _) = Supports::new(&family, &GRID(), &any.position)?;
         let fit = Nodal::fit(&any, &supports);

@@ -1,15 +1,15 @@
-//! The tutorials, as a reader does them: the commands of all pages, one after the other, in one folder that is empty at first. The
-//! numbers that a page shows come out.
+//! The tutorials, as a reader does them: the commands of all pages, one after the other, in one folder that is empty at first. The results
+//! must equal the numbers on the pages.
 
 use crate::manual::{Page, in_repository};
 use crate::support::Failure;
 use std::path::Path;
 use std::process::Command;
 
-/// How far, relative to the known answer, a number in the text may be from the one that came out: it is rounded.
+/// The allowed difference between a number in the text and the result, relative to the known answer: numbers in the text are rounded.
 const ROUNDED: f64 = 1e-3;
 
-/// Runs every block of commands of a page in `folder`, with the program where the shell finds it.
+/// Runs every block of commands of a page in `folder`, with the program on the shell's path.
 fn follow(page: &Page, folder: &Path) -> Result<(), Failure> {
     let program = Path::new(env!("CARGO_BIN_EXE_bfree")).parent().ok_or("no folder")?;
     let path = std::env::join_paths(
@@ -71,7 +71,7 @@ fn value(table: &str, column: &str, time: f64) -> Option<f64> {
     row[of].as_ref().ok().copied()
 }
 
-/// Does a page in `folder`, and compares what comes out, which is returned, with what it says and with the known answers.
+/// Follows a page in `folder` and compares the results with the text and with the known answers. Returns the results.
 fn tutorial<const ROWS: usize>(name: &str, folder: &Path) -> Result<[f64; ROWS], Failure> {
     let file = in_repository(&format!("docs/src/tutorial/{name}.md"));
     follow(&Page::read(&file)?, folder)?;
@@ -97,21 +97,21 @@ fn a_reader_does_all_pages_in_one_folder() -> Result<(), Failure> {
     assert_eq!(pages, ["beam", "membrane", "ring", "rebound", "plasticity", "own_law"]);
     tutorial::<4>("beam", folder)?;
     let [_, fine, finer, locked, free] = tutorial("membrane", folder)?;
-    // Of first order: extrapolated to h = 0, as the text does.
+    // The error is of first order, so the values are extrapolated to h = 0, as in the text.
     let extrapolated = 2.0 * finer - fine;
     assert!((extrapolated / 14.505 - 1.0).abs() < 1e-3, "{extrapolated}");
-    // The rest of the error with a mean dilatation.
+    // The error that remains with a mean dilatation.
     assert!((12.135 - free) < 0.3 * (12.135 - locked), "{locked} {free}");
     tutorial::<4>("ring", folder)?;
     tutorial::<4>("rebound", folder)?;
     let [_, _, coarse, fine, ..] = tutorial::<7>("plasticity", folder)?;
-    // Of first order, as the text says.
+    // The error is of first order, as in the text.
     let extrapolated = 2.0 * fine - coarse;
     assert!((extrapolated / 7.01 - 1.0).abs() < 0.005, "{extrapolated}");
     Ok(())
 }
 
-/// Directories that the commands of a text write into: those of `--out`, and else that of the scene.
+/// Directories that the commands of a text write into: that of `--out`, otherwise that of the scene.
 fn written(text: &str) -> Vec<String> {
     let runs = text.lines().filter_map(|line| line.split_once("bfree run ")).map(|(_, arguments)| arguments);
     let directory = |arguments: &str| match arguments.split_once("--out ") {
@@ -121,7 +121,7 @@ fn written(text: &str) -> Vec<String> {
     runs.filter(|arguments| !arguments.contains("--discard")).map(directory).collect()
 }
 
-/// Those that the suite does not run, too.
+/// The test also covers commands that the suite does not run.
 #[test]
 fn no_two_commands_of_the_tutorial_write_into_one_directory() -> Result<(), Failure> {
     let mut seen: Vec<String> = Vec::new();
@@ -149,7 +149,7 @@ fn the_code_of_the_own_law_is_that_of_the_example() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The scene of the README, written to the file that its command runs.
+/// The scene of the README, written to the file named in its command.
 #[test]
 fn the_readme_s_scene_runs() -> Result<(), Failure> {
     let (page, folder) = (Page::read(&in_repository("README.md"))?, tempfile::tempdir()?);

@@ -1,11 +1,11 @@
-//! What `bfree check` and the start of a run warn of, with numbers.
+//! The warnings of `bfree check` and of the start of a run, with numbers.
 
 use crate::support::Failure;
 use bfree::scene;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The warnings about a scene in the plane of these bodies; its functions are linear, and a grid has 8 × 8 cells of 1.
+/// The warnings about a 2D scene with these bodies. Its functions are linear, and its grid has 8 × 8 cells of 1.
 fn warnings(bodies: Value, more: Value, folder: &Path) -> Result<Vec<String>, Failure> {
     let mut text = json!({
         "grid": {"size": [8, 8], "spacing": 1}, "time": {"step": 0.1, "end": 1}, "approximation": "linear", "bodies": bodies
@@ -26,7 +26,7 @@ fn file(name: &str, file: &str) -> Value {
     json!({"name": name, "particles": {"file": file}, "density": 1, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
 }
 
-/// One warning that has all the words.
+/// Exactly one warning contains all the words.
 fn assert_one(warnings: &[String], words: &[&str]) {
     let all = |text: &&String| words.iter().all(|word| text.contains(word));
     assert_eq!(warnings.iter().filter(all).count(), 1, "{words:?}: {warnings:?}");
@@ -37,13 +37,13 @@ fn bodies_that_overlap_are_named_with_particles_and_volume() -> Result<(), Failu
     let nowhere = Path::new(".");
     let bodies = |x: f64| json!([block("a", [1.0, 1.0], [4.0, 4.0]), block("b", [x, 2.0], [x + 3.0, 5.0])]);
     let found = warnings(bodies(3.0), json!({}), nowhere)?;
-    // One cell wide, two high: 8 particles of each, in the same places.
+    // One cell wide, two high: 8 particles of each body in the same places.
     assert_one(&found, &["\"a\" and \"b\" overlap: 16 particles", "volume of 2.0000e0"]);
     assert_one(&found, &["8 particles lie at the place of another one: at (3.25, 2.25)", "…"]);
     assert_eq!(found.len(), 2, "{found:?}");
-    // Side by side.
+    // The bodies lie side by side.
     assert_eq!(warnings(bodies(4.0), json!({}), nowhere)?, Vec::<String>::new());
-    // Round ones that touch in a point.
+    // Round bodies that touch in a point.
     let ball = |name: &str, x: f64| {
         json!({"name": name, "shape": {"ball": {"center": [x, 4.1], "radius": 1.3}}, "density": 1,
                "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
@@ -74,7 +74,7 @@ fn a_body_of_less_than_two_cells_is_named_with_its_thickness() -> Result<(), Fai
         |thickness: f64| warnings(json!([block("plate", [1.0, 2.0], [7.0, 2.0 + thickness])]), json!({}), nowhere);
     assert_one(&thick(1.0)?, &["\"plate\" is about 1.000e0 thick", "1.00 cells"]);
     assert_eq!(thick(2.0)?, Vec::<String>::new());
-    // Of the wall of a ring, not of the ring.
+    // The warning names the thickness of the ring's wall, not the diameter of the ring.
     let disc = |radius: f64| json!({"ball": {"center": [4, 4], "radius": radius}});
     let ring = json!([{"name": "ring", "shape": {"difference": {"of": disc(3.5), "minus": disc(2.7)}}, "density": 1,
                        "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}]);
@@ -93,7 +93,7 @@ fn a_mass_that_misses_the_shape_by_a_percent_is_said() -> Result<(), Failure> {
     let nowhere = Path::new(".");
     let mut disc = json!({"name": "disc", "shape": {"ball": {"center": [4, 4], "radius": 2.2}}, "density": 1, "fill": "cells",
                           "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}});
-    // 16 cells whose middles lie in a circle of 15.2.
+    // The centres of 16 cells lie in the circle, whose area is 15.2.
     assert_one(
         &warnings(json!([disc]), json!({}), nowhere)?,
         &["\"disc\" has the volume 16.000000", "+5.2 % off", "bodies[0].fill \"cut\""],
@@ -144,7 +144,7 @@ fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failu
     let metal = json!({"von_mises": {"elastic": {"young": 100, "poisson": 0.3}, "yield_stress": {"initial": 1}}});
     assert_one(&of(metal.clone(), json!({}))?, &["flows without a change of volume", "0.300000", cure]);
     assert_eq!(of(metal, mean)?, Vec::<String>::new());
-    // A law without a volumetric part has another cure.
+    // A law without a volumetric part needs another remedy.
     let other = json!({"st_venant_kirchhoff": {"young": 100, "poisson": 0.49}});
     assert_one(&of(other, json!({}))?, &["0.490000", "take \"neo_hookean\" with that"]);
     Ok(())

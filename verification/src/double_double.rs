@@ -1,8 +1,8 @@
-//! Numbers of twice the digits, through the same generic code as `f64` and `f32`: what those are judged by.
+//! Numbers of twice the digits, through the same generic code as `f64` and `f32`. They are the reference for these two.
 //!
-//! Sums, products and square roots are those of the crate `twofloat` (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic
-//! building blocks of double-word arithmetic", 2017). Its quotients (version 0.8.4) and logarithms are good to 1e-16 only, so that those
-//! are made here. What no law of this project needs (exp, sin, …) is the library's, to its accuracy.
+//! Sums, products and square roots come from the crate `twofloat` (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic
+//! building blocks of double-word arithmetic", 2017). Its quotients (version 0.8.4) and logarithms are accurate to 1e-16 only, so this
+//! module has its own. Functions that no law of this project needs (exp, sin, …) come from the library, with its accuracy.
 
 use num_dual::{DualNum, DualStruct, Mappable};
 use num_traits::{FromPrimitive, Inv, Num, One, Signed, Zero};
@@ -15,10 +15,10 @@ use twofloat::{TwoFloat, consts::LN_2};
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct DoubleDouble(TwoFloat);
 
-/// Terms of the series of artanh that matter for |s| ≤ 0.172: s⁴⁴ = 2e-34.
+/// Number of terms of the series of artanh for |s| ≤ 0.172: s⁴⁴ = 2e-34.
 const TERMS: u32 = 22;
 
-/// Where ln(1 + x) is summed from x itself: s = x/(2 + x) is then as small as in `ln`.
+/// The range in which ln(1 + x) is summed from x itself: s = x/(2 + x) is then as small as in `ln`.
 const NEAR_ONE: std::ops::RangeInclusive<f64> = -0.29..=0.41;
 
 impl DoubleDouble {
@@ -30,7 +30,7 @@ impl DoubleDouble {
         self.0.hi().abs()
     }
 
-    /// Long division in three digits to base 2⁵³, remainders to twice the digits.
+    /// Long division in three digits to base 2⁵³; the remainders have twice the digits.
     fn quotient(a: TwoFloat, b: TwoFloat) -> TwoFloat {
         let first = a.hi() / b.hi();
         let rest = a - b * first;
@@ -277,7 +277,7 @@ impl DualNum for DoubleDouble {
             return Self::from(if high == f64::INFINITY { high } else { f64::NAN });
         }
         let k = high.log2().round();
-        // Two factors, neither of which over- or underflows.
+        // Two factors, so that neither overflows or underflows.
         let m = self.0 * (-(0.5 * k).floor()).exp2() * ((0.5 * k).floor() - k).exp2();
         Self(LN_2 * k + Self::twice_artanh(Self::quotient(m - 1.0, m + 1.0)))
     }

@@ -1,8 +1,8 @@
-//! Lagrangian finite elements through the same residual: elements are another way to make supports.
+//! Lagrangian finite elements with the same residual: elements are another way to make shape-function values.
 //!
-//! Gauss points stand for particles and never move from X; the nodes of serendipity elements (three in 1D, eight in 2D, twenty
-//! in 3D) are those of a grid of half the element's size. With F_n = I and Δφ the whole displacement u, the residual of a
-//! step is that of the total-Lagrangian method, on a grid that is kept.
+//! Gauss points take the place of particles and stay at X. The nodes of serendipity elements (three in 1D, eight in 2D, twenty in 3D) are
+//! nodes of a grid of half the element's size. With F_n = I and the whole displacement u as Δφ, the residual of a step is that of the total
+//! Lagrangian method.
 
 use bfree::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use bfree::clock::Clock;
@@ -95,7 +95,7 @@ pub struct Elements<const D: usize, L> {
     grid: Grid<D>,
     nodes: Nodes,
     supports: Supports<D>,
-    /// The Gauss points, at X, undeformed for ever.
+    /// The Gauss points, always at X and undeformed.
     points: Particles<D>,
     bodies: Vec<Body<L>>,
     mass: Vec<f64>,
@@ -110,11 +110,11 @@ pub struct Elements<const D: usize, L> {
     pub scheme: Arc<dyn Scheme>,
     /// Newton and Krylov.
     pub newton: NewtonSettings,
-    /// Where in time.
+    /// The time.
     pub clock: Clock,
 }
 
-/// Gauss's rule with three points: places in [−1, 1] and weights that sum to 1.
+/// Gauss's rule with three points: positions in [−1, 1] and weights that sum to 1.
 const GAUSS: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 18.0), (0.0, 4.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 18.0)];
 
@@ -175,7 +175,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
     /// One step with the consistent mass.
     ///
     /// # Errors
-    /// No equilibrium found; the elements are then as before.
+    /// No equilibrium was found; the elements are then unchanged.
     pub fn step(&mut self) -> Result<NewtonReport, StepError> {
         let (t, dt) = (self.clock.time(), self.clock.step());
         let (theta, alphas, end) = (self.scheme.instant(), self.scheme.balance(dt), self.scheme.end(dt));
@@ -186,7 +186,7 @@ impl<const D: usize, L: Law> Elements<D, L> {
             motion: self.displacement.clone().into(),
             ..Nodal::default()
         };
-        // Walls at rest alone: u = 0 there.
+        // Only resting walls are supported: u = 0 there.
         let prescribed = prescribed_dofs(&self.loads.prescribed, &self.grid, &self.nodes, &[], t, dt);
         let nodal = nodal.with_prescribed(&prescribed);
         let (particles, bodies, loads, supports) = (&self.points, &self.bodies, &self.loads, &self.supports);
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn a_bar_rings_at_its_exact_frequency() -> Result<(), Box<dyn std::error::Error>> {
-        // A free bar of length 1 with v = V cos(πx): small, so linear; period 2/c.
+        // A free bar of length 1 with v = V cos(πx). The amplitude is small, so the motion is linear; its period is 2/c.
         let law = Material::from(NeoHookean::ciarlet(Lame::new(0.5, 0.25)?));
         let body = Body { name: "bar".into(), law, density: 1.0, dilatation: Default::default() };
         let mut bar = Elements::<1, _>::new(Vector::zeros(), 0.1, [10], body, Clock::new(2.0 / 400.0, 0))?;

@@ -6,8 +6,8 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito, 2008), the yellow left out: too pale for a line.
-/// Black, blue, vermillion, green, purple, orange, sky; grey for what stands behind.
+/// Colours that people with any colour vision distinguish (Okabe and Ito, 2008), without yellow, which is too pale for a line. Black, blue,
+/// vermillion, green, purple, orange, sky; grey for the background.
 pub(crate) const COLORS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
@@ -19,24 +19,24 @@ pub(crate) const COLORS: [RGBColor; 8] = [
     RGBColor(170, 170, 170),
 ];
 
-/// Width of a line; each one is thinner than those below it, so that lines that coincide are all seen.
+/// The width of a line. Each line is thinner than those below it, so that coincident lines all show.
 fn width(line: usize, lines: usize) -> u32 {
     2 + 2 * (lines - 1 - line).min(3) as u32
 }
 
-/// Height of a line of the legend, and room for its letters.
+/// The height of a line of the legend, and the width of a letter.
 const LEGEND: (i32, i32) = (22, 8);
 
-/// Ticks of an axis, at most, and what a label of a decade, as 1e-12, takes of its length.
+/// The largest number of ticks of an axis, and the length that a label of a decade, such as 1e-12, takes.
 const TICKS: f64 = 8.0;
 const DECADE: f64 = 56.0;
 
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with its unit.
+    /// The quantity on the axis, with its unit.
     pub label: String,
-    /// Whether it is logarithmic; values that are not positive are then left out.
+    /// Whether the axis is logarithmic. It then omits values that are not positive.
     pub logarithmic: bool,
 }
 
@@ -51,7 +51,7 @@ impl Axis {
         Self { label: label.into(), logarithmic: true }
     }
 
-    /// Where `value` stands on the axis.
+    /// The coordinate of `value` on the axis.
     pub(crate) fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic { value.log10() } else { value };
         place.is_finite().then_some(place)
@@ -61,13 +61,13 @@ impl Axis {
         if self.logarithmic {
             short(10.0_f64.powf(place))
         } else {
-            // without the round-off of a multiple
+            // Removes the round-off of a multiple.
             format!("{}", (place * 1e9).round() / 1e9)
         }
     }
 
-    /// Where the axis has ticks: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5. Along `length`
-    /// units of the picture their labels have room side by side.
+    /// The ticks of the axis: at decades, with 2 and 5 between them if they are few, or at multiples of 1, 2 or 5. On an axis of `length`
+    /// units of the picture their labels fit side by side.
     pub(crate) fn ticks(&self, range: &Range<f64>, length: f64) -> Vec<f64> {
         let span = range.end - range.start;
         if self.logarithmic {
@@ -89,7 +89,7 @@ impl Axis {
     }
 }
 
-/// A range with its ticks: the plotting library would cut the logarithms into tenths.
+/// A range with its own ticks: the plotting library would divide the logarithms into tenths.
 struct Ticked {
     range: Range<f64>,
     ticks: Vec<f64>,
@@ -128,7 +128,7 @@ pub struct Line {
 pub struct Figure {
     /// Name of the file, without `.svg`.
     pub name: String,
-    /// The line above it.
+    /// The title above the chart.
     pub title: String,
     /// The horizontal axis.
     pub x: Axis,
@@ -163,7 +163,7 @@ impl Figure {
     /// The picture.
     ///
     /// # Errors
-    /// Those of the plotting library.
+    /// Errors of the plotting library.
     pub fn svg(&self) -> Result<String, FigureError> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| FigureError(error.to_string()))?;
@@ -181,10 +181,10 @@ impl Figure {
         let root = SVGBackend::with_string(text, (1000, 560)).into_drawing_area();
         root.fill(&WHITE)?;
         let longest = self.lines.iter().map(|line| line.name.chars().count()).max().unwrap_or(0) as i32;
-        // The legend stands beside the chart, where it hides nothing.
+        // The legend stands beside the chart and covers nothing.
         let (area, legend) = root.split_horizontally(1000 - (LEGEND.1 * longest + 60).min(400));
         let (x, y) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
-        // Labels of the upright axis stand above each other.
+        // Labels of the vertical axis stand above each other, so they need no room along it.
         let (x_ticks, y_ticks) = (self.x.ticks(&x, 500.0), self.y.ticks(&y, f64::INFINITY));
         let mut chart = ChartBuilder::on(&area)
             .caption(&self.title, ("sans-serif", 18))

@@ -1,23 +1,23 @@
-//! Failures that are known: the one list of them, with numbers. The manual's page of limits holds the same text.
+//! The list of known failures, with numbers. The manual's page of limits holds the same text.
 //!
-//! A known failure does not fail a run; it is printed and counted apart. One that passes again, gets much worse or is
-//! not there any more does: the list cannot rot.
+//! A known failure does not fail a run; it is printed and counted separately. A known failure that passes again, gets much worse or no
+//! longer exists fails the run, so the list stays true.
 
 use crate::report::{Bound, Listed, Report, short};
 use crate::studies::Effort;
 
-/// What fails, for one reason.
+/// Failures with one cause.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// The study that shows it.
     pub study: &'static str,
-    /// What is measured, and what is asked.
+    /// The measured quantity and its requirement.
     pub what: &'static str,
-    /// Why it fails.
+    /// The cause of the failure.
     pub why: &'static str,
     /// The day it was listed.
     pub since: &'static str,
-    /// Values that miss their bound so many times further are new failures.
+    /// A value that misses its bound by this factor more is a new failure.
     pub factor: f64,
     /// The cells that fail.
     pub cells: &'static [KnownCell],
@@ -28,11 +28,11 @@ pub struct Known {
 pub struct KnownCell {
     /// The least effort that measures it.
     pub effort: Effort,
-    /// What its labels begin with.
+    /// The first labels of the cell.
     pub labels: &'static [&'static str],
     /// The value measured.
     pub value: f64,
-    /// Whether seconds decide.
+    /// Whether the value is a time in seconds.
     pub timed: bool,
 }
 
@@ -48,7 +48,7 @@ const fn timed(labels: &'static [&'static str], value: f64) -> KnownCell {
     KnownCell { effort: Effort::Full, labels, value, timed: true }
 }
 
-/// The list.
+/// All known failures.
 pub const KNOWN: &[Known] = &[
     Known {
         study: "tangent",
@@ -69,7 +69,7 @@ pub const KNOWN: &[Known] = &[
         why: "Linear solves that are loose leave the modes that have next to no mass unsolved; tight ones end in \
               round-off.",
         since: "22 November 2026",
-        // It jumps by a hundred from one iteration to the next.
+        // The value changes by a factor of a hundred from one iteration to the next.
         factor: 1e3,
         cells: &[
             short_effort(&["v=0.5, t=21.8", CONSISTENT, EISENSTAT_WALKER], 2.4e8),
@@ -478,14 +478,13 @@ const EISENSTAT_WALKER: &str = "exact, Eisenstat-Walker";
 const SPARSE: &str = "eps = 0: steps taken, of 200";
 const SAME_TIME_STEP: &str = "width / undissipated, same time step";
 
-/// Whether a cell with these labels may be on the list: those of one there are their beginning.
+/// Whether a cell with these labels may be on the list. An entry holds only the first labels of its cell.
 pub fn may_list(labels: &[String]) -> bool {
     let begin = |cell: &KnownCell| labels.iter().take(cell.labels.len()).eq(cell.labels);
     KNOWN.iter().flat_map(|entry| entry.cells).any(begin)
 }
 
-/// Marks the cells of `study` that are on the list; an entry that is not exactly one cell of its reports becomes a
-/// report that fails.
+/// Marks the cells of `study` that are on the list. An entry that does not match exactly one cell becomes a failing report.
 pub(crate) fn mark(known: &[Known], study: &str, effort: Effort, reports: &mut Vec<Report>) {
     let mut astray = Report::new("known failures that are not exactly one cell of the study: cells found", &["cell"]);
     for entry in known.iter().filter(|entry| entry.study == study) {
@@ -502,7 +501,7 @@ pub(crate) fn mark(known: &[Known], study: &str, effort: Effort, reports: &mut V
     }
 }
 
-/// The list in Markdown, an item for each entry. Of the labels those are left out that all cells of an entry have.
+/// The list in Markdown, one item per entry. Labels that all cells of an entry share are omitted.
 pub fn markdown() -> String {
     let item = |known: &Known| {
         let told = |k: usize, label: &str| known.cells.iter().any(|cell| cell.labels.get(k) != Some(&label));
@@ -532,7 +531,7 @@ mod tests {
         cells: &[short_effort(&["a", "b"], 3.0), full_effort(&["c"], 3.0)],
     }];
 
-    /// What seconds decide may pass, and may not get much worse; the rest may not pass either.
+    /// A timed cell may pass, but must not get much worse. Any other cell must not pass either.
     #[test]
     fn seconds_may_be_kind() {
         for (timed, value, verdict) in [

@@ -1,4 +1,4 @@
-//! Everything that judges bfree. The checks are for other crates' tests too:
+//! The verification of bfree. Its checks also serve the tests of other crates:
 //!
 //! ```
 //! use bfree::material::{Lame, NeoHookean};

@@ -1,4 +1,4 @@
-//! Runs studies, prints what they found, writes CSV, SVG and JSON; the exit code is the verdict.
+//! Runs studies, prints their results, and writes CSV, SVG and JSON. The exit code is the verdict.
 
 use clap::{Parser, ValueEnum};
 use serde_json::{Value, json};
@@ -12,20 +12,20 @@ use verification::record::{self, Finding, Run};
 use verification::report::{chain, stop_at_failures};
 use verification::studies::{Effort, Outcome, PAPER, STUDIES, Study, StudyError};
 
-/// Everything that judges bfree.
+/// Verification of bfree.
 #[derive(Parser)]
 #[command(version, after_help = studies_list())]
 struct Arguments {
-    /// Studies by name; `all` is the short set that CI runs, `full` all studies with long sweeps but those of the
-    /// paper: verdicts are kept in verification/FULL.md, README.md and docs/src/limits.md, tables in target/verification. `results` are the
-    /// studies of the paper with their tables and pictures, kept in verification/RESULTS.md and verification/results.
-    /// `tradeoff` with full effort rewrites verification/TRADEOFF.md
+    /// Studies by name. `all` is the short set that CI runs. `full` is every study with long sweeps, except those of the paper: verdicts
+    /// are kept in verification/FULL.md, README.md and docs/src/limits.md, tables in target/verification. `results` are the studies of the
+    /// paper with their tables and pictures, kept in verification/RESULTS.md and verification/results. `tradeoff` with full effort rewrites
+    /// verification/TRADEOFF.md
     #[arg(value_name = "STUDY", default_value = "all")]
     studies: Vec<String>,
-    /// How much each study does; `full` as a study asks for full effort
+    /// The amount of work of each study; the study `full` implies full effort
     #[arg(long, value_enum, default_value_t = EffortArgument::Short)]
     effort: EffortArgument,
-    /// Stop at the first cell that fails; `mutants`, whose cells are to fail, goes on
+    /// Stop at the first cell that fails; `mutants`, whose cells must fail, continues
     #[arg(long)]
     first: bool,
     /// Write every cell, table and remark as JSON
@@ -50,7 +50,7 @@ fn studies_list() -> String {
     text
 }
 
-/// The studies asked for, each once, and how much they do; the word that names none is the error.
+/// The requested studies, each once, with their effort. The error is the word that names no study.
 fn selected(arguments: &Arguments) -> Result<Vec<(&'static Study, Effort)>, String> {
     let effort = match arguments.effort {
         EffortArgument::Short => Effort::Short,
@@ -61,7 +61,7 @@ fn selected(arguments: &Arguments) -> Result<Vec<(&'static Study, Effort)>, Stri
         let of_the_paper = |study: &&Study| PAPER.contains(&study.name);
         let named: Vec<(&Study, Effort)> = match word.as_str() {
             "all" => STUDIES.iter().map(|study| (study, effort)).collect(),
-            // The long sweeps of the paper's studies are `results`.
+            // `results` runs the long sweeps of the paper's studies, so `full` does not.
             "full" => {
                 let effort_of = |study: &Study| if PAPER.contains(&study.name) { Effort::Short } else { Effort::Full };
                 STUDIES.iter().map(|study| (study, effort_of(study))).collect()
@@ -91,7 +91,7 @@ fn main() -> ExitCode {
     match run(&studies, &arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
-        // Nobody reads on: `… | head`.
+        // The reader has closed the pipe: `… | head`.
         Err(Failure { source, .. }) if source.kind() == io::ErrorKind::BrokenPipe => ExitCode::from(1),
         Err(error) => {
             eprintln!("error: {}", chain(&error));
@@ -114,7 +114,7 @@ fn writing(place: impl Into<String>) -> impl FnOnce(io::Error) -> Failure {
 
 fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Failure> {
     let mut out = io::stdout().lock();
-    // Before hours are spent; and of the tree as it is before the run writes to it.
+    // This check precedes hours of work. It records the tree before the run writes to it.
     let of_run = if asked_for(arguments, "full") {
         Some(Run::starting(&root()).map_err(writing("README.md and docs/src/limits.md"))?)
     } else {
@@ -165,12 +165,12 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
     Ok(passed)
 }
 
-/// Where the repository is.
+/// The root of the repository.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Where cargo builds: nothing in it belongs to the repository.
+/// The build folder of cargo: nothing in it belongs to the repository.
 fn target() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
 }
@@ -179,12 +179,12 @@ fn asked_for(arguments: &Arguments, word: &str) -> bool {
     arguments.studies.iter().any(|one| one == word)
 }
 
-/// Where pictures are kept.
+/// The folder of stored pictures.
 fn kept_folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// Leaves the measured trade of speed against accuracy in the repository.
+/// Writes the measured trade of speed against accuracy into the repository.
 fn keep_tradeoff(chapter: &str) -> Result<(), Failure> {
     let path = kept_folder("TRADEOFF.md");
     let date = humantime::format_rfc3339_seconds(SystemTime::now());
@@ -194,7 +194,7 @@ fn keep_tradeoff(chapter: &str) -> Result<(), Failure> {
     fs::write(&path, header + chapter).map_err(writing(path.display().to_string()))
 }
 
-/// Leaves the results of the paper's studies in the repository.
+/// Writes the results of the paper's studies into the repository.
 fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("RESULTS.md");
     let date = humantime::format_rfc3339_seconds(SystemTime::now());
@@ -206,7 +206,7 @@ fn keep_paper(chapters: &[String]) -> Result<(), Failure> {
     fs::write(&path, header + &chapters.concat()).map_err(writing(path.display().to_string()))
 }
 
-/// A study as a chapter in Markdown, with its pictures, in `folder`, by reference.
+/// A study as a chapter in Markdown, with references to its pictures in `folder`.
 fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, folder: &str) -> String {
     let mut text = format!("\n## {}: {}\n\n", study.name, study.about);
     match result {
@@ -229,7 +229,7 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, fo
     text + &format!("({seconds:.0} s)\n")
 }
 
-/// The pictures for print, as SVG and PNG.
+/// Writes the pictures for print, as SVG and PNG.
 fn draw(directory: &Path, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     for sheet in &outcome.sheets {
@@ -273,7 +273,7 @@ fn document(finding: &Finding, result: &Result<Outcome, StudyError>) -> Value {
     }
 }
 
-/// `<study>.csv`, or `<study>-1.csv`, … where there are several, and the figures by their names.
+/// Writes `<study>.csv`, or `<study>-1.csv`, … if there are several, and the figures under their names.
 fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     let several = outcome.reports.len() + outcome.tables.len() > 1;

@@ -1,4 +1,4 @@
-//! The coming step of a simulation, taken apart: what a study needs to ask the residual and the tangent directly.
+//! The parts of the next step of a simulation, for studies that evaluate residual and tangent directly.
 
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
@@ -11,7 +11,7 @@ use bfree::nodes::Nodes;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::tensor::Vector;
 
-/// The ingredients of the equilibrium of the coming step.
+/// The parts of the equilibrium of the next step.
 #[derive(Clone, Debug)]
 pub struct Prepared<const D: usize> {
     /// Shape functions at x_n.
@@ -29,7 +29,7 @@ pub struct Prepared<const D: usize> {
 }
 
 impl<const D: usize> Prepared<D> {
-    /// Does what a step does before Newton.
+    /// Does the work of a step before Newton's method.
     ///
     /// # Errors
     /// A particle without shape functions, or a projection that overflows.
@@ -52,7 +52,7 @@ impl<const D: usize> Prepared<D> {
         simulation.equilibrium(&self.supports, &self.nodal, &self.prescribed, self.alphas, self.end)
     }
 
-    /// Where the step's Newton method starts.
+    /// The initial guess of the step's Newton method.
     pub fn initial_guess<L: Law, A: ShapeFunction>(&self, simulation: &Simulation<D, L, A>) -> Vec<Vector<f64, D>> {
         let mut dphi = vec![Vector::zeros(); self.nodes.len()];
         if simulation.settings.initial_guess == InitialGuess::Velocity {
@@ -62,7 +62,7 @@ impl<const D: usize> Prepared<D> {
         dphi
     }
 
-    /// Puts the prescribed increments into Δφ.
+    /// Writes the prescribed increments into Δφ.
     pub fn prescribe(&self, dphi: &mut [Vector<f64, D>]) {
         for dof in &self.prescribed {
             dphi[dof.node][dof.component] = dof.step.increment;
@@ -70,7 +70,7 @@ impl<const D: usize> Prepared<D> {
     }
 }
 
-/// The simulation with its particles where the sweep looks for them, as they are after a step.
+/// The simulation with its particles in the order of the transfer, as after a step.
 ///
 /// # Errors
 /// A particle without shape functions.

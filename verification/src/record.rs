@@ -1,5 +1,5 @@
-//! What the last full run leaves in the repository: verification/FULL.md, a passage of README.md, and one of the manual's limits; its
-//! tables go elsewhere.
+//! The record that a full run leaves in the repository: verification/FULL.md, a passage of README.md, and a passage of the manual's limits.
+//! Its tables go elsewhere.
 
 use crate::known;
 use crate::report::{Counts, Report, chain, worst};
@@ -12,27 +12,27 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::SystemTime;
 
-/// What a study came to, in a line.
+/// The result of a study in one line.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The study.
+    /// The name of the study.
     pub study: &'static str,
-    /// Its verdict.
+    /// Whether the study passed.
     pub passed: bool,
-    /// Its cells.
+    /// The counts of its cells.
     pub counts: Counts,
-    /// The worst cell that is judged, or why there is none.
+    /// The worst judged cell, or the reason why there is none.
     pub worst: String,
     /// Every cell that fails.
     pub failures: Vec<String>,
-    /// Every cell that is known to fail, and does.
+    /// Every known failure that still fails.
     pub known: Vec<String>,
-    /// How long it took.
+    /// The duration of the study.
     pub seconds: f64,
 }
 
 impl Finding {
-    /// Of a study's result.
+    /// The finding of a study's result.
     pub fn of(study: &'static str, result: &Result<Outcome, StudyError>, seconds: f64) -> Self {
         let none = Self {
             study,
@@ -66,7 +66,7 @@ impl Finding {
                 }
             }
             Err(error) => {
-                // The first line says what failed; the output of a compiler may follow.
+                // The first line names the failure; the output of a compiler may follow.
                 let error = chain(error.as_ref());
                 let first = error.lines().next().unwrap_or_default();
                 Self { worst: format!("could not be finished: {first}"), ..none }
@@ -79,14 +79,14 @@ fn word(passed: bool) -> &'static str {
     if passed { "PASS" } else { "FAIL" }
 }
 
-/// One line for all: the verdict, how many studies, how many cells.
+/// One line for all studies: the verdict, the number of studies, the number of cells.
 fn total(findings: &[Finding]) -> String {
     let (passed, all) = (findings.iter().filter(|finding| finding.passed).count(), findings.len());
     let counts: Counts = findings.iter().map(|finding| finding.counts).sum();
     format!("{}: {passed} of {all} studies pass; {counts}", word(passed == all))
 }
 
-/// The verdicts of all studies, and what is known to fail, as printed at the end of a run.
+/// The verdicts of all studies, and the known failures, as printed at the end of a run.
 pub fn summary(findings: &[Finding]) -> String {
     let study = |finding: &Finding| {
         let Finding { study, passed, counts, seconds, .. } = finding;
@@ -98,7 +98,7 @@ pub fn summary(findings: &[Finding]) -> String {
     format!("{}{}{}\n", studies.collect::<String>(), known.collect::<String>(), total(findings))
 }
 
-/// What a run is of.
+/// The tree and the machine of a run.
 #[derive(Clone, Debug)]
 pub struct Run {
     commit: String,
@@ -117,11 +117,11 @@ impl Run {
         Ok(Self { commit: commit(root), machine: machine() })
     }
 
-    /// Leaves the text of the whole run in `target`/verification, whose path is returned, what it came to in
-    /// verification/FULL.md, its verdict in README.md, and the list of known failures on the page of limits.
+    /// Writes the text of the whole run into `target`/verification, and returns the path. Writes the findings to verification/FULL.md, the
+    /// verdict to README.md, and the list of known failures to the page of limits.
     ///
     /// # Errors
-    /// Those of reading and writing these files.
+    /// Errors of reading and writing these files.
     pub fn keep(&self, root: &Path, target: &Path, findings: &[Finding], text: &[u8]) -> io::Result<PathBuf> {
         let folder = target.join("verification");
         fs::create_dir_all(&folder)?;
@@ -191,15 +191,15 @@ pub const LAST_RUN: (&str, &str) = ("README.md", "last-full-verification");
 /// The file and the passage that lists the known failures.
 pub const LIMITS: (&str, &str) = ("docs/src/limits.md", "known-failures");
 
-/// What stands between `<!-- name -->` and `<!-- /name -->`, each on a line of its own.
+/// The text between `<!-- name -->` and `<!-- /name -->`, each on a line of its own.
 ///
 /// # Errors
-/// If one of the two is not there, or twice.
+/// If one of the two marks is missing or occurs twice.
 pub fn passage<'a>(text: &'a str, name: &str) -> io::Result<&'a str> {
     Ok(&text[place(text, name)?])
 }
 
-/// Where it stands.
+/// The byte range of the passage.
 fn place(text: &str, name: &str) -> io::Result<Range<usize>> {
     let once = |line: &str| {
         let mut places = text.match_indices(line).map(|(at, _)| at);
@@ -218,13 +218,13 @@ fn place(text: &str, name: &str) -> io::Result<Range<usize>> {
 /// The text with another passage of this name.
 ///
 /// # Errors
-/// As for [`passage`].
+/// The errors of [`passage`].
 pub fn replaced(text: &str, name: &str, by: &str) -> io::Result<String> {
     let place = place(text, name)?;
     Ok([&text[..place.start], by, &text[place.end..]].concat())
 }
 
-/// The commit of the tree, if the tree is that of a commit.
+/// The commit of the tree, or a note that the tree differs from its commit.
 fn commit(root: &Path) -> String {
     let git = |arguments: &[&str]| {
         let output = Command::new("git").args(arguments).current_dir(root).output().ok()?;
@@ -237,7 +237,7 @@ fn commit(root: &Path) -> String {
     }
 }
 
-/// The processor, and how many threads it runs.
+/// The processor and its number of threads.
 fn machine() -> String {
     let information = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = information.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));

@@ -1,6 +1,6 @@
-//! What a check hands back: a titled table of cells, each a value, a bound and a verdict.
+//! The result of a check: a titled table of cells, each with a value, a bound and a verdict.
 //!
-//! Shown is not passed: a cell without a bound is counted apart, and so is one that is known to fail.
+//! Shown is not passed: cells without a bound are counted separately, and so are known failures.
 
 mod cell;
 
@@ -14,23 +14,22 @@ use std::fmt;
 use std::io::{self, Write};
 use std::sync::{PoisonError, RwLock};
 
-/// How a report prints. Cells that fail, known or not, are always listed, each by itself.
+/// The printed form of a report. Failing cells, known or not, are always listed one by one.
 #[derive(Clone, Debug)]
 enum Layout {
-    /// Every cell on a line.
+    /// One line per cell.
     List,
-    /// The worst cell of each place in a matrix: a row for each combination of labels, a column for each label of one
-    /// kind.
+    /// A matrix with the worst cell of each position: a row for each combination of labels, a column for each label of one kind.
     Matrix { rows: Vec<usize>, column: usize, attained: usize },
 }
 
-/// Whether a cell with these labels may fail and not end the program.
+/// Whether a cell with these labels may fail without ending the program.
 type Spared = fn(&[String]) -> bool;
 
-/// `None`: all are spared.
+/// `None`: every cell may fail.
 static SPARED: RwLock<Option<Spared>> = RwLock::new(None);
 
-/// From now on the first cell that fails ends the program with exit code 1, unless its labels are `spared`; `None` takes that back.
+/// From now on the first failing cell ends the program with exit code 1, unless its labels are `spared`. `None` restores the default.
 pub fn stop_at_failures(spared: Option<Spared>) {
     *SPARED.write().unwrap_or_else(PoisonError::into_inner) = spared;
 }
@@ -47,7 +46,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// No cells yet; `columns` name the labels.
+    /// An empty report; `columns` name the labels.
     pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
         Self {
             title: title.into(),
@@ -58,9 +57,8 @@ impl Report {
         }
     }
 
-    /// Prints the worst cell of each place in a matrix, with the label in column `attained` that attains it: rows by
-    /// the labels in `rows`, columns by those in `column` (numbers of columns). What is no column of this report is
-    /// left out.
+    /// Prints a matrix of the worst cells, each with the label in column `attained` that belongs to it. Rows are the labels in `rows`,
+    /// columns the labels in `column` (numbers of columns). Numbers without a column in this report are ignored.
     #[must_use]
     pub fn as_matrix(mut self, rows: &[usize], column: usize, attained: usize) -> Self {
         let known = |column: &usize| *column < self.columns.len();
@@ -82,8 +80,8 @@ impl Report {
         self.cells.push(cell);
     }
 
-    /// Marks the worst of the cells whose labels begin with `labels`, which may be several samples, as known to fail, and says how many
-    /// are marked.
+    /// Marks as a known failure the worst of the cells whose labels begin with `labels`; there may be several samples. Returns the number
+    /// of marked cells.
     pub fn list_known(&mut self, labels: &[&str], listed: Listed) -> usize {
         let named =
             |cell: &&mut Cell| cell.labels.iter().map(String::as_str).take(labels.len()).eq(labels.iter().copied());
@@ -92,7 +90,7 @@ impl Report {
         worst.map(|cell| cell.listed = Some(listed)).into_iter().count()
     }
 
-    /// Adds a cell that could not be measured, and why: it fails.
+    /// Adds a failing cell for a value that could not be measured, with the error.
     pub fn push_error(&mut self, labels: &[&str], error: &dyn std::error::Error) {
         self.push(labels, f64::NAN, Bound::AtMost(0.0));
         self.note(format!("{}: {}", labels.join(", "), chain(error)));
@@ -118,28 +116,28 @@ impl Report {
         self.cells.iter().filter(|cell| !cell.passed())
     }
 
-    /// The cells that are known to fail, and do.
+    /// The known failures that still fail.
     pub fn known_failures(&self) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(|cell| cell.verdict() == Verdict::Known)
     }
 
-    /// How many cells are judged, shown, known to fail.
+    /// The numbers of judged, shown and known failing cells.
     pub fn counts(&self) -> Counts {
         Counts::of(self.cells.iter())
     }
 
-    /// Whether something is judged, and no cell fails.
+    /// Whether at least one cell is judged and no cell fails.
     pub fn passed(&self) -> bool {
         let counts = self.counts();
         counts.judged > 0 && counts.failed == 0
     }
 
-    /// Of the cells that are judged the one closest to its bound, or furthest beyond it.
+    /// The judged cell that is closest to its bound, or furthest beyond it.
     pub fn worst(&self) -> Option<&Cell> {
         worst(self.cells.iter().filter(|cell| matches!(cell.verdict(), Verdict::Met | Verdict::Failed)))
     }
 
-    /// One sentence: the verdict, how many cells are judged and how many shown, and the worst of them.
+    /// One sentence: the verdict, the numbers of judged and shown cells, and the worst cell.
     pub fn verdict(&self) -> String {
         let counts = self.counts();
         let Some(cell) = self.worst() else { return format!("FAIL  {}: nothing is judged; {counts}", self.title) };
@@ -150,7 +148,7 @@ impl Report {
     /// Every cell as comma-separated values, with a header.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Errors of the writer.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         for column in &self.columns {
             write!(out, "{},", csv_field(column))?;
@@ -185,7 +183,8 @@ impl Report {
         let across = in_order(self.cells.iter().map(|cell| cell.labels[column].as_str()));
         let header = rows.iter().map(|&k| self.columns[k].as_str()).chain(across.iter().copied());
         let mut table = Table::new(&self.title, header);
-        // Rows in the order of their first appearance: a sweep has hundreds of them, and hundreds of thousands of cells.
+        // Rows keep the order of their first appearance. A sweep has hundreds of rows and hundreds of thousands of cells, so a map finds
+        // the row.
         let (mut row_of, mut all) = (HashMap::new(), Vec::new());
         for cell in &self.cells {
             let labels: Vec<&str> = rows.iter().map(|&k| cell.labels[k].as_str()).collect();
@@ -215,7 +214,7 @@ impl Report {
     }
 }
 
-/// Different items in the order of their first appearance.
+/// Distinct items in the order of their first appearance.
 fn in_order<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     items.fold(Vec::new(), |mut seen, item| {
         if !seen.contains(&item) {
@@ -287,8 +286,8 @@ mod tests {
         assert_eq!(report.verdict(), "FAIL  shown: 1 of 2 judged failed, 1 shown; worst: c: 3 (<= 2)");
     }
 
-    /// A report of one cell that is met, and one of the value and bound given that is known to fail with 30, or 10
-    /// times worse.
+    /// A report of one passing cell, and of one cell with this value and bound. The second is a known failure with the value 30 and the
+    /// factor 10.
     fn known(value: f64, bound: Bound) -> Report {
         let mut report = Report::new("known", &["what", "where"]);
         report.push(&["a", "here"], 1.0, Bound::AtMost(2.0));
@@ -308,12 +307,12 @@ mod tests {
             let report = known(value, Bound::AtMost(2.0));
             assert!(!report.passed() && report.verdict().contains(words), "{report}");
         }
-        // From below: 3 is ten times as far from 100 as 30.
+        // For a lower bound: 3 is ten times as far from 100 as 30.
         assert!(known(4.0, Bound::AtLeast(100.0)).passed());
         for worse in [2.0, 0.0, -1.0, 101.0] {
             assert!(!known(worse, Bound::AtLeast(100.0)).passed(), "{worse}");
         }
-        // What is not judged cannot be known to fail.
+        // A cell that is not judged cannot be a known failure.
         assert!(!known(29.0, Bound::Reported).passed());
     }
 

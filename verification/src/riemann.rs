@@ -59,11 +59,11 @@ pub struct Riemann {
     system: PSystem,
     /// The states at the far left, in the middle, and at the far right.
     pub states: [State; 3],
-    /// Speeds of the wave that runs to the left (negative) and of that to the right.
+    /// The wave to the left, with negative speed, and the wave to the right.
     pub waves: [Wave; 2],
 }
 
-/// The states asked for are none of a bar: F or a constant is not finite and positive, or a velocity is not finite.
+/// The given states belong to no bar: F or a constant is not finite and positive, or a velocity is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("F, the modulus and the density must be finite and > 0, and velocities finite")]
 pub struct NoState;
@@ -110,7 +110,7 @@ impl PSystem {
     /// Solves the problem with the given states on both sides of X = 0.
     ///
     /// # Errors
-    /// States that are none of a bar.
+    /// States that belong to no bar.
     pub fn solve(self, left: State, right: State) -> Result<Riemann, NoState> {
         let positive = [self.modulus, self.density, left.stretch, right.stretch];
         let sound = positive.iter().all(|x| *x > 0.0 && x.is_finite());
@@ -128,7 +128,7 @@ impl PSystem {
         while gap(high) < 0.0 {
             high *= 2.0;
         }
-        // Bisection to neighbouring numbers: it cannot fail, and once per problem it costs nothing.
+        // Bisection to neighbouring numbers cannot fail, and its cost does not matter.
         loop {
             let middle = low + 0.5 * (high - low);
             if middle <= low || middle >= high {
@@ -150,7 +150,7 @@ impl PSystem {
 }
 
 impl Riemann {
-    /// Energy per time and area that the shocks take: Σ (|s| [½ρv² + W] ∓ [P v]) in the frame of the middle state; 0 for fans.
+    /// Energy that the shocks dissipate per time and area: Σ (|s| [½ρv² + W] ∓ [P v]) in the frame of the middle state; 0 for fans.
     pub fn dissipation(&self) -> f64 {
         let (system, star) = (&self.system, self.states[1]);
         let of = |outer: State, wave: Wave| match wave {
@@ -158,7 +158,7 @@ impl Riemann {
             Wave::Shock(speed) => {
                 let v = outer.velocity - star.velocity;
                 let energy = 0.5 * system.density * v * v + system.energy(outer.stretch) - system.energy(star.stretch);
-                // What flows in with the outer state minus what is left behind, minus the work of the outer stress.
+                // The inflow with the outer state minus the energy left behind, minus the work of the outer stress.
                 speed.abs() * energy - system.stress(outer.stretch) * v * -speed.signum()
             }
         };
@@ -199,7 +199,7 @@ mod tests {
         State { stretch, velocity }
     }
 
-    /// Pairs of states whose solutions have all four combinations of waves, weak and strong.
+    /// Pairs of states whose solutions include all four combinations of waves, weak and strong.
     fn problems() -> Vec<Riemann> {
         let mut solved = Vec::new();
         for (left, right) in [
@@ -256,7 +256,7 @@ mod tests {
                 // −s [F] = [v],  −s ρ [v] = [P]
                 assert!((speed * jump_f + jump_v).abs() < 1e-10 * jump_v.abs(), "{wave:?}");
                 assert!((speed * system.density * jump_v + jump_p).abs() < 1e-10 * jump_p.abs(), "{wave:?}");
-                // Faster than sound ahead, slower than sound behind; and only compression jumps.
+                // The shock is supersonic ahead and subsonic behind, and only compression jumps.
                 let ahead = system.speed(outer.stretch);
                 assert!(sign * speed > ahead && sign * speed < system.speed(star.stretch), "{wave:?}");
                 assert!(jump_f < 0.0);
@@ -290,7 +290,7 @@ mod tests {
         }
     }
 
-    /// ∫ g(state) dξ from −reach to reach, by Gauss's rule on pieces that end where the waves do.
+    /// ∫ g(state) dξ from −reach to reach, by Gauss's rule on pieces that end at the edges of the waves.
     fn integral(problem: &Riemann, reach: f64, g: impl Fn(State) -> f64) -> f64 {
         let (a, b) = (problem.waves[0].edges(), problem.waves[1].edges());
         let ends = [-reach, a.0, a.1, 0.0, b.0, b.1, reach];
@@ -323,14 +323,14 @@ mod tests {
             let deformation = error(&|at| at.stretch, &|at| at.velocity);
             let momentum = error(&|at| system.density * at.velocity, &|at| system.stress(at.stretch));
             assert!(deformation.abs() < 1e-10 && momentum.abs() < 1e-10, "{deformation:e} {momentum:e}");
-            // Fans keep the energy, shocks lose some.
+            // Fans conserve the energy; shocks dissipate some.
             let energy =
                 error(&|at| 0.5 * system.density * at.velocity * at.velocity + system.energy(at.stretch), &|at| {
                     system.stress(at.stretch) * at.velocity
                 });
             if problem.waves.iter().any(|wave| matches!(wave, Wave::Shock(_))) {
                 assert!(energy < 0.0 && problem.dissipation() > 0.0, "{energy:e}");
-                // The same loss, in the frame of the middle state, from the fluxes through the shocks.
+                // The same dissipation, in the frame of the middle state, from the fluxes through the shocks.
                 let v_star = problem.states[1].velocity;
                 let moving =
                     |at: State| 0.5 * system.density * (at.velocity - v_star).powi(2) + system.energy(at.stretch);

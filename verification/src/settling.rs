@@ -1,4 +1,4 @@
-//! The block that settles under gravity: 2ᴰ jittered particles a cell, Courant number 1 by √((Λ+2G)/ρ).
+//! A block that settles under gravity: 2ᴰ jittered particles per cell, Courant number 1 by √((Λ+2G)/ρ).
 
 use crate::random::Random;
 use crate::studies::StudyError;

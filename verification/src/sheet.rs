@@ -7,19 +7,19 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use std::ops::Range;
 
-/// Plotters rounds places to whole units: drawn this much larger, and shown smaller, lines are smooth.
+/// Plotters rounds coordinates to whole units. Pictures are drawn larger by this factor and shown smaller, so that lines are smooth.
 const FINE: u32 = 4;
 
-/// A dash of a broken line, and the gap after it.
+/// The lengths of a dash of a broken line and of the gap after it.
 const DASH: (u32, u32) = (6 * FINE, 4 * FINE);
 
-/// Room beside a chart, and for the numbers at its upright axis.
+/// The margin beside a chart, and the space for the numbers at its vertical axis.
 const MARGINS: (u32, u32) = (8, 18);
 const NUMBERS: u32 = 66;
 
 const LABEL: (&str, u32) = ("sans-serif", 14 * FINE);
 
-/// How the points of a curve are shown.
+/// The style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// A line.
@@ -35,11 +35,11 @@ pub enum Mark {
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Its name in the legend; without one it is not listed.
+    /// The name in the legend; a curve without a name is not listed.
     pub name: String,
-    /// Number of its colour; 0 is black.
+    /// The number of its colour; 0 is black.
     pub color: usize,
-    /// How it is shown.
+    /// The style of the curve.
     pub mark: Mark,
     /// The points (x, y).
     pub points: Vec<(f64, f64)>,
@@ -55,17 +55,17 @@ impl Curve {
 /// One chart.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// The line above it.
+    /// The title above the chart.
     pub title: String,
     /// The horizontal axis.
     pub x: Axis,
     /// The vertical axis.
     pub y: Axis,
-    /// Ends of both axes; without them all points are shown.
+    /// The ends of both axes; without them all points are shown.
     pub window: Option<[(f64, f64); 2]>,
     /// The curves.
     pub curves: Vec<Curve>,
-    /// Where the legend stands, if there is one.
+    /// The position of the legend, if there is one.
     pub legend: Option<SeriesLabelPosition>,
 }
 
@@ -74,9 +74,9 @@ pub struct Panel {
 pub struct Sheet {
     /// Name of the files, without extension.
     pub name: &'static str,
-    /// What it shows, as its caption.
+    /// The caption.
     pub caption: String,
-    /// Charts in a row.
+    /// The number of charts in a row.
     pub columns: usize,
     /// Width and height of one chart, in units of the SVG.
     pub size: (u32, u32),
@@ -88,7 +88,7 @@ impl Sheet {
     /// The picture as SVG.
     ///
     /// # Errors
-    /// Those of the plotting library.
+    /// Errors of the plotting library.
     pub fn svg(&self) -> Result<String, FigureError> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|error| FigureError::new(&*error))?;
@@ -100,7 +100,7 @@ impl Sheet {
     /// An SVG of this picture as PNG.
     ///
     /// # Errors
-    /// Those of the rendering library.
+    /// Errors of the rendering library.
     pub fn png(&self, svg: &str) -> Result<Vec<u8>, PlotError> {
         png::from_svg(self.name, svg)
     }
@@ -109,7 +109,7 @@ impl Sheet {
         self.panels.len().div_ceil(self.columns.max(1))
     }
 
-    /// Width and height of the whole.
+    /// The width and height of the whole picture.
     fn extent(&self) -> (u32, u32) {
         (self.size.0 * self.columns as u32, self.size.1 * self.rows() as u32)
     }
@@ -126,12 +126,12 @@ impl Sheet {
     }
 }
 
-/// Whether `value` lies in `range`, ends included.
+/// Whether `value` lies in `range`, including its ends.
 fn within(range: &Range<f64>, value: f64) -> bool {
     (range.start..=range.end).contains(&value)
 }
 
-/// An axis labelled where it is told to be.
+/// An axis with labels at given values.
 struct Scale {
     range: Range<f64>,
     ticks: Vec<f64>,
@@ -143,7 +143,7 @@ impl Ranged for Scale {
 
     fn map(&self, value: &f64, (start, end): (i32, i32)) -> i32 {
         let share = (value - self.range.start) / (self.range.end - self.range.start);
-        // `as` saturates, also for what lies far outside.
+        // `as` saturates, also for points far outside.
         start + (f64::from(end - start) * share).round() as i32
     }
 
@@ -157,7 +157,7 @@ impl Ranged for Scale {
 }
 
 impl Panel {
-    /// A panel with the names of `curves` alone: a key that hides nothing, for charts that share it.
+    /// A panel with only the names of `curves`: a key for several charts, which covers none of them.
     pub fn key(curves: Vec<Curve>) -> Self {
         let curves = curves.into_iter().map(|curve| Curve { points: Vec::new(), ..curve }).collect();
         let [x, y] = [Axis::linear(""), Axis::linear("")];
@@ -211,7 +211,7 @@ impl Panel {
         let (x, y) = window
             .unwrap_or_else(|| (crate::figure::range(all().map(|p| p.0)), crate::figure::range(all().map(|p| p.1))));
         let length = (area.dim_in_pixel().0 / FINE).saturating_sub(MARGINS.0 + MARGINS.1 + NUMBERS);
-        // Labels of the upright axis stand above each other.
+        // Labels of the vertical axis stand above each other, so they need no room along it.
         let (ticks_x, ticks_y) = (self.x.ticks(&x, f64::from(length)), self.y.ticks(&y, f64::INFINITY));
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, ("sans-serif", 16 * FINE))
@@ -261,7 +261,7 @@ impl Panel {
                 let length = 20 * FINE as i32;
                 let (start, width) = if curve.mark == Mark::Dots { (length / 2, 5 * FINE) } else { (0, 2 * FINE) };
                 let end = if curve.mark == Mark::Dots { start + width as i32 } else { length };
-                // The library measures text too short: without the blanks it would leave the box.
+                // The library underestimates the width of text: without the blanks it would leave the box.
                 let series = series.label(format!("{}    ", curve.name));
                 let line = move |(x, y)| [(x + start, y), (x + end, y)];
                 let style = color.stroke_width(width);

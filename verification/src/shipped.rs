@@ -12,7 +12,7 @@ pub enum ShippedError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// A scene is not valid.
@@ -20,12 +20,12 @@ pub enum ShippedError {
     Scene {
         /// Its name.
         name: String,
-        /// Why.
+        /// The cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
-/// Where the scenes are.
+/// The folder of the scenes.
 pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes")
 }

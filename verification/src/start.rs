@@ -1,4 +1,4 @@
-//! Velocities at the start.
+//! Initial velocities.
 
 use bfree::approximation::ShapeFunction;
 use bfree::material::Law;
@@ -7,8 +7,8 @@ use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
 
-/// Gives the particles `velocity(x_p)`, projects it to the nodes by the masses, and interpolates that once to the particles, as the
-/// independent program does: what the nodes cannot represent is not there, and a jump lies as far to the left as to the right.
+/// Gives the particles `velocity(x_p)`, projects it to the nodes by the masses, and interpolates it back once, as the independent program
+/// does. So velocities that the nodes cannot represent vanish, and a jump extends equally to both sides.
 ///
 /// # Errors
 /// A particle without shape functions.

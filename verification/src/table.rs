@@ -13,7 +13,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Without rows.
+    /// A table without rows.
     pub fn new<S: Into<String>>(title: impl Into<String>, header: impl IntoIterator<Item = S>) -> Self {
         Self { title: title.into(), header: header.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
@@ -28,7 +28,7 @@ impl Table {
         &self.title
     }
 
-    /// As Markdown, the title in bold above it.
+    /// The table as Markdown, with the title in bold above it.
     pub fn markdown(&self) -> String {
         let escaped =
             |row: &[String]| row.iter().map(|field| field.replace('|', "\\|")).collect::<Vec<_>>().join(" | ");
@@ -37,10 +37,10 @@ impl Table {
         format!("**{}**\n\n| {} |\n| {rule} |\n{rows}", self.title, escaped(&self.header))
     }
 
-    /// Comma-separated values, with a header.
+    /// The table as comma-separated values, with a header.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Errors of the writer.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         for row in std::iter::once(&self.header).chain(&self.rows) {
             let fields: Vec<_> = row.iter().map(|field| csv_field(field)).collect();
@@ -50,12 +50,12 @@ impl Table {
     }
 }
 
-/// Quoted where a comma, a quote or a line break would be misread.
+/// The text, quoted if it contains a comma, a quote or a line break.
 pub(crate) fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
-/// Numbers stand to the right, words to the left.
+/// Whether the text is a number, which is aligned to the right.
 fn is_number(text: &str) -> bool {
     text.parse::<f64>().is_ok()
 }

@@ -1,4 +1,4 @@
-//! The checkers pass on what is shipped, and name what is wrong in what is not.
+//! The checkers pass for shipped laws and shape functions, and name the fault in wrong ones.
 
 use bfree::approximation::{Approximation, ApproximationError, AxisWeights, Bspline, Linear, Lme, Separable, Validate};
 use bfree::clock::Clock;
@@ -39,12 +39,12 @@ fn shipped_shape_functions_pass() {
     }
 }
 
-/// What is wrong with [`Wrong`].
+/// The fault of [`Wrong`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     /// ℂ:X twice as large.
     Factor,
-    /// ℂ takes X for symmetric.
+    /// ℂ treats X as symmetric.
     Symmetrisation,
 }
 
@@ -99,7 +99,7 @@ fn a_dropped_symmetrisation_shows_in_the_plane_and_in_space() -> Result<(), Lame
     Ok(())
 }
 
-/// 2G (1 − d) E with a damage d of the steps before; `forgets` it in ℂ.
+/// 2G (1 − d) E with a damage d from earlier steps; `forgets` omits d in ℂ.
 struct Damaged {
     shear: f64,
     forgets: bool,
@@ -163,7 +163,7 @@ fn the_tangent_of_a_simulation_is_judged_by_piece() -> Result<(), LameError> {
     assert!(report.passed(), "{report}");
     for fault in [Fault::Factor, Fault::Symmetrisation] {
         let report = check_tangent(&patch(wrong(fault)?));
-        // Without a closed form the product is made of ℂ: all that holds it is wrong, and nothing else.
+        // Without a closed form the product uses ℂ: every piece that contains ℂ is wrong, and no other.
         assert_eq!(red(&report, 0), ["material", "stress", "whole product"], "{fault:?}\n{report}");
     }
     Ok(())
@@ -179,7 +179,7 @@ fn a_simulation_that_cannot_be_set_up_fails_with_the_reason() -> Result<(), Lame
     Ok(())
 }
 
-/// Hats with slopes that are a thousandth too steep.
+/// Hat functions whose slopes are a thousandth too steep.
 struct Steep;
 
 impl Validate for Steep {
@@ -202,7 +202,7 @@ impl Separable for Steep {
     }
 }
 
-/// Splines whose ghosts beyond a wall are left out instead of folded back.
+/// Splines without the ghost functions beyond a wall, which should be folded back.
 struct Cut;
 
 impl Validate for Cut {

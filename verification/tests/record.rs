@@ -1,4 +1,4 @@
-//! What a full run writes, and that README.md and the manual have a place for it and list the known failures.
+//! The output of a full run. README.md and the manual must have a place for it and list the known failures.
 
 use std::fs;
 use std::io;
@@ -39,7 +39,7 @@ fn readme_says_when_what_was_last_verified() -> io::Result<()> {
     Ok(())
 }
 
-/// A folder with nothing in it but places for what is written.
+/// A folder with only the files into which a run writes.
 fn folder(name: &str) -> io::Result<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {

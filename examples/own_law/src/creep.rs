@@ -1,14 +1,14 @@
-//! A law with memory from values alone: Norton's creep, whose stress is the solution of an equation at each particle.
+//! A law with internal variables, given by values alone: Norton's creep. Its stress solves an equation at each particle.
 //!
-//! You write the energy, the stress and what is remembered. The tangent comes from dual numbers, through the equation:
-//! [`bfree::scalar::implicit`] gives its root the derivatives that the number type asks for.
+//! You write the energy, the stress and the internal variables. The tangent comes from dual numbers, through the equation:
+//! [`bfree::scalar::implicit`] gives the root of the equation the derivatives that the number type needs.
 
 use bfree::material::{DISSIPATED, Law, PLASTIC_STRAIN, Remembered, Start};
 use bfree::scalar::{Real, implicit};
 use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, trace};
 
-/// S = (Λ + 2G/3) tr(E) I + 2G dev(E − E_c), which creeps along its deviator: ṗ = A (q/σ₀)ⁿ with q = √(3/2) ‖dev S‖ and p the accumulated creep
-/// strain. Backward Euler in time; for strains that are small but for rotations.
+/// S = (Λ + 2G/3) tr(E) I + 2G dev(E − E_c). The creep strain E_c grows along the deviator of S: ṗ = A (q/σ₀)ⁿ with q = √(3/2) ‖dev S‖ and
+/// the accumulated creep strain p. Backward Euler in time. Strains must be small; rotations may be large.
 #[derive(Clone, Copy, Debug)]
 pub struct Creep {
     /// Λ
@@ -39,15 +39,15 @@ const MEMORY: [Remembered; 8] = {
     ]
 };
 
-/// Where the six numbers of E_c are.
+/// Rows and columns of the six components of E_c.
 const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-/// What a step ends with.
+/// The end of a step.
 struct Crept<T> {
     volume: T,
-    /// dev(E − E_c) before it creeps.
+    /// dev(E − E_c) before creep.
     trial: Tensor<T, 3>,
-    /// q then, and after.
+    /// q before and after creep.
     q: [T; 2],
 }
 
@@ -70,7 +70,7 @@ impl Creep {
         let factor = 3.0 * self.shear * self.rate * start.dt;
         let slope =
             |q: f64| 1.0 + factor * f64::from(self.power) / self.stress * (q / self.stress).powi(self.power - 1);
-        // Newton's method comes from above: the left side is convex.
+        // Newton's method converges from above, because the left side is convex.
         let mut q = q_trial.value();
         for _ in 0..100 {
             let step = (q + factor * (q / self.stress).powi(self.power) - q_trial.value()) / slope(q);
@@ -89,7 +89,7 @@ impl Law for Creep {
         &MEMORY
     }
 
-    /// The potential of the step: the elastic energy, and q Δp n/(n + 1).
+    /// The potential of the step: the elastic energy plus q Δp n/(n + 1).
     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
         let Crept { volume, q: [q_trial, q], .. } = self.crept(at, start);
         let (bulk, power) = (self.lambda + 2.0 * self.shear / 3.0, f64::from(self.power));
@@ -139,7 +139,7 @@ mod tests {
         assert!(report.passed(), "{report}");
     }
 
-    /// A strain that is held: q̇ = −3G A (q/σ₀)ⁿ.
+    /// Relaxation at constant strain: q̇ = −3G A (q/σ₀)ⁿ.
     #[test]
     fn stress_relaxes_as_the_closed_form_with_order_one() {
         let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.01, 0.0));
@@ -180,7 +180,7 @@ mod tests {
             let step = simulation.advance()?;
             assert!(step.newton.history.iterations.len() <= 5);
         }
-        // Where q is gone the volume alone bears: E → S/K, S = 3 to the first order.
+        // When q has vanished, only the volumetric stress is left: E → S/K, S = 3 to first order.
         let (last, bulk) = (middle(&simulation.particles), LAW.lambda + 2.0 * LAW.shear / 3.0);
         assert!(at_first < last && last < 3.0 / bulk, "{at_first} {last}");
         Ok(())

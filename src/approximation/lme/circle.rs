@@ -1,4 +1,4 @@
-//! LME on a circle of nodes, as in the paper: one D-dimensional Newton method for the multipliers of a particle.
+//! LME on a circle of nodes, as in the paper: a D-dimensional Newton method for the Lagrange multipliers of a particle.
 
 use super::{Lme, radius, validate};
 use crate::approximation::product::{Place, inside};
@@ -10,15 +10,14 @@ use argmin::solver::neldermead::NelderMead;
 
 /// LME on the nodes with |D| < R_a = h sqrt(−ln TOL₀ / γ̂), the circle (sphere) of the paper, cut at the walls.
 ///
-/// 1. Support (Algorithm 3): the closest node, which on a grid is a matter of rounding, and of its rings of neighbours
-///    those within the circle.
-/// 2. λ = argmin log Z (eq. 25), by Newton from the λ of the separable functions, shortened until log Z falls enough
-///    (Armijo), until the step is at rounding. Where that fails, by Nelder and Mead without derivatives, then polished.
+/// 1. Connectivity (Algorithm 3): rounding gives the closest node. The nodes within the circle are kept from the rings around this node.
+/// 2. λ = argmin log Z (eq. 25), by Newton's method from the λ of the separable functions. An Armijo line search shortens the steps. The
+///    iteration ends when the error is at round-off. If Newton's method fails, a Nelder–Mead search without derivatives finds λ, and
+///    Newton's method refines it.
 /// 3. N, and ∇N = −N J⁻¹ D with J centred (eq. 27).
 ///
-/// A particle on a wall, where λ is infinite, is moved inside by [`LmeCircle::INSET`] h: an error of that size in the
-/// position, and none in Σ ∇N = 0 and Σ x ⊗ ∇N = I. For large γ̂ the circle holds too few nodes; see
-/// [`LmeCircle::largest_gamma`].
+/// On a wall λ is infinite, so a particle there is moved inside by [`LmeCircle::INSET`] h. The position then has an error of this size;
+/// Σ ∇N = 0 and Σ x ⊗ ∇N = I have none. For large γ̂ the circle holds too few nodes; see [`LmeCircle::largest_gamma`].
 ///
 /// ```
 /// use bfree::approximation::{Lme, LmeCircle, Scratch, ShapeFunction, Support};
@@ -45,38 +44,38 @@ pub struct LmeCircle {
     tolerance: f64,
     /// R_a/h
     radius: f64,
-    /// The same parameters on a box, for the first guess.
+    /// The separable functions with equal parameters; their λ is the first guess.
     product: Lme,
 }
 
-/// Newton steps allowed: next to a wall about ln(h/distance) are needed from a poor start.
+/// Largest number of Newton steps. Next to a wall, a poor start needs about ln(h/distance) steps.
 const NEWTON_STEPS: usize = 100;
-/// A Newton step |Δλ|h below this leaves an error of its square.
+/// Convergence tolerance for a Newton step |Δλ|h: after a step below this, the error is about the square of the step.
 const LAST_STEP: f64 = 1e-9;
-/// Nelder–Mead iterations allowed.
+/// Largest number of Nelder–Mead iterations.
 const SEARCH_STEPS: u64 = 2000;
 
 impl LmeCircle {
-    /// How far inside a wall, in units of h, a particle is treated that is closer to it or on it.
+    /// The smallest distance from a wall, in units of h. A particle closer to the wall, or on the wall, is treated at this distance.
     pub const INSET: f64 = 1e-14;
 
-    /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
+    /// The functions with locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
         Self { gamma, tolerance, radius: radius(gamma, tolerance), product: Lme::new(gamma, tolerance) }
     }
 
-    /// γ̂
+    /// The locality γ̂.
     pub fn gamma(&self) -> f64 {
         self.gamma
     }
 
-    /// TOL₀
+    /// The support tolerance TOL₀.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
 
-    /// γ̂ must stay below −ln TOL₀ / (1 + (D−1)/4): then R_a² > (1 + (D−1)/4) h², the distance from the middle of a
-    /// cell's side to the next nodes on either hand, and every particle lies in the hull of its nodes.
+    /// The limit −ln TOL₀ / (1 + (D−1)/4), below which γ̂ must stay. Then R_a² > (1 + (D−1)/4) h². So R_a exceeds the distance from the
+    /// middle of a cell's side to the next nodes on either hand. Every particle then lies in the convex hull of its nodes.
     ///
     /// ```
     /// use bfree::approximation::{LmeCircle, Validate};
@@ -91,9 +90,9 @@ impl LmeCircle {
         -tolerance.ln() / (1.0 + 0.25 * (dimension as f64 - 1.0))
     }
 
-    /// The nodes in the circle and their D in units of h, the latter in place of the gradients.
+    /// Fills `out` with the nodes in the circle. Their D, in units of h, are stored in place of the gradients.
     fn support<const D: usize>(&self, grid: &Grid<D>, places: &[Place; D], out: &mut Support<D>) {
-        // Ring n holds |k − k₀| ≤ n, and |x − k₀| ≤ ½: those with n < R + ½ reach into the circle.
+        // Ring n holds |k − k₀| ≤ n, and |x − k₀| ≤ ½. So the rings with n < R + ½ reach into the circle.
         let rings = (self.radius + 0.5).min(f64::from(u32::MAX)) as i64;
         let (mut first, mut count) = ([0; D], [0; D]);
         for k in 0..D {
@@ -136,7 +135,7 @@ impl<const D: usize> Dual<'_, D> {
         (0..D).map(|k| (lambda[k] - self.gamma * distance[k]) * distance[k]).sum()
     }
 
-    /// log Z = log Σ exp(−γ̂|D|² + λ·D), the largest exponent taken out.
+    /// log Z = log Σ exp(−γ̂|D|² + λ·D), with the largest exponent factored out.
     fn log_z(&self, lambda: &Vector<f64, D>) -> f64 {
         let exponents = || self.distances.iter().map(|distance| self.exponent(lambda, distance));
         let largest = exponents().fold(f64::NEG_INFINITY, f64::max);
@@ -162,7 +161,7 @@ impl<const D: usize> Dual<'_, D> {
         Moments { log_z, r, j }
     }
 
-    /// λ by damped Newton in at most `steps` steps; `None` where it fails.
+    /// λ by a damped Newton method in at most `steps` steps; `None` if the method fails.
     fn newton(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
         let mut lambda = start;
         for _ in 0..steps {
@@ -172,7 +171,7 @@ impl<const D: usize> Dual<'_, D> {
                 return Some(lambda + step);
             }
             let slope = r.dot(&step);
-            // Where log Z changes by less than its own rounding, the full step is right.
+            // If log Z changes by less than its own round-off, the full step is right.
             let rounding = 8.0 * f64::EPSILON * (1.0 + log_z.abs());
             let mut t = 1.0;
             while self.log_z(&(lambda + step * t)) > log_z + 1e-4 * t * slope + rounding {
@@ -186,7 +185,7 @@ impl<const D: usize> Dual<'_, D> {
         None
     }
 
-    /// λ by the simplex search of Nelder and Mead, good to about the root of rounding.
+    /// λ by the Nelder–Mead simplex search, accurate to about the square root of round-off.
     fn search(&self, start: Vector<f64, D>) -> Option<Vector<f64, D>> {
         let simplex = std::iter::once(start)
             .chain((0..D).map(|k| start + Vector::<f64, D>::from(identity::<f64, D>().column(k))))
@@ -200,7 +199,8 @@ impl<const D: usize> Dual<'_, D> {
         (best.len() == D).then(|| Vector::from_column_slice(best))
     }
 
-    /// λ = argmin log Z: Newton in at most `steps` steps, and where that fails the search, polished by Newton.
+    /// λ = argmin log Z by Newton's method in at most `steps` steps. If this method fails, the search finds λ, and Newton's
+    /// method refines it.
     fn minimize(&self, start: Vector<f64, D>, steps: usize) -> Option<Vector<f64, D>> {
         self.newton(start, steps).or_else(|| self.newton(self.search(start)?, NEWTON_STEPS))
     }
@@ -211,19 +211,19 @@ impl<const D: usize> CostFunction for Dual<'_, D> {
     type Output = f64;
 
     fn cost(&self, lambda: &Vec<f64>) -> Result<f64, Error> {
-        // The search compares costs: not-a-number would compare as anything.
+        // The search compares costs, and a comparison with NaN means nothing.
         let log_z = self.log_z(&Vector::from_column_slice(lambda));
         Ok(if log_z.is_finite() { log_z } else { f64::MAX })
     }
 }
 
-/// J⁻¹ b, the determinant of J being positive; the cofactors make it insensitive to J's scale along each axis.
+/// J⁻¹ b; `None` unless det J > 0 and the result is finite. Cofactors make the result insensitive to the scale of J along each axis.
 fn solve<const D: usize>(j: &Tensor<f64, D>, b: &Vector<f64, D>) -> Option<Vector<f64, D>> {
     let x = inverse(j) * b;
     (determinant(j) > 0.0 && x.iter().all(|x| x.is_finite())).then_some(x)
 }
 
-/// A particle closer to a wall than the inset, moved inside; the distance to the wall's node stays accurate.
+/// Moves a particle inside if it is closer to a wall than [`LmeCircle::INSET`]. The distance to the wall node stays accurate.
 fn inset(place: Place, cells: u32) -> Place {
     let Place { cell, mut below, mut above } = place;
     if cell == 0 && below < LmeCircle::INSET {
@@ -300,7 +300,7 @@ impl ShapeFunction for LmeCircle {
 mod tests {
     use super::*;
 
-    /// D of the nodes −2 … 3 along both axes within R of `x`, the wall at −`below` cutting the first axis.
+    /// D of the nodes −2 … 3 along both axes within R of `x`. A wall at −`below` cuts the first axis.
     fn distances(x: [f64; 2], below: i32, radius: f64) -> Vec<[f64; 2]> {
         (-2..=3)
             .flat_map(|k| (-below..=3).map(move |i| [x[0] - f64::from(i), x[1] - f64::from(k)]))
@@ -327,7 +327,7 @@ mod tests {
 
     #[test]
     fn outside_the_hull_nothing_is_found() {
-        // All nodes on one side: log Z falls for ever.
+        // All nodes lie on one side, so log Z falls without limit.
         let nodes = [[0.5, 0.1], [0.5, -0.9], [1.5, 0.1]];
         assert!(Dual { gamma: 3.0, distances: &nodes }.minimize(Vector::zeros(), NEWTON_STEPS).is_none());
     }

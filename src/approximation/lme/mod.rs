@@ -1,6 +1,6 @@
 //! Local maximum-entropy functions (LME), N_I = exp(−β̂|D|² + λ·D)/Z with D = x − x_I (eqs. 22–28).
 //!
-//! Arroyo & Ortiz, Int. J. Numer. Meth. Engng 65 (2006). Lengths are in units of the spacing here, β̂ = γ̂/h².
+//! Arroyo & Ortiz, Int. J. Numer. Meth. Engng 65 (2006). Lengths are in units of the spacing, so β̂ = γ̂/h².
 
 mod circle;
 mod separable;
@@ -19,25 +19,25 @@ use serde::{Deserialize, Serialize};
 #[schemars(rename = "Lme")]
 #[serde(default, deny_unknown_fields)]
 pub struct LmeParameters {
-    /// γ̂, how local the functions are (no unit), 0.1 to 1000; near 0.8 they are smooth and wide, near 4 almost hats. With the
-    /// circle it must be less than −ln tolerance / (1 + (D − 1)/4), 11.05 in two dimensions at 1e-6, for the circle to reach
-    /// enough nodes. Default 3, the paper's; 1.4 has about half the error for 1.4 times the work (study `tradeoff`).
+    /// The locality γ̂ of the functions (no unit), 0.1 to 1000. Near 0.8 the functions are smooth and wide, near 4 almost hats. On the
+    /// circle, γ̂ must be less than −ln tolerance / (1 + (D − 1)/4) so that the circle reaches enough nodes: 11.05 in two dimensions at
+    /// 1e-6. Default 3, as in the paper; 1.4 has about half the error for 1.4 times the work (study `tradeoff`).
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub gamma: f64,
-    /// Where the functions are cut (no unit), 1e-16 to 1e-2: nodes nearer than h √(−ln tolerance / γ̂) support a particle.
-    /// Default 1e-6.
+    /// The tolerance that cuts off the functions (no unit), 1e-16 to 1e-2: a particle is connected to nodes nearer than
+    /// h √(−ln tolerance / γ̂). Default 1e-6.
     #[schemars(range(min = 1e-16, max = 1e-2))]
     pub tolerance: f64,
-    /// The region of the supporting nodes.
+    /// The region of the nodes that a particle is connected to.
     pub support: LmeSupport,
 }
 
-/// The region of the nodes that support a particle.
+/// The region of the nodes that a particle is connected to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "Support")]
 #[serde(rename_all = "snake_case")]
 pub enum LmeSupport {
-    /// A box: the functions are then products of one-dimensional ones.
+    /// A box. The functions are then products of one-dimensional functions.
     #[default]
     Separable,
     /// The circle (ball) of the paper.
@@ -69,7 +69,7 @@ impl Listed for Lme {
         (ok && !reached).then(|| LmeCircle::new(gamma, tolerance).into())
     }
 
-    /// On the box and on the circle; the widest, of γ̂ = 0.8, on the box alone.
+    /// Members on the box and on the circle. The widest functions, with γ̂ = 0.8, are on the box alone.
     fn examples() -> Vec<(&'static str, Approximation)> {
         vec![
             ("lme 0.8", Self::new(0.8, 1e-6).into()),
@@ -81,7 +81,7 @@ impl Listed for Lme {
     }
 }
 
-/// The smallest TOL₀ a family accepts: next to 1 such a weight is far below rounding, and the arithmetic has room.
+/// The smallest TOL₀ that a family accepts. Such a weight is far below round-off next to 1, and still far from underflow.
 pub const SMALLEST_TOLERANCE: f64 = 1e-100;
 
 /// R_a/h = sqrt(−ln TOL₀ / γ̂)
@@ -89,7 +89,7 @@ fn radius(gamma: f64, tolerance: f64) -> f64 {
     (-tolerance.ln() / gamma).sqrt()
 }
 
-/// γ̂ and TOL₀ in range.
+/// Checks that γ̂ and TOL₀ are in range.
 fn validate(gamma: f64, tolerance: f64) -> Result<(), ApproximationError> {
     if !(gamma > 0.0 && gamma.is_finite()) {
         let parameter = "the locality γ of max-ent";

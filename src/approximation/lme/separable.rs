@@ -1,4 +1,4 @@
-//! LME on a box of nodes: a product of one-dimensional LME functions, each one scalar root away.
+//! LME on a box of nodes: a product of one-dimensional LME functions, each of which needs the root of one scalar equation.
 
 use super::starts::Starts;
 use super::{radius, validate};
@@ -10,29 +10,29 @@ use std::sync::Arc;
 
 /// LME on the nodes of the box |D_k| < R_a, R_a = h sqrt(−ln TOL₀ / γ̂).
 ///
-/// On a box log Z is a sum over the axes, and N factorises. The box is cut at the walls and always holds the nodes of
-/// the particle's cell: for large γ̂ the functions become the linear ones. Works for every γ̂ and every point of the box.
+/// On a box log Z is a sum over the axes, so N factorises. The box is cut at the walls and always holds the nodes of the particle's cell.
+/// So for large γ̂ the functions become linear functions. The family works for every γ̂ and at every point of the grid.
 ///
 /// ## One axis
-/// Let a and b = 1 − a be the distances from the two nodes of the cell. Seen from there the other nodes are j = 1, 2, …
-/// further: D = a + j on the lower side, −(b + j) on the upper. With μ = λ − γ̂(a − b) and q = exp μ the weights are, up to
-/// a common factor,
+/// Let a and b = 1 − a be the distances from the two nodes of the cell. The other nodes are j = 1, 2, … spacings further away: D = a + j on
+/// the lower side, D = −(b + j) on the upper side. With μ = λ − γ̂(a − b) and q = exp μ the weights are, up to a common factor,
 ///
 /// ```text
 /// q gⱼ qʲ  below,    gⱼ q⁻ʲ  above,    gⱼ = exp(−γ̂ j(j+1))
 /// ```
 ///
-/// so the position enters through a and b only. Σ N D = 0 says that both sides have the same moment:
+/// so the position enters through a and b only. Σ N D = 0 means that both sides have equal moments:
 ///
 /// ```text
 /// f(μ) = μ + ln Σⱼ (a + j) gⱼ qʲ − ln Σⱼ (b + j) gⱼ q⁻ʲ = 0
 /// ```
 ///
-/// f increases with a slope of at least 1, so that |μ* − μ| ≤ |f(μ)|: one evaluation gives a bracket, and Newton kept in
-/// it cannot fail. f is nearly straight, also next to a wall, where λ → ∞: at most five evaluations of f.
+/// f increases with a slope of at least 1, so the root μ* satisfies |μ* − μ| ≤ |f(μ)|. One evaluation gives a bracket, and a Newton method
+/// confined to the bracket cannot fail. f is nearly linear, also next to a wall, where λ → ∞. So at most five evaluations of f are
+/// needed.
 ///
-/// Away from walls μ is a function of a alone. There q is taken from a table, and two steps of Newton's method from the table, written
-/// in q, need no exponential and no logarithm.
+/// Away from walls μ depends only on the distance a. A table then gives a first q. Two Newton steps follow, written in q, without an
+/// exponential or a logarithm.
 ///
 /// ```
 /// use bfree::approximation::{AxisWeights, Lme, Separable};
@@ -59,22 +59,22 @@ pub struct Lme {
     radius: f64,
     /// exp(−2γ̂) = gⱼ gⱼ₋₂ / gⱼ₋₁²
     decay: f64,
-    /// q away from walls.
+    /// The table of q away from walls.
     starts: Option<Arc<Starts>>,
 }
 
-/// Nodes further away than those of the cell: how many of them on the lower and on the upper side.
+/// The number of nodes beyond those of the cell, on the lower and on the upper side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reach {
     pub lower: u32,
     pub upper: u32,
 }
 
-/// Iterations of the bracketed Newton method; bisection alone would need fewer than this.
+/// Largest number of iterations of the bracketed Newton method; bisection alone would need fewer.
 const ITERATIONS: usize = 200;
 
 impl Lme {
-    /// With locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
+    /// The functions with locality γ̂ (0.8 … 4 are usual) and support tolerance TOL₀ (1e-6 is usual).
     pub fn new(gamma: f64, tolerance: f64) -> Self {
         let radius = radius(gamma, tolerance);
         let mut lme = Self { gamma, tolerance, radius, decay: (-2.0 * gamma).exp(), starts: None };
@@ -87,27 +87,27 @@ impl Lme {
         self.radius
     }
 
-    /// γ̂
+    /// The locality γ̂.
     pub fn gamma(&self) -> f64 {
         self.gamma
     }
 
-    /// TOL₀
+    /// The support tolerance TOL₀.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
 
-    /// The nodes with |D| < R_a beyond those of the cell, as far as the axis goes.
+    /// The number of nodes with |D| < R_a beyond those of the cell, limited by the ends of the axis.
     #[inline]
     pub(super) fn reach(&self, axis: &Axis, place: &Place) -> Reach {
         let Reach { lower, upper } = self.free_reach(place);
         Reach { lower: lower.min(place.cell), upper: upper.min(axis.cells - 1 - place.cell) }
     }
 
-    /// The same away from walls.
+    /// The number of nodes with |D| < R_a beyond those of the cell, on an axis without ends.
     #[inline]
     fn free_reach(&self, place: &Place) -> Reach {
-        // j < R − d; a cast saturates, and takes NaN to 0.
+        // These nodes have j < R − d. The cast saturates, and turns NaN into 0.
         let count = |distance: f64| ((self.radius - distance).ceil() - 1.0).max(0.0) as u32;
         Reach { lower: count(place.below), upper: count(place.above) }
     }
@@ -135,7 +135,7 @@ impl Lme {
         }
     }
 
-    /// gⱼ qʲ for j = 0 … M, zero for nodes out of reach: |D| = d + j ≥ R.
+    /// gⱼ qʲ for j = 0 … M, zero for nodes out of reach, with |D| = d + j ≥ R.
     #[inline(always)]
     fn weights_within<T: Lane, const M: usize>(&self, distance: T, q: T) -> [T; FURTHEST + 1] {
         let room = distance.constant(self.radius) - distance;
@@ -172,14 +172,14 @@ impl Lme {
         (mu + (lower / upper).ln(), 1.0 + lower_slope / lower + upper_slope / upper)
     }
 
-    /// Where to start: λ = 0 if nodes all around are close together, the root for three nodes if they are not.
+    /// The starting value of μ. Wide functions (γ̂ < 1.5) with nodes on both sides start at λ = 0, others at the root for three nodes.
     #[inline]
     fn guess(&self, place: &Place, reach: Reach) -> f64 {
         let (a, b) = (place.below, place.above);
         if self.gamma < 1.5 && reach.lower > 0 && reach.upper > 0 {
             return self.gamma * (b - a);
         }
-        // q (a + g₁(1+a) q) = b, the nearer of the two nodes having another one behind it.
+        // q (a + g₁(1+a) q) = b: the nearer node of the cell has another node behind it.
         let root = |a: f64, b: f64, reach: u32| {
             let behind = if reach > 0 { self.decay } else { 0.0 };
             2.0 * b / (a + (a * a + 4.0 * b * (1.0 + a) * behind).sqrt())
@@ -187,7 +187,7 @@ impl Lme {
         if a <= b { root(a, b, reach.lower).ln() } else { -root(b, a, reach.upper).ln() }
     }
 
-    /// μ, the root of f. There must be a node with D > 0 and one with D < 0.
+    /// μ, the root of f. Some node must have D > 0, and some node D < 0.
     #[inline]
     fn solve(&self, place: &Place, reach: Reach) -> f64 {
         let start = self.guess(place, reach);
@@ -204,7 +204,7 @@ impl Lme {
                 break;
             }
             (f, slope) = self.balance(place, reach, mu);
-            // Far from the root a sum may overflow (for γ̂ << 1); as f increases, the side tells its sign.
+            // For γ̂ << 1 a sum may overflow far from the root. Since f increases, the side of the start then tells the sign of f.
             let above = if f.is_finite() { f > 0.0 } else { mu > start };
             if above {
                 high = mu;
@@ -251,7 +251,7 @@ impl Separable for Lme {
         validate(self.gamma, self.tolerance)?;
         let place = Place::new(axis, x)?;
         let reach = self.reach(axis, &place);
-        // With all nodes on one side, the limit λ → ±∞: N = 1 at the wall, the slopes of the linear functions.
+        // All nodes lie on one side, so λ → ±∞. The limit is N = 1 at the wall, with the slopes of the linear functions.
         let on_lower_wall = place.below < f64::MIN_POSITIVE && reach.lower == 0;
         let on_upper_wall = place.above < f64::MIN_POSITIVE && reach.upper == 0;
         if on_lower_wall || on_upper_wall {
@@ -273,7 +273,7 @@ impl Separable for Lme {
 
         let mu = self.solve(&place, reach);
         let (q, p) = (mu.exp(), (-mu).exp());
-        // The common factor that keeps the larger of the two weights in the cell at 1.
+        // This common factor keeps the larger of the two weights in the cell at 1.
         let (lower, upper) = if q >= 1.0 { (1.0, p) } else { (q, 1.0) };
         out.start(place.cell - reach.lower);
         self.weights(reach.lower, q, |j, weight| out.push(lower * weight, place.below + j));
@@ -296,13 +296,13 @@ impl Separable for Lme {
     }
 
     fn width(&self) -> usize {
-        // |D| < R holds for ceil(2R) nodes at most, and the two of the cell are always there.
+        // At most ceil(2R) nodes have |D| < R. The two nodes of the cell are always listed.
         ((2.0 * self.radius).ceil() as usize).max(2)
     }
 }
 
-/// Weights to N = weight/Z, and D to ∇N = −N J⁻¹ D, J = Σ N D². D and J are taken about r = Σ N D, zero but for rounding, which makes
-/// Σ ∇N = 0 and Σ x ∇N = 1 independent of the accuracy of λ.
+/// Turns weights into N = weight/Z, and D into ∇N = −N J⁻¹ D with J = Σ N D². D and J are taken about r = Σ N D, which is zero up to
+/// round-off. So Σ ∇N = 0 and Σ x ∇N = 1 do not depend on the accuracy of λ.
 #[inline(always)]
 fn normalise<T: Lane>(values: &mut [T], derivatives: &mut [T], spacing: f64) {
     let Some(&like) = values.first() else { return };
@@ -330,8 +330,8 @@ impl Interior for Lme {
         self.starts.as_ref().map_or(f64::NAN, |starts| starts.at(below))
     }
 
-    /// From q of the table two steps of Newton's method in μ: −f/f' with f = −ln(U/(qL)) = −2 artanh t, t = (U − qL)/(U + qL), which
-    /// multiplies q by its exponential. Steps are so small that both are polynomials to the last digit.
+    /// Two Newton steps in μ from the tabulated q: Δμ = −f/f' with f = −ln(U/(qL)) = −2 artanh t, t = (U − qL)/(U + qL). A step multiplies
+    /// q by exp Δμ. The steps are so small that polynomials give artanh and exp to the last digit.
     #[inline(always)]
     fn column<T: Lane, const M: usize>(&self, below: T, above: T, start: T, spacing: f64) -> Column<T> {
         let c = |x: f64| below.constant(x);
@@ -344,7 +344,7 @@ impl Interior for Lme {
             q = q + q * step * (c(1.0) + c(0.5) * step);
         }
         let p = c(1.0) / q;
-        // The common factor that keeps the larger of the two weights in the cell at 1.
+        // This common factor keeps the larger of the two weights in the cell at 1.
         let (lower, upper) = (q.where_less(c(1.0), q, c(1.0)), q.where_less(c(1.0), c(1.0), p));
         let (on_lower, on_upper) = (self.weights_within::<T, M>(below, q), self.weights_within::<T, M>(above, p));
         let (mut values, mut derivatives) = ([c(0.0); NODES], [c(0.0); NODES]);

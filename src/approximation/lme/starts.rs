@@ -1,20 +1,22 @@
-//! Where Newton starts inside a body of nodes: q = exp μ as a function of the place in the cell, tabulated once.
+//! Starting values of Newton's method away from walls: q = exp μ as a function of the position in the cell, tabulated once.
 //!
-//! Away from walls the root depends on nothing but the distance a from the lower node of the cell. A table does what the last
-//! step's λ would do, for all particles alike and without being remembered: a step is the same whatever went before it.
+//! Away from walls the root depends only on the distance a from the lower node of the cell. The table replaces the λ of the last step as a
+//! starting value, for all particles. No λ is stored, so a step does not depend on the steps before it.
 
 use super::separable::Lme;
 use crate::approximation::interior::FURTHEST;
 use crate::approximation::product::Place;
 
-/// Beyond this locality the table would leave the first-level cache; functions are nearly linear there.
+/// The largest γ̂ with a table. For larger γ̂ the table would leave the first-level cache, and the functions are nearly linear.
 const LARGEST_GAMMA: f64 = 10.0;
 
-/// Wider functions, in spacings, have more nodes than vector lanes have room for, and cost more to sum than to start.
+/// The largest radius with a table, in spacings. Vector lanes have no room for the nodes of wider functions, and sums over these nodes cost
+/// more than the start.
 const LARGEST_RADIUS: f64 = FURTHEST as f64 + 1.0;
 
-/// Intervals for each unit of γ̂. q varies like exp(γ̂(1 − 2a)): a cubic misses it by (2γ̂ δa)⁴/384, here 5e-10 at most. One
-/// step of Newton's method from there is exact to rounding, and a second shows it, also where nodes come into reach within an interval.
+/// Intervals of the table per unit of γ̂. q varies like exp(γ̂(1 − 2a)). The error of a cubic is (2γ̂ δa)⁴/384, here at most 5e-10. One
+/// Newton step from there is exact to round-off, and a second step confirms it. This also holds where nodes come into reach within an
+/// interval.
 const INTERVALS: f64 = 96.0;
 
 /// q and dq/da at equally spaced a in 0 … 1.
@@ -22,7 +24,7 @@ const INTERVALS: f64 = 96.0;
 pub(super) struct Starts(Vec<[f64; 2]>);
 
 impl Starts {
-    /// The table of `lme`; `None` where functions reach no further than the cell or very far, or for a large γ̂.
+    /// The table of `lme`. `None` if functions reach only the nodes of the cell, if they reach very far, or if γ̂ is large.
     pub(super) fn new(lme: &Lme) -> Option<Self> {
         let narrow_enough = lme.radius() > 1.0 && lme.radius() <= LARGEST_RADIUS;
         if !(narrow_enough && lme.gamma() > 0.0 && lme.gamma() <= LARGEST_GAMMA) {

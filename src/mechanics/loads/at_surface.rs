@@ -1,4 +1,4 @@
-//! Where the functions of points on loaded surfaces are evaluated, and by what they are continued to the surface.
+//! The points at which shape functions of loaded surface points are evaluated, and the offsets that continue them to the surface.
 
 use super::Loads;
 use crate::approximation::AtSurface;
@@ -9,10 +9,11 @@ use crate::shape::HAIR;
 use crate::tensor::{Vector, cofactor, identity};
 use std::collections::{BTreeMap, HashMap};
 
-/// Particles whose distances differ by less than this, relative to the larger one, are equally near: rounding does not choose one.
+/// Distances that differ relatively by less than this count as equal, so that rounding does not choose the nearest particle.
 const SAME: f64 = 1e-6;
 
-/// All particles, with the points of loaded surfaces continued to the surface. They lie a hair below it, in the cell of the body.
+/// The evaluation points of all particles, with loaded surface points continued to the surface. Surface points lie slightly below the
+/// surface (by `HAIR`), in the cell of the body.
 pub(crate) fn at_surface_points<'a, const D: usize>(
     mut points: Points<'a, D>,
     particles: &Particles<D>,
@@ -41,7 +42,8 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
     points
 }
 
-/// Of each point, the mean position of the nearest particles of its body, among those at most a cell away; none where there are none.
+/// For each point, the mean position of the nearest particles of its body, among particles at most a cell away. A point without such
+/// particles has no entry.
 fn nearest<const D: usize>(
     particles: &Particles<D>,
     grid: &Grid<D>,

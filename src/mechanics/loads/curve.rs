@@ -5,12 +5,12 @@
 /// ```
 /// use bfree::mechanics::loads::Curve;
 ///
-/// // Gravity that ramps up over 1 s: the velocity it gives is the integral of its value, which is that of its slope.
+/// // Gravity that ramps up over 1 s. The velocity is the integral of its value, and the value is the integral of its slope.
 /// let ramp = Curve::new(vec![[0.0, 0.0], [1.0, 9.81]])?;
 /// assert_eq!((ramp.slope(0.5), ramp.slope(2.0)), (9.81, 0.0));
 /// assert_eq!(ramp.value(0.5), 0.5 * ramp.slope(0.5));
 /// assert_eq!(ramp.integral(0.0, 1.0) + ramp.integral(1.0, 3.0), ramp.integral(0.0, 3.0));
-/// // From then on, as if it had always been there, half a second later.
+/// // After the ramp, the integral is that of constant gravity from t = 0.5 on.
 /// assert_eq!(ramp.integral(0.0, 3.0), Curve::constant(9.81).integral(0.5, 3.0));
 /// # Ok::<(), bfree::mechanics::loads::CurveError>(())
 /// ```
@@ -19,7 +19,7 @@ pub struct Curve {
     points: Vec<[f64; 2]>,
 }
 
-/// Why a list of points does not define a curve.
+/// A list of points that does not define a curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CurveError {
     /// No points.
@@ -30,9 +30,9 @@ pub enum CurveError {
     Order {
         /// The offending point.
         index: usize,
-        /// Its time.
+        /// The time of this point.
         time: f64,
-        /// The time before it.
+        /// The time of the point before.
         previous: f64,
     },
     /// NaN or infinite.
@@ -44,7 +44,7 @@ pub enum CurveError {
 }
 
 impl Curve {
-    /// From points `[time, value]` with strictly increasing times.
+    /// A curve from points `[time, value]` with strictly increasing times.
     ///
     /// # Errors
     /// No points, times out of order, or numbers that are not finite.
@@ -94,13 +94,13 @@ impl Curve {
         }
     }
 
-    /// The slope at time `t`; at a kink, that of the piece after it.
+    /// The slope at time `t`; at a kink, the slope of the piece after the kink.
     pub fn slope(&self, t: f64) -> f64 {
         self.piece(t).map_or(0.0, |(a, b)| (b[1] - a[1]) / (b[0] - a[0]))
     }
 
-    /// The slopes in the step from `t` to `t + dt` at its start, from the right, and at its end, from the left: looked up a little inside
-    /// the step, so that a kink that round-off puts just beyond either does not bring in the neighbouring piece.
+    /// The slopes at the start of the step from `t` to `t + dt`, from the right, and at its end, from the left. They are evaluated slightly
+    /// inside the step, so that round-off at a kink does not bring in the neighbouring piece.
     pub(super) fn slopes(&self, t: f64, dt: f64) -> [f64; 2] {
         [1e-6, 1.0 - 1e-6].map(|part| self.slope(t + part * dt))
     }

@@ -23,18 +23,18 @@ pub struct Gravity<const D: usize> {
     pub curve: Curve,
 }
 
-/// A particle that stands for a piece of surface: one of its own, without volume, or one of the body.
+/// A particle that represents a piece of surface: a surface point without volume, or a particle of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint<const D: usize> {
-    /// The place of the particle in memory.
+    /// The index of the particle in memory.
     pub particle: usize,
     /// Outward normal N in the reference configuration, the mean of unit normals over A.
     pub normal: Vector<f64, D>,
-    /// Reference area A it stands for.
+    /// Reference area A of the piece.
     pub area: f64,
 }
 
-/// What acts on a surface.
+/// The kind and the value of a load on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pressing<const D: usize> {
     /// Nominal traction T (force per reference area), a dead load.
@@ -61,7 +61,7 @@ pub struct Loads<const D: usize> {
     pub gravity: Option<Gravity<D>>,
     /// Loads on surface particles.
     pub surface: Vec<SurfaceLoad<D>>,
-    /// Prescribed motion; where two hold the same component of a node, the later one wins.
+    /// Prescribed motion. If two conditions hold the same component of a node, the later condition wins.
     pub prescribed: Vec<Prescribed<D>>,
     /// A body force that varies in space, given in code.
     pub field: Option<ForceField<D>>,
@@ -72,14 +72,14 @@ pub struct Loads<const D: usize> {
 /// p A N of a particle under follower pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressurePoint<const D: usize> {
-    /// The place of the particle in memory.
+    /// The index of the particle in memory.
     pub particle: usize,
     /// p A N
     pub force: Vector<f64, D>,
 }
 
 impl<const D: usize> Loads<D> {
-    /// How many particles carry loads of a kind.
+    /// The number of particles with loads of a kind.
     pub(crate) fn loaded(&self, kind: impl Fn(&Pressing<D>) -> bool) -> usize {
         let of_kind = self.surface.iter().filter(|load| kind(&load.pressing));
         of_kind.flat_map(|load| &load.points).map(|point| point.particle).collect::<HashSet<_>>().len()

@@ -1,4 +1,4 @@
-//! Prescribed motion: which nodes, and how they move.
+//! Prescribed motion: the nodes, and their motion.
 
 use super::{Curve, Rotation};
 use crate::grid::Grid;
@@ -15,11 +15,11 @@ pub enum Motion<const D: usize> {
     Displacement(Curve),
     /// ġ(t) given.
     Velocity(Curve),
-    /// That of a rotation of all components.
+    /// A rotation of all components.
     Rotation(Rotation<D>),
 }
 
-/// What a step needs to know of a prescribed component.
+/// The motion of a prescribed component over one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionStep {
     /// g(t_{n+1}) − g(t_n)
@@ -35,7 +35,7 @@ pub struct MotionStep {
 }
 
 impl<const D: usize> Motion<D> {
-    /// The motion over the step from `t` to `t + dt` of component `i` of a node that is at `x` at its start.
+    /// The motion of component `i` of a node over the step from `t` to `t + dt`. The node is at `x` at the start.
     ///
     /// ```
     /// use bfree::mechanics::loads::{Curve, Motion};
@@ -69,14 +69,14 @@ impl<const D: usize> Motion<D> {
     }
 }
 
-/// Which nodes a prescribed motion holds.
+/// The nodes that a prescribed motion holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Selection<const D: usize> {
     /// A face of the box: the lower or the upper one along an axis.
     Face {
         /// The axis.
         axis: usize,
-        /// The face at the upper end.
+        /// Whether the face is the upper one.
         upper: bool,
     },
     /// The nodes inside a region.
@@ -84,7 +84,7 @@ pub enum Selection<const D: usize> {
 }
 
 impl<const D: usize> Prescribed<D> {
-    /// Its rotation, if it is one.
+    /// The rotation, if the motion is one.
     pub fn rotation(&self) -> Option<&Rotation<D>> {
         self.motion.iter().flatten().find_map(|motion| match motion {
             Motion::Rotation(rotation) => Some(rotation),
@@ -120,7 +120,7 @@ pub struct PrescribedDof {
     pub node: usize,
     /// Component.
     pub component: usize,
-    /// Which of [`Loads::prescribed`](super::Loads::prescribed) holds it.
+    /// The index in [`Loads::prescribed`](super::Loads::prescribed) of the condition that holds it.
     pub owner: usize,
     /// Whether the owner moves (a curve) or rests.
     pub moving: bool,
@@ -128,8 +128,8 @@ pub struct PrescribedDof {
     pub step: MotionStep,
 }
 
-/// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component. On a grid that is kept, `moved` is the motion
-/// of the nodes since it was new; on a new one there is none, and it is empty.
+/// The degrees of freedom prescribed in the step from `t` to `t + dt`, by node and component. `moved` is the nodal motion since the last
+/// grid reset. Right after a reset there is no such motion, and `moved` is empty.
 ///
 /// ```
 /// use bfree::grid::Grid;
@@ -143,7 +143,7 @@ pub struct PrescribedDof {
 /// let pushing = Some(Motion::Velocity(Curve::constant(2.0)));
 /// let floor = Prescribed { name: "floor".into(), on: face(1), motion: [None, Some(Motion::Rest)] };
 /// let wall = Prescribed { name: "wall".into(), on: face(0), motion: [pushing, None] };
-/// // The nodes of the cell in the corner: two on the floor, two at the wall, one of them the same.
+/// // The nodes of the cell in the corner: two on the floor, two at the wall, one of them in both pairs.
 /// let nodes = Nodes::new([[[0, 0], [1, 0], [0, 1], [1, 1]].map(|index| grid.id(index))].iter().map(|ids| ids.as_slice()));
 /// let dofs = prescribed_dofs(&[floor, wall], &grid, &nodes, &[], 0.0, 0.5);
 /// let held: Vec<_> = dofs.iter().map(|dof| (dof.node, dof.component, dof.step.increment)).collect();
@@ -204,7 +204,7 @@ mod tests {
     fn a_kink_at_the_start_of_a_step_belongs_to_the_step_after_it() -> Result<(), CurveError> {
         let stop = Motion::<1>::Displacement(Curve::new(vec![[0.0, 0.0], [1.0, 3.0], [2.0, 3.0]])?);
         let over = |t, dt| stop.over(t, dt, &Vector::zeros(), 0);
-        // However short the step, what is a thousand steps away is not looked at.
+        // Slopes a thousand steps away are not used, however short the step.
         for dt in [0.1, 1e-7] {
             let (before, after) = (over(1.0 - dt, dt), over(1.0, dt));
             assert_eq!((before.velocity_start, before.velocity_end), (3.0, 3.0));

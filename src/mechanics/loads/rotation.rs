@@ -1,4 +1,4 @@
-//! Rotation of all that a condition holds.
+//! Rotation of all nodes of a condition.
 
 use super::{Curve, MotionStep};
 use crate::tensor::Vector;
@@ -11,13 +11,13 @@ use nalgebra::Vector3;
 /// use bfree::tensor::Vector;
 /// use std::f64::consts::FRAC_PI_2;
 ///
-/// // A quarter turn about the point (1, 1), from t = 0 to 2: what lies to its right comes to lie above it.
+/// // A quarter turn about the point (1, 1), from t = 0 to 2: a point to its right moves above it.
 /// let quarter = Curve::new(vec![[0.0, 0.0], [2.0, FRAC_PI_2]])?;
 /// let rotation = Rotation::new(Vector::from([1.0, 1.0]), [0.0, 0.0, 1.0], quarter);
 /// let x = Vector::from([4.0, 1.0]);
 /// let up: Vec<_> = (0..2).map(|i| rotation.over(0.0, 2.0, &x, i).increment).collect();
 /// assert!((up[0] + 3.0).abs() < 1e-15 && (up[1] - 3.0).abs() < 1e-15);
-/// // It starts with v = ω × r, upwards, and is drawn inwards by ω² r.
+/// // The point starts with v = ω × r, upwards, and is accelerated inwards with ω² r.
 /// let omega = 0.5 * FRAC_PI_2;
 /// assert!((rotation.over(0.0, 2.0, &x, 1).velocity_start - 3.0 * omega).abs() < 1e-15);
 /// assert!((rotation.over(0.0, 2.0, &x, 0).acceleration_start + 3.0 * omega * omega).abs() < 1e-15);
@@ -28,14 +28,15 @@ use nalgebra::Vector3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rotation<const D: usize> {
     center: Vector<f64, D>,
-    /// Of length 1.
+    /// A unit vector.
     axis: Vector3<f64>,
     /// θ(t)
     angle: Curve,
 }
 
 impl<const D: usize> Rotation<D> {
-    /// About an axis through `center`, of any length but zero; counterclockwise where it points at the reader. In the plane the axis is z.
+    /// A rotation about an axis through `center`, counterclockwise where the axis points at the reader. `axis` has any length but zero. In
+    /// the plane the axis is z.
     pub fn new(center: Vector<f64, D>, axis: [f64; 3], angle: Curve) -> Self {
         Self { center, axis: Vector3::from(axis).normalize(), angle }
     }
@@ -45,7 +46,8 @@ impl<const D: usize> Rotation<D> {
         Vector3::from_fn(|i, _| if i < D { x[i] - self.center[i] } else { 0.0 })
     }
 
-    /// What component `i` of a node does in the step from `t`, when it is at `x`, to `t + dt`; ω is that of the piece of the curve within.
+    /// The motion of component `i` of a node over the step from `t` to `t + dt`. The node is at `x` at time `t`. ω is the slope of the
+    /// curve inside the step.
     pub fn over(&self, t: f64, dt: f64, x: &Vector<f64, D>, i: usize) -> MotionStep {
         let (arm, angle) = (self.arm(x), self.angle.value(t + dt) - self.angle.value(t));
         // (R − 1) r = sin θ a × r + (1 − cos θ) a × (a × r), with 1 − cos θ = 2 sin² θ/2 to the last digit

@@ -1,9 +1,9 @@
-//! Load steps along a path of equilibria.
+//! Load steps along the equilibrium path, by arc length.
 
 use super::{Alphas, Scheme, Statics};
 use std::fmt::{Display, Formatter};
 
-/// Every step ends in static equilibrium, a length farther on the path: loads rise to a turning point, fall, and rise again.
+/// Every step ends in static equilibrium, one arc length further on the path. Loads may rise to a limit point, fall, and rise again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArcLength;
 

@@ -6,15 +6,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
-/// M a(t_{n+1−α_m}) + R(φ_{n+1−α_f}, t_{n+1−α_f}) = 0 with Newmark's relations between Δφ, v and a. Motion is interpolated, not force: with
-/// α_m = α_f = ½ it is the midpoint rule.
+/// M a(t_{n+1−α_m}) + R(φ_{n+1−α_f}, t_{n+1−α_f}) = 0 with Newmark's relations between Δφ, v and a. The motion is interpolated, not the
+/// force. α_m = α_f = ½ is the midpoint rule.
 ///
 /// α_m = (2ρ − 1)/(ρ + 1),  α_f = ρ/(ρ + 1),  γ = ½ − α_m + α_f,  β = ¼ (1 − α_m + α_f)²
 ///
 /// ```
 /// use bfree::mechanics::schemes::{GeneralizedAlpha, Scheme};
 ///
-/// // ρ = 1 damps nothing: forces are in balance halfway, and the end of the step is that of the trapezoidal rule.
+/// // ρ = 1 damps nothing: forces are in balance halfway, and the end of the step follows the trapezoidal rule.
 /// let midpoint = GeneralizedAlpha { spectral_radius: 1.0 };
 /// assert_eq!((midpoint.instant(), midpoint.newmark().beta, midpoint.newmark().gamma), (0.5, 0.25, 0.5));
 /// ```
@@ -22,8 +22,8 @@ use std::fmt::{Display, Formatter};
 #[serde(deny_unknown_fields)]
 #[schemars(description = "The generalised-α method; α_m, α_f, β and γ follow from ρ∞.")]
 pub struct GeneralizedAlpha {
-    /// The spectral radius ρ∞ (no unit), 0 to 1: the share of a vibration much faster than the time step that is left after one step. 1 damps
-    /// nothing.
+    /// The spectral radius ρ∞ (no unit), 0 to 1. A vibration much faster than the time step keeps this share of its amplitude after one
+    /// step. 1 damps nothing.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub spectral_radius: f64,
 }
@@ -39,7 +39,7 @@ impl GeneralizedAlpha {
         ((2.0 - rho) / (rho + 1.0), 1.0 / (rho + 1.0))
     }
 
-    /// Its relations between Δφ, v and a.
+    /// Newmark's relations between Δφ, v and a, with β and γ of this scheme.
     pub fn newmark(&self) -> Newmark {
         let (inertia, force) = self.weights();
         let shift = inertia - force;
@@ -58,7 +58,7 @@ impl Scheme for GeneralizedAlpha {
         self.weights().1
     }
 
-    /// With Newmark's α, θ = 1 − α_f, and μ = 1 − α_m:  μ a + (1−μ) a_n  and  θ v + (1−θ) v_n  as functions of θ Δφ.
+    /// μ a + (1−μ) a_n and θ v + (1−θ) v_n as functions of θ Δφ, with Newmark's α, θ = 1 − α_f and μ = 1 − α_m.
     fn balance(&self, dt: f64) -> Alphas {
         let (inertia, force) = self.weights();
         let Alphas { a1, a2, a3, a4, a6, .. } = self.end(dt);
@@ -76,7 +76,7 @@ impl Scheme for GeneralizedAlpha {
         self.newmark().alphas(dt)
     }
 
-    /// An acceleration a is that of the time (α_m − α_f) Δt later, half of which Δφ has of it.
+    /// A stored acceleration belongs to a time (α_m − α_f) Δt later. Through ½ a Δt² this shift adds ½ (α_m − α_f) to Newmark's β − 1/6.
     fn error_constant(&self) -> f64 {
         let (inertia, force) = self.weights();
         self.newmark().beta - 0.5 * (inertia - force) - 1.0 / 6.0
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::tensor::Vector;
 
-    /// The amplification of x″ = −ω² x over one step, as (x, v, a) ← A (x, v, a).
+    /// The amplification matrix A of x″ = −ω² x over one step: (x, v, a) ← A (x, v, a).
     fn amplification(scheme: &dyn Scheme, omega: f64, dt: f64) -> nalgebra::Matrix3<f64> {
         let (theta, balance, end) = (scheme.instant(), scheme.balance(dt), scheme.end(dt));
         let columns = [0, 1, 2].map(|k| {
@@ -110,7 +110,7 @@ mod tests {
                 let eigenvalues = amplification(&scheme, omega, 1.0).complex_eigenvalues();
                 eigenvalues.iter().map(|z| z.norm()).fold(0.0, f64::max)
             };
-            // A triple eigenvalue: the third root of the distance 1/ω² from the limit, 2e-5.
+            // The limit is a triple eigenvalue, so the error is the cube root of the distance 1/ω² from the limit: 2e-5.
             assert!((radius(1e7) - rho).abs() < 1e-4, "ρ = {rho}: {}", radius(1e7));
             assert!([0.1, 1.0, 3.0, 30.0].into_iter().all(|omega| radius(omega) < 1.0 + 1e-9), "ρ = {rho} is unstable");
         }
@@ -122,7 +122,7 @@ mod tests {
             let scheme = GeneralizedAlpha { spectral_radius: rho };
             let errors = [0.02, 0.01].map(|dt| {
                 let map = amplification(&scheme, 1.0, dt);
-                // On x = cos t: accelerations are those (α_m − α_f) Δt later.
+                // The start is on x = cos t. A stored acceleration belongs to a time (α_m − α_f) Δt later.
                 let (inertia, force) = scheme.weights();
                 let later = (force - inertia) * dt;
                 let start = nalgebra::Vector3::new(1.0, 0.0, -later.cos());

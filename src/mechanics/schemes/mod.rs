@@ -1,7 +1,8 @@
-//! Time schemes, a file each: at which instant of a step forces are in balance, and what a and v are there and at its end.
+//! Time integration schemes, one file each. A scheme says at which instant of a step forces are in balance, and gives a and v at this
+//! instant and at the end of the step.
 //!
-//! All of them make a and v functions of the increment of motion, affine and of one form ([`Alphas`]), so that no term of the residual
-//! knows which of them it is evaluated for.
+//! In every scheme, a and v are affine functions of the motion increment, of one form ([`Alphas`]). The terms of the residual therefore do
+//! not depend on the scheme.
 
 mod arc_length;
 mod generalized_alpha;
@@ -20,41 +21,41 @@ use serde::{Deserialize, Serialize};
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
 
-/// Courant numbers, of pressure waves, beyond which inertia hardly holds a node.
+/// Courant number of pressure waves. Above it, inertia hardly restrains a node at the boundary of a body.
 pub const LONG_STEPS: f64 = 10.0;
 
-/// How a step goes from t_n to t_{n+1}. Reports call it by its [`Display`].
+/// A time integration scheme, from t_n to t_{n+1}. Its [`Display`] is its name in reports.
 ///
-/// Newton's unknown is the motion to t_n + θ Δt, where forces are in balance; the step ends with Δφ, which is 1/θ of it.
+/// Newton's unknown is the motion up to t_n + θ Δt, where forces are in balance. Δφ of the whole step is 1/θ of this motion.
 pub trait Scheme: Debug + Display + Send + Sync {
     /// θ in (0, 1].
     fn instant(&self) -> f64 {
         1.0
     }
 
-    /// a and v of the balance, functions of the motion to t_n + θ Δt, which lasts θ Δt.
+    /// a and v in the balance of forces, as functions of the motion up to t_n + θ Δt, which lasts θ Δt.
     fn balance(&self, dt: f64) -> Alphas {
         self.end(dt)
     }
 
-    /// a and v at t_{n+1}, functions of Δφ.
+    /// a and v at t_{n+1}, as functions of Δφ.
     fn end(&self, dt: f64) -> Alphas;
 
-    /// c of the displacement's local error c Δt² |Δa|; exact to leading order.
+    /// The constant c of the local displacement error c Δt² |Δa|; exact to leading order.
     fn error_constant(&self) -> f64;
 
-    /// Without inertia there is no velocity, acceleration or mass matrix, and time says only which loads act.
+    /// Whether the scheme has inertia. Without inertia there is no velocity, acceleration or mass matrix, and time only selects the loads.
     fn has_inertia(&self) -> bool {
         true
     }
 
-    /// Whether a step has a length on the path of equilibria, and what loads act at its end is found.
+    /// Whether a step has an arc length on the equilibrium path, and the load at its end is solved for.
     fn follows_path(&self) -> bool {
         false
     }
 }
 
-/// The time scheme.
+/// The time integration scheme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Inertia")]
@@ -62,18 +63,19 @@ pub enum Parameters {
     /// Dynamics, by Newmark's method.
     #[default]
     Newmark,
-    /// Dynamics, by the generalised-α method of Chung and Hulbert. It is of second order, and damps vibrations that the time step does not resolve.
+    /// Dynamics, by the generalised-α method of Chung and Hulbert. The method is of second order, and damps vibrations that the time step
+    /// does not resolve.
     GeneralizedAlpha(GeneralizedAlpha),
     /// Statics: time only sets the loads and the prescribed motions.
     None,
-    /// Quasi-statics along the path of equilibria, where loads may fall after they have risen (snap-through). The first step brings the loads of
-    /// the time `step`; all others are as long as it, in motion, and the column `load` of `history.csv` says which time's loads act. For dead
-    /// loads and walls at rest.
+    /// Quasi-statics along the equilibrium path, by arc length: loads may fall after they have risen (snap-through). The first step applies
+    /// the loads of the time `step`. All later steps have the same arc length, measured in the motion. The column `load` of `history.csv`
+    /// gives the time whose loads act. The scheme is for dead loads and walls at rest.
     ArcLength,
 }
 
 impl Parameters {
-    /// The scheme, with the constants that are Newmark's own.
+    /// The scheme; `newmark` gives the constants of Newmark's method.
     pub fn scheme(&self, newmark: Newmark) -> Arc<dyn Scheme> {
         match *self {
             Self::Newmark => Arc::new(newmark),
@@ -83,12 +85,12 @@ impl Parameters {
         }
     }
 
-    /// As [`Scheme::has_inertia`].
+    /// Whether the scheme has inertia, see [`Scheme::has_inertia`].
     pub fn has_inertia(&self) -> bool {
         !matches!(self, Self::None | Self::ArcLength)
     }
 
-    /// Adds what is wrong with them to `problems`, of the keys below `path`.
+    /// Adds invalid values of the keys below `path` to `problems`.
     pub(crate) fn check(&self, problems: &mut Problems, path: &str) {
         if let Self::GeneralizedAlpha(scheme) = self {
             scheme.check(problems, &format!("{path}.generalized_alpha"));
@@ -104,8 +106,9 @@ impl Parameters {
 /// a − a_n = α₁ (Δφ − Δt v_n) − (α₃ + 1) a_n
 /// ```
 ///
-/// which is the same, because α₂ = α₁ Δt and α₅ = 1 − α₄ Δt. As printed, large terms leave a small difference, and in steady flight
-/// they are rounded the same way in every step: the momentum drifts. Here Δφ = Δt v_n without acceleration changes not a bit.
+/// Both forms are equal, because α₂ = α₁ Δt and α₅ = 1 − α₄ Δt. In the printed form, large terms leave a small difference. In steady flight
+/// this difference is rounded the same way in every step, and the momentum drifts. In the form above, Δφ = Δt v_n without acceleration
+/// changes not a bit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)] // named in the formulas above
 pub struct Alphas {
@@ -121,13 +124,13 @@ impl Alphas {
     /// a = a_n for Δφ = 0: the equilibrium at the start of a step.
     pub const START: Self = Self { dt: 0.0, a1: 1.0, a2: 0.0, a3: -1.0, a4: 0.0, a6: 0.0 };
 
-    /// Δφ̂, the increment that ends without acceleration, from v_n and a_n. There is none without inertia.
+    /// Δφ̂ from v_n and a_n: the motion increment that ends without acceleration. Δφ̂ exists only with inertia.
     ///
     /// ```
     /// use bfree::mechanics::schemes::Newmark;
     /// use bfree::tensor::Vector;
     ///
-    /// // Without acceleration at the start either, it is that of uniform motion.
+    /// // Without acceleration at the start too, Δφ̂ is the increment of uniform motion.
     /// let (v, rest) = (Vector::from([3.0, -1.0]), Vector::from([0.0, 0.0]));
     /// assert_eq!(Newmark::default().alphas(0.5).predicted(&v, &rest), v * 0.5);
     /// ```

@@ -78,7 +78,7 @@ mod tests {
                 let dphi = v * dt + a * (0.5 * dt * dt);
                 let (delta_v, delta_a) = alphas.increments(&dphi, &v, &a);
                 let acceleration = (dphi - alphas.predicted(&v, &a)) * alphas.a1;
-                // What a rounding of Δφ makes of it.
+                // The effect of one rounding of Δφ.
                 let round_off = f64::EPSILON * dphi.norm() * alphas.a1;
                 assert!((acceleration - a).norm() < 8.0 * round_off, "β = {beta}: a = {acceleration}");
                 assert!(delta_a.norm() < 8.0 * round_off, "β = {beta}: Δa = {delta_a}");

@@ -14,7 +14,7 @@ impl Display for Statics {
 }
 
 impl Scheme for Statics {
-    /// Nothing has a velocity or an acceleration.
+    /// There is no velocity and no acceleration.
     fn end(&self, dt: f64) -> Alphas {
         Alphas { dt, a1: 0.0, a2: 0.0, a3: 0.0, a4: 0.0, a6: 0.0 }
     }

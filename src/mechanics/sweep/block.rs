@@ -1,13 +1,13 @@
-//! A block of cells: its groups of particles, their weights, and its box of nodes.
+//! A block of cells: its groups of particles, their shape-function values along each axis (weights), and its box of nodes.
 
 use super::kernel::Window;
 use super::lanes::LANES;
 use crate::tensor::Vector;
 
-/// A cube of cells: its groups, its box of nodes, and which of them are active.
+/// A cube of cells: its groups, its box of nodes, and the active nodes of the box.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block {
-    /// The particles.
+    /// The groups of its particles.
     pub(super) groups: Groups,
     /// Index of the first node of the box along each axis.
     pub(super) origin: [u32; 3],
@@ -15,13 +15,13 @@ pub(super) struct Block {
     pub(super) size: [usize; 3],
     /// Active numbers of the block's nodes, ascending.
     pub(super) nodes: Vec<u32>,
-    /// Their places in the box.
+    /// Places in the box of these `nodes`.
     pub(super) places: Vec<u32>,
-    /// Which nodes of the box they are: a bit for each node of a row along x.
+    /// Active nodes of the box, as a bit set for each row along x.
     pub(super) active: Vec<u64>,
 }
 
-/// Groups of up to eight particles of a block, with a common window each.
+/// The groups of a block. The up to eight particles of a group share a window of nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Groups {
     /// 1, 2 or 3.
@@ -33,16 +33,16 @@ pub struct Groups {
     pub(super) windows: Vec<Span>,
     /// Weights of the groups, one after the other, as in [`Window`].
     pub(super) weights: Vec<[f64; LANES]>,
-    /// The same in single precision, dN/dx in units of 1/h; empty where no product asks for it.
+    /// The weights in single precision, dN/dx in units of 1/h; empty where no tangent product asks for them.
     pub(super) single: Vec<[f32; LANES]>,
-    /// Particles of each group; the lanes behind them hold zeros.
+    /// Particles of each group. The weights of unused lanes are zero.
     pub(super) particles: Vec<[u32; LANES]>,
 }
 
-/// Where the window and the weights of a group are.
+/// The position of a group's window in the box, and of its weights in the array.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
-    /// Where its weights begin.
+    /// Index of its first row of weights.
     pub(super) weights: u32,
     /// The first node of the window, as a place in the box.
     pub(super) first: u32,
@@ -52,17 +52,17 @@ pub struct Span {
     pub(super) lanes: u8,
 }
 
-/// The particles of a group, by their places in memory, and its number over all blocks.
+/// The particles of a group, by their index in memory, and the group's number over all blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct Group<'a> {
     /// From 0.
     pub number: usize,
-    /// Up to eight, a lane each.
+    /// Up to eight particles, one a lane.
     pub particles: &'a [u32],
 }
 
 impl Groups {
-    /// No groups yet, in the arrays of others.
+    /// An empty list that reuses the arrays of `self`.
     pub(super) fn renewed(mut self, dimension: usize, size: [usize; 3]) -> Self {
         self.windows.clear();
         self.weights.clear();
@@ -71,19 +71,17 @@ impl Groups {
         Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, ..self }
     }
 
-    /// Number of groups.
     pub(super) fn len(&self) -> usize {
         self.windows.len()
     }
 
-    /// A group of the block.
     #[inline(always)]
     pub(super) fn group(&self, group: usize) -> Group<'_> {
         let lanes = usize::from(self.windows[group].lanes);
         Group { number: self.first + group, particles: &self.particles[group][..lanes] }
     }
 
-    /// Window and weights of a group, `weights` being those of all groups.
+    /// Window and weights of a group. `weights` are the weights of all groups, in double or single precision.
     #[inline(always)]
     pub(super) fn window<'w, X>(&self, group: usize, weights: &'w [[X; LANES]]) -> Window<'w, X> {
         let Span { weights: start, first, width, lanes } = self.windows[group];
@@ -99,7 +97,7 @@ impl Groups {
         }
     }
 
-    /// Calls `visit(place in the box, N, ∇N)` for the nodes a particle sees: those with N ≠ 0 or ∇N ≠ 0.
+    /// Calls `visit(place in the box, N, ∇N)` for the nodes with N ≠ 0 or ∇N ≠ 0 at a particle.
     #[inline(always)]
     pub(super) fn entries<const D: usize>(
         &self,
@@ -145,7 +143,7 @@ impl Groups {
 }
 
 impl Block {
-    /// Nodes of the box.
+    /// Number of nodes in the box.
     pub(super) fn box_nodes(&self) -> usize {
         self.size.iter().product()
     }

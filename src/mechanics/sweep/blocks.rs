@@ -1,24 +1,25 @@
-//! The diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I², of one group of particles.
+//! The nodal diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I² I, summed over one group of particles.
 
 use super::kernel::{In, Pairs, Window, each_tile, tile};
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::Arithmetic;
 use crate::tensor::{Tensor, Vector};
 
-/// Pairs (k, l) with k ≤ l of D axes.
+/// Number of pairs (k, l) of axes with k ≤ l, in 3D.
 const MOST_PAIRS: usize = 6;
 
-/// The quadratic form of one group: B(∇N, ∇N) + m N² I, a lane a particle.
+/// The quadratic forms B(∇N, ∇N) + m N² I of the particles of one group, a lane each.
 #[derive(Clone, Debug)]
 pub struct Quadratic {
-    /// B(e_k, e_l) + B(e_l, e_k) for k < l, B(e_k, e_k) for k = l, by `pair`; the first D rows and columns.
+    /// `[pair][i][j]`, the pair (k, l) at index k + l (l + 1)/2. It is B(e_k, e_l) + B(e_l, e_k) for k < l, and B(e_k, e_k) for k = l.
+    /// The first D rows and columns are used.
     pub bilinear: [[[[f64; LANES]; 3]; 3]; MOST_PAIRS],
     /// m
     pub mass: [f64; LANES],
 }
 
 impl Quadratic {
-    /// Nothing yet.
+    /// The form B = 0, m = 0.
     pub fn zero() -> Self {
         Self { bilinear: [[[[0.0; LANES]; 3]; 3]; MOST_PAIRS], mass: [0.0; LANES] }
     }
@@ -36,13 +37,13 @@ impl Quadratic {
     }
 }
 
-/// The place of B(e_k, e_l) in [`Quadratic::bilinear`].
+/// The index of the pair (k, l) in [`Quadratic::bilinear`].
 pub(super) const fn pair(k: usize, l: usize) -> usize {
     k + l * (l + 1) / 2
 }
 
-/// B_I += B(∇N_I, ∇N_I) + m N_I² I, summed over the particles of a group; `out` is a box of D×D blocks by rows, a vector longer
-/// than its nodes.
+/// B_I += B(∇N_I, ∇N_I) + m N_I² I, summed over the particles of a group. `out` is a box of D×D blocks stored by rows. It is one vector
+/// of lanes longer than its nodes need.
 ///
 /// With ∇N = (N_x' P_x, N_x P_y, N_x P_z), P_x = N_y N_z, …, row i of the block is
 /// N_x'² B_xx P_x P_x + N_x N_x' (B_xy P_x P_y + B_xz P_x P_z) + N_x² (B_yy P_y P_y + B_yz P_y P_z + B_zz P_z P_z + m P_x P_x e_i).
@@ -84,7 +85,7 @@ fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
     for i in 0..D {
         let mut row = [[zero; D]; W];
         for p in 0..window.lanes.min(LANES) {
-            // By powers of N_x': 2, 1, 0.
+            // The coefficients of N_x'², N_x N_x' and N_x².
             let mut powers = [[zero; D]; 3];
             for l in 0..D {
                 for k in 0..=l {

@@ -1,4 +1,4 @@
-//! How the tiled sweep is set up: the shape functions and groups of each block, and the numbers of the active nodes.
+//! The set-up of [`Tiled`](super::tiled::Tiled): the shape functions and groups of each block, and the numbers of the active nodes.
 
 use super::Points;
 use super::block::{Block, Groups, Span};
@@ -11,22 +11,22 @@ use crate::grid::Grid;
 use crate::nodes::Nodes;
 use std::ops::Range;
 
-/// What one thread works in.
+/// Working memory of one thread.
 #[derive(Default)]
 pub(super) struct Scratch {
-    /// The particles of a block on each axis.
+    /// The particles of a block along each axis.
     along: [Along; 3],
-    /// The functions of a group along each axis.
+    /// The shape functions of a group along each axis.
     columns: [Columns; 3],
     /// Groups and their windows.
     groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
 
-/// The block of the particles `keys`, without its number of groups before it and its node numbers. With `single` it has groups for
-/// single precision too. The arrays of `spare` are used again.
+/// The block of the particles `keys`. The number of its first group and its node numbers are filled in later. With `single` it has
+/// weights in single precision too. The arrays of `spare` are reused.
 ///
 /// # Errors
-/// Those of the functions of one of the particles.
+/// The error of the shape functions of one of the particles.
 pub(super) fn block<const D: usize>(
     family: Family<'_>,
     grid: &Grid<D>,
@@ -74,7 +74,7 @@ impl Groups {
     }
 }
 
-/// The smallest interval that holds all.
+/// The smallest interval that holds all `spans`.
 #[inline(always)]
 fn union(spans: &[[u32; 2]]) -> [u32; 2] {
     spans.iter().fold([u32::MAX, 0], |[low, high], span| [low.min(span[0]), high.max(span[1])])
@@ -90,7 +90,7 @@ struct Building<'a, const D: usize> {
 }
 
 impl<const D: usize> Building<'_, D> {
-    /// The particles by groups, in the arrays of `spare`; marks the nodes of their functions in `active`.
+    /// The groups of the particles, in the arrays of `spare`. Marks the nodes with nonzero shape functions in `active`.
     fn groups(&self, spare: Groups, scratch: &mut Scratch, active: &mut [u64]) -> Result<Groups, ApproximationError> {
         let mut built = spare.renewed(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
@@ -109,7 +109,7 @@ impl<const D: usize> Building<'_, D> {
         built.windows.reserve_exact(groups.len());
         built.particles.reserve_exact(groups.len());
         built.weights.reserve_exact(rows);
-        // A block may have been much denser before.
+        // `spare` may have been a much denser block.
         built.windows.shrink_to(2 * groups.len());
         built.particles.shrink_to(2 * groups.len());
         built.weights.shrink_to(2 * rows);
@@ -160,7 +160,7 @@ impl<const D: usize> Building<'_, D> {
             for k in 0..D {
                 [begin[k], end[k]] = columns[k].spans[lane].map(|node| (node - self.origin[k]) as usize);
             }
-            // No N vanishes, nor underflows: the whole of the particle's window.
+            // No N vanishes or underflows, so all nodes of the particle's own window are active.
             let whole = columns.iter().map(|columns| columns.smallest[lane]).product::<f64>() > 0.0;
             if !whole {
                 groups.entries::<D>(groups.len() - 1, lane, |place, _, _| active[place / nx] |= 1 << (place % nx));
@@ -176,10 +176,10 @@ impl<const D: usize> Building<'_, D> {
     }
 }
 
-/// Where the group that begins at `start` ends: as many particles of a cell as there are lanes, or whole neighbouring cells
-/// along x while all fit into the lanes and their window is not too wide.
+/// The end of the group that begins at `start`. A group takes as many particles of one cell as there are lanes. Or it takes whole
+/// neighbouring cells along x, while their particles fit into the lanes and their window is not too wide.
 fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -> usize {
-    // No further than a group reaches: a cell may hold very many.
+    // Counting stops behind the last lane, since a cell may hold very many particles.
     let cell_end =
         |from: usize| from + keys[from..].iter().take(LANES + 1).take_while(|key| key.cell == keys[from].cell).count();
     let mut end = cell_end(start);
@@ -200,20 +200,22 @@ fn group_end<const D: usize>(keys: &[Key], along_x: &[[u32; 2]], start: usize) -
     end
 }
 
-/// A row of a box along x, by the grid number of the row's node at x = 0.
+/// A row of a box along x.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
+    /// Grid number of the node with index 0 along x in its line.
     start: u64,
+    /// Index along x of its first node.
     x: usize,
     block: usize,
-    /// Its first node in the box.
+    /// The place of its first node in the box.
     place: usize,
-    /// Its nodes that are active.
+    /// Its active nodes, as a bit set.
     active: u64,
 }
 
 impl Row {
-    /// The active nodes, counted from the beginning of the row.
+    /// The active nodes, counted from the first node of the row.
     fn nodes(&self) -> impl Iterator<Item = usize> + use<> {
         let mut left = self.active;
         std::iter::from_fn(move || {
@@ -223,13 +225,13 @@ impl Row {
         })
     }
 
-    /// The node behind the last active one.
+    /// Index along x of the node behind the last active one.
     fn end(&self) -> usize {
         self.x + (u64::BITS - self.active.leading_zeros()) as usize
     }
 }
 
-/// Numbers the active nodes in the order of the grid, and gives each block those of its box. The arrays `rows` and `ids` are used again.
+/// Numbers the active nodes in the order of the grid, and tells each block the numbers in its box. The arrays `rows` and `ids` are reused.
 pub(super) fn number<const D: usize>(
     grid: &Grid<D>,
     blocks: &mut [Block],
@@ -253,7 +255,7 @@ pub(super) fn number<const D: usize>(
     rows.sort_unstable_by_key(|row| (row.start, row.x, row.block));
     ids.clear();
     let mut numbers: Vec<u32> = Vec::new();
-    // The rows along one line, apart where no box reaches: what lies between two bodies costs nothing.
+    // Overlapping or adjacent rows of one line are numbered together. A gap between two bodies splits a line, so empty space costs nothing.
     let mut reach = 0;
     let together = |row: &Row, next: &Row| {
         reach = row.end().max(reach);

@@ -1,7 +1,7 @@
-//! The functions of an axis for the particles of a group, a lane each.
+//! The shape functions N(x) and dN/dx along one axis for the particles of a group, a lane each.
 //!
-//! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, each
-//! particle asks for its list.
+//! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, the list
+//! of nodes and functions ([`AxisWeights`]) is evaluated for each particle.
 
 use super::Points;
 use super::lanes::{LANES, Lanes, Widest, WithLanes};
@@ -15,34 +15,35 @@ use crate::grid::Axis;
 use std::collections::BTreeMap;
 use std::ops::{Add, Div, Mul, Range, Sub};
 
-/// A product of functions, and how far they reach if they have vector lanes.
+/// A family of product shape functions.
 #[derive(Clone, Copy)]
 pub(super) struct Family<'a> {
     product: &'a dyn Separable,
-    /// Of points on a loaded surface.
+    /// The family at points on a loaded surface.
     at_surface: &'a dyn Separable,
+    /// The formulas for vector lanes and their radius in spacings, if the family has them.
     shipped: Option<(Shipped<'a>, f64)>,
 }
 
-/// Particles on an axis.
+/// The particles of a block along one axis.
 #[derive(Default)]
 pub(super) struct Along {
     /// Their coordinates.
     pub(super) x: Vec<f64>,
-    /// First node and end of each list.
+    /// First node and end of the nodes of each particle.
     pub(super) spans: Vec<[u32; 2]>,
     cells: Vec<u32>,
     below: Vec<f64>,
     above: Vec<f64>,
-    /// Whether a wall cuts the list.
+    /// Whether a wall cuts off some of the particle's nodes.
     cut: Vec<bool>,
-    /// By what the functions of points on a loaded surface are continued, by their places in the block.
+    /// The distance by which functions are continued linearly, of points on a loaded surface, by their index in the block.
     continued: BTreeMap<usize, f64>,
     list: AxisWeights,
 }
 
 impl Along {
-    /// Takes what continues the functions of the particles `keys` along the axis `k`.
+    /// Takes from `points` the distances by which the functions of the particles `keys` are continued along axis `k`.
     pub(super) fn continue_by<const D: usize>(&mut self, k: usize, keys: &[Key], points: &Points<'_, D>) {
         self.continued.clear();
         if !points.continued.is_empty() {
@@ -59,10 +60,10 @@ impl<'a> Family<'a> {
         Self { product, at_surface, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
     }
 
-    /// Finds the lists of the particles at `along.x`, which lie on the axis.
+    /// Finds the nodes of the particles at `along.x`, which lie on the axis.
     ///
     /// # Errors
-    /// That of the first particle that has none.
+    /// The error of the first particle whose functions cannot be evaluated.
     pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), ApproximationError> {
         approximation::check(axis)?;
         if let Some((_, radius)) = self.shipped {
@@ -81,10 +82,10 @@ impl<'a> Family<'a> {
         Ok(())
     }
 
-    /// The functions of the particles `range`, at most eight.
+    /// Evaluates the functions of the particles `range`, at most eight.
     ///
     /// # Errors
-    /// That of the first particle that has none.
+    /// The error of the first particle whose functions cannot be evaluated.
     pub(super) fn columns(
         &self,
         axis: &Axis,
@@ -121,12 +122,12 @@ impl<'a> Family<'a> {
     }
 }
 
-/// First node and end of a list.
+/// First node and end of the nodes of a list.
 fn span(list: &AxisWeights) -> [u32; 2] {
     [list.first, list.first + list.values.len() as u32]
 }
 
-/// Finds cells, places in them, and first nodes and ends.
+/// Finds the cell of each particle, the place in the cell, and the first node and the end of its nodes.
 struct Places<'a> {
     axis: &'a Axis,
     radius: f64,
@@ -149,7 +150,7 @@ impl WithLanes<f64> for Places<'_> {
             let place = Place::at(axis, axis.spacings(x).min(last));
             (*cell, *below, *above) = (place.cell, place.below, place.above);
         }
-        // j ≥ 1 with j < R − d
+        // Number of integers j ≥ 1 with j < R − d: nodes beyond the cell within the radius R.
         let reach = |distance: f64| (1..=FURTHEST).map(|j| u32::from((j as f64) < radius - distance)).sum::<u32>();
         let lists = along.spans.iter_mut().zip(&mut along.cut);
         for (((&cell, &below), &above), (span, cut)) in
@@ -162,17 +163,17 @@ impl WithLanes<f64> for Places<'_> {
     }
 }
 
-/// The functions of an axis at up to eight coordinates.
+/// The functions along one axis at up to eight coordinates, a lane each.
 #[derive(Default)]
 pub(super) struct Columns {
-    /// N by rows: the i-th is that of the node `first + i` of each lane.
+    /// N by rows. The i-th row belongs to the node `first + i` of each lane.
     values: [[f64; LANES]; WIDEST],
     /// dN/dx
     derivatives: [[f64; LANES]; WIDEST],
     first: [i64; LANES],
-    /// First node and end of each list.
+    /// First node and end of the nodes of each lane.
     pub(super) spans: [[u32; 2]; LANES],
-    /// The smallest |N| of each list.
+    /// The smallest |N| of each lane.
     pub(super) smallest: [f64; LANES],
 }
 
@@ -188,9 +189,9 @@ impl Columns {
         }
     }
 
-    /// Writes N and dN/dx of the first `count` lanes to the rows of the nodes `low ..`, which hold zeros.
+    /// Writes N and dN/dx of the first `count` lanes to the rows of the nodes `low ..`. These rows hold zeros before.
     pub(super) fn write(&self, count: usize, low: u32, values: &mut [[f64; LANES]], derivatives: &mut [[f64; LANES]]) {
-        // The same nodes in all lanes, as in one cell: whole rows.
+        // All lanes have the same nodes, as they do in one cell, so whole rows are copied.
         let skipped = usize::try_from(i64::from(low) - self.first[0]);
         if let Ok(skipped) = skipped
             && skipped + values.len() <= WIDEST
@@ -213,14 +214,14 @@ impl Columns {
     }
 }
 
-/// Finds the columns of one family.
+/// Evaluates the functions of one family in vector lanes.
 struct InLanes<'a> {
     below: [f64; LANES],
     above: [f64; LANES],
     spacing: f64,
     radius: f64,
     corrections: &'a mut [f64; LANES],
-    /// `first` is relative to the cell.
+    /// The result, with `first` relative to the cell.
     out: &'a mut Columns,
 }
 

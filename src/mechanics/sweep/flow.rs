@@ -1,13 +1,13 @@
-//! What a pass gathers and scatters, and by which weights.
+//! The evaluation mode of a pass: values, gradients or both, and the weights of its scatter.
 
 use crate::scalar::Real;
 
-/// What a pass gathers, and scatters.
+/// The evaluation mode of a pass over the particles. It holds for gather and scatter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flow {
-    /// Σ u_I N_I, and q N_I
+    /// Σ u_I N_I is gathered, and q N_I scattered.
     pub value: bool,
-    /// Σ u_I ⊗ ∇N_I, and σ ∇N_I
+    /// Σ u_I ⊗ ∇N_I is gathered, and σ ∇N_I scattered.
     pub gradient: bool,
     /// The weights of the scatter.
     pub weights: Weights,
@@ -21,25 +21,25 @@ impl Flow {
     /// Values alone.
     pub const VALUE: Self = Self { gradient: false, ..Self::BOTH };
 
-    /// What one or the other needs.
+    /// The mode that serves both `self` and `other`, with the weights of `self`.
     pub fn and(self, other: Self) -> Self {
         Self { value: self.value || other.value, gradient: self.gradient || other.gradient, ..self }
     }
 }
 
-/// How N and ∇N enter a scatter.
+/// The weights of a scatter, made from N and ∇N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights {
-    /// As they are.
+    /// N and ∇N with their signs.
     Signed,
-    /// By their magnitude.
+    /// |N| and |∇N|.
     Magnitude,
-    /// N²: the diagonal of a mass matrix, since N is a product.
+    /// N², for the diagonal of a mass matrix. N is a product, so squaring the weights of each axis is enough.
     Square,
 }
 
 impl Weights {
-    /// What is done to every weight.
+    /// The function applied to every weight; `None` where weights stay unchanged.
     pub(super) fn changed<X: Real>(self) -> Option<fn(X) -> X> {
         match self {
             Self::Signed => None,

@@ -1,10 +1,9 @@
-//! Gather and scatter of one group of particles, sum-factorised, for C components a node.
+//! Sum-factorised gather and scatter of one group of particles, for C components a node.
 //!
-//! A group is up to eight particles, one for each lane, that share one window of nodes, so that the nodes of a window are read
-//! and written once for all of them.
+//! A group is up to eight particles that share one window of nodes. Its nodes are read and written once for all these particles.
 //!
-//! gather, a lane a particle:  u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z;
-//! scatter, a lane a row (y, z) of the window: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
+//! - Gather, one particle a lane: u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z.
+//! - Scatter, one row (y, z) of the window a lane: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
 use super::Flow;
 use super::lanes::{LANES, Lanes, WithLanes};
@@ -13,7 +12,7 @@ use crate::tensor::Vector;
 use nalgebra::SMatrix;
 use num_traits::One;
 
-/// The widest window along x of a group of neighbouring cells, and the widest tile that a kernel sums at a time.
+/// The widest tile of nodes along x that a kernel sums at a time. A group of neighbouring cells has no wider window along x.
 pub(super) const WIDEST_TILE: usize = 6;
 
 /// A group's window of nodes and its weights.
@@ -25,16 +24,16 @@ pub struct Window<'a, X> {
     pub width: [usize; 3],
     /// Axis after axis: N of each node, then dN/dx of each node, a lane a particle.
     pub weights: &'a [[X; LANES]],
-    /// Particles: lanes from here on are empty, with weights zero.
+    /// Number of particles. The lanes behind them are empty and have zero weights.
     pub lanes: usize,
-    /// Number of the first node in the box of the block.
+    /// Place of the first node in the box of the block.
     pub first: usize,
     /// Nodes from one row of the box to the next, and from one plane to the next.
     pub stride: [usize; 2],
 }
 
 impl<X> Window<'_, X> {
-    /// N of axis `k`, and behind it dN/dx.
+    /// N and dN/dx along axis `k`.
     #[inline(always)]
     pub(super) fn axis(&self, k: usize) -> (&[[X; LANES]], &[[X; LANES]]) {
         let start: usize = 2 * self.width[..k].iter().sum::<usize>();
@@ -42,7 +41,7 @@ impl<X> Window<'_, X> {
     }
 }
 
-/// What components are at the particles of a group: values, and gradients by rows, a lane each.
+/// The data at the particles of a group, a lane each: values, and gradients by rows.
 #[derive(Clone, Copy, Debug)]
 pub struct At<X, const C: usize, const D: usize> {
     /// `value[c]`, of each lane
@@ -66,14 +65,14 @@ impl<X: Real, const C: usize, const D: usize> At<X, C, D> {
     }
 }
 
-/// The width of the next tile where `left` nodes are left along x: 1 only for a window of one node.
+/// The width of the next tile if `left` nodes remain along x. It is 1 only for a window of one node.
 #[inline(always)]
 pub(super) fn tile(left: usize) -> usize {
     if left <= WIDEST_TILE { left } else { left.div_ceil(2).min(WIDEST_TILE - 1) }
 }
 
-/// Calls a function for every tile of a window, from `start` on and as wide as the last argument says: compiled for every width, or
-/// once for all where the lanes are rare.
+/// Calls a function for every tile of a window. `start` is the first node of the tile, and the last argument its width. The function is
+/// compiled for every width, but once for all widths where the lanes are [rare](Lanes::RARE).
 macro_rules! each_tile {
     ($window:ident, $start:ident => $function:ident::<$lanes:ident, $($generic:tt),*>($($argument:expr),*)) => {
         let mut $start = 0;
@@ -95,10 +94,10 @@ macro_rules! each_tile {
 
 pub(super) use each_tile;
 
-/// Work on C components in D dimensions.
+/// A kernel `W` on C components in D dimensions.
 pub(super) struct In<W, const C: usize, const D: usize>(pub W);
 
-/// Fills value and gradient, C and C·D rows, from the box `nodal`, component after component of each node.
+/// Fills `value` and `gradient`, C and C·D rows, from the box `nodal`, which holds the C components of node after node.
 pub struct Gather<'a, X> {
     pub window: Window<'a, X>,
     pub nodal: &'a [X],
@@ -113,7 +112,7 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Gather<'_, X>,
         let Gather { window, nodal, flow, value, gradient } = self.0;
         let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
         each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
-        // Loops, not closures: what is not inlined loses the wide instructions.
+        // Loops, not closures: a closure that is not inlined loses the wide instructions.
         if flow.value {
             for (c, row) in value.iter_mut().enumerate().take(C) {
                 s.store(out.value[c], row);
@@ -128,13 +127,13 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Gather<'_, X>,
     }
 }
 
-/// u and L of a group in registers.
+/// u and L of a group, in registers.
 struct Gathered<N, const C: usize, const D: usize> {
     value: [N; C],
     gradient: [[N; D]; C],
 }
 
-/// What is known of a row of nodes, a plane of them, or all, contracted with N_x, N_y, N_z: Σ u N, and with one derivative.
+/// The contraction of a row or plane of nodes with N: Σ u N, then the sums with one N replaced by its derivative.
 type Sums<N, const C: usize, const K: usize> = [[N; C]; K];
 
 /// (Σ_x u N_x, Σ_x u N_x') of the row that begins at the node `first`.
@@ -232,8 +231,8 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     }
 }
 
-/// f_I += σ ∇N_I + q N_I, with q in the place of u, C rows, and σ in that of L, C·D rows, a lane a particle; `out` is a box as in
-/// [`Gather`], a vector longer than its nodes.
+/// f_I += σ ∇N_I + q N_I. `value` is q in C rows, and `gradient` is σ in C·D rows, a lane a particle. `out` is a box with the layout of
+/// [`Gather::nodal`], one vector of lanes longer than its nodes need.
 pub struct Scatter<'a, X> {
     pub window: Window<'a, X>,
     pub flow: Flow,
@@ -246,7 +245,7 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Scatter<'_, X>
     #[inline(always)]
     fn run<S: Lanes<X = X>>(self, s: S) {
         let Scatter { window, flow, value, gradient, out } = self.0;
-        // Fixed lengths, so that no place in them is checked.
+        // Fixed lengths, so that no index is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
         let rows = window.width[1] * window.width[2];
         let at_once = S::ROWS;
@@ -257,7 +256,8 @@ impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Scatter<'_, X>
     }
 }
 
-/// Of as many rows (y, z) of a window as fill a register: N_y N_z, N_y' N_z, N_y N_z', a lane a row, for each particle; and where the rows begin.
+/// The products N_y N_z, N_y' N_z, N_y N_z' of each particle, a lane a row (y, z) of the window. The rows are as many as fill a register.
+/// `places` is where the rows begin in the box.
 pub(super) struct Pairs<S: Lanes, const D: usize> {
     pub(super) products: [[<S::Rows as Arithmetic>::N; LANES]; D],
     places: [usize; LANES],
@@ -302,8 +302,8 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         Self { products: columns, places, count }
     }
 
-    /// Adds `sums`, `at` the first entry of each row: from a lane a row to a row after the other. `sums` are the entries of a
-    /// row in their order, `numbers` for each node.
+    /// Adds `sums` to the rows of the box, from the node `at` of each row on. `sums` are the entries of a row in order, `numbers` for each
+    /// node, and hold a row in each lane.
     #[inline(always)]
     pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [S::X]) {
         let mut places = self.places;
@@ -334,7 +334,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     let mut sums = [[zero; C]; W];
     let sums = &mut sums[..width.min(W)];
     for p in 0..window.lanes.min(LANES) {
-        // a = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  b = σ_x N_y N_z; which of them there are is asked outside the inner loops.
+        // across = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  along = σ_x N_y N_z. The mode is tested outside the inner loops.
         let (mut across, mut along) = ([zero; C], [zero; C]);
         if flow.gradient {
             for c in 0..C {
@@ -384,7 +384,7 @@ mod tests {
         ((i + 1) as f64 * 0.618_033_988_749_894_9).fract() - 0.5
     }
 
-    /// Gathers and scatters what was gathered.
+    /// Gathers a field, and scatters the gathered values and gradients.
     struct ThereAndBack<'a, X>(&'a [[X; LANES]], &'a [X], &'a mut Vec<(Vec<X>, Vec<X>)>);
 
     impl<X: Real> WithLanes<X> for ThereAndBack<'_, X> {
@@ -403,7 +403,7 @@ mod tests {
         }
     }
 
-    /// Weights, nodal values, and the results of these sums written down: place, N and ∇N of every node of the window.
+    /// Weights, nodal values, and the expected results, from plain sums over place, N and ∇N of every node of the window.
     #[allow(clippy::type_complexity)]
     fn problem<X: Real>() -> (Vec<[X; LANES]>, Vec<X>, Vec<f64>, Vec<f64>) {
         let rows = 2 * WIDTH.iter().sum::<usize>();

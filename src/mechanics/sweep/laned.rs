@@ -1,6 +1,6 @@
-//! The kernels of one group, compiled here once for each number, dimension and instruction set.
+//! The kernels of one group, compiled here once for each number type, dimension and instruction set.
 //!
-//! Nothing here is generic for those who call it, so that no other crate and no point function compiles a kernel again.
+//! No function here is generic for its caller. So neither another crate nor a point function compiles a kernel again.
 
 use super::block::Groups;
 use super::blocks::{Quadratic, ScatterBlocks};
@@ -10,22 +10,22 @@ use super::tangents::{AddTo, Form, Product};
 use crate::pooled;
 use bytemuck::Pod;
 
-/// A number of which fields are gathered and scattered, in double or in single precision.
+/// A plain number in double or single precision, with its compiled kernels.
 pub trait Laned: Widest + Pod + Default + Send + Sync + pooled::Number {
     /// The weights of all groups of a block.
     fn weights(groups: &Groups) -> &[[Self; LANES]];
 
-    /// Values and gradients of `components` numbers a node, 1 or as many as axes, from a box.
+    /// Gathers values and gradients from a box with `components` numbers a node: 1, or as many as there are axes.
     fn gather(components: usize, work: Gather<'_, Self>);
 
-    /// Adds values and gradients to a box.
+    /// Scatters values and gradients into a box.
     fn scatter(components: usize, work: Scatter<'_, Self>);
 
-    /// Adds the product of a group's tangents with its gradients.
+    /// Adds the product 𝔸 : L of a group's tangents with its gradients.
     fn product(dimension: usize, work: Product<'_, Self>);
 }
 
-/// Does work on one component, or on as many as there are axes, with the widest lanes of a number.
+/// Runs a kernel with the widest lanes of a number type, for one component or for as many as there are axes.
 macro_rules! widest {
     ($number:ty, $dimension:expr, $work:expr) => {
         match $dimension {
@@ -73,7 +73,7 @@ pub(super) fn blocks(work: ScatterBlocks<'_>) {
     widest!(f64, work.window.dimension, work);
 }
 
-/// Adds `factor` times the quadratic form of the tangents of a group, see [`AddTo`].
+/// Adds `factor` times the quadratic form of the tangents of a group; see [`AddTo`].
 pub(crate) fn add_quadratic<X: Laned>(
     form: Form,
     dimension: usize,

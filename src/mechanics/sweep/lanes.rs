@@ -1,7 +1,7 @@
-//! Vectors of eight numbers, a lane each, with whatever the processor has: AVX-512, AVX2 with FMA, or plain arrays.
+//! Vectors of eight numbers, a lane each, with the instructions of the processor: AVX-512, AVX2 with FMA, or plain arrays.
 //!
-//! The operations and their order are the same everywhere; a·b + c is rounded once where the processor has FMA and
-//! twice where it has not, and that is all a result can differ by between processors.
+//! The operations and their order are the same on every processor. Results differ between processors in one way only: a·b + c is
+//! rounded once with FMA, and twice without.
 
 use crate::scalar::{Arithmetic, Real};
 use pulp::{Scalar, Simd};
@@ -10,14 +10,14 @@ use std::marker::PhantomData;
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
 
-/// Lanes of a vector, in double and in single precision.
+/// Number of lanes of a vector, in double and in single precision.
 pub const LANES: usize = 8;
 
-/// Arithmetic on lanes. A value of the type is the proof that the processor has the instructions.
+/// Arithmetic on lanes. A value of this type proves that the processor has the instructions.
 pub trait Lanes: Arithmetic {
     /// The number in a lane.
     type X: Real;
-    /// Whether these lanes are there for the rare processor that has no other: kernels then do without a copy for every width.
+    /// Whether these lanes only serve the rare processor without AVX2. Kernels are then not compiled for every width.
     const RARE: bool;
     fn splat(self, x: Self::X) -> Self::N;
     fn load(self, x: &[Self::X; LANES]) -> Self::N;
@@ -27,19 +27,20 @@ pub trait Lanes: Arithmetic {
     fn div(self, a: Self::N, b: Self::N) -> Self::N;
     /// `then` where a < b, and `otherwise` elsewhere.
     fn where_less(self, a: Self::N, b: Self::N, then: Self::N, otherwise: Self::N) -> Self::N;
-    /// Arithmetic on rows of nodes, a lane each, with as many as fill one register.
+    /// Arithmetic on rows of nodes, a lane each. A vector holds as many rows as fill one register.
     type Rows: Arithmetic;
-    /// Rows of a vector.
+    /// Number of rows in such a vector.
     const ROWS: usize;
     fn rows(self) -> Self::Rows;
     fn splat_rows(self, x: Self::X) -> <Self::Rows as Arithmetic>::N;
-    /// From a vector of particles for each row to a vector of rows for each particle.
+    /// Transposes: a vector of particles for each row becomes a vector of rows for each particle.
     fn columns(self, rows: &[Self::N; LANES]) -> [<Self::Rows as Arithmetic>::N; LANES];
-    /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row; a vector's length from there is read and written.
+    /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row. Whole vectors are read and written, so `out`
+    /// has to be one vector longer than the numbers it holds.
     fn add_up(self, sums: &[<Self::Rows as Arithmetic>::N], places: &[usize], out: &mut [Self::X]);
 }
 
-/// An instruction set that turns the rows of a square of numbers, a register each, into columns.
+/// An instruction set that transposes a square of numbers, one row a register.
 pub(super) trait Square: Simd {
     #[inline(always)]
     fn transpose_f64s(self, rows: &mut [Self::f64s]) {
@@ -51,19 +52,19 @@ pub(super) trait Square: Simd {
     }
 }
 
-/// Something to be done with the widest lanes there are.
+/// A computation that is generic over the lanes.
 pub trait WithLanes<X> {
-    /// Does it.
+    /// Runs the computation with the lanes `s`.
     fn run<S: Lanes<X = X>>(self, s: S);
 }
 
-/// A number that has vectors.
+/// A number type that has vectors.
 pub trait Widest: Real {
-    /// Does it with the widest lanes of this processor.
+    /// Runs `work` with the widest lanes of this processor.
     fn widest(work: impl WithLanes<Self>);
 }
 
-/// Eight numbers in `N` registers of the instruction set `I`; their rows of nodes are `R` registers wide.
+/// Eight numbers in `N` registers of the instruction set `I`. A vector of rows of nodes takes `R` registers.
 #[derive(Clone, Copy)]
 pub(super) struct Registers<I, X, const N: usize, const R: usize>(I, PhantomData<X>);
 
@@ -71,19 +72,19 @@ pub(super) struct Registers<I, X, const N: usize, const R: usize>(I, PhantomData
 pub(super) type Portable<X> = Registers<Scalar, X, LANES, LANES>;
 
 impl<I, X, const N: usize, const R: usize> Registers<I, X, N, R> {
-    /// The proof `I` that the processor has the instructions.
+    /// The lanes of an instruction set. The value `instructions` proves that the processor has it.
     #[inline(always)]
     pub(super) fn of(instructions: I) -> Self {
         Self(instructions, PhantomData)
     }
 }
 
-/// An operation on numbers, register by register.
+/// Defines an operation on lanes, register by register.
 macro_rules! by_register {
     ($method:ident($($a:ident),+) = $of_one:ident) => {
         #[inline(always)]
         fn $method(self, $($a: Self::N),+) -> Self::N {
-            // A loop, not a closure: what is not inlined loses the wide instructions.
+            // A loop, not a closure: a closure that is not inlined loses the wide instructions.
             let mut out = self.zero();
             for i in 0..N {
                 out[i] = self.0.$of_one($($a[i]),+);
@@ -93,7 +94,7 @@ macro_rules! by_register {
     };
 }
 
-/// Lanes and rows of one kind of number with any instruction set, by what `pulp` calls that number's operations.
+/// Defines the lanes and rows of one number type for any instruction set, given the names of its operations in `pulp`.
 macro_rules! registers {
     ($number:ident: $vector:ident, $in_one:ident, $read:ident, $written:ident, $splat:ident, $less:ident, $select:ident, $transpose:ident;
      $($arithmetic:ident $arguments:tt = $of_one:ident),+; $($more:ident $more_arguments:tt = $more_of_one:ident),+;) => {
@@ -163,7 +164,7 @@ macro_rules! registers {
         }
 
         impl<I: Square, const N: usize, const R: usize> Registers<I, $number, N, R> {
-            /// Rows of `A` registers become columns of `B`, as many as both have numbers.
+            /// Transposes rows of `A` registers into columns of `B` registers.
             #[inline(always)]
             fn turned<const A: usize, const B: usize>(self, rows: &[[I::$vector; A]; LANES]) -> [[I::$vector; B]; LANES] {
                 let mut columns = [[self.0.$splat(0.0); B]; LANES];
@@ -198,7 +199,7 @@ registers! {
 
 impl Square for Scalar {}
 
-/// A square of numbers, row by row, becomes that of its columns.
+/// Transposes a square of numbers in place.
 #[inline(always)]
 fn transpose<X>(numbers: &mut [X], edge: usize) {
     for i in 0..edge {
@@ -230,16 +231,16 @@ mod x86 {
         }
     }
 
-    /// Quarters 0 and 2 of both.
+    /// Selects quarters 0 and 2 of both registers.
     const EVEN: i32 = 0b10_00_10_00;
-    /// Quarters 1 and 3 of both.
+    /// Selects quarters 1 and 3 of both registers.
     const ODD: i32 = 0b11_01_11_01;
 
     impl Square for V4 {
         #[inline(always)]
         fn transpose_f64s(self, rows: &mut [f64x8]) {
             let x = self.avx512f;
-            // Two rows interleaved: columns (0, 2, 4, 6) and (1, 3, 5, 7) of both, two numbers a quarter; then quarters.
+            // Two rows are interleaved into columns (0, 2, 4, 6) and (1, 3, 5, 7), two numbers a quarter. Then quarters are exchanged.
             let mut two = [[x._mm512_setzero_pd(); 4]; 2];
             for i in 0..4 {
                 two[0][i] = x._mm512_unpacklo_pd(cast(rows[2 * i]), cast(rows[2 * i + 1]));
@@ -259,7 +260,7 @@ mod x86 {
     }
 }
 
-/// The call as `pulp` wants it.
+/// The call in the form that `pulp` takes.
 #[cfg(target_arch = "x86_64")]
 struct Call<W, S>(W, S);
 
@@ -327,7 +328,7 @@ mod tests {
                 }
                 *row = s.load(&numbers);
             }
-            // As many columns as there are rows, one after the other, and back into memory.
+            // Transposed into columns, and back by adding them to rows in memory.
             let mut written = vec![X::zero(); LANES * LANES + LANES];
             let places: Vec<usize> = (0..S::ROWS).map(|row| row * LANES).collect();
             s.add_up(&s.columns(&rows), &places, &mut written);
@@ -356,7 +357,7 @@ mod tests {
 
     fn judge<X: Real>(all: Vec<Vec<[X; LANES]>>, epsilon: f64) {
         for results in all {
-            // Rows become columns and rows again: at least four of them.
+            // The rows were transposed twice. At least four of them were written.
             let rows = if results[4][0].value() == 0.0 { 4 } else { LANES };
             for i in 0..rows {
                 for k in 0..LANES {

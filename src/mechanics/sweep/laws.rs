@@ -1,8 +1,8 @@
-//! Laws in vector lanes: the particles of a group side by side.
+//! Material laws in vector lanes: the particles of a group side by side.
 //!
-//! The formulas are those of one particle, called in a loop over the lanes. The shipped laws are arithmetic alone, and the compiler
-//! turns the loop into vector instructions, with the same bits; their loops are compiled here, once. Any other law keeps a plain loop.
-//! Which loop a body takes is chosen once a pass over the particles.
+//! The formulas are those of one particle, called in a loop over the lanes. The shipped laws are arithmetic alone, so the compiler turns
+//! their loops into vector instructions with the same bits. These loops are compiled once, here. Any other law keeps a plain loop.
+//! The loop of each body is chosen once a pass over the particles.
 
 use super::lanes::{LANES, Lanes, Widest, WithLanes};
 use super::tangents::{Form, general};
@@ -13,31 +13,31 @@ use crate::particles::{Body, Particles};
 use crate::scalar::{Real, Single};
 use crate::tensor::{Deformation, Tensor, identity};
 
-/// The laws of all particles, and the states they begin the step with.
+/// The laws of all particles, and their states at t_n.
 #[derive(Clone, Copy)]
 pub struct Laws<'a, const D: usize, L> {
     /// The particles.
     pub particles: &'a Particles<D>,
-    /// Their laws.
+    /// The bodies with their laws.
     pub bodies: &'a [Body<L>],
     /// Δt
     pub dt: f64,
 }
 
-/// A tensor by rows, a lane a particle; the first D·D of them.
+/// A tensor by rows, a lane a particle. The first D·D entries are used.
 type Rows<T> = [[T; LANES]; 9];
 
 /// The rows of a closed tangent, the longest form that vector lanes write.
 type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
 
-/// The particles of a group, a lane each; zero in the lanes behind them.
+/// The states of the particles of a group, a lane each. Empty lanes hold zeros.
 pub struct States<'a, T> {
     /// ∇u
     gradient: Rows<T>,
     h_n: Rows<f64>,
     /// V₀
     volume: [f64; LANES],
-    /// Δt, and what each particle remembers.
+    /// Δt and the internal variables of each particle at t_n.
     start: [Start<'a>; LANES],
 }
 
@@ -45,7 +45,7 @@ impl<'a, T: Real> States<'a, T> {
     fn of<const D: usize>(particles: &'a Particles<D>, dt: f64, group: &[u32], at: &[[T; LANES]]) -> Self {
         let mut gradient = [[T::zero(); LANES]; 9];
         gradient[..D * D].copy_from_slice(at);
-        // An empty lane remembers what the first particle does.
+        // Empty lanes take the internal variables of the first particle.
         let start = [particles.start(group[0] as usize, dt); LANES];
         let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], start };
         for (lane, &p) in group.iter().enumerate().take(LANES) {
@@ -69,10 +69,10 @@ impl<'a, T: Real> States<'a, T> {
     }
 }
 
-/// The loop over the lanes of one law: fills rows, and det F.
+/// The loop over the lanes of one law. It fills rows and det F.
 pub type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
-/// For each body the loop of its law.
+/// The loop over the lanes for each body.
 struct Chosen<'a, T> {
     body: &'a [u32],
     ids: &'a [u32],
@@ -80,10 +80,10 @@ struct Chosen<'a, T> {
 }
 
 impl<T: Real> Chosen<'_, T> {
-    /// Evaluates the laws that are in the group, and keeps the lanes of their particles.
+    /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
     ///
     /// # Errors
-    /// The particle with the smallest id where det F ≤ 0.
+    /// The particle with the smallest id among those with det F ≤ 0.
     fn evaluate(&self, group: &[u32], states: &States<'_, T>, out: &mut [[T; LANES]]) -> Result<(), Inadmissible> {
         let mut det_f = [1.0; LANES];
         let body = |lane: usize| self.body[group[lane] as usize];
@@ -109,7 +109,7 @@ impl<T: Real> Chosen<'_, T> {
 }
 
 impl<const D: usize, L: Law> Laws<'_, D, L> {
-    /// What adds σ = V₀ F S F_nᵀ at ∇u, a group at a time, for one pass; only the F of `part` carry derivatives.
+    /// The point function that adds σ = V₀ F S F_nᵀ at ∇u, for one pass. Only the F of `part` carry derivatives.
     pub(crate) fn stresses<T: Number>(
         &self,
         part: Part,
@@ -129,12 +129,12 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         }
     }
 
-    /// The form that holds the tangents of all laws. It does not depend on the state.
+    /// The smallest form that holds the tangents of all laws. It does not depend on the state.
     pub(crate) fn form(&self) -> Form {
         self.bodies.iter().map(|body| form::<L, D>(&body.law)).max().unwrap_or(Form::Closed)
     }
 
-    /// What fills the rows of frozen tangents at ∇u times `factor`, a group at a time, for one pass.
+    /// The point function that linearises the laws at ∇u and fills the rows of their tangents times `factor`, for one pass.
     pub(crate) fn tangents(
         &self,
         part: Part,
@@ -153,14 +153,14 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         }
     }
 
-    /// `choose` of the law of every body.
+    /// The loops that `choose` picks for the law of each body.
     fn chosen<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Loop<'s, T>>) -> Chosen<'s, T> {
         let Particles { body, id, .. } = self.particles;
         Chosen { body, ids: id, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
     }
 }
 
-/// The form of a law's tangents.
+/// The form of the tangents of a law.
 fn form<L: Law, const D: usize>(law: &L) -> Form {
     match law.closed(&identity::<f64, D>(), &Deformation::new(Tensor::zeros()), 1.0) {
         None => Form::General,
@@ -178,7 +178,7 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     out: &mut [[T; LANES]],
     det_f: &mut [f64; LANES],
 ) {
-    // Fixed lengths, so that no place in them is checked and the loop becomes vector instructions.
+    // Fixed lengths, so that no index is checked and the loop becomes vector instructions.
     let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
     for lane in 0..LANES {
         let (gradient, h_n, volume) = states.of_lane::<D>(lane);
@@ -193,7 +193,7 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     out.copy_from_slice(&rows[..D * D]);
 }
 
-/// The tangents of every lane, of one part and in one form, times a factor.
+/// The tangents of every lane times `factor`: those of `part`, stored in `form`.
 #[inline(always)]
 fn tangents_of<L: Law, const D: usize>(
     law: &L,
@@ -233,7 +233,8 @@ fn tangents_of<L: Law, const D: usize>(
     }
 }
 
-/// Writes A, the upper triangle of B column by column, κ, q, and those of b and c: the tangent times `factor`.
+/// Writes A, B, κ, q, b and c of the tangent times `factor`. Of B, b and c it writes the upper triangle, column by column. The tangent is
+/// linear in B, κ, q and c, so only these are multiplied.
 #[inline(always)]
 fn write<const D: usize>(closed: &ClosedTangent<f64, D>, factor: f64, form: Form, out: &mut ClosedRows, lane: usize) {
     let symmetric = D * (D + 1) / 2;
@@ -263,14 +264,14 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedR
     }
 }
 
-/// What is evaluated of a law in every lane.
+/// The quantity that is evaluated of a law in every lane.
 #[derive(Clone, Copy)]
 pub(super) enum What {
     Stresses,
     Tangents { form: Form, factor: f64 },
 }
 
-/// A loop of a shipped law. Not generic, so that it is compiled here and not by every crate that uses it.
+/// The loop of a shipped law. It is not generic, so it is compiled here and not by every crate that uses it.
 #[inline(never)]
 pub(super) fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
     law.with(Choose { dimension, what })

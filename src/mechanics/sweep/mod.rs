@@ -1,16 +1,20 @@
-//! The loop over particles: gather (N, ∇N) → at the point → scatter (N, ∇N). With the vectors of the solver the only user of threads,
-//! and the only one of vector instructions.
+//! The loop over particles: gather nodal values (grid to particle), evaluate at the particle, scatter (particle to grid).
+//! Threads are used here and in the vectors of the solver. Vector instructions are used here alone.
 //!
-//! The sweep knows components, not meanings. A field has C numbers a node; gathered, C values u = Σ u_I N_I and C gradients
-//! L = Σ u_I ⊗ ∇_n N_I a particle; a point function turns them into q and σ, and f_I += q N_I + σ ∇_n N_I is scattered. A mass is one
-//! component, a motion D; a dual number is two fields, since both ways are linear: derivatives go through the kernels of production.
+//! The loop knows components, not their physical meaning. A field has C numbers a node. The gather gives a particle C values
+//! u = Σ u_I N_I and C gradients L = Σ u_I ⊗ ∇_n N_I. A point function turns u and L into q and σ. The scatter is
+//! f_I += q N_I + σ ∇_n N_I. A mass has one component, a motion has D.
 //!
-//! - A *lane* is one particle of eight, side by side in a vector of the processor.
-//! - A *group* is up to eight particles of one cell, or of neighbours along x, that share a window of nodes.
-//! - A *block* is a cube of cells with a box of nodes. Blocks do not depend on the number of threads; each gathers from its own nodes and
-//!   scatters into a buffer of its own, and buffers are added in the order of the blocks: the same bits for any number of threads.
+//! Gather and scatter are linear, so a dual number travels as two fields. Derivatives therefore go through the production kernels.
 //!
-//! Two ways with one answer: `plain` is the specification, and the way of shape functions that are no products;
+//! - A *pass* is one run of gather, point function and scatter over all particles. Gather or scatter may be missing.
+//! - A *lane* is one slot of a vector of eight numbers, and holds one particle.
+//! - A *group* is a batch of up to eight particles that share a window of nodes. They lie in one cell, or in neighbours along x.
+//! - A *block* is a cube of cells with a box of nodes. It gathers from its own nodes and scatters into its own buffer.
+//!   Blocks do not depend on the number of threads, and their buffers are added in the order of the blocks.
+//!   So the result has the same bits for any number of threads.
+//!
+//! Two implementations give one answer. `plain` is the specification, and serves shape functions that are not products.
 //! `tiled` is for products, N = Π_k N_k.
 
 mod block;
@@ -43,14 +47,14 @@ pub use number::Number;
 pub use supports::{Points, SupportError, Supports};
 pub use tangents::{Form, Product};
 
-/// `(group, u and L, q and σ)` of every field: adds to the last, which begin with zero. It is found once a pass.
+/// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
 type Point<'a, X, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<X, C, D>], &mut [At<X, C, D>]) + Sync + 'a;
 
-/// `(particle, what was gathered of every field, lane)`: what becomes of it there.
+/// `(particle, u and L of every field, lane)`: the result at the particle in this lane.
 type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync + 'a;
 
-/// `(group, what was gathered, rows)`: fills the rows of a group.
+/// `(group, u and L, rows)`: fills the rows of a group.
 pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync + 'a;
 
-/// As [`Point`], of one field.
+/// A [`Point`] function of one field.
 pub(crate) type Linear<'a, X, const D: usize> = dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a;

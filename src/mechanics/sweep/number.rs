@@ -1,4 +1,4 @@
-//! Numbers of which fields go through the sweep: gather and scatter are linear, so a dual number is two fields of plain numbers.
+//! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
 use super::kernel::At;
 use super::lanes::LANES;
@@ -9,15 +9,15 @@ use crate::tensor::Vector;
 use num_dual::{Dual2_64, Dual64};
 use std::borrow::Cow;
 
-/// A number made of one or more plain numbers, each of which the sweep takes through the same kernels.
+/// A number made of one or more plain numbers. Each of them is a field of its own in the kernels.
 pub trait Number: Real + Send + Sync {
-    /// How many.
+    /// Number of plain numbers in it.
     const FIELDS: usize;
 
-    /// The `i`-th of them.
+    /// The `i`-th plain number.
     fn field(&self, i: usize) -> f64;
 
-    /// The number made of them.
+    /// The number made of the plain numbers `field(0)`, `field(1)`, ….
     fn from_fields(field: impl FnMut(usize) -> f64) -> Self;
 
     /// A nodal field as plain numbers: node after node, field after field, component after component.
@@ -29,7 +29,7 @@ pub trait Number: Real + Send + Sync {
         Cow::Owned(nodal.iter().flat_map(numbers).collect())
     }
 
-    /// Lets `point` add to sums of numbers, from numbers whose fields were gathered.
+    /// Calls `point` with the numbers made of the gathered `fields`. Its result goes into the fields of `sums`, which are zero before.
     #[doc(hidden)]
     fn at<R, const C: usize, const D: usize>(
         fields: &[At<f64, C, D>],
@@ -59,14 +59,14 @@ pub trait Number: Real + Send + Sync {
         result
     }
 
-    /// The loop over lanes with the stresses of a shipped law, if there is one in vector instructions: of plain numbers, which carry no
-    /// derivatives.
+    /// The loop over lanes that evaluates the stresses of a shipped law in vector instructions. It exists for plain numbers alone,
+    /// which carry no derivatives.
     #[doc(hidden)]
     fn stresses_of(_law: &Material, _dimension: usize) -> Option<Box<Loop<'static, Self>>> {
         None
     }
 
-    /// Lets `add` add to a nodal field as plain numbers.
+    /// Calls `add` with a nodal field as plain numbers, and writes them back.
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {
         let mut sums = Self::flat(nodal).into_owned();
         add(&mut sums);

@@ -1,10 +1,10 @@
-//! The order of particles in the tiled sweep: by block of cells, by cell, by id.
+//! The order of particles in [`Tiled`](super::tiled::Tiled): by block of cells, then by cell, then by id.
 
 use crate::grid::Grid;
 use crate::parallel;
 use crate::tensor::Vector;
 
-/// Edge of a block in cells: in 3D its box of nodes, gathered and scattered, stays in the first-level cache.
+/// Edge of a block in cells. In 3D the nodal values that a block gathers and scatters then stay in the first-level cache.
 const fn edge(dimension: usize) -> u64 {
     match dimension {
         1 => 32,
@@ -13,7 +13,7 @@ const fn edge(dimension: usize) -> u64 {
     }
 }
 
-/// Particles whose cells are found in one go.
+/// Number of particles whose cells one task finds.
 const RUN: usize = 4096;
 
 /// A particle and its cell.
@@ -21,14 +21,16 @@ const RUN: usize = 4096;
 pub(super) struct Key {
     /// block · cells of a block + cell in the block
     pub(super) cell: u64,
-    /// Its id.
     id: u32,
-    /// Where it lies in memory.
+    /// Its index in memory.
     pub(super) particle: u32,
 }
 
-/// All particles by block, cell and id, which without `ids` is their place in memory; or the particle of the smallest id that lies in
-/// no cell. `keys` may be those of the last step: the nearer their order is, the sooner they are sorted.
+/// All particles, sorted by block, cell and id. Without `ids` the index in memory is the id. `keys` may come from the last step: the
+/// nearer they are to the new order, the less work the sorting is.
+///
+/// # Errors
+/// The index of the particle with the smallest id that lies in no cell.
 pub(super) fn sorted<const D: usize>(
     grid: &Grid<D>,
     positions: &[Vector<f64, D>],
@@ -66,10 +68,11 @@ pub(super) fn sorted<const D: usize>(
     }
 }
 
-/// Keys dropped one after the other that tell that not they are out of order, but some that were kept.
+/// After this many dropped keys in a row, keys kept before them are taken to be out of order instead.
 const RECENT: usize = 8;
 
-/// Sorts keys most of which may be in order: those that are not are taken out, sorted, and merged into the rest ("drop-merge sort").
+/// Sorts keys most of which may be in order already. Keys out of order are taken out, sorted, and merged into the rest
+/// ("drop-merge sort").
 fn sort(keys: &mut [Key]) {
     let (mut kept, mut dropped, mut in_row) = (0, Vec::new(), 0);
     let mut i = 0;
@@ -85,7 +88,7 @@ fn sort(keys: &mut [Key]) {
         dropped.push(key);
         in_row += 1;
         if in_row == RECENT {
-            // Take them back, and drop what is larger than all of them.
+            // Take the dropped keys back, and drop the kept keys that are larger than all of them.
             let last = dropped.split_off(dropped.len() - RECENT);
             let largest = last.into_iter().fold(key, Key::max);
             while kept > 0 && keys[kept - 1] > largest {
@@ -97,7 +100,7 @@ fn sort(keys: &mut [Key]) {
         }
     }
     parallel::sort(&mut dropped);
-    // From the back, so that what was kept is read before it is written over.
+    // From the back, so that a kept key is read before it is written over.
     for to in (0..keys.len()).rev() {
         let Some(&last) = dropped.last() else { break };
         keys[to] = if kept > 0 && keys[kept - 1] > last {
@@ -110,7 +113,7 @@ fn sort(keys: &mut [Key]) {
     }
 }
 
-/// Cells of a block.
+/// Number of cells in a block.
 const fn cells<const D: usize>() -> u64 {
     edge(D).pow(D as u32)
 }
@@ -120,7 +123,7 @@ pub(super) fn block<const D: usize>(key: &Key) -> u64 {
     key.cell / cells::<D>()
 }
 
-/// Whether `next` is the cell after `cell` along x in the same row of a block.
+/// Whether the cell of `next` follows that of `cell` along x, in the same row of a block.
 pub(super) fn follows<const D: usize>(cell: &Key, next: &Key) -> bool {
     next.cell == cell.cell + 1 && !next.cell.is_multiple_of(edge(D))
 }
@@ -136,7 +139,7 @@ mod tests {
             &|i| i,
             &|i| 1000 - i,
             &number,
-            // One far too large at the beginning, and every tenth out of its place.
+            // One key far too large at the beginning, then every tenth key out of place.
             &|i| if i == 0 { 5000 } else { i },
             &|i| if i % 10 == 3 { number(i) % 1000 } else { i },
             &|i| if i == 2 || i == 3 { 2000 + i } else { i },

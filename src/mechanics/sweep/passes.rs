@@ -1,4 +1,4 @@
-//! The passes through all particles that the rest of the program asks for.
+//! The passes over all particles: the particle-to-grid and grid-to-particle transfers that the rest of the program calls.
 
 use super::kernel::At;
 use super::supports::{Way, either};
@@ -8,11 +8,11 @@ use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 
 impl<const D: usize> Supports<D> {
-    /// `f_I += Σ_p q N_I + σ ∇_n N_I` with q and σ that `point(group, u and L, q and σ)` adds to zero, for C components: 1 or D. Without
-    /// a field u and L are not specified.
+    /// `f_I += Σ_p q N_I + σ ∇_n N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
+    /// zero. Without a field u and L are unspecified.
     ///
     /// # Errors
-    /// Of the errors of `point`, each with a number, the one with the smallest; what was added is then unspecified.
+    /// An error of `point` carries a number. The error with the smallest number is returned, and `out` is then unspecified.
     pub fn sweep<T: Number, const C: usize, E: Send>(
         &self,
         field: Option<&[Vector<T, C>]>,
@@ -35,14 +35,14 @@ impl<const D: usize> Supports<D> {
         failure.check()
     }
 
-    /// As [`Self::sweep`], for D plain numbers a node in either precision: what a product with a tangent is.
+    /// [`Self::sweep`] for D plain numbers a node, in double or single precision. It computes products with a tangent.
     pub(crate) fn product<X: Laned>(&self, field: &[X], flow: Flow, out: &mut [X], point: &Linear<'_, X, D>) {
         self.pass();
         let point = |group: Group<'_>, at: &[At<X, D, D>], sums: &mut [At<X, D, D>]| point(group, &at[0], &mut sums[0]);
         either!(self, way => way.sweep::<X, D>(1, Some(field), flow, out, &point));
     }
 
-    /// `fill(group, L, rows)` of every group, each with `count` rows of its own.
+    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
     pub(crate) fn fill_rows<Y: Send>(
         &self,
         field: &[Vector<f64, D>],
@@ -54,7 +54,8 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
     }
 
-    /// `out_I +=` the diagonal blocks Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I of the quadratic forms that `quadratic` adds up, group by group.
+    /// `out_I +=` Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
+    /// each group.
     pub(crate) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         self.pass();
         either!(self, way => way.blocks(out, quadratic));
@@ -98,7 +99,7 @@ impl<const D: usize> Supports<D> {
         self.sweep(Some(field), Flow::BOTH, out, each_lane(point))
     }
 
-    /// As [`Self::assemble`] with |N_I| and |∇_n N_I| in the sum.
+    /// The sum of [`Self::assemble`] with |N_I| and |∇_n N_I| in place of N_I and ∇_n N_I.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
@@ -108,7 +109,7 @@ impl<const D: usize> Supports<D> {
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    /// // A uniform pressure acts on the rim of a body: within, the forces of the particles around a node cancel, and their sizes do not.
+    /// // A uniform pressure acts on the rim of a body. Inside, the forces of the particles around a node cancel, but their sizes do not.
     /// let pressure = |_: usize, _: Vector<f64, 2>, _: Tensor<f64, 2>| Ok::<_, Infallible>((Vector::zeros(), Tensor::identity()));
     /// let (field, mut force) = (direction(nodes.len(), 1), vec![Vector::zeros(); nodes.len()]);
     /// let mut magnitude = force.clone();
@@ -121,7 +122,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::assemble`].
+    /// The error of the first particle in memory whose `point` fails.
     pub fn assemble_magnitudes<T: Number, E: Send>(
         &self,
         field: &[Vector<T, D>],
@@ -136,7 +137,7 @@ impl<const D: usize> Supports<D> {
         self.spread_with(Weights::Signed, out, value);
     }
 
-    /// As [`Self::spread`], with other weights than N.
+    /// [`Self::spread`] with the given weights in place of N.
     pub(crate) fn spread_with<const C: usize>(
         &self,
         weights: Weights,
@@ -162,7 +163,7 @@ impl<const D: usize> Supports<D> {
         values
     }
 
-    /// `take(p, Σ u_I N_I)` of every particle, in an order that does not depend on the number of threads.
+    /// Calls `take(p, Σ u_I N_I)` for every particle, in an order that does not depend on the number of threads.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
@@ -187,7 +188,7 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.each::<_, C>(1, field, Flow::VALUE, &point, &mut take));
     }
 
-    /// `take(p, point(p, u_p, ∇u_p))` of every particle, in an order that does not depend on the number of threads.
+    /// Calls `take(p, point(p, u_p, ∇u_p))` for every particle, in an order that does not depend on the number of threads.
     ///
     /// ```
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -219,7 +220,7 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Flow::BOTH, &point, &mut take));
     }
 
-    /// `point(p, u_p, ∇u_p)` of every particle, in their order.
+    /// `point(p, u_p, ∇u_p)` of every particle, in the order of the particles in memory.
     ///
     /// Example: [`Self::assemble`].
     ///
@@ -241,7 +242,7 @@ impl<const D: usize> Supports<D> {
     }
 }
 
-/// A point function of the particles, one after the other.
+/// The point function of a group, made from the function of one particle.
 fn each_lane<T: Real, E, const D: usize>(
     point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
 ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), (usize, E)> + Sync {

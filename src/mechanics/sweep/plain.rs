@@ -1,5 +1,5 @@
-//! The sweep written down plainly, one list of (node, N, ∇N) a particle: the specification, and the way of shape functions
-//! that are no products.
+//! The plain loop over the particles, with one list of (node, N, ∇N) for each particle. It is the specification, and serves shape
+//! functions that are not products.
 
 use super::block::Group;
 use super::blocks::Quadratic;
@@ -15,27 +15,27 @@ use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use std::ops::{AddAssign, Range};
 
-/// Particles of a block: enough to pay for a task, few enough to keep a block's nodes in cache.
+/// Particles of a block: enough to pay for a task, few enough to keep the nodes of a block in cache.
 const BLOCK: usize = 256;
 
-/// Groups of a block.
+/// Number of groups in a block.
 const GROUPS: usize = BLOCK / LANES;
 
-/// Shape functions of all particles, node by node.
+/// The shape functions of all particles, node by node.
 #[derive(Clone, Debug)]
 pub(super) struct Plain<const D: usize> {
     blocks: Vec<Block<D>>,
-    /// The particles, as groups name them.
+    /// All particles in order, so that a [`Group`] can borrow its part.
     particles: Vec<u32>,
 }
 
-/// The entries (node, N, ∇_n N) of consecutive particles; nodes by their places in the block's own list.
+/// The entries (node, N, ∇_n N) of consecutive particles. A node is stored as its place in the block's own list of nodes.
 #[derive(Clone, Debug)]
 struct Block<const D: usize> {
     particles: Range<usize>,
     /// Active numbers of the block's nodes, ascending.
     nodes: Vec<u32>,
-    /// Start of each particle's entries, and the end of the last one's.
+    /// Start of each particle's entries, and at last the end of all entries.
     offsets: Vec<u32>,
     places: Vec<u32>,
     weights: Vec<(f64, Vector<f64, D>)>,
@@ -91,7 +91,6 @@ impl<const D: usize> Plain<D> {
         block.entries(particle).map(|(place, n, grad_n)| (block.nodes[place] as usize, n, grad_n)).collect()
     }
 
-    /// The groups of a block.
     fn groups_of<'a>(&'a self, b: usize) -> impl Iterator<Item = Group<'a>> {
         let groups = self.particles[self.blocks[b].particles.clone()].chunks(LANES).enumerate();
         groups.map(move |(group, particles)| Group { number: b * GROUPS + group, particles })
@@ -172,7 +171,8 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// `scatter(block, group, buffer)` of all groups, with a buffer of `numbers` numbers a node for each block; adds them in their order.
+    /// Calls `scatter(block, group, buffer)` for all groups. Each block has a buffer with `numbers` numbers a node. The buffers are added
+    /// to `out` in the order of the blocks.
     fn scatter<Y: Copy + Zero + AddAssign + Send>(
         &self,
         numbers: usize,
@@ -198,7 +198,7 @@ impl<const D: usize> Block<D> {
     /// The block with an empty node list, and the grid numbers of its nodes.
     ///
     /// # Errors
-    /// The first particle that has no support.
+    /// The first particle without shape functions.
     fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -229,7 +229,7 @@ impl<const D: usize> Block<D> {
         Ok((Self { particles, nodes: Vec::new(), offsets, places, weights }, ids))
     }
 
-    /// (place, N, ∇_n N) of a particle.
+    /// The entries (place, N, ∇_n N) of a particle.
     fn entries(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         let k = particle - self.particles.start;
         let range = self.offsets[k] as usize..self.offsets[k + 1] as usize;
@@ -237,13 +237,13 @@ impl<const D: usize> Block<D> {
         both.map(|(&place, &(n, grad_n))| (place as usize, n, grad_n))
     }
 
-    /// (lane, entry) of the particles of a group.
+    /// The pairs (lane, entry) of the particles of a group.
     fn entries_of(&self, group: Group<'_>) -> impl Iterator<Item = (usize, (usize, f64, Vector<f64, D>))> {
         let lanes = group.particles.iter().enumerate();
         lanes.flat_map(|(lane, &p)| self.entries(p as usize).map(move |entry| (lane, entry)))
     }
 
-    /// Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group.
+    /// Adds Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group to `at`.
     fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
         let numbers = at.len() * C;
         for (lane, (place, n, grad_n)) in self.entries_of(group) {

@@ -1,4 +1,4 @@
-//! Shape functions of all particles, evaluated once, and the way of the sweep through them.
+//! The shape functions of all particles, evaluated once, and their storage for the passes over the particles.
 
 use super::block::Group;
 use super::plain::Plain;
@@ -16,13 +16,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Particles lie well in memory if at most one in so many lies elsewhere than behind the one before it in the sweep.
+/// Passes leap too often in memory if more than one in so many particles does not directly follow the particle before it.
 const LEAPS: usize = 8;
 
-/// Products with more nodes than this along an axis take the plain sweep: the box of a block would leave the cache.
+/// Product shape functions with more nodes than this along an axis take [`Way::Plain`]: the box of a block would leave the cache.
 pub(super) const WIDEST: usize = 16;
 
-/// Shape functions of all particles at the last converged positions, and the active nodes they name.
+/// The shape-function values and the connectivity of all particles at the last converged positions, and the active nodes.
 ///
 /// ```
 /// use bfree::approximation::Lme;
@@ -37,7 +37,7 @@ pub(super) const WIDEST: usize = 16;
 /// let positions: Vec<_> = seeds.iter().map(|seed| seed.position).collect();
 /// let (supports, nodes) = Supports::new(&Lme::new(3.0, 1e-6), &grid, &positions)?;
 /// assert_eq!(supports.particles(), positions.len());
-/// // What particles see of the field x_I is x and I: Σ N x_I = x, Σ x_I ⊗ ∇N = I.
+/// // The field x_I is reproduced at the particles: Σ N x_I = x, Σ x_I ⊗ ∇N = I.
 /// let x: Vec<_> = nodes.positions(&grid).map(|(_, x)| x).collect();
 /// let apart = supports.values(&x).iter().zip(&positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
 /// assert!(apart < 1e-13);
@@ -52,13 +52,13 @@ pub struct Supports<const D: usize> {
     grid: Grid<D>,
     /// Active nodes.
     nodes: Nodes,
-    /// h, if weights in single precision are there.
+    /// h, if weights in single precision are stored.
     unit: Option<f64>,
-    /// How often the sweeps have gone through all particles.
+    /// Number of passes over all particles so far.
     passes: AtomicU64,
-    /// Where fields take their memory from.
+    /// Memory pool of the nodal fields.
     pool: Pool,
-    /// Which nodes follow others; `None` where every node is an unknown.
+    /// The extension u = E û by which outer nodes follow inner ones; `None` where every node is an unknown.
     extension: Option<Arc<Extension>>,
 }
 
@@ -71,15 +71,16 @@ impl<const D: usize> Clone for Supports<D> {
     }
 }
 
-/// Where shape functions are evaluated.
+/// The points where shape functions are evaluated.
 #[derive(Clone, Debug)]
 pub struct Points<'a, const D: usize> {
     /// x of all particles.
     pub positions: Cow<'a, [Vector<f64, D>]>,
-    /// Ids of the particles, wherever they lie in memory; without them, their places in memory count.
+    /// Ids of the particles. Without them the index in memory is the id.
     pub ids: Option<&'a [u32]>,
-    /// Of points on a loaded surface, by their places in memory: functions are [those of a surface](crate::approximation::Separable::at_surface), evaluated at x and
-    /// continued linearly along each axis by this vector.
+    /// The points on a loaded surface, by their index in memory. They take the
+    /// [functions of a surface](crate::approximation::Separable::at_surface), evaluated at x and continued linearly along each axis by
+    /// this vector.
     pub continued: BTreeMap<u32, Vector<f64, D>>,
 }
 
@@ -89,13 +90,13 @@ impl<'a, const D: usize> Points<'a, D> {
         Self { positions: positions.into(), ids: None, continued: BTreeMap::new() }
     }
 
-    /// The number of a particle in messages.
+    /// The id of a particle, for messages.
     pub(super) fn id(&self, particle: usize) -> usize {
         self.ids.map_or(particle, |ids| ids[particle] as usize)
     }
 }
 
-/// A way through the particles.
+/// An implementation of the loop over the particles.
 #[derive(Clone, Debug)]
 pub(super) enum Way<const D: usize> {
     Plain(Plain<D>),
@@ -106,13 +107,13 @@ pub(super) enum Way<const D: usize> {
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("particle {particle} has no shape functions")]
 pub struct SupportError {
-    /// Id of the particle; where none are given, its place.
+    /// Id of the particle; its index in memory where no ids are given.
     pub particle: usize,
-    /// What went wrong.
+    /// The error of the shape functions.
     pub source: ApproximationError,
 }
 
-/// Calls the same method of the way taken.
+/// Calls one method of whichever [`Way`] is stored.
 macro_rules! either {
     ($self:expr, $way:ident => $call:expr) => {
         match &$self.way {
@@ -128,7 +129,7 @@ impl<const D: usize> Supports<D> {
     /// Evaluates the shape functions at all positions and numbers the active nodes.
     ///
     /// # Errors
-    /// The first particle that lies outside the grid or whose shape functions do not exist.
+    /// The first particle lies outside the grid, or has no shape functions.
     pub fn new<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -137,12 +138,12 @@ impl<const D: usize> Supports<D> {
         Self::with_precision(approximation, grid, positions, Precision::Double)
     }
 
-    /// As [`Self::new`], prepared for products in single precision if they are asked for and shape functions are products.
+    /// [`Self::new`] with weights in single precision too, if `precision` asks for them and shape functions are products.
     ///
     /// Example: [`single_tangent`](crate::mechanics::residual::Equilibrium::single_tangent).
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// The errors of [`Self::new`].
     pub fn with_precision<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -152,9 +153,9 @@ impl<const D: usize> Supports<D> {
         Self::renewed(None, approximation, grid, &Points::at(positions), precision, &Pool::default())
     }
 
-    /// As [`Self::with_precision`], in the memory of supports no longer needed, such as the last step's, and from their order of
-    /// particles. What comes out does not depend on them. Nor does it on the places of particles in memory, if `ids` tells them apart:
-    /// sums are taken in the order of cells and ids.
+    /// [`Self::with_precision`] in the memory of `spare`, such as the supports of the last step. Sorting begins with the order of particles
+    /// in `spare`. The result does not depend on `spare`. If the points have ids, the result does not depend on the order of particles
+    /// in memory either, because sums run over cells and ids.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::{Points, Supports}};
@@ -177,7 +178,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// The errors of [`Self::new`].
     pub fn renewed<A: ShapeFunction>(
         spare: Option<Self>,
         approximation: &A,
@@ -204,7 +205,7 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// As [`Self::new`], by the plain sweep whatever the shape function: the specification of the fast one.
+    /// [`Self::new`] with the plain loop for every shape function. The plain loop is the specification of the fast one.
     ///
     /// ```
     /// use bfree::approximation::Lme;
@@ -223,7 +224,7 @@ impl<const D: usize> Supports<D> {
     /// let field = direction::<2>(nodes.len(), 1);
     /// let apart = fast.values(&field).into_iter().zip(plain.values(&field)).map(|(a, b)| (a - b).norm());
     /// assert!(apart.fold(0.0, f64::max) < 1e-14);
-    /// // The fast one keeps functions of one coordinate, not N and ∇N of every node; and particles that share their nodes together.
+    /// // The fast loop stores functions of one coordinate, not N and ∇N of every node. Particles that share their nodes form groups.
     /// assert!(fast.bytes() < plain.bytes());
     /// assert_eq!(fast.windows().iter().map(|(_, particles)| particles).sum::<usize>(), positions.len());
     /// assert!(plain.windows().is_empty());
@@ -231,7 +232,7 @@ impl<const D: usize> Supports<D> {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// The errors of [`Self::new`].
     pub fn plain<A: ShapeFunction>(
         approximation: &A,
         grid: &Grid<D>,
@@ -246,33 +247,33 @@ impl<const D: usize> Supports<D> {
         Self { way, grid: *grid, nodes, unit, passes, pool, extension: None }
     }
 
-    /// The same, where outer nodes follow inner ones: equilibria on these supports are solved for the inner ones alone.
+    /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
     pub fn with_extension(self, extension: Extension) -> Self {
         Self { extension: Some(Arc::new(extension)), ..self }
     }
 
-    /// Which nodes follow others; `None` where every node is an unknown whatever it has of a body.
+    /// The extension by which outer nodes follow inner ones; `None` where every active node is an unknown.
     pub fn extension(&self) -> Option<&Arc<Extension>> {
         self.extension.as_ref()
     }
 
-    /// A nodal field of zeros, one entry for each active node.
+    /// A nodal field of zeros, one entry for each active node, from the memory pool.
     pub(crate) fn field<T: Element + num_traits::Zero>(&self) -> Pooled<T> {
         self.pool.filled(self.nodes.len(), T::zero())
     }
 
-    /// Where fields take their memory from.
+    /// The memory pool of the nodal fields.
     pub(crate) fn pool(&self) -> &Pool {
         &self.pool
     }
 
-    /// The order in which the particles are taken, if that leaps too often in memory: if the next one lies elsewhere for more than one in
-    /// eight.
+    /// The order in which passes take the particles, if it leaps too often in memory. A particle leaps if it does not directly follow
+    /// the particle before it. More than one leap in eight particles is too often.
     ///
     /// ```
     /// use bfree::mechanics::sweep::Supports;
     ///
-    /// // A disc with its last particle first: the sweep goes backwards through memory, cell by cell.
+    /// // A disc with its last particle first: passes go backwards through memory, cell by cell.
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
     /// let mut simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &mut simulation.particles;
@@ -291,7 +292,7 @@ impl<const D: usize> Supports<D> {
         (leaps > tiled.particles() / LEAPS).then(|| tiled.order().collect())
     }
 
-    /// The same, the particles having been put in [`Self::leaping`]'s order.
+    /// These supports after the particles have been put in the order of [`Self::leaping`].
     pub(crate) fn rearranged(mut self) -> Self {
         if let Way::Tiled(tiled) = &mut self.way {
             tiled.rearrange();
@@ -299,7 +300,7 @@ impl<const D: usize> Supports<D> {
         self
     }
 
-    /// The same, to count passes anew.
+    /// These supports with the number of passes set to zero.
     pub(crate) fn again(self) -> Self {
         self.passes.store(0, Ordering::Relaxed);
         self
@@ -322,12 +323,12 @@ impl<const D: usize> Supports<D> {
         &self.nodes
     }
 
-    /// The grid they are of.
+    /// The grid of the active nodes.
     pub fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 
-    /// How often the methods below have gone through all particles so far.
+    /// Number of passes over all particles so far.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
@@ -345,22 +346,22 @@ impl<const D: usize> Supports<D> {
         self.passes.load(Ordering::Relaxed)
     }
 
-    /// Another pass through the particles begins.
+    /// Counts a pass over the particles.
     pub(super) fn pass(&self) {
         self.passes.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The spacing in which weights in single precision are measured; `None` where there are none.
+    /// The spacing h that scales the derivatives in single precision, stored as h dN/dx; `None` without weights in single precision.
     pub fn unit(&self) -> Option<f64> {
         self.unit
     }
 
-    /// Whether functions are products, so that particles are summed in vector lanes.
+    /// Whether the loop takes particles in vector lanes, as it does for shape functions that are products.
     pub fn is_tiled(&self) -> bool {
         matches!(self.way, Way::Tiled(_))
     }
 
-    /// Visits all groups, in the order of their numbers.
+    /// Calls `visit` for all groups, in the order of their numbers.
     pub(crate) fn each_group(&self, mut visit: impl FnMut(Group<'_>)) {
         either!(self, way => way.each_group(&mut visit));
     }
@@ -370,8 +371,8 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.groups())
     }
 
-    /// The groups of particles that share a window of nodes in vector lanes: nodes along each axis, and particles; none where the
-    /// sweep has no vector lanes. For counting operations.
+    /// The groups in vector lanes: the nodes of a group's window along each axis, and its number of particles. The list is empty where
+    /// the loop has no vector lanes. It serves for counting operations.
     ///
     /// Example: [`Self::plain`].
     pub fn windows(&self) -> Vec<([usize; 3], usize)> {
@@ -381,7 +382,7 @@ impl<const D: usize> Supports<D> {
         }
     }
 
-    /// Along any axis, the largest difference of the indices of two nodes that share a particle, or a little more.
+    /// The largest index difference, along any axis, of two nodes that share a particle, or a slightly larger bound.
     pub(crate) fn reach(&self) -> u32 {
         if let Way::Tiled(tiled) = &self.way {
             let widths = tiled.windows().into_iter().flat_map(|(window, _)| window);

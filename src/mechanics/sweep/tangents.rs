@@ -1,4 +1,4 @@
-//! Frozen tangents, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
+//! Stored tangents of the linearisation, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
 
 use super::blocks::{Quadratic, pair};
 use super::kernel::In;
@@ -6,19 +6,19 @@ use super::lanes::{LANES, Lanes, WithLanes};
 use crate::material::ClosedTangent;
 use crate::scalar::Real;
 
-/// Which numbers a frozen tangent is made of.
+/// The storage form of a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Form {
     /// A, B, κ and q of a [`ClosedTangent`].
     Closed,
-    /// The same, then b and c.
+    /// A, B, κ and q, then b and c.
     ClosedWithBoth,
-    /// 𝔸 itself: the blocks of all pairs of unit gradients.
+    /// 𝔸 itself, as the blocks 𝔸_kl of all pairs of unit gradients (e_k, e_l).
     General,
 }
 
 impl Form {
-    /// Numbers of a particle.
+    /// Number of stored numbers a particle.
     pub const fn rows(self, dimension: usize) -> usize {
         let symmetric = dimension * (dimension + 1) / 2;
         let closed = dimension * dimension + symmetric + 2;
@@ -29,7 +29,7 @@ impl Form {
         }
     }
 
-    /// The closed tangent from the rows of a group.
+    /// Reads the closed tangent from the rows of a group.
     #[inline(always)]
     fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[S::X; LANES]]) -> ClosedTangent<S::N, D> {
         let mut at = 0;
@@ -49,13 +49,13 @@ impl Form {
     }
 }
 
-/// The place of entry (i, j) of the block of e_k and e_l among the rows of a general tangent.
+/// The row of entry (i, j) of the block 𝔸_kl in a general tangent.
 #[inline(always)]
 pub(super) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usize) -> usize {
     ((k * D + l) * D + i) * D + j
 }
 
-/// A symmetric tensor from its upper triangle, column by column.
+/// Reads a symmetric tensor from its upper triangle, stored column by column.
 #[inline(always)]
 fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut usize) -> [[S::N; D]; D] {
     let mut b = [[s.zero(); D]; D];
@@ -69,15 +69,15 @@ fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut us
     b
 }
 
-/// `out` += 𝔸 : L of a group; L and what is added to by rows.
+/// `out` += 𝔸 : L of a group. `l` and `out` are stored by rows.
 pub struct Product<'a, X> {
-    /// Of the tangents.
+    /// The form of the tangents.
     pub form: Form,
     /// The tangents.
     pub rows: &'a [[X; LANES]],
     /// L
     pub l: &'a [[X; LANES]],
-    /// What is added to.
+    /// δσ
     pub out: &'a mut [[X; LANES]],
 }
 
@@ -119,7 +119,7 @@ impl<X: Real, const D: usize> WithLanes<X> for In<Product<'_, X>, D, D> {
     }
 }
 
-/// Adds a multiple of the quadratic form of the tangents of a group.
+/// Adds `factor` times the quadratic form of the tangents of a group to `into`.
 pub(super) struct AddTo<'a> {
     pub form: Form,
     pub rows: &'a [[f64; LANES]],

@@ -1,7 +1,7 @@
-//! The sweep for products N = Π_k N_k: weights of each axis only, particles of a cell side by side in vector lanes.
+//! The shape functions of all particles for products N = Π_k N_k. Only the weights of each axis are stored, and the particles of a cell lie
+//! side by side in vector lanes.
 //!
-//! Particles are taken in the order (cell, id). A *group* is up to eight of them, of one cell or of a few neighbours
-//! along x, with one window of nodes around them; a *block* is a cube of cells with one box of nodes.
+//! Particles are taken in the order (cell, id). [Groups and blocks](super) are defined on the page of the module.
 
 use super::block::{Block, Group};
 use super::builder::{Row, block, number};
@@ -16,21 +16,21 @@ use crate::parallel;
 use crate::parallel::First;
 use crate::tensor::Vector;
 
-/// Shape functions of all particles, by axis.
+/// The shape functions of all particles, by axis.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tiled<const D: usize> {
     pub(super) blocks: Vec<Block>,
-    /// Slot of each particle, eight for each group: group · 8 + lane.
+    /// Slot of each particle: group · 8 + lane.
     slots: Vec<u32>,
     /// The particles in their order.
     keys: Vec<Key>,
-    /// What the nodes were numbered by, and what came out: memory for the next step.
+    /// Rows and nodes of the last numbering, whose memory the next step reuses.
     rows: Vec<Row>,
     nodes: Nodes,
 }
 
 impl<const D: usize> Tiled<D> {
-    /// As [`super::Supports::new`], for a shape function that is a product. The arrays of `spare` are used again, and its order.
+    /// [`super::Supports::new`] for a shape function that is a product. The arrays and the particle order of `spare` are reused.
     pub(super) fn new<A: ShapeFunction>(
         approximation: &A,
         product: &dyn Separable,
@@ -40,7 +40,7 @@ impl<const D: usize> Tiled<D> {
         spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
         let positions = &*points.positions;
-        // Whichever came first in time: the first particle without functions, and what they say of its whole position.
+        // Threads meet errors in any order. So the particle with the smallest id is searched, with the error for its whole position.
         let failure = |particle: usize, source: ApproximationError| {
             let (mut scratch, mut support) = (Scratch::default(), Support::default());
             let mut error = |x: &Vector<f64, D>| approximation.evaluate(grid, x, &mut scratch, &mut support).err();
@@ -95,7 +95,7 @@ impl<const D: usize> Tiled<D> {
         self.keys.iter().map(|key| key.particle)
     }
 
-    /// As if particles had been put in [`Self::order`], for the next step to start from.
+    /// Renumbers the particles as if they lay in memory in [`Self::order`]. The next step sorts from there.
     pub(super) fn rearrange(&mut self) {
         self.keys.iter_mut().zip(0..).for_each(|(key, place)| key.particle = place);
     }
@@ -106,7 +106,6 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// Number of groups.
     pub(super) fn groups(&self) -> usize {
         self.blocks.last().map_or(0, |last| last.groups.first + last.groups.len())
     }
@@ -120,7 +119,7 @@ impl<const D: usize> Tiled<D> {
         size_of_val(self.slots.as_slice()) + self.blocks.iter().map(Block::bytes).sum::<usize>()
     }
 
-    /// The group and the lane of a particle: (block, group in the block, lane).
+    /// The place of a particle: (block, group in the block, lane).
     fn place(&self, particle: usize) -> (&Block, usize, usize) {
         let slot = self.slots[particle] as usize;
         let (group, lane) = (slot / LANES, slot % LANES);

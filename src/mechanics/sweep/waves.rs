@@ -1,8 +1,8 @@
-//! The sweep over all blocks, on all cores.
+//! The passes over all blocks, on all cores.
 //!
-//! Blocks are taken in waves of fixed length: each block of a wave scatters into a buffer of its own, and then the buffers
-//! are added to the nodes in the order of the blocks, every slab of nodes by one thread. Neither the waves nor the order
-//! depend on the number of threads.
+//! Blocks are taken in batches of fixed length, called *waves*. Each block of a wave scatters into a buffer of its own. Then the buffers
+//! are added to the nodes in the order of the blocks. One thread adds to each slab of nodes.
+//! Neither the waves nor the order depend on the number of threads.
 
 use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks};
@@ -15,19 +15,19 @@ use crate::parallel;
 use crate::tensor::Tensor;
 use num_traits::Zero;
 
-/// Blocks of a wave: their buffers stay in the second-level caches.
+/// Number of blocks in a wave: their buffers stay in the second-level caches.
 const WAVE: usize = 64;
 
-/// Nodes of a slab.
+/// Number of nodes in a slab.
 const SLAB: usize = 1024;
 
-/// Below this number of groups waking the threads costs more than the work.
+/// Below this number of groups, waking the threads costs more than the work.
 const PARALLEL: usize = 256;
 
 /// `(block, scratch, buffer)`: fills the buffer of a block.
 type Work<'a, X, S> = dyn Fn(&Block, &mut S, &mut [X]) + Sync + 'a;
 
-/// `(block, buffer, first, slab)`: adds what lies on the active nodes of the slab, which begins at the node `first`.
+/// `(block, buffer, first, slab)`: adds the buffer's entries at the active nodes of the slab, which begins at the node `first`.
 type Add<'a, X> = dyn Fn(&Block, &[X], usize, &mut [X]) + Sync + 'a;
 
 impl<const D: usize> Tiled<D> {
@@ -35,7 +35,7 @@ impl<const D: usize> Tiled<D> {
         parallel::several() && self.groups() >= PARALLEL
     }
 
-    /// As [`super::Supports::sweep`], for `fields` fields of C components side by side; without a field nothing is gathered.
+    /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
     pub(super) fn sweep<X: Laned, const C: usize>(
         &self,
         fields: usize,
@@ -45,7 +45,7 @@ impl<const D: usize> Tiled<D> {
         point: &Point<'_, X, C, D>,
     ) {
         let numbers = fields * C;
-        // The buffer of a field is a vector longer than its nodes.
+        // The buffer of a field is one vector longer than its nodes, since scatters write whole vectors.
         let length = |block: &Block| block.box_nodes() * C + LANES;
         let work = |block: &Block, scratch: &mut Scratch<X, C, D>, buffer: &mut [X]| {
             let Scratch { nodal, at, sums, weights } = scratch;
@@ -85,7 +85,7 @@ impl<const D: usize> Tiled<D> {
         self.each_block(numbers, fields * LANES, out, &work, &add);
     }
 
-    /// `out_I += ` the diagonal blocks of the quadratic forms that `quadratic` fills in, group by group.
+    /// Adds to `out` the nodal diagonal blocks of the quadratic forms. `quadratic` fills in the form of each group.
     pub(super) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         let numbers = D * D;
         let work = |block: &Block, (): &mut (), buffer: &mut [f64]| {
@@ -98,7 +98,7 @@ impl<const D: usize> Tiled<D> {
         };
         let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [f64]| {
             block.each_node(first, first + out.len() / numbers, |place, node| {
-                // Rows of the kernel, columns of nalgebra.
+                // The kernel stores blocks by rows, nalgebra by columns.
                 for i in 0..D {
                     for k in 0..D {
                         out[node * numbers + k * D + i] += buffer[place * numbers + i * D + k];
@@ -109,7 +109,7 @@ impl<const D: usize> Tiled<D> {
         self.each_block(numbers, LANES, bytemuck::cast_slice_mut(out), &work, &add);
     }
 
-    /// The waves, with `numbers` numbers a node in the buffers and `more` behind them.
+    /// Runs `work` and `add` for all blocks, wave by wave. A buffer has `numbers` numbers a node and `more` numbers behind them.
     fn each_block<X: Laned, S: Default + Send>(
         &self,
         numbers: usize,
@@ -146,8 +146,8 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// `take(p, point(p, what was gathered, lane))` of every particle in the order of the blocks; no more results wait to be taken than
-    /// those of a wave.
+    /// Calls `take(p, point(p, u and L, lane))` for every particle in the order of the blocks. At most the results of one wave wait in
+    /// memory.
     pub(super) fn each<R: Send, const C: usize>(
         &self,
         fields: usize,
@@ -179,7 +179,7 @@ impl<const D: usize> Tiled<D> {
         }
     }
 
-    /// `fill(group, what was gathered, rows)` of every group, each with `count` rows of its own.
+    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
     pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = rows;
@@ -206,20 +206,20 @@ impl<const D: usize> Tiled<D> {
     }
 }
 
-/// What one thread works in.
+/// Working memory of one thread.
 #[derive(Default)]
 struct Scratch<X, const C: usize, const D: usize> {
     /// The boxes of the fields.
     nodal: Vec<X>,
-    /// What was gathered of each field.
+    /// u and L of each field.
     at: Vec<At<X, C, D>>,
-    /// What is scattered of each.
+    /// q and σ of each field.
     sums: Vec<At<X, C, D>>,
-    /// The weights of a group, changed.
+    /// The weights of a group: magnitudes or squares of its shape-function values.
     weights: Vec<[X; LANES]>,
 }
 
-/// The boxes of the fields, one after the other; zero at nodes that are not active.
+/// Copies nodal values into the boxes of the fields, one after the other. Nodes that are not active get zero.
 fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
     let boxed = block.box_nodes() * C;
     nodal.clear();
@@ -232,7 +232,7 @@ fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fiel
     }
 }
 
-/// Gathers a group from the boxes of the fields.
+/// Gathers u and L of a group from the boxes of the fields.
 fn gather<X: Laned, const C: usize, const D: usize>(
     window: Window<'_, X>,
     nodal: &[X],
@@ -244,7 +244,7 @@ fn gather<X: Laned, const C: usize, const D: usize>(
     }
 }
 
-/// `visit(group, what was gathered)` of every group of a block.
+/// Calls `visit(group, u and L)` for every group of a block.
 fn gathered<const C: usize, const D: usize>(
     block: &Block,
     field: &[f64],

@@ -1,12 +1,12 @@
-//! What was out of balance when the grid was made anew, carried over as a force on its nodes: in balance on the grid before, and to be so on
-//! this one, or each new grid adds an error of its own to the stresses.
+//! The out-of-balance force R₀ of the last converged state on a grid that has just been reset, carried over as a force on the nodes. The
+//! state was in balance on the old grid. Without R₀, each reset would add an error of its own to the stresses.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
 use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::tensor::Vector;
 
-/// R₀
+/// R₀, the out-of-balance force.
 pub struct CarriedOver<'a, const D: usize>(&'a [Vector<f64, D>]);
 
 impl<'a, const D: usize> CarriedOver<'a, D> {

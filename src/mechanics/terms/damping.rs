@@ -1,5 +1,5 @@
-//! Rayleigh damping, (a M̃ + b K_n) v, with the material part of the stiffness at the beginning of the step: a body that turns as a
-//! whole is not damped by it.
+//! Rayleigh damping, (a M̃ + b K_n) v. K_n is the material part of the stiffness at the beginning of the step, so b K_n does not damp rigid
+//! rotations.
 
 use super::inertia::FrozenMass;
 use super::stress::FrozenStress;
@@ -16,15 +16,15 @@ use crate::tensor::{Tensor, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Rayleigh damping: both constants in units that make a M + b K a damping, 1/time and time.
+/// Rayleigh damping a M + b K, with a in 1/time and b in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rayleigh {
-    /// a ≥ 0, 1/time: damps slow motions, rigid ones too, by the share a/(2ω) of critical damping.
+    /// a ≥ 0, 1/time. This term damps slow motions, rigid motions too, by the share a/(2ω) of critical damping.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub mass: f64,
-    /// b ≥ 0, time: damps fast deformations, by the share b ω/2 of critical damping; the stiffness is that of the material at the
+    /// b ≥ 0, time. This term damps fast deformations, by the share b ω/2 of critical damping. The stiffness is that of the material at the
     /// beginning of each step.
     #[serde(default)]
     #[schemars(range(min = 0))]
@@ -32,7 +32,7 @@ pub struct Rayleigh {
 }
 
 impl Rayleigh {
-    /// What is wrong with them in a scene.
+    /// Adds invalid values of a scene to `problems`.
     pub(crate) fn check(&self, problems: &mut Problems) {
         for (key, value) in [("damping.mass", self.mass), ("damping.stiffness", self.stiffness)] {
             problems.between(key, value, 0.0, f64::MAX);
@@ -40,11 +40,11 @@ impl Rayleigh {
     }
 }
 
-/// (a M̃ + b K_n) v; not there without inertia.
+/// (a M̃ + b K_n) v; absent without inertia.
 pub struct Damping<'a, const D: usize, L> {
     rayleigh: Rayleigh,
     step: Step<'a, D, L>,
-    /// K_n; a state without one has no stress either, and the step fails there.
+    /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
     stiffness: Option<FrozenStress<f64>>,
 }
 
@@ -88,7 +88,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
         all.map(|(dphi, known)| Vector::from_fn(|i, _| dphi[i] * T::lit(a4) + T::lit(known[i]))).collect()
     }
 
-    /// (a M̃ + b K_n) v, for every number: it is linear in v.
+    /// (a M̃ + b K_n) v for every number type, field by field: the force is linear in v.
     fn force_of<T: Number>(&self, v: &[Vector<T, D>]) -> Vec<Vector<T, D>> {
         let mut force = vec![Vector::<T, D>::zeros(); v.len()];
         for field in 0..T::FIELDS {

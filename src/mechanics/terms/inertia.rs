@@ -11,7 +11,7 @@ use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
 
-/// M̃ a; not there without inertia.
+/// M̃ a; absent without inertia.
 pub struct Inertia<'a, const D: usize> {
     mass: Mass<'a, D>,
     nodal: &'a Nodal<D>,
@@ -94,7 +94,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         Some(Ok((sum, magnitude)))
     }
 
-    /// The whole mass, also for ε < 1: the consistent part is of the same size.
+    /// The lumped mass stands for the whole mass, also for ε < 1: the consistent part is of the same size.
     fn add_magnitudes_at_nodes(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         let Alphas { a1, a2, a3, .. } = self.alphas;
         let state = self.nodal.velocity.iter().zip(&self.nodal.acceleration).zip(self.mass.lumped);

@@ -1,9 +1,9 @@
-//! The mean dilatation of cells: what a body gains in energy because its volumetric part U sees θ, the mean of a cell, and not J,
+//! The mean dilatation of cells. The volumetric part U of the energy depends on θ, the mean of a cell, in place of J. This adds the energy
 //!
 //! Π = Σ_p V₀ [U(θ_p) − U(J_p)],  θ_p = Θ_c θ_n,  Θ_c = v/V_c,  v = Σ_{p∈c} V₀ J_p,
 //!
-//! beside W(F) of the law, which has U(J). A cell has one pressure then, as finite elements have with linear motions and a constant pressure
-//! (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985), and Π is a potential: the tangent is symmetric.
+//! to W(F) of the law, which contains U(J). A cell then has one pressure, like finite elements with linear motion and constant pressure
+//! (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). Π is a potential, so the tangent is symmetric.
 //!
 //! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_n N_I, a = V₀ J A, A = ΔF⁻ᵀ:
 //!
@@ -26,13 +26,13 @@ use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
 
-/// Σ_p V₀ [U(θ_p) − U(J_p)]; not there where no body averages its change of volume.
+/// Σ_p V₀ [U(θ_p) − U(J_p)]; absent if no body has mean dilatation.
 pub struct MeanDilatation<'a, const D: usize, L> {
     step: Step<'a, D, L>,
     cells: Cells,
 }
 
-/// What a cell is at one Δφ.
+/// The state of a cell at one Δφ.
 struct State<T> {
     /// Θ − 1
     change: T,
@@ -42,7 +42,7 @@ struct State<T> {
     stiffness: T,
 }
 
-/// What a particle is at one Δφ.
+/// The state of a particle at one Δφ.
 struct Local<T: Real, const D: usize> {
     jacobian: T,
     response: VolumeResponse<T>,
@@ -56,18 +56,18 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
         Some(Self { step: *step, cells })
     }
 
-    /// U of the body of a particle at 1 + `change`; nothing of one that has none, which is in no cell.
+    /// U of a particle's body at 1 + `change`; zero for a body without U, whose particles are in no cell.
     fn response<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
         let nothing = VolumeResponse { energy: T::zero(), stress: T::zero(), stiffness: T::zero() };
         self.step.bodies[self.step.particles.body[p] as usize].response(change).unwrap_or(nothing)
     }
 
-    /// U at θ of a particle in a cell of Θ.
+    /// U at θ = Θ θ_n of a particle, with Θ − 1 = `change` of its cell.
     fn at_mean<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
         self.response(p, total(change, self.step.particles.dilatation(p)))
     }
 
-    /// U at J, with which the law resists already.
+    /// U at J, which the law contains already.
     fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
         let h_n = &self.step.particles.displacement_gradient[p];
         let (at, _) = admissible_or_rest(compose(g, h_n));
@@ -171,12 +171,12 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
     }
 }
 
-/// Numbers of a particle in the frozen tangent.
+/// Numbers per particle in the linearised tangent.
 pub(crate) const fn frozen_rows(dimension: usize) -> usize {
     Form::Closed.rows(dimension) + 1
 }
 
-/// δσ, with the mean of the cells first.
+/// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
 struct FrozenMean<'a, X: Laned, const D: usize> {
     cells: &'a Cells,
     supports: &'a Supports<D>,
@@ -184,7 +184,7 @@ struct FrozenMean<'a, X: Laned, const D: usize> {
     rows: Pooled<[X; LANES]>,
     /// k over the scale.
     stiffness: Vec<f64>,
-    /// In which gradients are taken.
+    /// The unit of length of gradients.
     length: f64,
 }
 
@@ -244,7 +244,7 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
         }))
     }
 
-    /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the coupling is in the blocks, too.
+    /// Σ_c k b_I ⊗ b_I with b_I = ∂v/∂Δφ_I: the contribution of the coupling.
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         let mut sums = vec![Vector::<f64, D>::zeros(); blocks.len()];
         let mut touched = Vec::new();
@@ -265,7 +265,7 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
         }
     }
 
-    /// Particles of one cell see nodes that are one apart, with functions that change at the middle of a cell.
+    /// Shape functions may change their nodes at the middle of a cell. Two particles of one cell then see nodes that are one apart.
     fn reach(&self) -> u32 {
         1
     }

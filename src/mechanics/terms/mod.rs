@@ -1,8 +1,13 @@
-//! The residual as a list of terms, a file each.
+//! The residual as a list of terms, one file each.
 //!
-//! A term acts at particles, in the one pass over them that all terms share, or at nodes. It gives its value, for every number; its energy,
-//! if it has a potential; what round-off in it is relative to; and its tangent, frozen at one Δφ: product and diagonal blocks. What is in
-//! the list is summed by [`Equilibrium`](super::residual::Equilibrium), and planned and checked without being named anywhere else.
+//! A term acts at nodes, or at particles in the one pass that all terms share. A term gives
+//!
+//! - its value, for every number type;
+//! - its energy, if it has a potential;
+//! - the size that its round-off is relative to;
+//! - its tangent, linearised at one Δφ: product and diagonal blocks.
+//!
+//! [`Equilibrium`](super::residual::Equilibrium) sums the terms of the list. Plans and checks go through the same list.
 
 mod body_force;
 mod carried_over;
@@ -34,24 +39,24 @@ use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
 use crate::tensor::{Deformation, Tensor, Vector};
 
-/// What all terms of a step are made from.
+/// The data that all terms of a step are built from.
 #[derive(Debug)]
 pub struct Step<'a, const D: usize, L> {
     /// The particles at the last converged step.
     pub particles: &'a Particles<D>,
     /// The bodies.
     pub bodies: &'a [Body<L>],
-    /// What acts on them.
+    /// The loads on the bodies.
     pub loads: &'a Loads<D>,
     /// Shape functions at x_n.
     pub supports: &'a Supports<D>,
     /// State at the nodes.
     pub nodal: &'a Nodal<D>,
-    /// How a and v follow from Δφ.
+    /// The relations of a and v to Δφ.
     pub alphas: Alphas,
-    /// ε
+    /// ε, the lumped share of the mass.
     pub lumping: f64,
-    /// When loads act.
+    /// The time at which the loads are evaluated.
     pub time: f64,
     /// Δt
     pub dt: f64,
@@ -66,7 +71,7 @@ impl<const D: usize, L> Clone for Step<'_, D, L> {
 impl<const D: usize, L> Copy for Step<'_, D, L> {}
 
 impl<const D: usize, L: Law> Step<'_, D, L> {
-    /// Λ + 2G of a body at rest, the stiffness of its first particle in uniaxial strain; 0 if it has none.
+    /// Λ + 2G of an undeformed body: the stiffness of its first particle in uniaxial strain; 0 if the body has no particle.
     pub fn modulus(&self, body: usize) -> f64 {
         let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
         let along_x = Tensor::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
@@ -92,20 +97,20 @@ impl<'a, const D: usize, L> Step<'a, D, L> {
     }
 }
 
-/// What a term does at the particles of a group, chosen once a pass: adds q and σ to the last argument.
+/// The contribution of a term at the particles of a group: adds q and σ to the last argument. The function is chosen once per pass.
 pub type AtPoints<'a, T, const D: usize> =
     Box<dyn Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync + 'a>;
 
-/// As [`AtPoints`], of a frozen tangent, which always exists.
+/// The contribution of a linearised term to the product, like [`AtPoints`]. A linearised term always exists, so there is no error.
 pub type ProductAtPoints<'a, X, const D: usize> = Box<dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a>;
 
-/// The functions of all unknowns at a particle, by node.
+/// The effective shape functions of all unknowns at a particle, by node.
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
-/// Adds the quadratic form of a frozen tangent at the particles of a group.
+/// Adds the quadratic form of a linearised tangent at the particles of a group.
 pub type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
 
-/// The units of a tangent in single precision, which has none: K/s, with gradients in units of 1/h; 1 in double precision.
+/// The scaling of a tangent in single precision: K/s, with gradients in units of 1/h. Both units are 1 in double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     /// s, a power of two near the largest entries of K.
@@ -115,66 +120,67 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Of double precision.
+    /// The units in double precision.
     pub const ONE: Self = Self { scale: 1.0, length: 1.0 };
 }
 
-/// A sum with the magnitude of its contributions.
+/// A sum, and the sum of the magnitudes of its contributions.
 pub type Sum<T> = (T, f64);
 
-/// What a simulation gives a term, before any step: what a plan is made from.
+/// The data of a simulation before its first step, from which a term makes its plan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Given<'a, const D: usize> {
     pub loads: &'a Loads<D>,
     pub scheme: &'a dyn Scheme,
     /// ε
     pub lumping: f64,
-    /// Whether a body averages its change of volume.
+    /// Whether a body has mean dilatation.
     pub averages: bool,
-    /// Whether a grid may be made anew.
+    /// Whether the grid may be reset.
     pub renews: bool,
 }
 
-/// Whether a term, or a part of it, is there, and why: `(name, used, why)`.
+/// `(name, used, why)`: whether a term, or a part of a term, is used, and the reason.
 pub(crate) type Reason = (&'static str, bool, String);
 /// The sum of energies.
 fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
     energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
 }
 
-/// What freezing a term comes to.
+/// The result of linearising a term; `None` for a dead load.
 pub(crate) type Freezing<'a, X, const D: usize> = Result<Option<Box<dyn Frozen<X, D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
-    /// As checks, plans and reports call it.
+    /// The name of the term in checks, plans and reports.
     const NAME: &'static str;
-    /// The parts of its tangent that can be frozen alone, as they are called.
+    /// The parts of its tangent that can be linearised alone, with their names.
     const PARTS: &'static [(Part, &'static str)] = &[];
     /// Where its work goes.
     const ROLE: Role = Role::Stores;
 
-    /// What a plan says of it.
+    /// The entries of the term in a plan.
     fn planned(given: Given<'_, D>) -> Vec<Reason>;
 
-    /// Adds what acts at the nodes.
+    /// Adds the contribution at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
-    /// What acts at the particles at Δφ, and what of u and L it reads and of q and σ it writes. Only the occurrences of Δφ in `part` carry derivatives.
+    /// The contribution at the particles at Δφ. Its [`Flow`] says which of u and L it reads, and which of q and σ it writes. Only the
+    /// occurrences of Δφ in `part` carry derivatives.
     fn at_points<T: Number>(&self, _part: Part, _dphi: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
         None
     }
 
-    /// The potential whose gradient it is, if it has one.
+    /// The potential whose gradient is this term; `None` if there is none.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>>;
 
-    /// Adds the magnitudes of what [`Self::add_at_nodes`] sums up.
+    /// Adds the magnitudes of the contributions of [`Self::add_at_nodes`].
     fn add_magnitudes_at_nodes(&self, _dphi: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
-    /// Adds what rounding Δφ and the state changes in the residual, in units of eps.
+    /// Adds the change of the residual when Δφ and the state are rounded, in units of eps.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
@@ -182,7 +188,7 @@ pub(crate) trait Term<const D: usize>: Sync {
         Ok(())
     }
 
-    /// Its tangent frozen at Δφ; `None` of a dead load.
+    /// Linearises the term at Δφ; `None` for a dead load.
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
@@ -191,29 +197,29 @@ pub(crate) trait Term<const D: usize>: Sync {
     }
 }
 
-/// The tangent of a term, frozen: what its product needs, and no more.
+/// A term linearised at one Δφ: the data that its product needs, and no more.
 pub(crate) trait Frozen<X, const D: usize>: Sync {
-    /// Adds what acts at the nodes.
+    /// Adds the contribution to the product at the nodes.
     fn add_product_at_nodes(&self, _u: &[Vector<X, D>], _out: &mut [Vector<X, D>]) {}
 
-    /// What acts at the particles in the product with `u`, and what it reads and writes; without `u`, where gradients are the same at all
+    /// The contribution to the product with `u` at the particles, with its [`Flow`]. `u` is `None` if gradients are the same at all
     /// particles of a cell.
     fn product_at_points(&self, _u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
         None
     }
 
-    /// Adds to the diagonal blocks what nodes have for themselves.
+    /// Adds the contribution of the nodes to the diagonal blocks.
     fn add_blocks_at_nodes(&self, _blocks: &mut [Tensor<f64, D>]) {}
 
-    /// Adds to the diagonal blocks what is known by the functions of single particles.
+    /// Adds the contribution to the diagonal blocks that needs the effective shape functions of single particles.
     fn add_blocks_of_functions(&self, _functions: &FunctionsAt<'_, D>, _blocks: &mut [Tensor<f64, D>]) {}
 
-    /// What adds to the diagonal blocks at the particles.
+    /// The contribution to the diagonal blocks at the particles.
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
         None
     }
 
-    /// How many nodes further along an axis than shape functions its entries reach.
+    /// The reach of the tangent's entries along an axis, beyond that of the shape functions; in nodes.
     fn reach(&self) -> u32 {
         0
     }
@@ -222,11 +228,11 @@ pub(crate) trait Frozen<X, const D: usize>: Sync {
 /// Where the work of a term goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Into kinetic or strain energy, and back.
+    /// The work goes into kinetic or strain energy, and back.
     Stores,
-    /// It comes from without.
+    /// The work is external.
     Loads,
-    /// It is lost.
+    /// The work is dissipated.
     Dissipates,
 }
 
@@ -237,14 +243,14 @@ pub struct Piece {
     pub term: &'static str,
     /// The part.
     pub part: Part,
-    /// As it is called.
+    /// The name of the piece.
     pub name: &'static str,
 }
 
-/// Declares the list.
+/// Declares [`Terms`] from the list of all terms.
 macro_rules! terms {
     ($($field:ident: $term:ty),* $(,)?) => {
-        /// The terms of one step; those that a scene does not require are not there.
+        /// The terms of one step. Terms that a scene does not need are `None`.
         pub struct Terms<'a, const D: usize, L> {
             $(#[doc = concat!("See [`", stringify!($term), "`].")] pub $field: Option<$term>),*
         }
@@ -255,12 +261,12 @@ macro_rules! terms {
                 Self { $($field: <$term>::of(step)),* }
             }
 
-            /// What a plan says of all terms that there are.
+            /// The entries of all terms in a plan.
             pub(crate) fn planned(given: Given<'_, D>) -> Vec<Reason> {
                 [$(<$term as Term<D>>::planned(given)),*].concat()
             }
 
-            /// The terms that are there, whole and by the parts that can be frozen alone.
+            /// The terms in use, whole and by the parts that can be linearised alone.
             pub fn pieces(&self) -> Vec<Piece> {
                 let mut pieces = Vec::new();
                 $(if self.$field.is_some() {
@@ -279,7 +285,7 @@ macro_rules! terms {
                 false
             }
 
-            /// Adds what acts at the nodes, of all terms that `picked` takes.
+            /// Adds the contributions at the nodes of all terms that `picked` selects.
             pub(crate) fn add_at_nodes<T: Number>(
                 &self,
                 picked: impl Fn(&str, Role) -> bool,
@@ -291,7 +297,7 @@ macro_rules! terms {
                 })*
             }
 
-            /// What acts at the particles, of all terms that `picked` takes.
+            /// The contributions at the particles of all terms that `picked` selects.
             pub(crate) fn at_points<T: Number>(
                 &self,
                 picked: impl Fn(&str, Role) -> bool,
@@ -337,7 +343,7 @@ macro_rules! terms {
                 Ok(())
             }
 
-            /// The tangents of all terms, or of one piece of them.
+            /// Linearises all terms, or one piece.
             pub(crate) fn freeze<X: Laned>(
                 &self,
                 piece: Option<Piece>,
@@ -365,8 +371,8 @@ terms! {
     pressure: Pressure<'a, D>,
 }
 
-/// A dead load is a term by the force f that it puts on the nodes: −f, with the energy −f·Δφ and no tangent. The last word says where its
-/// work goes.
+/// Implements [`Term`] for a dead load f on the nodes: the term −f, with the energy −f·Δφ and no tangent. The last argument is its
+/// [`Role`].
 macro_rules! dead_load {
     ($load:ty, $name:literal, $role:ident) => {
         impl<const D: usize> Term<D> for $load {

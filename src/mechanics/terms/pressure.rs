@@ -1,4 +1,4 @@
-//! Follower pressure, +p cof(F) N A on the particles of a surface: with an exact tangent, not symmetric on an open surface.
+//! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
 use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term, Unit};
 use crate::mechanics::loads::{Pressing, PressurePoint};
@@ -7,7 +7,7 @@ use crate::mechanics::sweep::{Laned, Number, Supports};
 use crate::particles::Particles;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
 
-/// Σ_Γ p cof(F) N A N_I: it has no potential.
+/// Σ_Γ p cof(F) N A N_I, which has no potential.
 pub struct Pressure<'a, const D: usize> {
     particles: &'a Particles<D>,
     supports: &'a Supports<D>,
@@ -81,7 +81,7 @@ struct FrozenPoint<const D: usize> {
 }
 
 impl<X: Laned, const D: usize> Frozen<X, D> for FrozenPressure<'_, D> {
-    /// At the particles themselves in double precision.
+    /// The product is evaluated particle by particle, in double precision.
     fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
         for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
             let l = self.supports.gradient_at(*particle, u).map(X::value);

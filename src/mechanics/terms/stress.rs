@@ -30,7 +30,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         &self.laws.bodies[self.laws.particles.body[p] as usize].law
     }
 
-    /// The tangent frozen at Δφ, one part of it if asked for.
+    /// The tangent linearised at Δφ, whole or one `part`.
     pub(super) fn frozen<X: Laned>(
         &self,
         dphi: &[Vector<f64, D>],
@@ -94,7 +94,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         Some(energies.map(summed))
     }
 
-    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖, the response to a change of volume standing for all, and δF of size ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖
+    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖. The response to a change of volume stands for all δF.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
@@ -115,13 +115,13 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     }
 }
 
-/// δσ = 𝔸 : L at all particles, a lane each.
+/// δσ = 𝔸 : L at all particles, one particle per lane.
 pub(super) struct FrozenStress<X: Laned> {
     form: Form,
     rows: Pooled<[X; LANES]>,
-    /// In which gradients are taken.
+    /// The unit of length of gradients.
     length: f64,
-    /// What products are multiplied by.
+    /// The factor of all products.
     factor: f64,
 }
 

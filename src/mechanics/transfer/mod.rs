@@ -1,4 +1,4 @@
-//! Particles → nodes (eqs. 40–42) and nodes → particles (eqs. 45, 50–52).
+//! Particle-to-grid transfer (eqs. 40–42) and grid-to-particle transfer (eqs. 45, 50–52).
 
 mod nodal;
 mod update;

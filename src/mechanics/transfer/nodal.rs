@@ -1,4 +1,4 @@
-//! Particles → nodes (eqs. 40–42).
+//! Particle-to-grid transfer (eqs. 40–42).
 
 use crate::aggregation::Followers;
 use crate::mechanics::affine::affine;
@@ -14,8 +14,8 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Lumped mass, velocity and acceleration at the active nodes: each array as long as there are nodes, or empty where nothing
-/// needs it.
+/// Lumped mass, velocity and acceleration at the active nodes. Each nodal array has one entry per active node, or is empty if nothing needs
+/// it.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 /// particles.velocity = direction(particles.len(), 1);
 /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// let momentum = |nodal: &Nodal<2>| nodal.mass.iter().zip(&nodal.velocity).map(|(&m, v)| v * m).sum::<Vector<f64, 2>>();
-/// // Mass and momentum are those of the particles, with the lumped mass as with the consistent one.
+/// // Mass and momentum are those of the particles, for the lumped and for the consistent mass.
 /// let rest = Nodal::at_rest(particles, &supports);
 /// assert!((rest.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
 /// let lumped = Nodal::project(particles, &supports, 1.0)?;
@@ -45,22 +45,22 @@ pub struct Nodal<const D: usize> {
     pub velocity: Pooled<Vector<f64, D>>,
     /// a_n; empty without inertia.
     pub acceleration: Pooled<Vector<f64, D>>,
-    /// φ_n, the motion since the grid was new; empty where it is.
+    /// φ_n, the motion since the last grid reset; empty right after a reset.
     pub motion: Pooled<Vector<f64, D>>,
-    /// R₀, what was out of balance when the grid was made anew; empty on the first grid, and with inertia.
+    /// R₀, the out-of-balance force carried over at the last grid reset; empty on the first grid, and with inertia.
     pub unbalanced: Pooled<Vector<f64, D>>,
-    /// x_n of the particles, where a field of forces asks for it and they are elsewhere; else empty.
+    /// x_n of the particles, if a force field needs x_n and the particles are at the last grid reset; otherwise empty.
     pub asked: Pooled<Vector<f64, D>>,
-    /// Iterations the projection took (0 for a lumped mass).
+    /// Iterations of the projection; 0 for a lumped mass.
     pub iterations: usize,
 }
 
 impl<const D: usize> Nodal<D> {
-    /// Projects the particles' velocity and acceleration with M̃ = (1−ε) M + ε lumped(M) onto `count` active nodes:
+    /// Projects the particles' velocity and acceleration with M̃ = (1−ε) M + ε lumped(M) onto the active nodes:
     /// M̃ v = Σ_p N m v_p and M̃ a = Σ_p N m a_p (eq. 42).
     ///
     /// # Errors
-    /// Particle velocities so large that the projection overflows.
+    /// The projection overflows, because particle velocities are too large.
     pub fn project(particles: &Particles<D>, supports: &Supports<D>, lumping: f64) -> Result<Self, LinearError> {
         let lumped = lumped(particles, supports);
         let mass = Mass { particles, supports, lumped: &lumped, lumping };
@@ -94,13 +94,13 @@ impl<const D: usize> Nodal<D> {
         Self { mass, velocity, acceleration, ..Self::default() }
     }
 
-    /// The lumped mass, and no motion.
+    /// The lumped mass; velocity and acceleration are zero.
     pub fn at_rest(particles: &Particles<D>, supports: &Supports<D>) -> Self {
         let still: Pooled<Vector<f64, D>> = supports.field();
         Self { velocity: still.clone(), acceleration: still, ..Self::mass_alone(particles, supports) }
     }
 
-    /// The lumped mass, which gravity acts on, and no inertia.
+    /// The lumped mass alone, which gravity acts on: there is no inertia.
     ///
     /// ```
     /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
@@ -109,7 +109,7 @@ impl<const D: usize> Nodal<D> {
     /// let simulation = scene.build::<2>("scenes".as_ref())?;
     /// let particles = &simulation.particles;
     /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
-    /// // The mass is there, and no motion that it could resist.
+    /// // The mass is there, and no velocity or acceleration.
     /// let nodal = Nodal::mass_alone(particles, &supports);
     /// assert!((nodal.mass.iter().sum::<f64>() / particles.mass.iter().sum::<f64>() - 1.0).abs() < 1e-14);
     /// assert!(nodal.is_static() && !Nodal::at_rest(particles, &supports).is_static());
@@ -126,19 +126,19 @@ impl<const D: usize> Nodal<D> {
         self.velocity.is_empty()
     }
 
-    /// φ_n of every node, zero where the grid is new.
+    /// φ_n of every node; zero right after a grid reset.
     pub fn moved(&self, count: usize) -> impl Iterator<Item = Vector<f64, D>> {
         let motion = self.motion.iter().copied().chain(std::iter::repeat(Vector::zeros()));
         motion.take(count)
     }
 
-    /// φ_n + Δφ̂ of every node: the motion that ends without acceleration. None without inertia.
+    /// φ_n + Δφ̂ of every node: the motion that ends without acceleration. Empty without inertia.
     pub fn predicted(&self, alphas: &Alphas) -> impl Iterator<Item = Vector<f64, D>> {
         let state = self.velocity.iter().zip(&self.acceleration).zip(self.moved(self.velocity.len()));
         state.map(|((v, a), motion)| motion + alphas.predicted(v, a))
     }
 
-    /// a_I = −R_I / m_I, from the residual of the same state at rest.
+    /// a_I = −R_I / m_I, with R the residual of this state without acceleration.
     ///
     /// ```
     /// use bfree::mechanics::{sweep::Supports, transfer::Nodal};
@@ -162,7 +162,7 @@ impl<const D: usize> Nodal<D> {
         divide(particles, &followers, &self.mass, &mut self.acceleration);
     }
 
-    /// The same where velocities and accelerations of nodes that follow others follow those that are prescribed.
+    /// Applies E to velocity and acceleration, so that outer nodes follow the prescribed values of inner nodes.
     pub(crate) fn extended(mut self, unknowns: &Unknowns<'_, D>) -> Self {
         if !self.is_static() {
             unknowns.followers.extend(&mut self.velocity);
@@ -171,7 +171,7 @@ impl<const D: usize> Nodal<D> {
         self
     }
 
-    /// The same with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
+    /// This state with ġ(t_n), g̈(t_n) in place of the projected values at prescribed degrees of freedom.
     ///
     /// ```
     /// use bfree::mechanics::{loads::{MotionStep, PrescribedDof}, sweep::Supports, transfer::Nodal};
@@ -198,7 +198,7 @@ impl<const D: usize> Nodal<D> {
     }
 }
 
-/// The field E û with the momentum of the field `u`: Eᵀ m û = Eᵀ (m u).
+/// Replaces the field `u` by E û with the same momentum: Eᵀ m û = Eᵀ (m u).
 fn aggregate<const D: usize>(particles: &Particles<D>, supports: &Supports<D>, mass: &[f64], u: &mut [Vector<f64, D>]) {
     let followers = followers(supports);
     if !followers.is_empty() {
@@ -207,7 +207,7 @@ fn aggregate<const D: usize>(particles: &Particles<D>, supports: &Supports<D>, m
     }
 }
 
-/// E û with Eᵀ m û = Eᵀ p, in the place of p; zero at nodes that have next to no mass.
+/// Replaces p by E û with Eᵀ m û = Eᵀ p; û is zero at light nodes.
 fn divide<const D: usize>(particles: &Particles<D>, followers: &Followers<D>, mass: &[f64], p: &mut [Vector<f64, D>]) {
     let is_light = is_light(particles);
     followers.restrict(p);
@@ -217,15 +217,16 @@ fn divide<const D: usize>(particles: &Particles<D>, followers: &Followers<D>, ma
     followers.extend(p);
 }
 
-/// How nodes get velocity and acceleration from the particles.
+/// The particle-to-grid transfer of velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Projection {
-    /// M̃ v = Σ N m v_p, as in the paper (42). With a lumped mass a body that spins freely loses some percent of its angular momentum in a
+    /// M̃ v = Σ N m v_p, as in the paper (42). With a lumped mass, a freely spinning body loses some percent of its angular momentum per
     /// radian.
     #[default]
     Mass,
-    /// Lumped, and each particle stands for an affine field, with the gradient that fits its surroundings: of the angular momentum about a
-    /// tenth as much is lost, for some passes over the particles more in a step. `time.lumping` then counts in the inertia alone.
+    /// Lumped mass, and an affine field around each particle, with the gradient fitted to the particle's surroundings. The loss of angular
+    /// momentum is about a tenth of that of `mass`. Each step needs some more passes over the particles. `time.lumping` then acts on the
+    /// inertia alone.
     Affine,
 }

@@ -1,4 +1,4 @@
-//! Nodes → particles (eqs. 45, 50–52).
+//! Grid-to-particle transfer (eqs. 45, 50–52).
 
 use super::Nodal;
 use crate::grid::Grid;
@@ -16,27 +16,27 @@ use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How particles see prescribed nodes in their update.
+/// The changes of velocity and acceleration that prescribed nodes give to the particles in the update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WallUpdate {
-    /// As the paper's Algorithm 1 reads: a resting wall changes neither velocity nor acceleration of the particles.
+    /// The paper's Algorithm 1 to the letter: a resting wall changes neither velocity nor acceleration of the particles.
     #[default]
     Literal,
-    /// The change is counted from what was projected, before the condition overwrote it.
+    /// The change is the prescribed value at the end of the step less the projected value, before the condition overwrote it.
     Consistent,
 }
 
-/// What a step has done to the particles.
+/// The results of a step at the particles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Committed {
-    /// The largest ‖½ (F_rᵀ F_r − I)‖, of the deformation since the grid was new.
+    /// The largest ‖½ (F_rᵀ F_r − I)‖, with F_r the deformation since the last grid reset.
     pub strain: f64,
-    /// Share of the volume of bodies with a plastic law that has flowed.
+    /// Share of the volume of all bodies with a plastic law that flowed plastically in the step.
     pub yielding: f64,
 }
 
-/// What the nodes give to the particles at the end of a step. Until it is committed nothing has touched them.
+/// The grid-to-particle transfer at the end of a step. The particles stay untouched until [`Self::commit`].
 ///
 /// ```
 /// use bfree::mechanics::{smoothing::Smoothing, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
@@ -58,7 +58,7 @@ pub struct Committed {
 /// assert!(flown.norm() < 1e-14);
 /// assert!((particles.kinetic_energy() / simulation.particles.kinetic_energy() - 1.0).abs() < 1e-12);
 /// assert!(particles.displacement_gradient.iter().all(|h| h.norm() < 1e-13));
-/// // That is what the whole step finds.
+/// // The whole step gives the same result.
 /// simulation.step()?;
 /// let whole = simulation.particles.by_id();
 /// assert!(whole.position.iter().zip(&particles.position).all(|(a, b)| (a - b).norm() < 1e-12));
@@ -66,25 +66,25 @@ pub struct Committed {
 /// ```
 pub struct Update<'a, const D: usize> {
     dphi: &'a [Vector<f64, D>],
-    /// φ = φ_n + Δφ, where the grid is kept.
+    /// φ = φ_n + Δφ; `None` right after a grid reset.
     kept: Option<Pooled<Vector<f64, D>>>,
     /// Δv and Δa of the nodes; empty without inertia.
     delta_velocity: Pooled<Vector<f64, D>>,
     delta_acceleration: Pooled<Vector<f64, D>>,
     impulses: Vec<f64>,
-    /// What smoothing adds to v and a of the particles.
+    /// The change of the particles' v and a by smoothing.
     smoothed: Option<[Pooled<Vector<f64, D>>; 2]>,
 }
 
 impl<'a, const D: usize> Update<'a, D> {
-    /// The increments of the nodes, with `projected` their state before, `nodal` after the prescribed values were put in.
+    /// The nodal increments. `projected` is the nodal state before the prescribed values were put in, `nodal` the state after.
     ///
     /// a_p += Σ N Δa,  Δa = α₁(Δφ − Δt v_n) − (α₃+1)a_n      (50)
     /// v_p += Σ N Δv,  Δv = α₄(Δφ − Δt v_n) + α₆a_n           (51), both as in [`Alphas`]
     /// x_p += Σ N Δφ                                           (52)
     /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
     ///
-    /// Where the grid is kept, x_p and F_p are those of when it was new, and φ_n + Δφ stands for Δφ in the last two.
+    /// Between two grid resets, x_p and F_p on the right are those of the last reset, and φ_n + Δφ stands for Δφ in (52) and (45).
     pub fn new(
         alphas: &Alphas,
         projected: &Nodal<D>,
@@ -121,7 +121,7 @@ impl<'a, const D: usize> Update<'a, D> {
         Self { dphi, kept, delta_velocity, delta_acceleration, impulses, smoothed: None }
     }
 
-    /// The same where nodes that follow others follow those that a wall has changed, too.
+    /// Applies E to the increments, so that outer nodes follow inner nodes that a wall has changed.
     pub(crate) fn extended(mut self, nodal: &Nodal<D>, unknowns: &Unknowns<'_, D>) -> Self {
         if nodal.is_static() || unknowns.followers.is_empty() {
             return self;
@@ -129,7 +129,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let mut by_forces = self.delta_velocity.clone();
         unknowns.followers.extend(&mut self.delta_velocity);
         unknowns.followers.extend(&mut self.delta_acceleration);
-        // The change of followers of a wall node is an impulse of the wall, too.
+        // The change of outer nodes that follow a wall node is an impulse of the wall, too.
         by_forces.iter_mut().zip(&self.delta_velocity).zip(&nodal.mass).for_each(|((before, after), &m)| {
             *before = (after - *before) * m;
         });
@@ -140,9 +140,10 @@ impl<'a, const D: usize> Update<'a, D> {
         self
     }
 
-    /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it for Newmark's step: what it differs from Taylor's
-    /// series with a third derivative ȧ = Δa/Δt, e = c Δt² Δa with the `constant` c = β − 1/6 of the scheme. The root of its mean square over the mass; exact to leading order in
-    /// Δt. Where a resting wall leaves the particles' acceleration alone, it counts as none; nor does smoothing count.
+    /// The local error of the displacement, as Zienkiewicz and Xie (1991) estimate it for Newmark's method: the root of its mean square
+    /// over the mass. The error is the difference to Taylor's series with the third derivative ȧ = Δa/Δt: e = c Δt² Δa, exact to leading
+    /// order in Δt. The `constant` c is that of the scheme, β − 1/6 for Newmark. A resting wall that leaves the particles' acceleration
+    /// alone adds no error, and neither does smoothing.
     ///
     /// ```
     /// use bfree::mechanics::{schemes::Newmark, sweep::Supports, transfer::{Nodal, Update, WallUpdate}};
@@ -170,7 +171,7 @@ impl<'a, const D: usize> Update<'a, D> {
         constant.abs() * dt * dt * (squares / mass.iter().sum::<f64>()).sqrt()
     }
 
-    /// Adds to v and a of the particles what `smoothing` makes of them as they are; `mass` is the lumped one of the nodes.
+    /// Stores the change of the particles' present v and a by `smoothing`; `mass` is the lumped mass of the nodes.
     pub fn smooth(
         &mut self,
         smoothing: &Smoothing,
@@ -187,18 +188,18 @@ impl<'a, const D: usize> Update<'a, D> {
         self.smoothed = Some([&particles.velocity, &particles.acceleration].map(|field| change(field)));
     }
 
-    /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom: the momentum a wall gives beyond the reactions, where
-    /// it finds nodes that do not move with it yet.
+    /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom. A wall gives this momentum, beyond the reactions, to nodes that do not
+    /// move with the wall yet.
     pub fn impulses(&self) -> &[f64] {
         &self.impulses
     }
 
-    /// φ, the motion of the nodes since the grid was new.
+    /// φ, the nodal motion since the last grid reset.
     pub fn motion(&self) -> &[Vector<f64, D>] {
         self.kept.as_deref().unwrap_or(self.dphi)
     }
 
-    /// φ, v and a of the nodes at the end, from v and a as `projected`.
+    /// φ, v and a of the nodes at the end of the step, from the state `projected`.
     pub fn end(&self, projected: &Nodal<D>) -> Nodal<D> {
         let sum = |field: &Pooled<Vector<f64, D>>, delta: &Pooled<Vector<f64, D>>| {
             field.pool().collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
@@ -212,7 +213,7 @@ impl<'a, const D: usize> Update<'a, D> {
         }
     }
 
-    /// The particle with the smallest id that would leave the grid, by its id, and where it would be.
+    /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
     pub fn leaving(
         &self,
         particles: &Particles<D>,
@@ -229,7 +230,7 @@ impl<'a, const D: usize> Update<'a, D> {
         first
     }
 
-    /// Writes to the particles, in place: the only place that does, once per step.
+    /// Writes the new state to the particles, once per step. No other code of a step does so.
     pub fn commit<L: Law>(
         self,
         particles: &mut Particles<D>,

@@ -1,25 +1,25 @@
-//! A pair of axes: their numbers, their names, and where a point lies between them.
+//! A pair of axes: tick labels, names, and the position of a point in the frame.
 
 use super::palette::{BLACK, GREY, LIGHT};
 use super::svg::{Anchor, Point, Svg, width};
 
-/// Height of letters of numbers and names at axes.
+/// Font size of tick labels and axis names.
 pub(super) const LABEL: f64 = 13.0;
 
-/// Height below the frame of axes that numbers take, and the name below them.
+/// Heights of the tick labels and of the axis name below the frame.
 pub(super) const BELOW: (f64, f64) = (25.0, 20.0);
 
-/// The numbers at an axis: multiples of 1, 2 or 5 times a power of ten.
+/// Ticks of an axis: multiples of 1, 2 or 5 times a power of ten.
 pub(super) struct Ticks {
-    /// Where they are.
+    /// Values of the ticks.
     pub at: Vec<f64>,
     decimals: usize,
-    /// Numbers are written in units of ten to this power.
+    /// Labels are in units of ten to this power.
     power: i32,
 }
 
 impl Ticks {
-    /// About `most` numbers in a range, whole ones alone if they are `whole`.
+    /// About `most` ticks in a range; only whole numbers if `whole`.
     pub(super) fn new((low, high): (f64, f64), most: usize, whole: bool) -> Self {
         let raw = ((high - low) / most as f64).max(if whole { 1.0 } else { 0.0 });
         let ten = 10.0_f64.powi(raw.log10().floor() as i32);
@@ -27,33 +27,33 @@ impl Ticks {
         let first = (low / step - 1e-9).ceil();
         let at = (0..=2 * most).map(|k| (first + k as f64) * step).take_while(|x| *x <= high + 1e-9 * step).collect();
         let size = low.abs().max(high.abs());
-        // Powers of a thousand, as units have them.
+        // Powers of a thousand, like the prefixes of units.
         let power = if (1e-2..1e5).contains(&size) { 0 } else { 3 * (size.log10() / 3.0).floor() as i32 };
         let decimals = (f64::from(power) - (step.log10() + 1e-9).floor()).clamp(0.0, 12.0) as usize;
         Self { at, decimals, power }
     }
 
-    /// A number as it is written.
+    /// Label of a tick.
     pub(super) fn label(&self, x: f64) -> String {
         let text = format!("{:.*}", self.decimals, x / 10.0_f64.powi(self.power));
-        // No zero has a sign.
+        // Zero has no sign.
         let zero = text.trim_start_matches('-').bytes().all(|byte| byte == b'0' || byte == b'.');
         if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
     }
 
-    /// The name of the axis, with the unit of its numbers.
+    /// Name of the axis, with the power of ten of its labels.
     pub(super) fn name(&self, name: &str) -> String {
         let power: String = self.power.to_string().chars().map(raised).collect();
         if self.power == 0 { name.to_owned() } else { format!("{name} (×10{power})") }
     }
 
-    /// Width of the widest number.
+    /// Width of the widest label.
     pub(super) fn width(&self) -> f64 {
         self.at.iter().map(|x| width(&self.label(*x), LABEL)).fold(0.0, f64::max)
     }
 }
 
-/// A digit, or a minus, as an exponent.
+/// A digit or a minus as a superscript.
 fn raised(digit: char) -> char {
     let place = digit.to_digit(10).and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
     place.unwrap_or('⁻')
@@ -63,28 +63,28 @@ fn raised(digit: char) -> char {
 pub(super) struct Axes {
     /// Upper left corner of the frame.
     pub corner: Point,
-    /// Its width and height.
+    /// Width and height of the frame.
     pub size: Point,
-    /// The range of the level axis.
+    /// Range of the horizontal axis.
     pub x: (f64, f64),
-    /// The range of the upright axis.
+    /// Range of the vertical axis.
     pub y: (f64, f64),
 }
 
 impl Axes {
-    /// Where a point lies in the picture.
+    /// Position of a point in the picture.
     pub(super) fn place(&self, (x, y): Point) -> Point {
         let along = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
         let (left, top) = self.corner;
         (left + self.size.0 * along(x, self.x), top + self.size.1 * (1.0 - along(y, self.y)))
     }
 
-    /// The room at the left of the frame that the upright axis takes.
+    /// Width that the vertical axis needs at the left of the frame.
     pub(super) fn left(numbers: &Ticks) -> f64 {
         numbers.width() + 2.0 * LABEL + 18.0
     }
 
-    /// Draws frame, numbers and names; and lines across, if there are to be `lines`. An empty name is left out.
+    /// Draws the frame, ticks and names, and grid lines if `lines`. An empty name is left out.
     pub(super) fn draw(&self, svg: &mut Svg, [level, upright]: [&Ticks; 2], [x, y]: [&str; 2], lines: bool) {
         let ((left, top), (wide, tall)) = (self.corner, self.size);
         let (right, bottom) = (left + wide, top + tall);
@@ -113,7 +113,7 @@ impl Axes {
     }
 }
 
-/// The range of the finite values, `padding` wider at either end, and never so narrow that axes could not be labelled.
+/// Range of the finite values, widened at either end by the fraction `padding`. The range is always wide enough for labels.
 pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f64) {
     let drawable = values.filter(|x| x.abs() < 1e100);
     let (low, high) = drawable.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (x.min(a), x.max(b)));
@@ -123,7 +123,7 @@ pub(super) fn range(values: impl Iterator<Item = f64>, padding: f64) -> (f64, f6
     let least = 1e-6 * low.abs().max(high.abs());
     match high - low {
         span if span < 1e-100 && least < 1e-100 => (low - 1.0, high + 1.0),
-        // A value that does not vary is shown as such, and its round-off is not.
+        // A constant value is shown as constant, without its round-off.
         span if span <= least => (low - 0.5 * low.abs(), high + 0.5 * high.abs()),
         span => (low - padding * span, high + padding * span),
     }

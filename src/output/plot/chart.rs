@@ -4,38 +4,35 @@ use super::axes::{Axes, BELOW, LABEL, Ticks, range};
 use super::palette::{BLACK, Color, GREY};
 use super::svg::{Anchor, Point, Svg, shortened, width};
 
-/// Width of a figure, in SVG units; of a name beside a curve, at most; height of its line.
+/// Width of a figure, in SVG units.
 const WIDTH: f64 = 900.0;
-/// See [`WIDTH`].
+/// Largest width of a name beside a curve, and height of its line.
 const LEGEND: (f64, f64) = (250.0, 17.0);
 
-/// Above so many points, a line is thinned to the extremes of as many intervals.
+/// A line with more than two points per interval is thinned to the extremes of this many intervals.
 const INTERVALS: usize = 1500;
 
-/// Height of letters of a title and of the line below it.
+/// Font sizes of a title and of the line below it.
 const TITLE: (f64, f64) = (19.0, 13.0);
 
 /// A line with its place in the legend.
 pub(super) struct Line {
-    /// Name; lines without one are not in the legend.
+    /// Name; empty for a line that is not in the legend.
     pub label: String,
-    /// Colour.
     pub color: Color,
-    /// Points.
     pub points: Vec<Point>,
 }
 
 /// One pair of axes.
 pub(super) struct Panel {
-    /// Name of the level axis, and whether it has whole numbers alone.
+    /// Name of the horizontal axis, and whether its ticks are whole numbers only.
     pub x: (&'static str, bool),
-    /// Name of the upright axis.
+    /// Name of the vertical axis.
     pub y: String,
-    /// A line of text above it; none if it is empty.
+    /// A line of text above the panel; none if it is empty.
     pub caption: String,
-    /// The lines.
     pub lines: Vec<Line>,
-    /// Height in parts of the sum over all panels.
+    /// Height relative to the sum over all panels.
     pub share: f64,
 }
 
@@ -45,13 +42,13 @@ impl Panel {
         Self { x: ("time", false), y: y.to_owned(), caption: String::new(), lines, share: 1.0 }
     }
 
-    /// The largest size of a finite value.
+    /// Largest absolute value of the finite values.
     pub(super) fn size(&self) -> f64 {
         let values = self.lines.iter().flat_map(|line| &line.points).map(|point| point.1.abs());
         values.filter(|size| size.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Lines with a name; none where one line is called what its axis is.
+    /// Lines of the legend. A single line with the name of the axis needs no legend.
     fn named(&self) -> Vec<&Line> {
         let named: Vec<&Line> = self.lines.iter().filter(|line| !line.label.is_empty()).collect();
         let same = self.lines.len() == 1 && named.iter().all(|line| line.label == self.y);
@@ -59,7 +56,7 @@ impl Panel {
     }
 }
 
-/// The subject of a picture, and the run that it is of.
+/// Heading of a picture: its subject, and the title of the run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Heading {
     pub what: String,
@@ -67,10 +64,10 @@ pub(super) struct Heading {
 }
 
 impl Heading {
-    /// The room that it takes.
+    /// Height of the heading.
     pub(super) const HEIGHT: f64 = 56.0;
 
-    /// Draws it in the middle of a picture so wide.
+    /// Draws the heading in the middle of a picture of width `wide`.
     pub(super) fn draw(&self, svg: &mut Svg, wide: f64) {
         let most = wide - 20.0;
         let lines = [(&self.what, TITLE.0, 26.0, BLACK), (&self.run, TITLE.1, 45.0, GREY)];
@@ -80,7 +77,7 @@ impl Heading {
     }
 }
 
-/// The figure as SVG, so many units high.
+/// The figure as SVG, with the given height in SVG units.
 pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
     let mut svg = Svg::new(WIDTH, height);
     heading.draw(&mut svg, WIDTH);
@@ -98,7 +95,7 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
         let (x, y) = spans(panel);
         (Ticks::new(x, 10, panel.x.1), Ticks::new(y, ((tall(panel) / 30.0) as usize).clamp(1, 6), false))
     };
-    // All panels have the margins that the widest numbers and names need.
+    // The widest tick labels and names set the margins of all panels.
     let left = panels.iter().map(|panel| Axes::left(&ticks(panel).1)).fold(0.0, f64::max);
     let names = panels.iter().flat_map(Panel::named).map(|line| width(&name(line), LABEL));
     let right = names.fold(0.0, f64::max) + 28.0;
@@ -124,7 +121,7 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
     svg.finish()
 }
 
-/// A name that fits beside an axis so high, with the power of ten that may follow it.
+/// A name shortened to fit beside an axis of this height, with room for a power of ten.
 fn fitting(name: &str, height: f64) -> String {
     shortened(name, LABEL, height - 60.0)
 }
@@ -133,7 +130,7 @@ fn name(line: &Line) -> String {
     shortened(&line.label, LABEL, LEGEND.0)
 }
 
-/// Names stand where their curves end, from top to bottom, as far apart as letters need.
+/// Draws each name at the end of its curve. Names that would overlap are moved apart.
 fn legend(svg: &mut Svg, axes: &Axes, named: &[&Line]) {
     let end = |line: &&&Line| thinned(&line.points).last().map_or(axes.corner.1, |point| axes.place(*point).1);
     let mut ends: Vec<(f64, &Line)> = named.iter().map(|line| (end(&line), *line)).collect();
@@ -145,7 +142,7 @@ fn legend(svg: &mut Svg, axes: &Axes, named: &[&Line]) {
     }
 }
 
-/// Heights in ascending order, moved until lines of text fit between them, none below `lowest` as long as there is room above.
+/// Moves ascending heights apart until lines of text fit between them. None lies below `lowest` as long as there is room above.
 fn apart(mut heights: Vec<f64>, lowest: f64) -> Vec<f64> {
     for k in 1..heights.len() {
         heights[k] = heights[k].max(heights[k - 1] + LEGEND.1);
@@ -158,7 +155,7 @@ fn apart(mut heights: Vec<f64>, lowest: f64) -> Vec<f64> {
     heights
 }
 
-/// The finite points; if they are many, only the lowest and the highest of each interval, in their order: no peak is lost.
+/// The finite points, in their order. If they are many, only the lowest and the highest of each interval are kept: no peak is lost.
 fn thinned(points: &[Point]) -> Vec<Point> {
     let drawable: Vec<_> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.abs() < 1e100).collect();
     if drawable.len() <= 2 * INTERVALS {

@@ -1,26 +1,26 @@
-//! The field that colours particles: by its name, or one worth a look.
+//! The field that colours particles, chosen by name or by default.
 
 use super::PlotError;
 use crate::output::vtu::{Array, Snapshot, Values};
 
-/// One number a particle.
+/// One number per particle.
 #[derive(Clone, Debug)]
 pub(super) struct Colouring {
-    /// The name of the field, for people.
+    /// Readable name of the field.
     pub label: String,
-    /// Its values.
+    /// One value per particle.
     pub values: Vec<f64>,
 }
 
 impl Colouring {
-    /// Least and largest finite value; of none ∞ and −∞.
+    /// Smallest and largest finite value; ∞ and −∞ if there is none.
     pub(super) fn extremes(&self) -> (f64, f64) {
         let finite = self.values.iter().filter(|x| x.is_finite());
         finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
     }
 
-    /// The field called `field`: one of a snapshot, a component of it such as `stress_xx`, or von Mises' equivalent where there is a
-    /// stress. Of a vector the length, of a tensor the Frobenius norm. `None` if the snapshot holds none of that name.
+    /// The field called `field`: an array of the snapshot, a component such as `stress_xx`, or `von_mises` where there is a stress. A
+    /// vector gives its length, a tensor its Frobenius norm. `None` if the snapshot holds no such field.
     pub(super) fn of(snapshot: &Snapshot, field: &str) -> Option<Self> {
         let array = |name: &str| snapshot.arrays.iter().find(|array| array.name == name);
         let label = words(field);
@@ -42,8 +42,8 @@ impl Colouring {
         Some(Self { label, values: tuples(array, |tuple| tuple[place]) })
     }
 
-    /// The field asked for; or without one the plastic strain, von Mises' stress, or else the first that was written. In one
-    /// dimension, where the field goes up, it is the first component of the first field.
+    /// The field that is asked for. The default is the plastic strain, else the von Mises stress, else the first field. In one dimension,
+    /// where the field is the vertical axis, the default is the first component of the first field.
     ///
     /// # Errors
     /// The snapshot holds no such field.
@@ -82,12 +82,12 @@ fn component(array: &Array, place: usize) -> String {
     }
 }
 
-/// A name as people write it.
+/// A name in readable words.
 pub(super) fn words(name: &str) -> String {
     if name == "von_mises" { "von Mises stress".to_owned() } else { name.replace('_', " ") }
 }
 
-/// A number of each particle's tuple.
+/// One number per particle, computed from its tuple by `of`.
 fn tuples(array: &Array, of: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     let width = array.components.len().max(1);
     match &array.values {
@@ -96,7 +96,7 @@ fn tuples(array: &Array, of: impl Fn(&[f64]) -> f64) -> Vec<f64> {
     }
 }
 
-/// The length of a vector, the Frobenius norm of a tensor; a number is itself.
+/// Length of a vector, Frobenius norm of a tensor, or the scalar itself.
 fn size(tuple: &[f64]) -> f64 {
     if let [x] = tuple {
         return *x;

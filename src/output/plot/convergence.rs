@@ -1,4 +1,4 @@
-//! How the residual falls in Newton's method: a sample of all steps, and the step with the most iterations.
+//! Residuals of Newton's method: a sample of all steps, and the step with the most iterations.
 
 use super::axes::rounded;
 use super::chart::{Line, Panel};
@@ -8,17 +8,17 @@ use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Steps drawn besides the one with the most iterations.
+/// Number of steps drawn besides the step with the most iterations.
 const SAMPLE: usize = 60;
 
-/// What of a step's line is drawn; residuals that are no numbers are strings.
+/// The part of a step's line that is drawn. Residuals that are not finite are strings.
 #[derive(Deserialize)]
 struct Step {
     time: f64,
     newton_residuals: Vec<Value>,
 }
 
-/// log₁₀ of the residuals over the first one, by iteration.
+/// log₁₀ |R| / |R₀| by iteration.
 fn fall(step: &Step) -> Vec<(f64, f64)> {
     let residuals: Vec<f64> = step.newton_residuals.iter().filter_map(Value::as_f64).collect();
     let first = residuals.first().copied().unwrap_or(1.0);
@@ -32,7 +32,7 @@ pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<P
         Some(steps) => steps.iter().filter_map(|step| Step::deserialize(step).ok()).collect(),
         None => logged(directory)?,
     };
-    // Of several the first.
+    // The first of several steps with the most iterations.
     let Some(worst) = steps.iter().rev().max_by_key(|step| step.newton_residuals.len()) else { return Ok(None) };
     let stride = steps.len().div_ceil(SAMPLE).max(1);
     let thin = |points| Line { label: String::new(), color: palette::SKY, points };
@@ -46,7 +46,7 @@ pub(super) fn panel(report: Option<&Value>, directory: &Path) -> Result<Option<P
     Ok(Some(Panel { x: ("Newton iteration", true), ..panel }))
 }
 
-/// The steps of a run that goes on or was killed; its last line may break off.
+/// The steps of a run that goes on or was killed. The last line may be incomplete.
 fn logged(directory: &Path) -> Result<Vec<Step>, PlotError> {
     let path = directory.join("newton.jsonl");
     match std::fs::File::open(&path) {

@@ -1,22 +1,23 @@
-//! Probes and reactions against time: a panel each, the components in it.
+//! Probes and reactions against time: one panel each, with its components.
 
 use super::chart::{Line, Panel};
 use super::table::Columns;
 use super::{PlotError, palette};
 
-/// Panels of a picture, at most.
+/// Largest number of panels in a picture.
 const MOST: usize = 8;
 
-/// A value is round-off below this part of the scale of its quantity.
+/// A value below this fraction of the scale of its quantity is round-off.
 pub(super) const ROUND_OFF: f64 = 1e-12;
 
-/// Colours of components; a tensor has more than there are colours, and its last ones look like its first.
+/// Colours of components. A tensor with more components repeats the first colours.
 const COLORS: [palette::Color; 6] =
     [palette::BLUE, palette::VERMILLION, palette::GREEN, palette::PURPLE, palette::SKY, palette::BLACK];
 
-/// A panel for each name that begins columns of `table`, in its order; the first [`MOST`] of them, and how many there are.
+/// One panel for each name in the columns of `table`, in order. Returns the first [`MOST`] panels, the number of panels before this limit,
+/// and the names of panels left out.
 ///
-/// Panels in which everything is 0, up to the round-off of the largest panel of the same `quantity`, are left out. Their names come last.
+/// A panel is left out if everything in it is 0, up to the round-off of the largest panel of the same `quantity`.
 pub(super) fn panels(
     table: &Columns,
     quantity: impl Fn(&str) -> String,
@@ -46,7 +47,7 @@ pub(super) fn panels(
     Ok((shown, there, left_out))
 }
 
-/// A column's name and its component; the name again if it has none.
+/// Name and component of a column; twice the name if there is no component.
 fn split(column: &str) -> (&str, &str) {
     match column.rsplit_once('_') {
         Some((name, end)) if matches!(end.len(), 1 | 2) && end.bytes().all(|b| b"xyz".contains(&b)) => (name, end),

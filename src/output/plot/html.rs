@@ -5,10 +5,10 @@ use super::player::Played;
 use serde_json::Value;
 use std::fmt::Write;
 
-/// What shows the snapshots.
+/// Script of the player.
 const PLAYER: &str = include_str!("player.js");
 
-/// What the player is steered by.
+/// Controls of the player.
 const CONTROLS: &str = "<noscript>particles.png shows the last snapshot; the player needs JavaScript.</noscript>
 <div id=\"player\"><div class=\"stage\"><canvas id=\"scene\"></canvas><canvas id=\"above\"></canvas></div>
 <p><button id=\"play\">▶</button><input id=\"frame\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"snapshot\"><output id=\"time\"></output></p>
@@ -37,8 +37,8 @@ figure { margin: 1em 0 } svg { max-width: 100%; height: auto }
 details td { vertical-align: top; font-size: 13px } .note { color: #555 }
 ";
 
-/// The page, of a run's snapshots, its pictures (name and SVG) and its report; without one, of a
-/// run that was killed.
+/// The page of a run: its report, the player of its snapshots, and its pictures (name and SVG). A run without a report goes on or was
+/// killed.
 pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[(&str, String)]) -> String {
     let nothing = Value::Null;
     let report = report.unwrap_or(&nothing);
@@ -67,7 +67,7 @@ pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[
     }
     if report.is_object() {
         out.push_str("<h2>Numbers</h2>\n<div class=\"tables\">\n");
-        // Of load steps the balance says nothing: work is done by loads that are there at once.
+        // In load steps, loads act at once, and the energy balance says nothing of their work.
         let left_out: &[&str] = if moves(Some(report)) { &[] } else { &["balance", "kinetic"] };
         table(&mut out, "Energy at the end", &report["energies"], left_out);
         table(&mut out, "Counts", &report["counts"], &[]);
@@ -101,7 +101,7 @@ pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[
     out
 }
 
-/// A row for every value, under its path; lists of mere values are one.
+/// A row for every value, with its path. A list of plain values is one row.
 fn rows(out: &mut String, path: String, value: &Value) {
     let plain = |value: &Value| match value {
         Value::String(text) => text.clone(),
@@ -182,7 +182,7 @@ fn words(name: &str) -> String {
     escaped(&name.replace('_', " "))
 }
 
-/// A number for people: whole ones as such, others with six digits.
+/// A readable number: a whole number as it is, others with five decimals.
 fn shown(x: f64) -> String {
     match x.abs() {
         size if x.fract() == 0.0 && size < 1e15 => format!("{x:.0}"),

@@ -1,8 +1,9 @@
-//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, iterations, Newton's convergence, the particles of
-//! the last snapshot; and all of them with the numbers of the run and a player of its snapshots on one page, `report.html`, that
-//! opens anywhere.
+//! Pictures of a finished (or killed) run: energies, momentum, probes, reactions, iterations, Newton's convergence, and the particles of
+//! the last snapshot. The page `report.html` shows the charts, the numbers of the run and a player of its snapshots. The page needs no
+//! other file.
 //!
-//! Everything is drawn as SVG, with axes and names that are measured in the font; the PNG beside it is made from the SVG with an embedded DejaVu Sans, so that no fonts need to be installed.
+//! Pictures are drawn as SVG, with axes and names measured in the font DejaVu Sans. PNG files are rendered from the SVG. The program
+//! contains the font, so no fonts need to be installed.
 
 mod axes;
 mod chart;
@@ -44,7 +45,7 @@ pub enum PlotError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// Reason given by the operating system.
         source: std::io::Error,
     },
     /// A table lacks a column.
@@ -60,34 +61,34 @@ pub enum PlotError {
     Cell {
         /// The table.
         path: PathBuf,
-        /// The line, the header being 1.
+        /// The line; the header is line 1.
         line: usize,
-        /// What is there.
+        /// The content of the cell.
         cell: String,
     },
-    /// The report is none.
+    /// The file is not a report of bfree.
     #[error("{} is no report written by bfree: {source}", path.display())]
     Report {
         /// The file.
         path: PathBuf,
-        /// What JSON says.
+        /// The reason given by the JSON parser.
         source: serde_json::Error,
     },
     /// A snapshot cannot be read.
     #[error(transparent)]
     Snapshot(#[from] vtu::ReadError),
-    /// There is nothing to make a movie of.
+    /// There are no snapshots for a movie.
     #[error("{} holds no snapshots: give the scene output.every", directory.display())]
     NoSnapshots {
         /// The directory.
         directory: PathBuf,
     },
-    /// Snapshots do not hold the field asked for.
+    /// The snapshots do not hold the field asked for.
     #[error("the snapshots hold no field {field:?}; they hold {there}; the key output.fields says what a run writes")]
     Field {
         /// The field.
         field: String,
-        /// Those there are.
+        /// The fields of the snapshots.
         there: String,
     },
     /// The renderer refused.
@@ -95,7 +96,7 @@ pub enum PlotError {
     Draw {
         /// The picture.
         name: &'static str,
-        /// Its reason.
+        /// The reason given by the renderer.
         reason: String,
     },
     /// A picture cannot be written.
@@ -103,32 +104,32 @@ pub enum PlotError {
     Write(#[from] OutputError),
 }
 
-/// The pictures that there may be.
+/// Names of all possible pictures.
 const PICTURES: [&str; 7] = ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "particles"];
 
 /// Height of a picture, in SVG units.
 const HEIGHT: f64 = 640.0;
 
-/// The page.
+/// File name of the page.
 const PAGE: &str = "report.html";
 
-/// How particles are drawn, and into which files.
+/// Field, view, time and file formats of the pictures.
 ///
 /// ```
 /// use bfree::output::plot::Look;
 ///
-/// // Whatever is not said is chosen: von Mises' stress, the plane of the motion, the last snapshot.
+/// // Missing settings have defaults: the von Mises stress, the plane of the motion, the last snapshot.
 /// let look = Look { field: Some("stress_xx".into()), view: Some("30,20".parse()?), ..Look::default() };
 /// assert_eq!(look.formats, ["svg", "png"]);
 /// # Ok::<(), String>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// The field that colours them: its name, `stress_xx` for a component, `von_mises` where there is a stress.
+    /// The field that colours particles: its name, `stress_xx` for a component, `von_mises` where there is a stress.
     pub field: Option<String>,
-    /// From where they are seen.
+    /// Direction of sight.
     pub view: Option<View>,
-    /// The time of the picture: the nearest snapshot is drawn.
+    /// Time of the picture of particles: the nearest snapshot is drawn.
     pub time: Option<f64>,
     /// Formats of the pictures: `svg`, `png`.
     pub formats: Vec<&'static str>,
@@ -140,16 +141,17 @@ impl Default for Look {
     }
 }
 
-/// Whether a file of this name is one that [`plot_run`] writes.
+/// Whether [`plot_run`] writes a file of this name.
 pub(crate) fn is_picture(file: &str) -> bool {
     let picture = file.strip_suffix(".svg").or(file.strip_suffix(".png"));
     file == PAGE || picture.is_some_and(|name| PICTURES.contains(&name))
 }
 
-/// Draws what is in the directory of a run, as `.svg` and `.png`, into the same directory: `energies`, `momentum`, `iterations`,
-/// `convergence` once there are steps, `probes` and `reactions` of a run that has them, and `particles` if there are snapshots; and
-/// writes `report.html`, with all of them in it, and a player of the snapshots. A picture in which all values are round-off is left out.
-/// Returns the files written.
+/// Draws the results in the directory of a run, as `.svg` and `.png` in the same directory. Returns the files written.
+///
+/// The pictures are `energies`, `momentum` and `iterations`, and `convergence` once there are steps. A run that has probes, reactions or
+/// snapshots also gets `probes`, `reactions` or `particles`. A picture in which all values are round-off is left out. The page
+/// `report.html` holds the charts and a player of the snapshots.
 ///
 /// ```
 /// use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference, plot::{Look, plot_run}};
@@ -163,7 +165,7 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// let step = simulation.advance()?;
 /// recorder.record(&simulation, &step)?;
 /// recorder.finish(&simulation, &serde_json::Map::new(), Outcome::Finished)?;
-/// // The page holds the pictures themselves: it opens wherever it is taken.
+/// // The page holds the charts themselves, so it opens anywhere.
 /// let written = plot_run(folder.path(), &Look::default())?;
 /// assert!(written.contains(&folder.path().join("energies.svg")));
 /// let page = std::fs::read_to_string(folder.path().join("report.html"))?;
@@ -172,14 +174,14 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// ```
 ///
 /// # Errors
-/// `history.csv` is missing or damaged, or another table, the report or a snapshot is damaged; the snapshots do not hold the field of the
-/// look; the system refuses.
+/// `history.csv` is missing or damaged. Another table, the report or a snapshot is damaged. The snapshots do not hold the field of `look`.
+/// The operating system refuses.
 pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
     let report = report(directory)?;
     let pictures = charts(directory, report.as_ref())?;
     let snapshots = series::files(directory)?;
     let mut played = None;
-    // Not on the page: the player shows it.
+    // The particles are not on the page: the player shows them.
     let mut last = None;
     if let Some(recording) = Recording::read(&snapshots)? {
         let snapshot = at_time(directory, &snapshots, look.time)?;
@@ -217,7 +219,7 @@ fn run_of(report: Option<&Value>) -> String {
     report.and_then(|report| report["settings"]["title"].as_str()).unwrap_or_default().to_owned()
 }
 
-/// The snapshot nearest to a time, or the last.
+/// The snapshot nearest to a time; without a time, the last snapshot.
 fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, PlotError> {
     let mut nearest: Option<Snapshot> = None;
     for path in snapshots.iter().rev() {
@@ -232,7 +234,7 @@ fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result
     nearest.ok_or(PlotError::NoSnapshots { directory: directory.to_owned() })
 }
 
-/// The pictures of numbers over time, with their names.
+/// The charts over time, with their names.
 fn charts(directory: &Path, report: Option<&Value>) -> Result<Vec<(&'static str, String)>, PlotError> {
     let history = Columns::read(directory.join("history.csv"))?;
     let run = run_of(report);
@@ -276,7 +278,8 @@ fn column(history: &Columns, column: &str, label: &str, color: palette::Color) -
     Ok(Line { label: label.to_owned(), color, points: history.pairs("time", column)? })
 }
 
-/// Energies, and their balance where there is inertia: loads of load steps are there at once, and a balance says nothing of their work.
+/// Panels of the energies, and of their balance if there is inertia. In load steps, loads act at once, and a balance says nothing of their
+/// work.
 fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
     let mut lines = vec![
         column(history, "strain", "strain", palette::VERMILLION)?,
@@ -301,7 +304,8 @@ fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
     Ok(vec![energies, Panel { caption, share: 2.0, ..balance }])
 }
 
-/// The momentum of a run with inertia; nothing if it is round-off of its scale, |p| ≤ √(2 M K) with the mass M and the largest kinetic energy K.
+/// The momentum of a run with inertia. `None` if it is round-off of its scale, |p| ≤ √(2 M K), with the mass M and the largest kinetic
+/// energy K.
 fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, PlotError> {
     if !moves(report) {
         return Ok(None);
@@ -319,22 +323,22 @@ fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, 
     Ok(Some(panel).filter(|panel| panel.size() > ROUND_OFF * (2.0 * mass * kinetic).sqrt()))
 }
 
-/// The quantity of a panel of probes or reactions; panels of one quantity have one scale.
+/// The quantity of a panel of probes or reactions. Panels of the same quantity have the same scale.
 fn quantity(report: Option<&Value>, table: &str, panel: &str) -> String {
     if table == "reactions" {
         return if panel.ends_with("_torque") { "torque" } else { "force" }.to_owned();
     }
     let probes = report.and_then(|report| report["settings"]["output"]["probes"].as_array());
     let probe = probes.into_iter().flatten().find(|probe| probe["name"] == panel);
-    // A probe that is not known has a scale of its own.
+    // An unknown probe has its own scale.
     probe.and_then(|probe| probe["field"].as_str()).unwrap_or(panel).to_owned()
 }
 
-/// Draws all snapshots of a run into the directory `frames`, which is made, as `frame_0000.png` and on: a movie for whatever
-/// encoder there is. All have the same axes and the same colours. Returns the files written.
+/// Draws all snapshots of a run as `frame_0000.png`, `frame_0001.png`, … in the directory `frames`, which is created. An encoder makes a
+/// movie of the frames. All frames have the same axes and the same range of colours. Returns the files written.
 ///
 /// # Errors
-/// There are no snapshots, one is damaged, or they do not hold the field of the look; the system refuses.
+/// There are no snapshots, or a snapshot is damaged. The snapshots do not hold the field of `look`. The operating system refuses.
 pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
     let snapshots = series::files(directory)?;
     let Some(recording) = Recording::read(&snapshots)? else {
@@ -363,7 +367,7 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
     Ok(written)
 }
 
-/// Whether bodies had inertia, as far as the report says.
+/// Whether bodies had inertia according to the report; `true` if the report does not say.
 fn moves(report: Option<&Value>) -> bool {
     let scheme = report.map(|report| Parameters::deserialize(&report["settings"]["time"]["inertia"]));
     scheme.and_then(Result::ok).is_none_or(|scheme| scheme.has_inertia())
@@ -398,7 +402,7 @@ mod tests {
         let momentum = |history: &Columns| momentum(history, Some(&report)).map(|panel| panel.is_some());
         let (round_off, real) = (table(-1e-15, 3e-16)?, table(1e-9, 1e-9)?);
         assert_eq!((momentum(&round_off)?, momentum(&real)?), (false, true));
-        // The balance is told in words.
+        // A balance of round-off is described in the caption.
         assert_eq!((energies(&round_off, true)?.len(), energies(&real, true)?.len()), (1, 2));
         assert!(energies(&round_off, true)?[0].caption.ends_with("at most 3e-16"));
         Ok(())

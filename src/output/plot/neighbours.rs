@@ -1,17 +1,17 @@
-//! The particles near a particle: how far they are, and the cell between them.
+//! Neighbours of a particle: their distance, and the Voronoi cell of the particle.
 
 use crate::output::vtu::{Background, Snapshot};
 use std::collections::{HashMap, HashSet};
 
-/// Corners of the polygon that a cell begins with.
+/// Corners of the initial polygon of a cell.
 const CORNERS: usize = 16;
 
-/// Particles by the cubes they lie in.
+/// Particles sorted into cubes.
 pub(super) struct Neighbours<'a> {
     snapshot: &'a Snapshot,
     /// Mean distance of neighbours.
     mean: f64,
-    /// Of a side of twice the mean distance.
+    /// Particles in each cube. The side of a cube is twice the mean distance.
     cubes: HashMap<[i64; 3], Vec<usize>>,
 }
 
@@ -21,10 +21,10 @@ fn cube(snapshot: &Snapshot, x: &[f64; 3], side: f64) -> [i64; 3] {
 }
 
 impl<'a> Neighbours<'a> {
-    /// Of those particles of a snapshot that are in `ids`.
+    /// Sorts the particles `ids` of a snapshot.
     pub(super) fn new(snapshot: &'a Snapshot, ids: &[usize]) -> Self {
         let Background { dimension, spacing, .. } = snapshot.background;
-        // The side of a particle's part of the cells that hold any.
+        // The occupied grid cells, divided among the particles, give the mean distance.
         let cells: HashSet<_> = snapshot.points.iter().map(|x| cube(snapshot, x, spacing)).collect();
         let part = cells.len() as f64 / ids.len().max(1) as f64;
         let mean = spacing * part.powf(1.0 / f64::from(dimension));
@@ -42,7 +42,8 @@ impl<'a> Neighbours<'a> {
         cubes.filter_map(|cube| self.cubes.get(&cube)).flatten().copied().filter(move |&q| q != p)
     }
 
-    /// How far the neighbours of `p` are, two along each axis as on a lattice; of one that is alone, what is the mean.
+    /// Mean distance of the nearest neighbours of `p`, two along each axis as on a lattice. A lone particle gets the mean over all
+    /// particles.
     pub(super) fn distance(&self, p: usize) -> f64 {
         let points = &self.snapshot.points;
         let square = |q: usize| (0..3).map(|k| (points[q][k] - points[p][k]).powi(2)).sum::<f64>();
@@ -53,19 +54,19 @@ impl<'a> Neighbours<'a> {
         if sum > 0.0 { sum / squares.len() as f64 } else { self.mean }
     }
 
-    /// The diameter of `p` in space: the distance of neighbours, but not the one that is larger at a surface.
+    /// Diameter of `p` in space: the distance of its neighbours, bounded because this distance is larger at a surface.
     pub(super) fn diameter(&self, p: usize) -> f64 {
         self.distance(p).min(1.1 * self.mean)
     }
 
-    /// How far neighbours are; where only few of many particles are shown, the mean for all of them.
+    /// Distance of neighbours for each of `ids`. If `ids` are a part of all particles, every particle gets the mean.
     pub(super) fn distances(&self, ids: &[usize]) -> Vec<f64> {
         let all = ids.len() == self.snapshot.points.len();
         ids.iter().map(|&p| if all { self.distance(p) } else { self.mean }).collect()
     }
 
-    /// In the plane, the points that are nearer to `p` than to any other particle: a polygon. At the surface of
-    /// a body, where a neighbour has no counterpart at the other side, the cell ends as far out as it does inwards.
+    /// Voronoi cell of `p` in the plane, a polygon. At the surface of a body, a neighbour may lack a counterpart on the other side. The
+    /// cell then ends as far out as it does inwards.
     pub(super) fn cell(&self, p: usize) -> Vec<[f64; 2]> {
         let points = &self.snapshot.points;
         let [x, y, _] = points[p];
@@ -73,14 +74,14 @@ impl<'a> Neighbours<'a> {
         let reach = self.mean.max(distance);
         let around: Vec<[f64; 2]> = self.around(p).map(|q| [points[q][0] - x, points[q][1] - y]).collect();
         let length = |v: &[f64; 2]| v[0].hypot(v[1]);
-        // Bisectors: of the neighbours, and of those that are missing where there is none less than 60° off the opposite direction.
+        // Bisectors with the neighbours, and with mirrored neighbours where none lies within 60° of the opposite direction.
         let mut towards: Vec<[f64; 2]> = around.iter().copied().filter(|v| length(v) < 2.0 * reach).collect();
         let missing = |v: &[f64; 2]| {
             let along = |other: &[f64; 2]| other[0] * v[0] + other[1] * v[1];
             around.iter().all(|other| along(other) <= 0.5 * length(other) * length(v))
         };
         let surface: Vec<[f64; 2]> = towards.iter().map(|v| v.map(|x| -x)).filter(missing).collect();
-        // The corners of a lattice's cells are 0.71 of a distance away.
+        // The corners of a cell in a square lattice are 0.71 distances away.
         let radius = if surface.is_empty() { reach } else { 0.8 * distance };
         towards.extend(surface);
         let corner = |k: usize| {
@@ -88,13 +89,13 @@ impl<'a> Neighbours<'a> {
             [x + radius * angle.cos(), y + radius * angle.sin()]
         };
         let whole: Vec<[f64; 2]> = (0..CORNERS).map(corner).collect();
-        // > 0 of points that are nearer to the neighbour.
+        // Positive at points that are nearer to the neighbour.
         let beyond = |[u, v]: [f64; 2]| move |at: &[f64; 2]| (at[0] - x - u / 2.0) * u + (at[1] - y - v / 2.0) * v;
         towards.into_iter().fold(whole, |polygon, v| cut(&polygon, beyond(v)))
     }
 }
 
-/// The part of a convex polygon where `beyond`, which is linear, is not positive.
+/// The part of a convex polygon where the linear function `beyond` is not positive.
 fn cut(polygon: &[[f64; 2]], beyond: impl Fn(&[f64; 2]) -> f64) -> Vec<[f64; 2]> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (k, from) in polygon.iter().enumerate() {

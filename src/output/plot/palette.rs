@@ -20,9 +20,9 @@ pub(super) const VERMILLION: Color = Color(213, 94, 0);
 pub(super) const GREEN: Color = Color(0, 158, 115);
 pub(super) const PURPLE: Color = Color(204, 121, 167);
 
-/// Frames and what is beside them; lines of a grid.
+/// Frames, ticks and secondary text.
 pub(super) const GREY: Color = Color(70, 70, 70);
-/// See [`GREY`].
+/// Grid lines.
 pub(super) const LIGHT: Color = Color(222, 222, 222);
 
 /// Viridis (Smith, van der Walt; CC0), every eighth of its range.
@@ -38,7 +38,7 @@ pub(super) const VIRIDIS: [[f64; 3]; 9] = [
     [253.0, 231.0, 37.0],
 ];
 
-/// The colour of `x` in [0, 1]; a value outside gets the colour of the end, NaN that of 0.
+/// The colour of `x` in [0, 1]. A value outside gets the colour of the nearest end, NaN the colour of 0.
 pub(super) fn viridis(x: f64) -> Color {
     let last = VIRIDIS.len() - 1;
     let place = if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) * last as f64 };

@@ -9,27 +9,28 @@ use super::svg::{Anchor, Point, Svg, width};
 use super::view::{Directions, dot};
 use crate::output::vtu::Snapshot;
 
-/// The largest width and height of the drawing, and the least of both.
+/// Largest width and height of the drawing, and the smallest value of both.
 const MOST: (f64, f64, f64) = (760.0, 620.0, 160.0);
 
-/// Grid lines beyond so many along an axis would be a grey area.
+/// Largest number of grid lines along an axis. More grid lines would be a grey area.
 const MAX_LINES: f64 = 100.0;
 
-/// More particles than this are drawn in part, evenly thinned; more than the other number as discs, not as cells.
+/// Largest number of particles that are drawn, and largest number drawn as cells. Beyond the first number an even sample is drawn, beyond
+/// the second number discs are drawn.
 const MAX_DRAWN: (usize, usize) = (50_000, 20_000);
 
-/// The radius of a disc over the distance of neighbours: it has the area of a lattice's square.
+/// Radius of a disc over the distance of neighbours. The disc has the area of a square of the lattice.
 const RADIUS: f64 = 0.56;
 
-/// The common part of all pictures of a run.
+/// Settings that all pictures of a run have in common.
 pub(super) struct Scene {
-    /// From where it is seen.
+    /// Direction of sight.
     pub directions: Directions,
     /// Lower and upper corner of the box around all particles at all times.
     pub bounds: [[f64; 3]; 2],
     /// The range of the colours.
     pub span: (f64, f64),
-    /// The run.
+    /// Title of the run.
     pub run: String,
 }
 
@@ -78,7 +79,7 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     svg.finish()
 }
 
-/// Makes a range at least so wide that it fills the least size of a drawing; its length in the picture.
+/// Widens a range to the smallest size of a drawing. Returns its length in the picture.
 fn widened(range: &mut (f64, f64), scale: f64) -> f64 {
     let length = (range.1 - range.0) * scale;
     let air = 0.5 * (MOST.2 - length).max(0.0) / scale;
@@ -87,12 +88,12 @@ fn widened(range: &mut (f64, f64), scale: f64) -> f64 {
 }
 
 impl Scene {
-    /// Corners of the box.
+    /// A corner of the box, numbered from 0 to 7.
     fn corner(&self, number: usize) -> [f64; 3] {
         std::array::from_fn(|k| self.bounds[number >> k & 1][k])
     }
 
-    /// The extent of the picture to the right and up: the box and a cell around it, but in a plane nothing beyond the grid.
+    /// Horizontal and vertical extent of the picture: the box and one cell around it. In a plane, the extent ends at the grid.
     fn window(&self, snapshot: &Snapshot) -> ((f64, f64), (f64, f64)) {
         let grid = &snapshot.background;
         let corners = (0..8).map(|number| self.directions.project(&self.corner(number)));
@@ -102,7 +103,7 @@ impl Scene {
             y = (y.0.min(up), y.1.max(up));
         }
         let plane = self.directions.plane();
-        // Discs at a wall reach beyond it.
+        // Discs at a wall reach beyond the grid.
         let beyond = if grid.dimension == 3 { 0.5 * grid.spacing } else { 0.0 };
         let wider = |(low, high): (f64, f64), place: usize| {
             let around = (low - grid.spacing, high + grid.spacing);
@@ -115,7 +116,7 @@ impl Scene {
     }
 }
 
-/// The lines of the grid, as long as they are no grey area.
+/// Draws the grid lines, unless they would be a grey area.
 fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scale: f64) {
     let (spacing, origin) = (snapshot.background.spacing, snapshot.background.origin);
     if axes.size.0.max(axes.size.1) / (spacing * scale) > MAX_LINES {
@@ -135,7 +136,7 @@ fn grid(svg: &mut Svg, snapshot: &Snapshot, axes: &Axes, plane: [usize; 2], scal
     }
 }
 
-/// The edges of the box behind the particles, and the coordinates along one edge of each axis, at the outline.
+/// Draws the edges of the box behind the particles, and labels along one edge of each axis at the outline.
 fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
     let place = |number: usize| axes.place(scene.directions.project(&scene.corner(number)));
     let nearest = (0..8).max_by(|&a, &b| {
@@ -149,7 +150,7 @@ fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
         for start in starts().filter(|&start| Some(start) != nearest && Some(end(start)) != nearest) {
             svg.line([place(start), place(end(start))], LIGHT, 1.0);
         }
-        // The lowest of the edges that run level, the one at the left of those that run up.
+        // The lowest of the edges that run horizontally, the leftmost of the edges that run vertically.
         let run = |start: usize| (place(end(start)).0 - place(start).0, place(end(start)).1 - place(start).1);
         let left = run(0).1.abs() > run(0).0.abs();
         let outward = |start: &usize| {
@@ -170,7 +171,7 @@ fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
             Beside { point, left, far: 5.0, color: GREY, text: ticks.label(x) }
         }));
     }
-    // Where edges meet, a number would cover another: it is left out.
+    // Where edges meet, labels may overlap. A label that would cover another label is left out.
     let mut drawn: Vec<Beside> = Vec::new();
     for text in names.into_iter().chain(numbers) {
         if drawn.iter().all(|other| !text.covers(other)) {
@@ -180,7 +181,7 @@ fn edges(svg: &mut Svg, scene: &Scene, axes: &Axes) {
     }
 }
 
-/// A text below a point, or at its left, so far away.
+/// A text below a point, or at its left, at the distance `far`.
 struct Beside {
     point: Point,
     left: bool,
@@ -190,7 +191,7 @@ struct Beside {
 }
 
 impl Beside {
-    /// Left and right end, upper and lower end; letters and the space between lines.
+    /// Left, right, upper and lower end of the text, with the space between lines.
     fn extent(&self) -> [f64; 4] {
         let ((x, y), wide) = (self.point, width(&self.text, LABEL));
         match self.left {
@@ -213,7 +214,7 @@ impl Beside {
     }
 }
 
-/// The particles: cells in the plane, discs in space, the nearest to the eye last.
+/// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
 fn bodies(
     svg: &mut Svg,
     snapshot: &Snapshot,
@@ -242,7 +243,7 @@ fn bodies(
     }
 }
 
-/// The bar that explains the colours, at the right of the drawing.
+/// Draws the colour bar at the right of the drawing.
 fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks, label: &str) {
     const STEPS: usize = 128;
     let (left, top, tall) = (axes.corner.0 + axes.size.0 + 24.0, axes.corner.1, axes.size.1);
@@ -260,12 +261,12 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
     }
     let at = (left + 25.0 + ticks.width() + 20.0, top + tall / 2.0);
     let name = ticks.name(label);
-    // Of a bar that is shorter than its name, the heading says the name.
+    // A name longer than the bar is left out, because the heading has it.
     let name = if width(&name, LABEL) > tall { ticks.name("") } else { name };
     svg.text(at, Anchor::Upright, LABEL, BLACK, &name);
 }
 
-/// In one dimension: the field over x.
+/// The picture in one dimension: the field over x.
 fn over_x(
     snapshot: &Snapshot,
     scene: &Scene,
@@ -301,7 +302,8 @@ mod tests {
     use crate::output::plot::view::View;
     use crate::output::vtu::{Array, Background, Values};
 
-    /// A lattice of particles in a grid of 4 cells along each axis, from a coordinate on, with a stress that grows with their number.
+    /// A lattice of particles in a grid of 4 cells along each axis, with the origin `from` on each axis. The stress grows with the number
+    /// of the particle.
     fn lattice(dimension: u32, from: f64) -> Snapshot {
         let count = 4_usize.pow(dimension);
         let place = |p: usize| {
@@ -352,7 +354,7 @@ mod tests {
     fn a_body_in_the_plane_is_filled_with_cells_and_one_in_space_with_discs() -> Result<(), PlotError> {
         let count = |svg: &str, kind: &str| svg.matches(kind).count();
         let (plane, space) = (picture(&lattice(2, 0.0), None)?, picture(&lattice(3, 0.0), None)?);
-        // And the pieces of the colour bar.
+        // The colour bar has 128 polygons.
         assert_eq!((count(&plane, "<polygon"), count(&plane, "<circle")), (16 + 128, 0));
         assert_eq!((count(&space, "<polygon"), count(&space, "<circle")), (128, 64));
         Ok(())

@@ -1,4 +1,4 @@
-//! The snapshots of a run for `player.js`, which shows them on the page: one block of 16-bit numbers, and where what begins in it.
+//! The snapshots of a run for `player.js`: one block of 16-bit numbers, and JSON with the place of every channel in the block.
 
 use super::PlotError;
 use super::colouring::words;
@@ -11,49 +11,49 @@ use base64::prelude::BASE64_STANDARD;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// The most numbers on a page: 20 MB, and 27 MB as base64.
+/// Largest number of values on a page: 20 MB, and 27 MB as base64.
 const MOST: usize = 10_000_000;
 
-/// Of runs that have more numbers, at most so many snapshots are shown, and the particles are sampled.
+/// Largest number of snapshots that are shown of a run with more than [`MOST`] values. The particles of the run are then sampled.
 const MOST_SNAPSHOTS: usize = 100;
 
-/// What stands for a number that is none, above the 65535 steps between the least and the largest.
+/// Code of a value that is not finite. Finite values have the codes 0 to 65534.
 const NONE: u16 = u16::MAX;
 
-/// The axes, as they name components.
+/// Axis names of components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// What a page needs to show a run.
+/// The data of a page for the player.
 pub(super) struct Played {
-    /// What the numbers are, as JSON that ends no element of a page.
+    /// Description of the numbers as JSON, which contains no `<` and so ends no element of the page.
     pub meta: String,
     /// The numbers, in base64.
     pub numbers: String,
-    /// What is left out.
+    /// A note on data left out.
     pub note: Option<String>,
 }
 
-/// Channels of the first snapshot alone: positions, and distances of neighbours.
+/// Number of channels of the first snapshot alone: positions, and distances of neighbours.
 const RESTING: usize = 4;
 
-/// One number of every particle that is shown, at one time or at all.
+/// One number per shown particle, in the first snapshot or in all snapshots.
 struct Channel {
     field: String,
     /// Empty for a scalar.
     component: String,
-    /// Snapshot after snapshot.
+    /// Values, snapshot by snapshot.
     values: Vec<f64>,
 }
 
 impl Channel {
-    /// The least and the largest number; 0 where there is none.
+    /// Smallest and largest finite value; 0 if there is none.
     fn range(&self) -> (f64, f64) {
         let finite = self.values.iter().filter(|x| x.is_finite());
         let range = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 
-    /// Whether one number says it all.
+    /// Whether all values are finite and equal.
     fn is_constant(&self) -> bool {
         let (low, high) = self.range();
         low == high && self.values.iter().all(|x| x.is_finite())
@@ -64,14 +64,14 @@ impl Channel {
 pub(super) struct Recording {
     background: Background,
     times: Vec<f64>,
-    /// Snapshots and particles there are.
+    /// Number of all snapshots, and of all particles.
     snapshots: usize,
     particles: usize,
-    /// Particles shown.
+    /// Number of shown particles.
     shown: usize,
     /// Lower and upper corner of a box around all particles in these snapshots.
     bounds: [[f64; 3]; 2],
-    /// Positions in the first snapshot, the distances of neighbours there, displacements since, then what was written.
+    /// Positions and distances of neighbours in the first snapshot, displacements since then, and the written fields.
     channels: Vec<Channel>,
 }
 
@@ -136,16 +136,16 @@ impl Recording {
     /// Lower and upper corner of a box around all particles at all times.
     pub(super) fn bounds(&self) -> [[f64; 3]; 2] {
         let [low, high] = self.bounds;
-        // There may be no particle with a place.
+        // Possibly no particle has a finite position.
         if low[0] <= high[0] { [low, high] } else { [self.background.origin; 2] }
     }
 
-    /// For `player.js`, with the axes of the picture.
+    /// The data for `player.js`, with the axes of the picture.
     pub(super) fn page(&self, [right, up]: [usize; 2]) -> Played {
         let (mut numbers, mut list): (Vec<u8>, Vec<Value>) = (Vec::new(), Vec::new());
         for channel in &self.channels {
             let (low, high) = channel.range();
-            // In units of 2: where the numbers of the channel begin.
+            // Start of the channel, counted in 16-bit numbers.
             let start = (!channel.is_constant()).then_some(numbers.len() / 2);
             if start.is_some() {
                 numbers.extend(channel.values.iter().flat_map(|&x| quantized(x, low, high).to_le_bytes()));
@@ -166,7 +166,7 @@ impl Recording {
         }
     }
 
-    /// What is left out, so that the page stays small.
+    /// A note on data left out to keep the page small.
     fn note(&self) -> Option<String> {
         let part = |shown: usize, of: usize, what: &str| (shown < of).then(|| format!("{shown} of {of} {what}"));
         let parts =
@@ -177,7 +177,7 @@ impl Recording {
     }
 }
 
-/// Displacements are had from the positions.
+/// Whether the player needs the array. Displacements follow from the positions.
 fn is_coloured(array: &Array) -> bool {
     array.name != "displacement"
 }
@@ -190,7 +190,7 @@ fn number(array: &Array, place: usize) -> f64 {
     found.unwrap_or(f64::NAN)
 }
 
-/// The channels of a run that begins with `first`; positions are there, all others empty.
+/// The channels of a run that begins with `first`. Positions and distances are filled, other channels are empty.
 fn channels(first: &Snapshot, ids: &[usize]) -> Vec<Channel> {
     let channel =
         |field: &str, component: &str, values| Channel { field: words(field), component: component.to_owned(), values };
@@ -204,15 +204,15 @@ fn channels(first: &Snapshot, ids: &[usize]) -> Vec<Channel> {
     rest.chain([distances]).chain(displacement).chain(written).collect()
 }
 
-/// About `most` of `count` ids, evenly whatever the order they were made in (Knuth's multiplicative hash: multiples of the golden
-/// ratio modulo 1); all if there are not more.
+/// About `most` of `count` ids; all ids if there are not more. Knuth's multiplicative hash (multiples of the golden ratio modulo 1) samples
+/// evenly, whatever the order of the particles.
 fn sample(count: usize, most: usize) -> Vec<usize> {
     let part = most as f64 / count.max(1) as f64;
     let kept = |id: &usize| f64::from((*id as u32).wrapping_mul(2_654_435_769)) < part * 2_f64.powi(32);
     (0..count).filter(|id| part >= 1.0 || kept(id)).collect()
 }
 
-/// `x` in steps of (high − low)/65534.
+/// `x` in steps of (high − low)/65534, or [`NONE`] if `x` is not finite.
 fn quantized(x: f64, low: f64, high: f64) -> u16 {
     if x.is_finite() { ((x - low) / (high - low) * f64::from(NONE - 1)).round() as u16 } else { NONE }
 }
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(sample(5, 7), [0, 1, 2, 3, 4]);
         let ids = sample(100_000, 15_384);
         assert!(ids.len().abs_diff(15_384) < 20, "{}", ids.len());
-        // of rows of any length, every part is taken evenly: no stripes
+        // rows of any length are sampled evenly: no stripes
         for row in [7, 13, 40, 64] {
             let mut columns = vec![0; row];
             ids.iter().for_each(|id| columns[id % row] += 1);

@@ -9,7 +9,7 @@ const SCALE: f32 = 2.0;
 /// The family of the embedded font.
 const FAMILY: &str = "DejaVu Sans";
 
-/// Renders an SVG on white, two pixels to its unit; `name` is for the error.
+/// Renders an SVG on white, at two pixels per unit. `name` names the picture in an error.
 ///
 /// ```
 /// use bfree::output::plot::png::from_svg;
@@ -21,7 +21,7 @@ const FAMILY: &str = "DejaVu Sans";
 /// ```
 ///
 /// # Errors
-/// An SVG that cannot be read or drawn.
+/// The SVG cannot be read or drawn.
 pub fn from_svg(name: &'static str, svg: &str) -> Result<Vec<u8>, PlotError> {
     let fail = |reason: String| PlotError::Draw { name, reason };
     let tree = tree(name, svg)?;
@@ -42,7 +42,7 @@ fn tree(name: &'static str, svg: &str) -> Result<usvg::Tree, PlotError> {
     usvg::Tree::from_str(svg, &options).map_err(|error| PlotError::Draw { name, reason: error.to_string() })
 }
 
-/// Where a text is drawn.
+/// Extent of a text.
 #[cfg(test)]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
@@ -54,7 +54,7 @@ pub(super) struct Extent {
 
 #[cfg(test)]
 impl Extent {
-    /// Whether two texts have a part of the picture in common.
+    /// Whether two texts overlap.
     pub(super) fn covers(&self, other: &Self) -> bool {
         self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
     }

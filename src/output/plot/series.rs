@@ -1,11 +1,11 @@
-//! The snapshots that a run has written, and from where its motion is seen.
+//! The snapshots of a run, and the default plane of its pictures.
 
 use super::PlotError;
 use crate::output::snapshots::SERIES;
 use crate::output::vtu::ReadError;
 use std::path::{Path, PathBuf};
 
-/// The files of the series that are there, in the order of time; none if there is no series.
+/// The existing files of the series, in order of time; empty if there is no series.
 pub(super) fn files(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     let path = directory.join(SERIES);
     match std::fs::read_to_string(&path) {
@@ -22,15 +22,15 @@ pub(super) fn files(directory: &Path) -> Result<Vec<PathBuf>, PlotError> {
     }
 }
 
-/// A file that is not what the run wrote.
+/// The error for a damaged file.
 pub(super) fn damaged(path: &Path, what: &str) -> PlotError {
     ReadError::Format { path: path.to_owned(), what: what.to_owned() }.into()
 }
 
-/// The axes of a picture, to the right and up, of bodies whose largest displacements along the axes are `motion`.
+/// Horizontal and vertical axis of a picture. `motion` holds the largest displacements along the axes.
 ///
-/// It is looked along the axis with the least motion: a ball that falls along y is not drawn on the x–z plane. Of axes with the same
-/// least motion, up to a tenth, along the last.
+/// The direction of sight is the axis with the least motion: a ball that falls along y is not drawn on the x–z plane. If several axes have
+/// the least motion, up to a tenth, the last of them is taken.
 pub(super) fn view(dimension: u32, motion: [f64; 3]) -> [usize; 2] {
     if dimension < 3 {
         return [0, 1];

@@ -8,24 +8,24 @@ use std::fmt::Write as _;
 /// A point of a picture: to the right and down from its upper left corner.
 pub(super) type Point = (f64, f64);
 
-/// Where a text has its point.
+/// The part of a text that lies at its point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
     Start,
     Middle,
     End,
-    /// In the middle, and the text runs upwards.
+    /// The middle; the text runs upwards.
     Upright,
 }
 
-/// A picture that grows.
+/// A picture under construction.
 pub(super) struct Svg {
     size: Point,
     body: String,
 }
 
 impl Svg {
-    /// A white picture, so wide and so high.
+    /// An empty white picture.
     pub(super) fn new(width: f64, height: f64) -> Self {
         Self { size: (width, height), body: String::new() }
     }
@@ -38,7 +38,7 @@ impl Svg {
         ));
     }
 
-    /// A polygon, filled; its rim has the same colour, so that neighbours leave no seam.
+    /// A filled polygon. Its rim has the same colour, so that neighbours leave no seam.
     pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: Color) {
         let points = listed(points);
         self.push(format_args!(
@@ -46,14 +46,14 @@ impl Svg {
         ));
     }
 
-    /// A disc, and its rim.
+    /// A disc with a rim.
     pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: Color, rim: Color) {
         self.push(format_args!(
             "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{color}\" stroke=\"{rim}\" stroke-width=\"0.4\"/>"
         ));
     }
 
-    /// A text of letters `size` high. A point is on its base line.
+    /// A text with the font size `size`. The point lies on the base line.
     pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: Color, text: &str) {
         let (place, turned) = match anchor {
             Anchor::Start => ("start", String::new()),
@@ -72,7 +72,7 @@ impl Svg {
         let _ = writeln!(self.body, "{element}");
     }
 
-    /// The file.
+    /// The content of the SVG file.
     pub(super) fn finish(self) -> String {
         let ((width, height), body) = (self.size, self.body);
         format!(
@@ -91,13 +91,13 @@ fn listed(points: impl IntoIterator<Item = Point>) -> String {
     list
 }
 
-/// A text in XML; control characters, which XML does not know, are left out.
+/// A text escaped for XML, without control characters, which XML forbids.
 fn escaped(text: &str) -> String {
     let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Width of a text of letters `size` high, in the font of the pictures.
+/// Width of a text with the font size `size`, in the font of the pictures.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     let Ok(font) = FontRef::new(dejavu::sans::regular()) else { return size * text.chars().count() as f64 };
     let metrics = font.glyph_metrics(Size::new(size as f32), LocationRef::default());
@@ -107,7 +107,7 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|letter| width(letter).map_or(size, f64::from)).sum()
 }
 
-/// The longest beginning of a text that is at most `most` wide.
+/// A text cut to the width `most`, with an ellipsis if it is cut.
 pub(super) fn shortened(text: &str, size: f64, most: f64) -> String {
     if width(text, size) <= most {
         return text.to_owned();

@@ -7,18 +7,18 @@ use std::path::PathBuf;
 pub(super) struct Columns {
     path: PathBuf,
     names: Vec<String>,
-    /// Row after row.
+    /// Cells, row by row.
     cells: Vec<f64>,
 }
 
 impl Columns {
-    /// Reads a table. A last line that breaks off, as a killed run may leave it, is dropped.
+    /// Reads a table. An incomplete last line, as a killed run may leave it, is dropped.
     pub(super) fn read(path: PathBuf) -> Result<Self, PlotError> {
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
             Err(source) => return Err(PlotError::Read { path, source }),
         };
-        // Behind the last line break stands nothing, or a line that breaks off.
+        // After the last line break there is nothing, or an incomplete line.
         let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
         let mut lines = whole.lines();
         let names: Vec<String> = names(lines.next().unwrap_or_default());
@@ -56,14 +56,14 @@ impl Columns {
     }
 }
 
-/// The cells of a header, of which some may stand in quotes (RFC 4180).
+/// The cells of a header. Some cells may stand in quotes (RFC 4180).
 fn names(header: &str) -> Vec<String> {
     let mut names = vec![String::new()];
     let mut quoted = false;
     let mut letters = header.chars().peekable();
     while let Some(letter) = letters.next() {
         match letter {
-            // Two quotes within quotes are one of the name.
+            // Two quotes in a quoted name mean one quote.
             '"' if quoted && letters.next_if_eq(&'"').is_some() => {
                 names.last_mut().into_iter().for_each(|name| name.push('"'))
             }

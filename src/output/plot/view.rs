@@ -1,9 +1,9 @@
-//! From where particles are seen.
+//! Direction of sight.
 
 use std::str::FromStr;
 
-/// A direction of sight. Written `xy`, `30,20` or `xz,30,20`: the plane of the picture, then the angles in degrees by which the eye moves
-/// from the front of this plane to the right and up.
+/// A direction of sight, written `xy`, `30,20` or `xz,30,20`: the plane of the picture, then two angles in degrees. The eye moves by these
+/// angles from the front of the plane to the right and up.
 ///
 /// ```
 /// use bfree::output::plot::View;
@@ -15,11 +15,11 @@ use std::str::FromStr;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Axes to the right and up; without them, the plane of the largest motion.
+    /// Horizontal and vertical axis of the plane; `None` for the plane of the largest motion.
     pub plane: Option<[usize; 2]>,
-    /// Degrees to the right.
+    /// Angle of the eye to the right, in degrees.
     pub azimuth: f64,
-    /// Degrees up.
+    /// Angle of the eye upwards, in degrees.
     pub elevation: f64,
 }
 
@@ -54,8 +54,8 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Those of a view of a body in so many dimensions, whose motion is best seen on the plane `moves`. Without a view, the eye in three
-    /// dimensions is in front, to the right and above.
+    /// The directions of a view of a body in `dimension` dimensions. Without a plane in the view, the plane is `moves`, on which the motion
+    /// is best seen. Without a view, the eye in three dimensions is in front, to the right and above.
     pub(super) fn new(view: Option<View>, dimension: u32, moves: [usize; 2]) -> Self {
         let standard = if dimension == 3 { (30.0, 20.0) } else { (0.0, 0.0) };
         let view = view.unwrap_or(View { plane: None, azimuth: standard.0, elevation: standard.1 });
@@ -67,12 +67,12 @@ impl Directions {
         Self { right: sum(ca, right, -sa, toward), up: sum(ce, up, -se, level), toward: sum(ce, level, se, up) }
     }
 
-    /// Where a point lies in the picture.
+    /// Position of a point in the picture.
     pub(super) fn project(&self, x: &[f64; 3]) -> (f64, f64) {
         (dot(&self.right, x), dot(&self.up, x))
     }
 
-    /// The names of the axes to the right and up, if the picture lies in a plane of two axes.
+    /// Numbers of the axes to the right and up, if the picture lies in a plane of two axes.
     pub(super) fn plane(&self) -> Option<[usize; 2]> {
         let axis = |direction: &[f64; 3]| direction.iter().position(|x| (x - 1.0).abs() < 1e-12);
         Some([axis(&self.right)?, axis(&self.up)?])

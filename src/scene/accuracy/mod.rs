@@ -1,6 +1,7 @@
-//! Speed against accuracy in one key: what a scene leaves open is set from a measured table.
+//! One key for speed against accuracy: a measured table sets the keys that a scene does not give.
 //!
-//! What is set is laid under the JSON of a scene before it becomes a [`Scene`](super::Scene): every key that the scene gives stays as it is.
+//! The values are inserted into the JSON of a scene before it becomes a [`Scene`](super::Scene). Every key that the scene gives stays
+//! unchanged.
 
 mod spacing;
 mod table;
@@ -16,23 +17,23 @@ use serde_json::{Value, json};
 use spacing::Unknown;
 use std::fmt::{self, Display};
 
-/// How accurate the results should be.
+/// The wanted accuracy of the results.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Accuracy {
-    /// To see whether a scene does what it is meant to.
+    /// For a first look at whether a scene does what it should.
     Draft,
     /// For everyday work.
     Standard,
-    /// To compare others with.
+    /// For reference results, with which other results are compared.
     Reference,
-    /// An error to aim for, relative to the size of the displacement, 0.0014 to 0.035. Smooth problems of the size of a body have
-    /// met it; jumps and contact do not.
+    /// A target error, relative to the size of the displacement, 0.0014 to 0.035. Smooth problems whose length scale is the size of a body
+    /// have met the target; jumps and contact do not.
     Error(#[schemars(range(min = 0.0014, max = 0.035))] f64),
 }
 
 impl Accuracy {
-    /// The knobs that it stands for; `None` for an error outside the table.
+    /// The row of the table for this accuracy; `None` for an error outside the table.
     ///
     /// ```
     /// use bfree::scene::accuracy::{Accuracy, levels};
@@ -55,7 +56,7 @@ impl Accuracy {
     }
 }
 
-/// As a scene writes it.
+/// The accuracy as a scene writes it.
 impl Display for Accuracy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -67,12 +68,12 @@ impl Display for Accuracy {
     }
 }
 
-/// A key that the accuracy has set.
+/// A key set by `accuracy`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chosen {
     /// The key, such as `grid.spacing`.
     pub key: String,
-    /// Its value.
+    /// The value of the key.
     pub value: Value,
 }
 
@@ -82,20 +83,20 @@ impl Display for Chosen {
     }
 }
 
-/// Keys that are left alone in a scene without inertia: those that speak of it, which the scene refuses, and the shape functions, for nodes
-/// of LME beside free faces are held by next to nothing but inertia.
+/// Keys that stay unchanged in a scene without inertia. The scene refuses `transfer` and keys of inertia in `time`. The shape functions
+/// stay because almost nothing but inertia holds the nodes of LME beside free faces.
 const NEED_INERTIA: [&str; 3] = ["time.", "transfer", "approximation"];
 
-/// Cells that the fastest wave of pressure crosses in a time; `None` if there is none.
+/// The number of cells that the fastest pressure wave crosses in `time`; `None` if no wave speed is known.
 pub(super) fn courant(bodies: &[Body], spacing: f64, time: f64) -> Option<f64> {
     Some(spacing::speed(bodies).ok()? * time / spacing)
 }
 
-/// Lays what the key `accuracy` sets under a scene. A scene that is not of the types of a scene is left as it is: whoever reads it
-/// says why.
+/// Inserts the keys set by `accuracy` into a scene. JSON without the types of a scene stays unchanged: reading it as a scene gives the
+/// error.
 ///
 /// # Errors
-/// The error is not in the table, or a length or a speed that the scene does not tell is needed.
+/// The target error is outside the table, or a needed length or speed is not in the scene.
 pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     let Some(accuracy) = part::<Accuracy>(&scene["accuracy"]) else { return Ok(Vec::new()) };
     let level = accuracy.level().ok_or_else(|| outside(accuracy))?;
@@ -128,13 +129,13 @@ pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
         }
         let speed = spacing::speed(&bodies).map_err(|why| needed("time.step", accuracy, &why))?;
         let longest = level.courant * spacing / speed;
-        // A whole number of steps to the end.
+        // The end is reached in a whole number of steps.
         under.set("time.step", (end / (end / longest).ceil().max(1.0)).into());
     }
     Ok(under.chosen)
 }
 
-/// A part of a scene, if it is of its type.
+/// A part of a scene; `None` if it does not have the type `T`.
 fn part<T: for<'de> Deserialize<'de>>(value: &Value) -> Option<T> {
     T::deserialize(value).ok()
 }
@@ -153,19 +154,19 @@ fn needed(key: &str, accuracy: Accuracy, why: &Unknown) -> Problems {
     problems
 }
 
-/// A scene, and what was laid under it.
+/// A scene, and the keys inserted into it.
 struct Under<'a> {
     scene: &'a mut Value,
     chosen: Vec<Chosen>,
 }
 
 impl Under<'_> {
-    /// Whether the section is there, or may be, and the key is not.
+    /// Whether the section is present as an object without the key.
     fn lacks(&self, section: &str, key: &str) -> bool {
         self.scene.get(section).is_some_and(|section| section.is_object() && section.get(key).is_none())
     }
 
-    /// Sets a key, `a.b.c`, that is not given, nor any section that it lies in as something else than an object.
+    /// Sets the key `a.b.c` if it is not given. Absent sections are created. A section that is neither object nor list stays unchanged.
     fn set(&mut self, key: &str, value: Value) {
         let mut here = &mut *self.scene;
         let mut steps = key.split('.').peekable();

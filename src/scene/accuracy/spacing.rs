@@ -7,16 +7,16 @@ use crate::scene::grid::GridBox;
 use crate::scene::shape::Shape;
 use crate::tensor::Vector;
 
-/// How far a place may be from a node, in spacings.
+/// Distance, in spacings, within which a face counts as on a node.
 const ON_NODE: f64 = 1e-6;
 
-/// Cells tried along the shortest edge of the box, over the fewest: a spacing is at most so much finer than asked for.
+/// Largest factor by which the number of cells along the shortest edge may exceed the required number.
 const FINER: usize = 2;
 
-/// Cells along the shortest edge of the box, at most.
+/// Maximum number of cells along the shortest edge of the box.
 const MOST_CELLS: f64 = 1e5;
 
-/// Why a spacing or a time step cannot be chosen.
+/// Reasons why a spacing or a time step cannot be chosen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(super) enum Unknown {
     /// A body from a file.
@@ -25,13 +25,13 @@ pub(super) enum Unknown {
     /// Edges without a common divisor.
     #[error("no spacing between {finest:.4e} and {coarsest:.4e} divides every edge of the grid")]
     NoDivisor { finest: f64, coarsest: f64 },
-    /// A box without an extent, or with more cells than any.
+    /// A box without an extent, or with too many cells.
     #[error("the box of the grid has no extent, or too many cells")]
     NoBox,
     /// A body without an extent.
     #[error("the body {0:?} has no extent inside the grid")]
     NoExtent(String),
-    /// Nothing to be as fine as.
+    /// A scene without a body.
     #[error("there is no body")]
     NoBody,
     /// A law without a speed of sound.
@@ -42,8 +42,8 @@ pub(super) enum Unknown {
     NoInertia,
 }
 
-/// The largest spacing that puts at least `cells` cells across the least extent of every body, divides all edges of the box, and puts
-/// nodes on the faces of boxes, if a spacing up to twice as fine can.
+/// The largest spacing that divides all edges of the box and puts at least `cells` cells across the smallest extent of every body. If a
+/// spacing up to twice as fine also puts nodes on the faces of all bodies that are boxes, that one is taken.
 pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, Unknown> {
     match grid.dimension() {
         1 => fitting_in::<1>(grid, bodies, cells),
@@ -60,7 +60,7 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
         return Err(Unknown::NoBox);
     }
     let mut extent = f64::INFINITY;
-    // Faces of boxes, as distances from the lower corner of the grid.
+    // Faces of bodies that are boxes, as distances from the lower corner of the grid.
     let mut faces: Vec<f64> = Vec::new();
     for body in bodies {
         let shape = body.shape.as_ref().ok_or_else(|| Unknown::Extent(body.name.clone()))?;
@@ -96,7 +96,7 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
     found.ok_or(Unknown::NoDivisor { finest: coarsest / FINER as f64, coarsest })
 }
 
-/// The greatest speed of pressure waves at rest, c = √(M/ρ), M = Λ + 2G in isotropic solids.
+/// The greatest speed of pressure waves in the undeformed bodies, c = √(M/ρ), M = Λ + 2G in isotropic solids.
 pub(super) fn speed(bodies: &[Body]) -> Result<f64, Unknown> {
     let mut greatest: f64 = 0.0;
     for body in bodies {

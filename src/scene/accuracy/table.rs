@@ -1,18 +1,18 @@
-//! The measured table. `cargo verify tradeoff --effort full` measures it anew, and fails where an error is not met.
+//! The measured table. `cargo verify tradeoff --effort full` measures the table anew, and fails if an error is exceeded.
 
 use serde_json::{Value, json};
 
-/// A row of the table: knobs, and the error that smooth problems have with them.
+/// A row of the table: settings, and the error of smooth problems with these settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
-    /// Its word, if it has one.
+    /// The word for the row in a scene, if there is one.
     pub name: Option<&'static str>,
-    /// The error of the displacement, relative to its size: the largest of the study's smooth problems, rounded up; with more than 12
-    /// cells, of those in two dimensions. Infinite where none is promised.
+    /// The error of the displacement, relative to its size: the largest of the study's smooth problems, rounded up. Beyond 12 cells, only
+    /// problems in two dimensions count. Infinite where no error is promised.
     pub error: f64,
-    /// Cells across the least extent of the smallest body.
+    /// Cells across the smallest extent of the smallest body.
     pub cells: f64,
-    /// c Δt/h with the greatest speed of sound c.
+    /// The Courant number c Δt/h, with the greatest speed of sound c.
     pub courant: f64,
     /// Particles per cell along each axis.
     pub particles_per_cell: u32,
@@ -20,12 +20,12 @@ pub struct Level {
     pub gamma: Option<f64>,
     /// ε of the mass matrix; `None` leaves the scene's default.
     pub lumping: Option<f64>,
-    /// Where Newton's method stops.
+    /// The relative tolerance of Newton's method.
     pub tolerance: f64,
 }
 
-/// As coarse as the coarsest templates of `bfree new`, with steps at least as long, and no linear system beside Newton's: implicit
-/// steps need not resolve waves to show a motion. It is there to be fast; no error is promised.
+/// A fast row without a promised error. The grid is as coarse as the coarsest templates of `bfree new`, and steps are at least as long.
+/// Implicit steps need not resolve waves to show a motion. No linear system is solved beside Newton's.
 const DRAFT: Level = Level {
     name: Some("draft"),
     error: f64::INFINITY,
@@ -37,7 +37,7 @@ const DRAFT: Level = Level {
     tolerance: 1e-4,
 };
 
-/// The first row with an error; others have in common with it what they do not name.
+/// The first row with an error; the other rows inherit the values that they do not state.
 const COARSEST: Level =
     Level { name: None, error: 0.035, cells: 6.0, courant: 2.0, gamma: Some(1.4), lumping: Some(0.1), ..DRAFT };
 
@@ -63,12 +63,13 @@ pub fn levels() -> &'static [Level] {
     &LEVELS
 }
 
-/// The least and the greatest error that can be asked for.
+/// The smallest and the largest error that a scene may ask for.
 pub(super) fn range() -> [f64; 2] {
     [LEVELS[LEVELS.len() - 1].error, COARSEST.error]
 }
 
-/// The knobs of the first row that is as accurate, with as few cells as the line from the row before it allows, log over log.
+/// The settings of the first row that is accurate enough. The number of cells is interpolated, log over log, between this row and the row
+/// before.
 pub(super) fn between(error: f64) -> Option<Level> {
     let [least, greatest] = range();
     if !(least..=greatest).contains(&error) {
@@ -85,7 +86,7 @@ pub(super) fn between(error: f64) -> Option<Level> {
 }
 
 impl Level {
-    /// Keys of the scene, but those that follow from lengths and speeds.
+    /// Keys of the scene and their values, except keys that follow from lengths and speeds.
     pub(super) fn keys(&self) -> impl Iterator<Item = (&'static str, Value)> {
         let functions = self.gamma.map(|gamma| ("approximation", json!({ "lme": { "gamma": gamma } })));
         let lumping = self.lumping.map(|lumping| ("time.lumping", lumping.into()));
@@ -107,7 +108,7 @@ mod tests {
             }
             assert_eq!(between(pair[1].error), Some(Level { name: None, ..pair[1] }));
         }
-        // What the schema says of the range.
+        // The schema states the range, too.
         let schema = schemars::schema_for!(super::super::Accuracy).to_value().to_string();
         let [least, greatest] = range();
         assert!(

@@ -1,4 +1,4 @@
-//! Solids inside of a closed surface of triangles, as files of STL and PLY have them.
+//! Solids inside a closed surface of triangles, as in STL and PLY files.
 
 mod rows;
 mod sound;
@@ -13,33 +13,33 @@ use sound::{crossing, neighbours, nested};
 use std::sync::Arc;
 use tree::{Bounds, Tree};
 
-/// Planes that stand for the triangles near a point one by one, at most: where there are more, those that face alike have one.
+/// The largest number of planes for the triangles near a point. If there are more, triangles with similar normals share one plane.
 const PLANES: usize = 6;
 
-/// The cosine of the angle between triangles that face alike.
+/// Two triangles have similar normals if the cosine of the angle between the normals exceeds this.
 const ALIKE: f64 = 0.9;
 
-/// What lies inside of a closed surface of triangles, in 3D.
+/// The solid inside a closed surface of triangles, in 3D.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface<const D: usize> {
     mesh: Arc<Mesh>,
 }
 
-/// The triangles, counter-clockwise as seen from outside, and what they know of each other.
+/// The triangles, counter-clockwise as seen from outside, with their neighbours and normals.
 #[derive(Debug, PartialEq)]
 struct Mesh {
     vertices: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
     /// The triangle beyond each edge.
     neighbours: Vec<[u32; 3]>,
-    /// Outward unit normals of triangles; 0 of those that are lines.
+    /// Outward unit normals of the triangles; 0 for triangles that are lines.
     normals: Vec<Vector3<f64>>,
     /// Σ angle × normal of the triangles around each vertex.
     at_vertices: Vec<Vector3<f64>>,
     tree: Tree,
 }
 
-/// Where on a triangle the point nearest to another is.
+/// The part of a triangle on which the nearest point lies.
 enum Foot {
     Inside,
     Edge(usize),
@@ -47,7 +47,8 @@ enum Foot {
 }
 
 impl<const D: usize> Surface<D> {
-    /// The inside of these triangles, which have numbers of vertices and face all outwards or all inwards; `D` must be 3.
+    /// The solid inside these triangles, each given by the numbers of its vertices. All triangles face outwards, or all face inwards; `D`
+    /// must be 3.
     ///
     /// ```
     /// use bfree::shape::{Shape, Surface, SurfaceError};
@@ -66,7 +67,7 @@ impl<const D: usize> Surface<D> {
     /// ```
     ///
     /// # Errors
-    /// A surface that is open, faces both ways, crosses itself, lies in itself or encloses nothing; and where.
+    /// The surface is open, faces both ways, crosses itself, lies in itself or encloses nothing. The error says where.
     pub fn new(vertices: Vec<Vector<f64, D>>, triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
         if D != 3 {
             return Err(SurfaceError::Dimension(D));
@@ -75,12 +76,12 @@ impl<const D: usize> Surface<D> {
         Ok(Self { mesh: Arc::new(Mesh::new(vertices, triangles)?) })
     }
 
-    /// The same by another name of its dimension, if that is 3.
+    /// This surface under another name of its dimension, if `E` is 3.
     pub(crate) fn in_dimension<const E: usize>(&self) -> Option<Surface<E>> {
         (E == 3).then(|| Surface { mesh: self.mesh.clone() })
     }
 
-    /// The same surface turned and scaled about a point, x ↦ c + s R (x − c).
+    /// This surface turned and scaled about a point, x ↦ c + s R (x − c).
     pub fn moved(&self, about: &Vector<f64, D>, rotation: &Tensor<f64, D>, factor: f64) -> Self {
         let (c, r) = (space(about), Matrix3::from_fn(|i, k| rotation[(i, k)]));
         let old = &self.mesh;
@@ -107,7 +108,7 @@ fn plane<const D: usize>(x: Vector3<f64>) -> Vector<f64, D> {
 
 impl Mesh {
     fn new(vertices: Vec<Vector3<f64>>, mut triangles: Vec<[u32; 3]>) -> Result<Self, SurfaceError> {
-        // One of two equal corners is a line, and its neighbours meet there.
+        // A triangle with two equal corners is a line. Its neighbours meet at this line.
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
         if triangles.is_empty() {
             return Err(SurfaceError::Empty);
@@ -194,7 +195,7 @@ impl Mesh {
         (a + ab * (vb / sum) + ac * (vc / sum), Foot::Inside)
     }
 
-    /// d and ∇d. The side of a point is that of the normals of the triangles that meet where it is nearest, each by its angle (Bærentzen
+    /// d and ∇d. The normals of the triangles that meet at the nearest point decide the sign of d, each weighted by its angle (Bærentzen
     /// and Aanæs, 2005).
     fn nearest(&self, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let distance = |triangle: usize| {
@@ -212,7 +213,7 @@ impl Mesh {
         let away = x - at;
         let side = if away.dot(&outward) < 0.0 { -1.0 } else { 1.0 };
         let distance = side * squared.sqrt();
-        // On the surface, and so near to it that its direction is round-off, the normal is that of the surface.
+        // On the surface, or so near that the direction is round-off, the normal is that of the surface.
         let direction = match foot {
             Foot::Inside => self.normals[triangle],
             _ if squared > 0.0 => away / distance,
@@ -228,7 +229,8 @@ impl<const D: usize> Solid<D> for Surface<D> {
         (distance, plane(normal))
     }
 
-    /// The planes of the triangles that come so near, if they are few; else one for those that face alike, through their middle.
+    /// The planes of the triangles within `radius` of `x`, if there are few. Otherwise triangles with similar normals share one plane
+    /// through their middle.
     fn add_planes(&self, x: &Vector<f64, D>, radius: f64, planes: &mut Vec<Face<D>>) -> f64 {
         let (mesh, x, reach) = (&self.mesh, space(x), Vector3::repeat(radius));
         let mut near = Vec::new();
@@ -274,7 +276,7 @@ impl<const D: usize> Solid<D> for Surface<D> {
         self.mesh.vertices.iter().map(|x| n.dot(x)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Its triangles, clipped.
+    /// The triangles, clipped to the box.
     fn facets(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, planes: &[Face<D>]) -> Option<Vec<Facet<D>>> {
         let (mesh, half) = (&self.mesh, space(edges) * 0.5);
         let center = space(lower) + half;
@@ -284,7 +286,7 @@ impl<const D: usize> Solid<D> for Surface<D> {
         let mut facets = Vec::new();
         for i in near {
             let corners = mesh.corners(i).map(|corner| corner - center).to_vec();
-            // What lies in a face of the box bounds the box that the solid is in.
+            // A triangle in a face of the box belongs to the box on the inner side of that triangle.
             let outside = |k: usize, sign: f64| {
                 sign * mesh.normals[i][k] < 0.0 && corners.iter().all(|corner| sign * corner[k] >= half[k])
             };

@@ -1,8 +1,8 @@
-//! What lies inside of a closed surface, box by box along a row: exact but for round-off.
+//! Volume and centroid inside a closed surface, box by box along a row: exact up to round-off.
 //!
-//! A line along the row leaves the solid where it meets a triangle that faces forwards, and enters it where it meets one that faces back.
-//! So what of a line lies in the solid and in [x₀, x₁] is Σ ± (clamp(x, x₀, x₁) − x₀), and the volume is that over the section of the
-//! row: ∫ clamp(x) − x₀ over the projections of the triangles, each with the sign of its side.
+//! A line along the row leaves the solid at a triangle that faces forwards, and enters the solid at a triangle that faces back. So the
+//! length of the line in the solid and in [x₀, x₁] is Σ ± (clamp(x, x₀, x₁) − x₀). The volume is the integral of this length over the
+//! section of the row: ∫ clamp(x) − x₀ over the projections of the triangles. Each triangle counts with the sign of its side.
 
 use super::Mesh;
 use super::tree::Bounds;
@@ -11,10 +11,10 @@ use nalgebra::Vector3;
 /// ∫ 1, ξ, y, z over a volume, ξ from the beginning of a box, y and z from the middle of the section.
 type Moments = [f64; 4];
 
-/// A triangle, clipped.
+/// A clipped triangle.
 type Polygon = Vec<Vector3<f64>>;
 
-/// Cuts a convex polygon where a linear function is 0: what is below, and what is above. One that lies there is below.
+/// Cuts a convex polygon where a linear function is 0, into a part below and a part above. A polygon in the cut is below.
 pub fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> (Polygon, Polygon) {
     let values: Vec<f64> = polygon.iter().map(f).collect();
     if values.iter().all(|&value| value <= 0.0) {
@@ -42,7 +42,7 @@ pub fn split(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> (Pol
     (below, above)
 }
 
-/// What of a polygon lies in −r_k ≤ x_k ≤ r_k along the axes from `first` on.
+/// The part of a polygon in −r_k ≤ x_k ≤ r_k, along the axes from `first` on.
 pub fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon {
     for k in first..3 {
         polygon = split(&polygon, |x| -r[k] - x[k]).0;
@@ -51,7 +51,7 @@ pub fn clipped(mut polygon: Polygon, r: &Vector3<f64>, first: usize) -> Polygon 
     polygon
 }
 
-/// ∫ f, f²/2, y f, z f over the projection of a polygon along the row, f being linear.
+/// ∫ f, f²/2, y f, z f over the projection of a polygon along the row, for linear f.
 fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Moments {
     let mut sums = [0.0; 4];
     let Some((a, rest)) = polygon.split_first() else { return sums };
@@ -78,13 +78,13 @@ fn integrals(polygon: &[Vector3<f64>], f: impl Fn(&Vector3<f64>) -> f64) -> Mome
 }
 
 impl Mesh {
-    /// Volume and centroid of what lies in `count` boxes with these edges, the first one from `lower`, each next to the last along the
-    /// first axis.
+    /// Volume and centroid of the solid in `count` boxes next to each other along the first axis. The first box begins at `lower`, and all
+    /// boxes have these edges.
     pub fn row(&self, lower: &Vector3<f64>, edges: &Vector3<f64>, count: usize) -> Vec<(f64, Vector3<f64>)> {
         let h = edges[0];
         let middle = Vector3::new(lower[0], lower[1] + 0.5 * edges[1], lower[2] + 0.5 * edges[2]);
         let mut parts = vec![[0.0; 4]; count];
-        // Of what lies beyond box k all boxes before it have their whole length.
+        // Integrals over the triangles in each box k. For these triangles, all boxes before k count with their whole length.
         let mut beyond = vec![[0.0; 4]; count + 1];
         let upper = lower + edges;
         let all = f64::INFINITY;
@@ -94,7 +94,7 @@ impl Mesh {
         for triangle in triangles {
             let mut polygon = clipped(self.corners(triangle).map(|x| x - middle).to_vec(), &(edges * 0.5), 1);
             let Some(first) = polygon.iter().map(|x| x[0]).reduce(f64::min) else { continue };
-            // `as` saturates at 0.
+            // The cast saturates at 0.
             let mut k = ((first / h).floor() as usize).min(count);
             (_, polygon) = split(&polygon, |x| x[0]);
             while k < count && !polygon.is_empty() {

@@ -1,35 +1,35 @@
-//! Which surfaces bound a solid: closed ones, turned one way, that do not cross themselves.
+//! The check that a surface bounds a solid: it is closed, faces one way and does not cross itself.
 
 use super::tree::{Bounds, Tree};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Round-off in a volume of four points, relative to the product of its edges.
+/// Round-off in the volume of four points, relative to the product of its edges.
 const ROUND_OFF: f64 = 1e-12;
 
-/// Triangles that bound no solid; each with a place where that is seen.
+/// A surface of triangles that bounds no solid. The error names a place where the fault is seen.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// Not in space.
+    /// The dimension is not 3.
     #[error("a surface of triangles in {0} dimension(s); it bounds a solid in 3")]
     Dimension(usize),
-    /// Nothing.
+    /// The surface has no triangles.
     #[error("a surface without triangles")]
     Empty,
-    /// More vertices or triangles than are numbered.
+    /// More vertices or triangles than their numbers allow.
     #[error("a surface of {0} triangles; at most {most} are allowed", most = u32::MAX)]
     TooMany(usize),
-    /// A vertex at infinity.
+    /// A vertex that is not finite.
     #[error("a vertex at {0:?}, which is no place")]
     NotFinite([f64; 3]),
-    /// A triangle of vertices that are not there.
+    /// A triangle with a vertex that does not exist.
     #[error("a triangle with vertex {vertex}, of {vertices} (triangle {triangle}, both counted from 0)")]
     NoVertex {
-        /// Its number, from 0.
+        /// The number of the triangle, from 0.
         triangle: usize,
-        /// The vertex.
+        /// The number of the vertex, from 0.
         vertex: u32,
-        /// How many there are.
+        /// The number of vertices.
         vertices: usize,
     },
     /// An edge of one triangle only.
@@ -43,12 +43,12 @@ pub enum SurfaceError {
     /// Two triangles that cross.
     #[error("a surface that crosses itself at {0:?}")]
     Crossing([f64; 3]),
-    /// A part of the surface that lies in another one, or a cavity that does not.
+    /// A part of the surface that lies in another part, or a cavity that does not.
     #[error(
         "a surface whose parts are not inside and outside by turns: the part at {0:?} should face the other way, or is in the way"
     )]
     Nested([f64; 3]),
-    /// No volume.
+    /// The surface encloses no volume.
     #[error("a surface that encloses nothing")]
     Flat,
 }
@@ -57,15 +57,16 @@ fn place(x: &Vector3<f64>) -> [f64; 3] {
     [x[0], x[1], x[2]]
 }
 
-/// The edges of a triangle, each in the direction in which it runs around.
+/// The edges of a triangle, each in the direction around the triangle.
 fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// The triangle beyond each edge of each triangle: an edge that one runs along, one other runs along backwards.
+/// The triangle beyond each edge of each triangle. Each edge of a triangle must belong to exactly one other triangle, in the opposite
+/// direction.
 ///
 /// # Errors
-/// The first edge of which that is not true.
+/// The first edge that breaks this rule.
 pub fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, SurfaceError> {
     let ends = |[a, b]: [u32; 2]| (place(&vertices[a as usize]), place(&vertices[b as usize]));
     let mut along = HashMap::with_capacity(3 * triangles.len());
@@ -92,7 +93,7 @@ pub fn neighbours(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Result<V
     Ok(beyond)
 }
 
-/// Where two triangles cross, of those whose numbers are the smallest; triangles that touch do not.
+/// A point where two triangles cross, for the crossing triangles with the smallest numbers. Triangles that only touch do not cross.
 pub fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) -> Option<Vector3<f64>> {
     for (i, &one) in triangles.iter().enumerate() {
         let mut found: Option<(usize, Vector3<f64>)> = None;
@@ -111,11 +112,11 @@ pub fn crossing(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &Tree) 
     None
 }
 
-/// How far the windings of the other parts around a part may be from what they should be: ½ where parts touch.
+/// The largest error allowed in the winding number of the other parts around a part. Where parts touch, the error is ½.
 const TOUCHING: f64 = 0.75;
 
-/// A place on a part of the surface that bounds no solid together with the others. One that faces outwards lies in none of them, or in as
-/// many as there are cavities around it; a cavity lies in one more.
+/// A point on a part of the surface that bounds no solid together with the other parts. A part that faces outwards must lie in none of the
+/// others, or in as many parts as cavities. A cavity must lie in one more part than cavities.
 pub fn nested(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], neighbours: &[[u32; 3]]) -> Option<Vector3<f64>> {
     let mut parts: Vec<Vec<usize>> = Vec::new();
     let mut seen = vec![false; triangles.len()];
@@ -146,7 +147,7 @@ pub fn nested(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], neighbours: &[[
     })
 }
 
-/// The solid angle of a triangle, > 0 from inside (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
+/// The solid angle of a triangle seen from `x`, > 0 from inside (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
 fn solid_angle(corners: [Vector3<f64>; 3], x: &Vector3<f64>) -> f64 {
     let [a, b, c] = corners.map(|corner| corner - x);
     let [p, q, r] = [a.norm(), b.norm(), c.norm()];
@@ -154,7 +155,7 @@ fn solid_angle(corners: [Vector3<f64>; 3], x: &Vector3<f64>) -> f64 {
     2.0 * a.dot(&b.cross(&c)).atan2(below)
 }
 
-/// Where an edge of `one` goes through `other`, neither having a vertex of the other's.
+/// The point where an edge of `one` goes through `other`. Edges that share a vertex with `other` do not count.
 fn pierced(vertices: &[Vector3<f64>], one: [u32; 3], other: [u32; 3]) -> Option<Vector3<f64>> {
     let [a, b, c] = other.map(|i| vertices[i as usize]);
     edges(one).into_iter().find_map(|edge| {
@@ -167,13 +168,13 @@ fn pierced(vertices: &[Vector3<f64>], one: [u32; 3], other: [u32; 3]) -> Option<
             return None;
         }
         let around = [side(&p, &q, &a, &b), side(&p, &q, &b, &c), side(&p, &q, &c, &a)];
-        // Through its boundary, too: the triangle beyond may miss it by round-off.
+        // Points on the boundary count, too: round-off may make the triangle beyond miss the edge.
         let through = around.iter().all(|&x| x >= 0.0) || around.iter().all(|&x| x <= 0.0);
         through.then(|| p + (q - p) * (below / (below - above)))
     })
 }
 
-/// On which side of the plane through `a`, `b` and `c` the point `x` lies: six times a volume, 0 where that is round-off.
+/// The side of the plane through `a`, `b` and `c` on which `x` lies: six times a volume, 0 if that volume is round-off.
 fn side(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
     let (u, v, w) = (b - a, c - a, x - a);
     let volume = u.cross(&v).dot(&w);

@@ -1,8 +1,8 @@
-//! A tree of boxes around triangles: which of them are near.
+//! A tree of bounding boxes of triangles, to find the triangles near a point or a box.
 
 use nalgebra::Vector3;
 
-/// Triangles in a leaf, at most.
+/// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
 
 /// An axis-parallel box, by its lower and its upper corner.
@@ -23,7 +23,7 @@ impl Bounds {
         (0..3).all(|k| self.0[k] <= other.1[k] && other.0[k] <= self.1[k])
     }
 
-    /// Squared distance of a point, 0 inside.
+    /// The squared distance of a point from the box, 0 inside.
     pub fn squared_distance(&self, x: &Vector3<f64>) -> f64 {
         (x - x.sup(&self.0).inf(&self.1)).norm_squared()
     }
@@ -70,7 +70,8 @@ impl Tree {
         }
     }
 
-    /// The smallest of what `squared_distance` gives for a triangle, and what comes with it; the triangle of lowest number among equals.
+    /// The triangle with the smallest `squared_distance`, and the data that come with it. Among equals, the triangle with the lowest number
+    /// wins.
     pub fn nearest<T>(
         &self,
         x: &Vector3<f64>,
@@ -85,7 +86,7 @@ impl Tree {
             match node {
                 Node::Halves(halves) => {
                     let mut both = [0, 1].map(|i| (halves[i].0.squared_distance(x), &halves[i].1));
-                    // The nearer one is taken first: it lies on top.
+                    // The nearer half lies on top, so it is visited first.
                     both.sort_by(|a, b| b.0.total_cmp(&a.0));
                     open.extend(both);
                 }
@@ -104,7 +105,7 @@ impl Tree {
     }
 }
 
-/// Halves a list at the median of the centres, across its longest side.
+/// Splits a list at the median of the centres, across the longest side of its bounds.
 fn grown(list: &mut [u32], triangles: &[Bounds]) -> (Bounds, Node) {
     let of = |i: u32| triangles[i as usize];
     let bounds = list.iter().fold(Bounds::of(std::iter::empty()), |all, &i| all.and(of(i)));

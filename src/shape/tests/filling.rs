@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Volume, centroid, area and ∫ n dA of a solid by the cells of a grid, and ∫ x·n dA / D, which is the volume too (Gauss).
+/// Volume, centroid, area and ∫ n dA of a solid, summed over the cells of a grid, and ∫ x·n dA / D, which is the volume, too (Gauss).
 fn measured<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> (f64, Vector<f64, D>, f64, Vector<f64, D>, f64) {
     let (mut volume, mut moment, mut area) = (0.0, Vector::zeros(), 0.0);
     let (mut normals, mut flux): (Vector<f64, D>, f64) = (Vector::zeros(), 0.0);
@@ -23,7 +23,7 @@ fn measured<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> (f64, Vector<f6
 
 #[test]
 fn flat_faces_are_cut_exactly() {
-    // An L and the two boxes that make it, one that overlaps and one that touches; a frame; all turned by 27° too.
+    // An L; two boxes that overlap and two that touch, which also make the L; a frame. All solids are turned by 27°, too.
     let l = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]
         .map(|x| vector(x) + vector([0.6, 0.7]));
     let at = |x: [f64; 2]| vector(x) + vector([0.6, 0.7]);
@@ -113,7 +113,7 @@ fn particles_have_the_volume_and_the_first_moments_of_the_shape() {
             assert!((found / volume - 1.0).abs() < 1e-9, "{shape:?}: {found}");
             assert!((moment[0] / found - center[0]).abs() < 1e-8, "{shape:?}: {}", moment / found);
             assert!(center[1] == 0.0 || (moment[1] / found - center[1]).abs() < 1e-8);
-            // No crumbs, where there is something to join them to; volumes of points that integrate are what they must be.
+            // No slivers remain where a neighbour can take them. Volumes of quadrature points only have to be positive.
             let least = seeds.iter().map(|seed| seed.volume).fold(f64::INFINITY, f64::min);
             assert!(least > if layout == Layout::Regular { 0.1 / 16.0 } else { 0.0 }, "{least}");
         }
@@ -203,7 +203,7 @@ fn in_cells_that_are_cut_gauss_points_integrate_products_of_polynomials() {
     }
 }
 
-/// ∮ x ⊗ n dA = V I and ∮ x₁² n₁ dA = 2 V c₁ (Gauss): points of a curved surface have turned normals, in a hole the other way.
+/// ∮ x ⊗ n dA = V I and ∮ x₁² n₁ dA = 2 V c₁ (Gauss). Points of a curved surface have turned normals, which point the other way in a hole.
 #[test]
 fn points_of_a_curved_surface_integrate_polynomials() {
     fn integrals<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> (Tensor<f64, D>, f64) {
@@ -236,8 +236,8 @@ fn points_of_a_curved_surface_integrate_polynomials() {
     assert!((of_square - 5.2 * volume).abs() < 1e-4 * 5.2 * volume, "{of_square}");
 }
 
-/// ∫ s² t² dV with s and t the places between middles, over a plate with a hole that touches cells by less than
-/// coarser planes tell. A sliver of a thousandth of half a cell joins its neighbour: up to 1e-3/4/32² a piece.
+/// ∫ s² t² dV with s and t the positions between the middles of cells, over a plate with a hole. The hole touches some cells by less than
+/// coarser planes can tell. A sliver of a thousandth of half a cell joins its neighbour: up to 1e-3/4/32² a piece.
 #[test]
 fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
     for cells in [16, 32, 64] {
@@ -255,7 +255,7 @@ fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
         let half = Vector::repeat(0.5 * h);
         let halves = indices([2 * u64::from(cells); 2]).flat_map(|i| {
             let lower = Vector::from_fn(|k, _| i[k] as f64 * half[k]);
-            // Of one of them no points are found.
+            // In one of the half cells no points are found.
             plate.quadrature(&lower, &half, h, 3, 2).unwrap_or_else(|| {
                 let (volume, position) = plate.part(&lower, &half, h);
                 vec![Seed { position, volume }]
@@ -266,7 +266,8 @@ fn cells_beside_a_cut_agree_on_which_of_them_is_whole() {
     }
 }
 
-/// A box off the lines of the grid, whose cut cells are boxes: Gauss's points of each, as many as in a full cell, symmetric, with all moments.
+/// A box off the lines of the grid, whose cut cells are boxes. Each cut cell has as many Gauss points as a full cell, symmetric and with
+/// all moments.
 #[test]
 fn parts_of_cells_that_are_boxes_have_gauss_points() {
     fn check<const D: usize>() {
@@ -302,7 +303,8 @@ fn parts_of_cells_that_are_boxes_have_gauss_points() {
     check::<3>();
 }
 
-/// Slivers between two larger parts: which one each joins does not depend on the order of cells, so that a mirrored solid has mirrored particles.
+/// Slivers between two larger parts. The choice of the part does not depend on the order of cells, so a mirrored solid has mirrored
+/// particles.
 #[test]
 fn mirrored_solids_have_mirrored_particles_where_slivers_join() {
     let (h, cells) = (0.2, [7, 8]);

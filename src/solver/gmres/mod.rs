@@ -7,17 +7,17 @@ use super::vector::{Entry, axpy, dot, norm, scaled};
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
-/// A second orthogonalisation is made when the first one leaves less than this part of the vector: 1/√2 (Daniel, Gragg,
-/// Kaufman, Stewart 1976).
+/// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
+/// Stewart 1976).
 const REORTHOGONALISE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A new direction below this part of the vector it was made from, in units of round-off: the Krylov space is exhausted.
+/// The Krylov space is exhausted if orthogonalisation leaves less than this multiple of eps of a vector.
 const EXHAUSTED: f64 = 8.0;
 
-/// A whole cycle that leaves more than this part of the residual is stagnation: a thousand such cycles gain a factor e.
+/// A whole cycle that leaves more than this part of the residual is stagnation. A thousand such cycles gain a factor e.
 const STAGNATION: f64 = 0.999;
 
-/// A cycle whose Krylov space holds no better than this part of the residual was too short: the next is twice as long.
+/// A cycle was too short if the best solution in its Krylov space leaves more than this part of the residual. The next is twice as long.
 const TOO_SHORT: f64 = 0.9;
 
 /// Settings of [`gmres`].
@@ -27,8 +27,8 @@ pub struct GmresSettings {
     pub relative_tolerance: f64,
     /// Iterations allowed, over all restarts.
     pub max_iterations: usize,
-    /// Iterations between restarts, at least 1. One vector is kept for each, and one more. Where a cycle gains next to
-    /// nothing, the following ones are twice as long.
+    /// Iterations between restarts, at least 1. One vector is stored for each iteration, and one more. After a cycle that gains next to
+    /// nothing, cycles are twice as long.
     pub restart: usize,
 }
 
@@ -38,19 +38,19 @@ impl Default for GmresSettings {
     }
 }
 
-/// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹, whose residual is the true one.
+/// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹. Its residual is the true residual.
 ///
 /// 1. r = b − A x, v₁ = r/‖r‖.
-/// 2. w = A M⁻¹ vⱼ, made orthogonal to v₁ … vⱼ (modified Gram–Schmidt, again if much cancels): column j of H, vⱼ₊₁.
+/// 2. w = A M⁻¹ vⱼ is made orthogonal to v₁ … vⱼ by modified Gram–Schmidt, twice if much cancels. This gives column j of H, and vⱼ₊₁.
 /// 3. Givens rotations keep H triangular and give the residual norm without x.
 /// 4. After m iterations, or at the tolerance, or when the space is exhausted: x ← x + M⁻¹ V y with H y = ‖r‖ e₁.
-/// 5. The residual is computed anew from x. If it does not meet the tolerance, back to 1.
-/// 6. Where the best of a cycle's whole space is hardly better than x, m is doubled: null modes and clustered small
-///    eigenvalues need a longer memory, and a failed solve costs more than a few vectors.
-/// 7. Otherwise a cycle that hardly lowers the true residual is round-off, or an exhausted space, and ends the iteration as
-///    [`LinearOutcome::Stagnated`]; one that raises it is undone.
+/// 5. The residual is computed anew from x. If it does not meet the tolerance, the method goes back to 1.
+/// 6. If the best solution in the space of a whole cycle is hardly better than x, m is doubled. Null modes and clustered small eigenvalues
+///    need longer cycles, and a failed solve costs more than a few vectors.
+/// 7. Otherwise a cycle that hardly lowers the true residual has met round-off or an exhausted space. It ends the iteration as
+///    [`LinearOutcome::Stagnated`]. A cycle that raises the true residual is undone.
 ///
-/// `solution` is overwritten; its former contents do not matter. b = 0 gives x = 0 without iterating.
+/// `solution` is overwritten, and its former contents do not matter. b = 0 gives x = 0 without iterating.
 ///
 /// ```
 /// use bfree::pooled::Pool;
@@ -74,7 +74,7 @@ impl Default for GmresSettings {
 /// ```
 ///
 /// # Errors
-/// A setting out of range, lengths that differ, NaN or infinity.
+/// A setting is out of range, the lengths differ, or a number is NaN or infinite.
 pub fn gmres<S: Entry>(
     operator: &dyn LinearOperator<S>,
     preconditioner: &dyn LinearOperator<S>,
@@ -131,8 +131,8 @@ pub fn gmres<S: Entry>(
     }
 }
 
-/// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the
-/// correction of x and returns the iterations taken and the norm the residual should have then.
+/// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the correction of x.
+/// Returns the number of iterations and the residual norm that the rotations predict.
 fn cycle<S: Entry>(
     operator: &dyn LinearOperator<S>,
     preconditioner: &dyn LinearOperator<S>,
@@ -145,7 +145,7 @@ fn cycle<S: Entry>(
     let fresh = || r.pool().filled(r.len(), S::zero());
     let mut v = fresh();
     scaled(1.0 / r_norm, r, &mut v);
-    // Grows by one vector an iteration: what is not needed is not allocated.
+    // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
     let mut basis: Vec<Pooled<S>> = Vec::new();
     let exhausted_below = EXHAUSTED * S::EPSILON;
     let mut triangle = Triangle {
@@ -179,7 +179,7 @@ fn cycle<S: Entry>(
     Ok((basis.len(), triangle.residual()))
 }
 
-/// Takes out of `w` its parts along the orthonormal `basis`. Returns these parts and the norm of what is left.
+/// Removes from `w` its components along the orthonormal `basis`. Returns these components and the norm of the remainder.
 fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Pooled<S>]) -> (Vec<f64>, f64) {
     let mut column = vec![0.0; basis.len()];
     let mut before = w_norm;
@@ -199,7 +199,7 @@ fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Pooled<S>]) -> (Ve
     (column, before)
 }
 
-/// The Hessenberg matrix of a cycle, turned into a triangle by Givens rotations as its columns come.
+/// The Hessenberg matrix of a cycle. Givens rotations make it triangular, column by column.
 struct Triangle {
     /// Column j has j + 1 entries, the diagonal last.
     columns: Vec<Vec<f64>>,
@@ -207,14 +207,14 @@ struct Triangle {
     rotations: Vec<(f64, f64)>,
     /// The rotated right-hand side ‖r‖ e₁, one entry a column.
     g: Vec<f64>,
-    /// Its entry below the triangle, the residual up to sign.
+    /// The entry of the rotated right-hand side below the triangle: the residual norm up to sign.
     last: f64,
     /// A pivot below this part of the largest one is round-off.
     negligible: f64,
 }
 
 impl Triangle {
-    /// Adds h₁ⱼ … hⱼⱼ and hⱼ₊₁,ⱼ.
+    /// Adds the column h₁ⱼ … hⱼⱼ with `below` = hⱼ₊₁,ⱼ.
     fn push(&mut self, mut column: Vec<f64>, below: f64) {
         let mut diagonal = column.first().copied().unwrap_or(0.0);
         for (i, (c, s)) in self.rotations.iter().enumerate() {

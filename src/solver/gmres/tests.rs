@@ -2,7 +2,7 @@ use super::super::testing::{Dense, distance, irregular};
 use super::super::{Identity, LinearOutcome};
 use super::*;
 
-/// In memory of its own.
+/// Solves with a memory pool of its own.
 fn gmres(
     operator: &dyn LinearOperator,
     preconditioner: &dyn LinearOperator,
@@ -15,7 +15,7 @@ fn gmres(
 
 const TIGHT: GmresSettings = GmresSettings { relative_tolerance: 1e-12, max_iterations: 500, restart: 100 };
 
-/// ‖b − A x‖ / ‖b‖, by another road than the solver's.
+/// ‖b − A x‖ / ‖b‖, computed independently of the solver.
 fn check(a: &Dense, b: &[f64], x: &[f64]) -> f64 {
     let r: Vec<f64> = b.iter().zip(a.times(x)).map(|(b, ax)| b - ax).collect();
     norm(&r) / norm(b)
@@ -57,7 +57,7 @@ fn solves_nonsymmetric_and_indefinite_systems() {
 
 #[test]
 fn ill_conditioned_system_meets_the_true_residual() {
-    // The Hilbert matrix of order 10 has condition 1.6e13: the residual is small, the solution need not be exact.
+    // The Hilbert matrix of order 10 has condition 1.6e13. The residual is small, but the solution need not be exact.
     let a = Dense::from_fn(10, |i, j| 1.0 / (1 + i + j) as f64);
     let b = a.times(&[1.0; 10]);
     let mut x = vec![0.0; 10];
@@ -67,8 +67,8 @@ fn ill_conditioned_system_meets_the_true_residual() {
 
 #[test]
 fn krylov_vectors_that_nearly_depend_on_each_other_are_orthogonal() {
-    // Hilbert's matrix makes vectors that lie nearly in the span of those before. Made orthogonal once, they have products of up to
-    // 0.03; twice is enough for round-off (Giraud, Langou, Rozložník, van den Eshof, Numer. Math. 101 (2005)).
+    // Hilbert's matrix makes vectors that lie nearly in the span of earlier vectors. Orthogonalised once, they have products of up to 0.03.
+    // Twice is enough for round-off (Giraud, Langou, Rozložník, van den Eshof, Numer. Math. 101 (2005)).
     const N: usize = 12;
     let a = Dense::from_fn(N, |i, j| 1.0 / (1 + i + j) as f64);
     let mut basis: Vec<Pooled<f64>> = Vec::new();
@@ -93,7 +93,7 @@ fn number_of_distinct_eigenvalues_is_the_number_of_iterations() {
     let mut x = vec![0.0; 60];
     let report = gmres(&a, &Identity, &irregular(60), &mut x, &TIGHT).unwrap();
     assert_eq!((report.outcome, report.iterations), (LinearOutcome::Converged, 3));
-    // The exact inverse as preconditioner: one.
+    // The exact inverse as preconditioner takes one iteration.
     assert_eq!(gmres(&a, &a.jacobi(), &irregular(60), &mut x, &TIGHT).unwrap().iterations, 1);
 }
 
@@ -104,7 +104,7 @@ fn restart_is_a_new_start_from_the_last_residual() {
     let settings = GmresSettings { relative_tolerance: 0.0, max_iterations: 6, restart: 3 };
     let mut twice = vec![0.0; 40];
     gmres(&a, &a.jacobi(), &b, &mut twice, &settings).unwrap();
-    // By hand: three iterations, then three on the residual.
+    // The same by hand: three iterations, then three on the residual.
     let once = GmresSettings { max_iterations: 3, ..settings };
     let (mut x, mut dx) = (vec![0.0; 40], vec![0.0; 40]);
     gmres(&a, &a.jacobi(), &b, &mut x, &once).unwrap();
@@ -112,7 +112,7 @@ fn restart_is_a_new_start_from_the_last_residual() {
     gmres(&a, &a.jacobi(), &r, &mut dx, &once).unwrap();
     axpy(1.0, &dx, &mut x);
     assert!(distance(&x, &twice) < 1e-15, "{}", distance(&x, &twice));
-    // And with any restart the same solution.
+    // Any restart gives the same solution.
     let mut full = vec![0.0; 40];
     assert!(gmres(&a, &a.jacobi(), &b, &mut full, &TIGHT).unwrap().converged());
     for restart in [2, 5, 11] {
@@ -140,7 +140,7 @@ fn cycles_that_gain_nothing_are_followed_by_longer_ones() {
 
 #[test]
 fn an_exhausted_space_ends_its_cycle() {
-    // Two eigenvalues, two directions, and behind them nothing but round-off: each cycle ends at the second.
+    // Two eigenvalues give two directions. A third would be round-off, so each cycle ends at the second.
     let a = Dense::from_fn(20, |i, j| if i == j { [1.0, 3.0][i % 2] } else { 0.0 });
     let mut x = vec![0.0; 20];
     let settings = GmresSettings { relative_tolerance: 0.0, ..TIGHT };
@@ -152,7 +152,7 @@ fn an_exhausted_space_ends_its_cycle() {
 
 #[test]
 fn rotations_solve_the_least_squares_problem() {
-    // A Hessenberg matrix without pattern: what is left of ‖r‖ e₁ is orthogonal to its columns, and as large as the rotations say.
+    // A Hessenberg matrix without pattern: the remainder of ‖r‖ e₁ is orthogonal to its columns, and as large as the rotations predict.
     let (n, r_norm) = (6, 2.5);
     let entries = irregular(n * (n + 1));
     let h = |i: usize, j: usize| if i <= j + 1 { entries[i * n + j] } else { 0.0 };
@@ -182,7 +182,7 @@ fn round_off_is_reported_not_looped_on() {
 
 #[test]
 fn singular_systems_give_the_least_residual() {
-    // A = diag(1, 2, 0, 3): consistent, then with a part 4 of b out of range.
+    // A = diag(1, 2, 0, 3): first b is consistent, then its third entry, 4, is out of the range of A.
     let a = Dense::from_fn(4, |i, j| if i == j { [1.0, 2.0, 0.0, 3.0][i] } else { 0.0 });
     let mut x = vec![0.0; 4];
     let report = gmres(&a, &Identity, &[1.0, 1.0, 0.0, 1.0], &mut x, &TIGHT).unwrap();

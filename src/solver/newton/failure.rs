@@ -1,36 +1,36 @@
-//! Why Newton's method found no solution.
+//! The errors of Newton's method.
 
 use super::report::NewtonHistory;
 use crate::solver::{InvalidSetting, LinearError, LinearReport};
 
-/// No solution found; x is the last accepted iterate.
+/// Newton's method found no solution. x is then the last accepted iterate.
 #[derive(Debug, thiserror::Error)]
 #[error("Newton's method stopped after {} iterations", history.iterations.len())]
 pub struct NewtonError<E: std::error::Error + 'static> {
-    /// Why.
+    /// The cause.
     #[source]
     pub cause: NewtonFailure<E>,
-    /// What happened before.
+    /// The course of the iteration until then.
     pub history: Box<NewtonHistory>,
 }
 
-/// Why Newton's method found no solution. Iterations are counted from 1; 0 is the initial guess.
+/// The cause for which Newton's method found no solution. Iterations are counted from 1, and 0 is the initial guess.
 #[derive(Debug, thiserror::Error)]
 pub enum NewtonFailure<E: std::error::Error + 'static> {
     /// A setting outside its range.
     #[error(transparent)]
     Setting(#[from] InvalidSetting),
-    /// The iterate itself is outside the domain; for any other than the initial guess this means that residual, magnitude
-    /// and tangent do not agree on the domain.
+    /// The iterate itself is outside the domain. For any iterate but the initial guess, residual, magnitude and tangent then disagree on
+    /// the domain.
     #[error("iterate {iteration} is inadmissible (0 is the initial guess)")]
     Inadmissible {
         /// The iterate.
         iteration: usize,
-        /// What is wrong there.
+        /// The reason why the iterate is inadmissible.
         #[source]
         source: E,
     },
-    /// Somebody asked for an end.
+    /// An end was requested; see [`is_stopped`](crate::solver::NonlinearProblem::is_stopped).
     #[error("it was stopped before iteration {iteration}")]
     Stopped {
         /// The iteration.
@@ -54,7 +54,7 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         /// ‖R‖ wanted.
         target: f64,
     },
-    /// Steps are found, but ‖R‖ hardly falls and is not round-off.
+    /// Steps are accepted, but ‖R‖ hardly falls and is above round-off.
     #[error(
         "the residual stagnates at {residual:e} (iteration {iteration}); wanted is {target:e}, round-off ends at {round_off:e}"
     )]
@@ -68,7 +68,7 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         /// ‖R‖ below which stagnation would count as convergence.
         round_off: f64,
     },
-    /// ‖R‖ has grown beyond all measure.
+    /// ‖R‖ has grown beyond 1e8 times its first value, or the first magnitude if that is larger.
     #[error("the residual grew to {residual:e} (iteration {iteration}), from {first:e} at the initial guess")]
     Diverged {
         /// The iteration.
@@ -90,13 +90,13 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         residual: f64,
         /// Step lengths tried.
         trials: usize,
-        /// The shortest.
+        /// The shortest step length.
         shortest: f64,
-        /// How many led outside the domain.
+        /// Number of step lengths that led outside the domain.
         inadmissible: usize,
-        /// At how many R was not finite.
+        /// Number of step lengths at which R was not finite.
         not_finite: usize,
-        /// The last reason for being outside.
+        /// The last reason why a trial was inadmissible.
         #[source]
         last: Option<E>,
     },
@@ -107,25 +107,25 @@ pub enum NewtonFailure<E: std::error::Error + 'static> {
         iteration: usize,
         /// ‖R‖ before the step.
         residual: f64,
-        /// Why.
+        /// The failure of the linear solver.
         #[source]
         source: LinearSolverFailure,
     },
 }
 
-/// Why a linear solve gave no useful step.
+/// The failure of a linear solve to give a useful step.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinearSolverFailure {
-    /// The solver failed.
+    /// The Krylov method returned an error.
     #[error(transparent)]
     Error(#[from] LinearError),
-    /// The solver reduced the residual too little for a Newton step: less than to 0.9.
+    /// The relative residual stayed at 0.9 or above, too large for a Newton step.
     #[error(
         "relative residual {:e} after {} Krylov iterations ({:?}); a step needs less than 0.9, wanted was {wanted:e}",
         report.relative_residual, report.iterations, report.outcome
     )]
     NoProgress {
-        /// What the solver did.
+        /// The report of the Krylov method.
         report: LinearReport,
         /// The relative residual wanted.
         wanted: f64,

@@ -1,4 +1,4 @@
-//! Step 3: the linear system of one iteration.
+//! Step 3 of [`newton`](super::newton): the linear system of one iteration.
 
 use super::failure::LinearSolverFailure;
 use super::report::NewtonCounts;
@@ -10,29 +10,29 @@ use crate::solver::gmres::{GmresSettings, gmres};
 use crate::solver::vector::{Entry, dot, norm};
 use crate::solver::{LinearOperator, LinearOutcome, LinearReport, Linearization};
 
-/// The least relative residual asked for in single precision: what a recurrence of vectors rounded to 6e-8 can still reach.
+/// The least relative residual wanted in single precision. A recurrence of vectors rounded to 6e-8 can still reach it.
 pub(super) const SINGLE_TOLERANCE: f64 = 1e-5;
 
 /// A solve that gave a step.
 pub(super) struct Solved {
     /// d
     pub step: Pooled<f64>,
-    /// The report of the solve that gave d; negative curvature if that ended it early.
+    /// The report of the solve that gave d. Its outcome is negative curvature if that ended the solve early.
     pub krylov: LinearReport,
-    /// That of conjugate gradients given up before.
+    /// The report of conjugate gradients that were abandoned for GMRES, if any.
     pub negative_curvature: Option<LinearReport>,
 }
 
-/// A linear system, and how it is to be solved.
+/// A linear system, the method and the accuracy wanted.
 pub(super) struct System<'a> {
     pub r: &'a Pooled<f64>,
     pub method: Krylov,
     pub relative_tolerance: f64,
-    /// Whether the problem has a potential: a step of a truncated linear solve may then lower it.
+    /// Whether the problem has a potential. A step of a truncated linear solve may then lower it.
     pub has_potential: &'a dyn Fn() -> bool,
 }
 
-/// `K d = −r` as (K/s) d' = −r/ρ with ρ = 2ᵏ ≤ ‖r‖ and d = (ρ/s) d', so that single precision neither over- nor underflows.
+/// Solves K d = −r as (K/s) d' = −r/ρ with ρ = 2ᵏ ≤ ‖r‖ and d = (ρ/s) d'. So single precision neither overflows nor underflows.
 pub(super) fn solve<S: Entry>(
     tangent: &dyn Linearization<S>,
     preconditioner: &dyn LinearOperator<S>,
@@ -62,7 +62,7 @@ pub(super) fn solve<S: Entry>(
         }
     };
     let negative = descended.filter(|report| report.outcome == LinearOutcome::NegativeCurvature);
-    // −R·d > 0: the potential falls along what there is of a step.
+    // −R·d > 0: the potential falls along the truncated step.
     let truncated = negative.filter(|_| dot(&rhs, &d) > 0.0 && has_potential());
     let given_up = negative.filter(|_| truncated.is_none());
     let krylov = match descended {
@@ -72,7 +72,7 @@ pub(super) fn solve<S: Entry>(
             count(gmres(tangent, preconditioner, &rhs, &mut d, &settings, workspace)?)
         }
     };
-    // Less accurate than wanted is still a direction in which ‖R‖ falls.
+    // ‖R‖ also falls along a step that is less accurate than wanted.
     if krylov.relative_residual >= LOOSEST && truncated.is_none() {
         return Err(LinearSolverFailure::NoProgress { report: krylov, wanted: relative_tolerance });
     }

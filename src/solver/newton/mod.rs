@@ -22,10 +22,10 @@ use search::{Search, Step, search};
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
 const ROUND_OFF_MULTIPLE: f64 = 16.0;
 
-/// An iteration that leaves more than this part of the residual is no progress …
+/// An iteration stalls if it leaves more than this part of the residual and was not accepted by the potential.
 const STALL_RATIO: f64 = 0.99;
 
-/// … and so many in a row, none of them justified by the potential, are stagnation.
+/// So many stalled iterations in a row are stagnation.
 const STALL_LENGTH: usize = 8;
 
 /// The iteration has diverged when the residual is this many times the first one, or the first magnitude if larger.
@@ -33,26 +33,28 @@ const DIVERGED: f64 = 1e8;
 
 /// Solves R(x) = 0 from the initial guess `x`.
 ///
-/// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude), the magnitude being that of the initial guess.
-/// 2. K = linearize(x), of which the preconditioner is told.
-/// 3. K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, η from [`Forcing`](super::Forcing), at least 1e-5 in single precision. A
-///    solve that ends early is still used if it is below 0.9, and one that negative curvature ends where there is a potential, which falls
-///    along what it has found (line-search Newton-CG: Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, alg. 7.1).
+/// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude). The magnitude is evaluated at the initial guess.
+/// 2. K = linearize(x). The preconditioner is prepared with K.
+/// 3. Solve K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, with η from [`Forcing`](super::Forcing), and at least 1e-5 in single
+///    precision. A solve that ends early is still used if it reaches η < 0.9. A solve ended by negative curvature is used if there is a
+///    potential, which falls along d (line-search Newton-CG: Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, alg. 7.1).
 /// 4. s = 1.
-/// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, η now being what the solve has reached; or if
+/// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, with the η that the solve has reached. Accept it also if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
-/// 6. Otherwise, or where x + s d is inadmissible or R not finite, halve s and go to 5.
-/// 7. If no step is found or accepted, or none of the last 8 reduced ‖R‖ by a percent: converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, now
-///    evaluated at x; an error if not.
-/// 8. x ← x + s d, and back to 1.
+/// 6. Otherwise halve s and go to 5. Also halve s where x + s d is inadmissible or R is not finite.
+/// 7. If no step is found or accepted, or none of the last 8 reduced ‖R‖ by a percent, evaluate the sensitivity at x. The iteration has
+///    converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, and has failed if not.
+/// 8. x ← x + s d, and go back to 1.
 ///
-/// Between calls into the problem: `x` holds accepted iterates only, also on error; every tangent is dropped before the
-/// next residual; the residual at an accepted iterate is not evaluated twice.
+/// Between calls into the problem:
+/// - `x` holds accepted iterates only, also on error.
+/// - Every tangent is dropped before the next residual.
+/// - The residual at an accepted iterate is not evaluated twice.
 ///
 /// Example: [`NonlinearProblem`].
 ///
 /// # Errors
-/// See [`NewtonFailure`]; the history so far comes with it.
+/// See [`NewtonFailure`]. The error carries the history so far.
 pub fn newton<E: std::error::Error + 'static>(
     problem: &dyn NonlinearProblem<Inadmissible = E>,
     preconditioner: &mut dyn Preconditioner,
@@ -118,7 +120,7 @@ fn iterate<E: std::error::Error + 'static>(
             let inverse = preconditioner.prepare_single(&*tangent);
             let reachable = forcing.max(SINGLE_TOLERANCE);
             let system = System { r: &r, method, relative_tolerance: reachable, has_potential };
-            // What single precision cannot solve, double precision may.
+            // Double precision may solve a system that single precision cannot.
             solved = solve::<f32>(&*tangent, &*inverse, &system, settings, &mut history.counts).ok();
             forcing = if solved.is_some() { reachable } else { forcing };
         }
@@ -132,7 +134,7 @@ fn iterate<E: std::error::Error + 'static>(
                 match solve::<f64>(&*tangent, &*inverse, &system, settings, &mut history.counts) {
                     Ok(solved) => solved,
                     Err(source) => {
-                        // What is left of R may be nothing that K could have made.
+                        // The remaining R may be round-off, which need not lie in the range of K.
                         if residual
                             <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)?
                         {
@@ -184,7 +186,10 @@ fn iterate<E: std::error::Error + 'static>(
     }
 }
 
-/// The magnitude or sensitivity at an accepted iterate.
+/// Counts and stores the magnitude or sensitivity at an accepted iterate.
+///
+/// # Errors
+/// The iterate is inadmissible, or the value is not finite.
 fn measured<E: std::error::Error + 'static>(
     magnitude: Result<f64, E>,
     iteration: usize,

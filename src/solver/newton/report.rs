@@ -1,13 +1,13 @@
-//! What Newton's method did.
+//! The report of Newton's method.
 
 use crate::solver::LinearReport;
 
-/// What made the line search accept a step.
+/// The merit function by which the line search accepted a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Merit {
     /// The residual norm fell.
     Residual,
-    /// It did not, but the potential fell.
+    /// The residual norm did not fall, but the potential fell.
     Potential,
 }
 
@@ -16,38 +16,38 @@ pub enum Merit {
 pub struct NewtonIteration {
     /// ‖R‖ after the iteration.
     pub residual: f64,
-    /// The same over ‖R‖ before.
+    /// ‖R‖ after the iteration over ‖R‖ before it.
     pub ratio: f64,
     /// The accepted step length, 1 for the full step.
     pub step_length: f64,
-    /// What accepted it.
+    /// The merit function that accepted the step.
     pub merit: Merit,
     /// The wanted relative residual of the linear system.
     pub forcing: f64,
-    /// The linear solve that gave the step; negative curvature where the step is what conjugate gradients had until then.
+    /// The linear solve that gave the step. Its outcome is negative curvature where conjugate gradients ended early and their step is used.
     pub krylov: LinearReport,
-    /// The conjugate gradients given up before it because of negative curvature, if any.
+    /// The conjugate gradients that were abandoned for GMRES because of negative curvature, if any.
     pub negative_curvature: Option<LinearReport>,
 }
 
-/// What was evaluated, how often.
+/// Numbers of evaluations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NewtonCounts {
-    /// Residuals, those of the line search included.
+    /// Residuals, including those of the line search.
     pub residuals: usize,
     /// Residuals at shortened steps.
     pub line_search: usize,
     /// Potentials.
     pub potentials: usize,
-    /// Magnitudes.
+    /// Magnitudes and sensitivities.
     pub magnitudes: usize,
-    /// Tangents formed.
+    /// Linearisations.
     pub linearizations: usize,
     /// Products with a tangent.
     pub tangent_products: usize,
     /// Krylov iterations.
     pub krylov_iterations: usize,
-    /// Linear systems left unsolved at the limit on Krylov iterations.
+    /// Linear systems left unsolved at the limit of Krylov iterations.
     pub krylov_limited: usize,
     /// Linear systems left unsolved because their residual no longer fell.
     pub krylov_stagnated: usize,
@@ -58,11 +58,11 @@ pub struct NewtonCounts {
 pub struct NewtonHistory {
     /// ‖R‖ at the initial guess, once it is known.
     pub first_residual: Option<f64>,
-    /// The magnitude ‖R‖ is compared with, as last evaluated.
+    /// The last magnitude or sensitivity with which ‖R‖ was compared.
     pub magnitude: Option<f64>,
     /// The iterations, one entry for each accepted iterate.
     pub iterations: Vec<NewtonIteration>,
-    /// What was evaluated.
+    /// The numbers of evaluations.
     pub counts: NewtonCounts,
 }
 
@@ -75,7 +75,7 @@ impl NewtonHistory {
     /// let first = &mut simulation.particles.velocity[0];
     /// *first *= 2.0; // one particle ahead of the others: the body must deform
     /// let history = simulation.step()?.newton.history;
-    /// // From Δφ = 0 by eight orders at least.
+    /// // From Δφ = 0 the residual falls by eight orders at least.
     /// let (first, last) = history.first_residual.zip(history.residual()).ok_or("residuals")?;
     /// assert!(last <= 1e-8 * first);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -85,20 +85,20 @@ impl NewtonHistory {
     }
 }
 
-/// Why the last iterate counts as a solution.
+/// The reason why the last iterate counts as a solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Convergence {
     /// ‖R‖ meets the tolerance or the floor.
     Tolerance,
-    /// ‖R‖ no longer falls, and is below 16 times the floor.
+    /// ‖R‖ no longer falls, and is at most 16 times the floor.
     RoundOff,
 }
 
-/// A solution found.
+/// The report of a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NewtonReport {
-    /// Why it counts as one.
+    /// The reason why the last iterate counts as a solution.
     pub convergence: Convergence,
-    /// How it was reached.
+    /// The course of the iteration.
     pub history: NewtonHistory,
 }

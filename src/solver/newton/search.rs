@@ -1,4 +1,4 @@
-//! Steps 4 to 6: backtracking along the Newton step.
+//! Steps 4 to 6 of [`newton`](super::newton): backtracking along the Newton step.
 
 use super::failure::NewtonFailure;
 use super::report::{Merit, NewtonCounts};
@@ -6,13 +6,13 @@ use super::settings::NewtonSettings;
 use crate::solver::NonlinearProblem;
 use crate::solver::vector::{norm, xpby};
 
-/// The part of the predicted decrease a step must achieve (Armijo).
+/// The part of the predicted decrease that a step must achieve (Armijo).
 const SUFFICIENT: f64 = 1e-4;
 
 /// Round-off of Π in units of eps times the sum of the magnitudes of its contributions.
 const POTENTIAL_ROUND_OFF: f64 = 4.0;
 
-/// A step to be searched along.
+/// A Newton step d from x.
 pub(super) struct Step<'a> {
     pub x: &'a [f64],
     pub d: &'a [f64],
@@ -20,7 +20,7 @@ pub(super) struct Step<'a> {
     pub residual: f64,
     /// R·d, the slope of the potential.
     pub slope: f64,
-    /// ‖R + K d‖ / ‖R‖ reached.
+    /// The ‖R + K d‖ / ‖R‖ that the linear solve reached.
     pub linear: f64,
 }
 
@@ -56,7 +56,7 @@ pub(super) enum Search<E> {
     Failed(Failed<E>),
 }
 
-/// Steps 4 to 6.
+/// Searches an acceptable step length.
 pub(super) fn search<E: std::error::Error + 'static>(
     problem: &dyn NonlinearProblem<Inadmissible = E>,
     at: &Step,
@@ -102,14 +102,14 @@ pub(super) fn search<E: std::error::Error + 'static>(
     Search::Failed(failed)
 }
 
-/// The second merit function of the line search, evaluated only where the first one is not enough.
+/// The second merit function of the line search. It is evaluated only where the residual norm does not accept the step.
 struct PotentialDecrease {
-    /// Π(x) and its magnitude, once they are asked for; `Some(None)` if there is none.
+    /// Π(x) and its magnitude, once they are evaluated; `Some(None)` if there is no potential.
     start: Option<Option<(f64, f64)>>,
 }
 
 impl PotentialDecrease {
-    /// Π(x + s d) ≤ Π(x) + c s R·d + round-off, for a predicted decrease −s R·d above that round-off.
+    /// Π(x + s d) ≤ Π(x) + c s R·d + round-off, where the predicted decrease −s R·d is above that round-off.
     fn suffices<E: std::error::Error + 'static>(
         &mut self,
         problem: &dyn NonlinearProblem<Inadmissible = E>,

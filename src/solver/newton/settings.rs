@@ -1,11 +1,11 @@
-//! What Newton's method may be told.
+//! Settings of Newton's method.
 
 use crate::solver::{Forcing, InvalidSetting};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
-/// Restart of the GMRES that is not asked for.
+/// Restart of GMRES where the scene does not choose one.
 pub(super) const DEFAULT_RESTART: u32 = 30;
 
 /// The Krylov method.
@@ -13,18 +13,18 @@ pub(super) const DEFAULT_RESTART: u32 = 30;
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[schemars(rename = "Method")]
 pub enum Krylov {
-    /// Conjugate gradients where the tangent is symmetric, GMRES(30) where it is not: with pressures, or laws that have no symmetric one.
+    /// Conjugate gradients where the tangent is symmetric, GMRES(30) where it is not. Pressures and some laws make it unsymmetric.
     #[default]
     Automatic,
     /// Restarted GMRES, for any tangent.
     Gmres {
-        /// Basis vectors kept before a restart, 1 to 1000. Default 30.
+        /// Basis vectors stored before a restart, 1 to 1000. Default 30.
         #[serde(default = "Krylov::default_restart")]
         #[schemars(range(min = 1, max = 1000))]
         restart: u32,
     },
-    /// Conjugate gradients, for symmetric tangents: not with pressures. Where one turns out not to be positive definite, the step found
-    /// until then is taken if there is a potential that it lowers; without a potential GMRES(30) solves that system instead.
+    /// Conjugate gradients, for symmetric tangents: not with pressures. If a tangent is not positive definite, the step found until then is
+    /// taken if there is a potential and the step lowers it. Otherwise GMRES(30) solves that system instead.
     ConjugateGradient,
 }
 
@@ -33,14 +33,14 @@ impl Krylov {
         DEFAULT_RESTART
     }
 
-    /// What is used for tangents that are `symmetric`, or are not.
+    /// The method used for tangents that are `symmetric` or not.
     ///
     /// ```
     /// use bfree::solver::Krylov;
     ///
     /// let chosen = [true, false].map(|symmetric| Krylov::Automatic.chosen(symmetric).to_string());
     /// assert_eq!(chosen, ["conjugate gradients", "GMRES(30)"]);
-    /// // What is asked for is used.
+    /// // A method that is asked for is used.
     /// assert_eq!(Krylov::Gmres { restart: 50 }.chosen(true), Krylov::Gmres { restart: 50 });
     /// ```
     pub fn chosen(self, symmetric: bool) -> Self {
@@ -62,42 +62,42 @@ impl Display for Krylov {
     }
 }
 
-/// The numbers of Krylov vectors and tangent products. Everything else is always in double precision.
+/// The precision of Krylov vectors and tangent products. Everything else is always in double precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
     /// Double precision.
     #[default]
     Double,
-    /// Single precision, for half the memory and more speed. Each linear system is then solved to 1e-5 at best, so that Newton's
-    /// method takes an iteration more, to the same residual. Where the shape functions are no products, or a law has no closed
-    /// tangent, double precision all the same.
+    /// Single precision, for half the memory and more speed. Each linear system is then solved to 1e-5 at best, so Newton's method takes
+    /// one iteration more to reach the same residual. Double precision is still used where the shape functions are not products, or a law
+    /// has no closed tangent.
     Mixed,
 }
 
 /// Settings of [`newton()`](crate::solver::newton()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonSettings {
-    /// Wanted ‖R‖ over that of the initial guess, in [0, 1).
+    /// Wanted ‖R‖ over ‖R‖ at the initial guess, in [0, 1).
     pub relative_tolerance: f64,
-    /// The least ‖R‖ asked for, in units of eps times the magnitude of the contributions to R: dimensionless, finite and
-    /// ≥ 0. A sum of a few dozen contributions is exact to about 4.
+    /// The least ‖R‖ wanted, in units of eps times the magnitude of the contributions to R: dimensionless, finite and ≥ 0. A sum of a few
+    /// dozen contributions is exact to about 4.
     pub floor: f64,
     /// Newton iterations allowed.
     pub max_iterations: usize,
-    /// How accurately each linear system is solved.
+    /// The forcing term: the accuracy to which each linear system is solved.
     pub forcing: Forcing,
-    /// How each linear system is solved.
+    /// The Krylov method.
     pub krylov: Krylov,
-    /// In which precision.
+    /// The precision of Krylov vectors and tangent products.
     pub precision: Precision,
     /// Krylov iterations allowed for each linear system, at least 1.
     pub max_krylov_iterations: usize,
-    /// How often the line search may halve the step, at most 60.
+    /// Halvings of the step allowed in a line search, at most 60.
     pub max_halvings: u32,
 }
 
-/// Those of a scene that says nothing.
+/// The settings of a scene without the keys for Newton's method.
 impl Default for NewtonSettings {
     fn default() -> Self {
         Self {

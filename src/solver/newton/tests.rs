@@ -73,8 +73,8 @@ fn rosenbrock(conservative: bool) -> impl NonlinearProblem<Inadmissible = Outsid
     }
 }
 
-/// Springs in a row, the first one held: n unknowns u, elongations g, force k g (1 − g²/2ℓ² + g⁴/2ℓ⁴), a load at the
-/// free end. Softening, then hardening.
+/// Springs in a row, fixed at the first end and loaded at the free end. The n unknowns are u, the elongations g, and the force
+/// k g (1 − g²/2ℓ² + g⁴/2ℓ⁴): softening, then hardening.
 fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmissible = Outside> {
     let elongation = |u: &[f64], i: usize| u[i] - if i == 0 { 0.0 } else { u[i - 1] };
     let terms = move |g: f64| {
@@ -124,7 +124,7 @@ fn springs(k: f64, l: f64, load: f64, n: usize) -> impl NonlinearProblem<Inadmis
     }
 }
 
-/// With the diagonal as preconditioner.
+/// Newton's method with the diagonal as preconditioner.
 fn newton(
     problem: &impl NonlinearProblem<Inadmissible = Outside>,
     x: &mut [f64],
@@ -150,7 +150,7 @@ fn rosenbrock_is_solved_and_counted() {
     let mut x = [-1.2, 1.0];
     let NewtonReport { history, .. } = solved(&rosenbrock(true), &mut x);
     assert!((x[0] - 1.0).abs() < 1e-8 && (x[1] - 1.0).abs() < 1e-8, "{x:?}");
-    // The full second step multiplies the residual by 300 and lowers nothing: the line search must have worked.
+    // The full second step multiplies the residual by 300 and lowers neither merit function, so the line search must have worked.
     assert!(history.iterations.iter().all(|i| i.merit == Merit::Potential || i.ratio < 1.0));
     let counts = history.counts;
     assert_eq!(counts.linearizations, history.iterations.len());
@@ -241,13 +241,13 @@ fn negative_curvature_falls_back_to_gmres_and_says_so() {
     let first = report.history.iterations[0];
     assert!(first.krylov.converged());
     assert_eq!(first.negative_curvature.map(|r| r.outcome), Some(LinearOutcome::NegativeCurvature));
-    // Where the tangent is definite there is nothing to fall back from.
+    // A definite tangent needs no fallback.
     let mut u = vec![0.0; 5];
     let report = newton(&springs(1.0, 1.0, 0.3, 5), &mut u, &settings).unwrap();
     assert!(report.history.iterations.iter().all(|i| i.negative_curvature.is_none()));
 }
 
-/// Π = Σ ¼ x⁴ − ½ x² + ½ i y²: hills between two valleys each, and directions that only rise.
+/// Π = Σ ¼ x⁴ − ½ x² + ½ i y²: hills with a valley on either side, and directions along which Π only rises.
 fn hills(n: usize, with_potential: bool) -> impl NonlinearProblem<Inadmissible = Outside> {
     Problem {
         residual: move |x: &[f64]| {
@@ -271,7 +271,7 @@ fn hills(n: usize, with_potential: bool) -> impl NonlinearProblem<Inadmissible =
 fn negative_curvature_leads_downhill_where_there_is_a_potential() {
     let n = 6;
     let solve = |problem: &dyn NonlinearProblem<Inadmissible = Outside>, krylov| {
-        // Close to the tops, where Newton's own step leads back to them.
+        // Close to the tops, where the full Newton step leads back to the tops.
         let mut x: Vec<f64> = (0..n).map(|i| 0.1 + 0.02 * i as f64).collect();
         let settings = NewtonSettings { krylov, ..NewtonSettings::default() };
         let preconditioner = &mut crate::solver::Identity;
@@ -283,7 +283,7 @@ fn negative_curvature_leads_downhill_where_there_is_a_potential() {
     let truncated = |i: &&NewtonIteration| i.krylov.outcome == LinearOutcome::NegativeCurvature;
     assert!(history.iterations.iter().filter(truncated).all(|i| i.negative_curvature.is_none()));
     assert!(history.iterations.iter().filter(truncated).count() > 0);
-    // Without one, and by GMRES, R = 0 is found where it is near: on the top.
+    // Without a potential, and by GMRES, the nearest solution of R = 0 is found: the top.
     for (problem, krylov) in
         [(hills(n, false), Krylov::ConjugateGradient), (hills(n, true), Krylov::Gmres { restart: 10 })]
     {
@@ -299,7 +299,7 @@ fn systems_left_unsolved_are_counted() {
         NewtonSettings { krylov: Krylov::ConjugateGradient, max_krylov_iterations: 3, ..NewtonSettings::default() };
     let counts = failure(&springs(3.0, 1.0, 1.2, 12), &mut [0.0; 12], &settings).history.counts;
     assert!(counts.krylov_limited > 0 && counts.krylov_stagnated == 0, "{counts:?}");
-    // A tangent without anything in it.
+    // A zero tangent.
     let counts = failure(&scalar(|x| Ok(x - 1.0), |_| 0.0), &mut [0.0], &settings).history.counts;
     assert_eq!((counts.krylov_limited, counts.krylov_stagnated), (0, 1));
     assert_eq!(solved(&springs(3.0, 1.0, 1.2, 12), &mut [0.0; 12]).history.counts.krylov_limited, 0);
@@ -323,22 +323,22 @@ fn not_finite_is_never_accepted() {
     let problem = scalar(|_| Ok(f64::NAN), |_| 1.0);
     let error = failure(&problem, &mut [1.0], &NewtonSettings::default());
     assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 0, .. }));
-    // NaN beyond x = 1, where the full step goes: shortened like an inadmissible one.
+    // R is NaN beyond x = 1, where the full step leads. The step is shortened like an inadmissible one.
     for bad in [f64::NAN, f64::INFINITY] {
         let problem = scalar(|x| Ok(if x > 1.0 { bad } else { x * x * x - 0.5 }), |x| 3.0 * x * x);
         let mut x = [0.2];
         assert!(solved(&problem, &mut x).history.iterations[0].step_length < 1.0);
         assert!((x[0] - 0.5_f64.cbrt()).abs() < 1e-8);
-        // NaN everywhere but at the guess.
+        // R is NaN everywhere but at the guess.
         let problem = scalar(|x| Ok(if x == 3.0 { 1.0 } else { bad }), |_| 1.0);
         let mut x = [3.0];
         let error = failure(&problem, &mut x, &NewtonSettings::default());
         assert!(matches!(error.cause, NewtonFailure::NotFinite { iteration: 1, .. }), "{error:?}");
         assert_eq!(x, [3.0]);
-        // In the tangent.
+        // NaN in the tangent.
         let error = failure(&scalar(Ok, |_| bad), &mut x, &NewtonSettings::default());
         assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { source: LinearSolverFailure::Error(_), .. }));
-        // In the magnitude, which would make anything converged.
+        // NaN in the magnitude, with which any residual would count as converged.
         let problem = Problem {
             residual: |x: &[f64]| Ok(x.to_vec()),
             magnitude: |_: &[f64]| bad,
@@ -357,12 +357,12 @@ fn failures_are_told_apart() {
     let mut x = [-1.2, 1.0];
     let error = failure(&rosenbrock(true), &mut x, &settings);
     assert!(matches!(error.cause, NewtonFailure::MaxIterations { allowed: 3, .. }));
-    // x is the last accepted iterate: its residual is the last one reported.
+    // x is the last accepted iterate, so its residual is the last reported one.
     let mut r = [0.0; 2];
     rosenbrock(true).residual(&x, &mut r).unwrap();
     assert_eq!((Some(norm(&r)), error.history.iterations.len()), (error.history.residual(), 3));
 
-    // A tangent without anything in it.
+    // A zero tangent.
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| 0.0), &mut [0.0], &default);
     assert!(matches!(error.cause, NewtonFailure::LinearSolverFailed { iteration: 1, .. }), "{error:?}");
     // A tangent of the wrong sign: the residual rises at every step length.
@@ -370,10 +370,10 @@ fn failures_are_told_apart() {
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| -1.0), &mut x, &default);
     assert!(matches!(error.cause, NewtonFailure::LineSearchFailed { trials: 26, inadmissible: 0, not_finite: 0, .. }));
     assert_eq!(x, [0.0]);
-    // A tangent a thousand times too stiff: every step is accepted and none helps.
+    // A tangent a thousand times too stiff: every step is accepted, but the residual hardly falls.
     let error = failure(&scalar(|x| Ok(x - 1.0), |_| 1000.0), &mut [0.0], &default);
     assert!(matches!(error.cause, NewtonFailure::Stagnated { iteration: 8, .. }), "{error:?}");
-    // Downhill without end: Π = −½x², and a tangent that is no derivative of it.
+    // Π = −½x² falls without end. The tangent is not its second derivative.
     let downhill = Problem {
         residual: |x: &[f64]| Ok(vec![-x[0]]),
         magnitude: |x: &[f64]| x[0].abs(),
@@ -389,13 +389,13 @@ fn failures_are_told_apart() {
 
 #[test]
 fn a_step_must_do_a_part_of_what_it_promises() {
-    // A tangent too stiff: each step takes this part of the residual away. A ten thousandth of what is promised is enough.
+    // A tangent too stiff: each step removes this part of the residual. A ten thousandth of the predicted decrease is enough.
     for (part, enough) in [(1e-3, true), (1e-5, false)] {
         let error = failure(&scalar(|x| Ok(x - 1.0), |_| 1.0 / part), &mut [0.0], &NewtonSettings::default());
         assert_eq!(matches!(error.cause, NewtonFailure::Stagnated { .. }), enough, "{error:?}");
         assert_eq!(matches!(error.cause, NewtonFailure::LineSearchFailed { trials: 26, .. }), !enough, "{error:?}");
     }
-    // |R| never falls, and Π does so by this part of what its slope R·d promises.
+    // |R| never falls. Π falls by this part of the decrease that its slope R·d predicts.
     for (part, enough) in [(1e-3, true), (1e-5, false)] {
         let slope = Problem {
             residual: |_: &[f64]| Ok(vec![-1.0]),
@@ -409,7 +409,7 @@ fn a_step_must_do_a_part_of_what_it_promises() {
     }
 }
 
-/// A problem with its tangent over `scale`, rounded to single precision.
+/// A problem whose tangent is divided by `scale` and rounded to single precision.
 struct Rounded<P> {
     problem: P,
     scale: f64,
@@ -478,7 +478,7 @@ fn single_precision_reaches_the_same_solution_in_any_units() {
             assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
             assert!(history.iterations.iter().all(|i| i.forcing == 1e-5 && i.krylov.relative_residual <= 1e-5));
             assert_eq!(history.counts.linearizations, history.iterations.len());
-            // Over a scale so large that nothing is left, there is no step in single precision.
+            // Divided by a scale so large that all entries vanish, the tangent gives no step in single precision.
             let mut u = vec![0.0; n];
             let nothing = Rounded { problem: problem(), scale: 1e100 * force };
             let history = newton(&nothing, &mut u, &mixed).unwrap().history;
@@ -492,11 +492,11 @@ fn single_precision_reaches_the_same_solution_in_any_units() {
 #[test]
 fn round_off_is_convergence_and_other_stagnation_is_not() {
     let settings = NewtonSettings { relative_tolerance: 0.0, ..NewtonSettings::default() };
-    // x − 1 with a last step that cannot be taken: |R| never falls below `noise`.
+    // R = x − 1, except that |R| never falls below `noise`.
     let noisy = |noise: f64| scalar(move |x| Ok(if (x - 1.0).abs() < noise { noise } else { x - 1.0 }), |_| 1.0);
     let eps = f64::EPSILON;
     let mut x = [0.0];
-    // Below the floor 4 eps · 1, below 16 floors, and above.
+    // `noise` below the floor 4 eps · 1, below 16 floors, and above 16 floors.
     let report = newton(&noisy(3.0 * eps), &mut x, &settings).unwrap();
     assert_eq!(report.convergence, Convergence::Tolerance);
     let mut x = [0.0];

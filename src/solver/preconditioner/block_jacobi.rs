@@ -1,4 +1,4 @@
-//! The inverses of the blocks on the diagonal.
+//! Block-Jacobi: the inverses of the blocks on the diagonal.
 
 use super::{DiagonalBlocks, Preconditioner};
 use crate::pooled::Pooled;
@@ -6,8 +6,8 @@ use crate::solver::vector::Entry;
 use crate::solver::{LinearOperator, Linearization};
 use crate::tensor::{Tensor, Vector, determinant, inverse};
 
-/// The inverse D×D diagonal blocks of the first tangent it is prepared with, one block for each node: making them costs as much as a
-/// few products, and a step changes them little. The identity before.
+/// Block-Jacobi: the inverse D×D diagonal blocks of the first tangent it is prepared with, one block for each node. They are made once a
+/// step, since they cost as much as a few products and change little in a step. Before that it is the identity.
 ///
 /// Example: [`Preconditioner`].
 #[derive(Clone, Debug, Default)]
@@ -17,7 +17,7 @@ pub struct BlockJacobi<const D: usize> {
 }
 
 impl<const D: usize> BlockJacobi<D> {
-    /// Unknowns.
+    /// Number of nodes.
     pub(super) fn len(&self) -> usize {
         self.inverse.len() / D
     }
@@ -27,7 +27,7 @@ impl<const D: usize> BlockJacobi<D> {
         bytemuck::cast_slice(&self.inverse)
     }
 
-    /// Takes the blocks of the first tangent it is shown.
+    /// Takes and inverts the blocks of `tangent`, unless it has blocks already.
     pub fn take(&mut self, tangent: &dyn DiagonalBlocks) {
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
@@ -49,7 +49,7 @@ impl<const D: usize> Preconditioner for BlockJacobi<D> {
     }
 }
 
-/// In double precision; single precision is rounded to at the end.
+/// Products are computed in double precision and rounded to the precision of z at the end.
 impl<S: Entry, const D: usize> LinearOperator<S> for BlockJacobi<D> {
     fn apply(&self, r: &[S], z: &mut [S]) {
         z.copy_from_slice(r);
@@ -61,10 +61,10 @@ impl<S: Entry, const D: usize> LinearOperator<S> for BlockJacobi<D> {
     }
 }
 
-/// The inverse of a diagonal block. A block that is singular to round-off (a node no stiffness and no mass reaches)
-/// is replaced by the inverse of its diagonal, or by the identity where that is zero too.
+/// The inverse of a diagonal block. A node without stiffness and mass has a block that is singular to round-off. Such a block gives the
+/// inverse of its diagonal, or the identity where the diagonal is zero too.
 fn invert_block<const D: usize>(block: &Tensor<f64, D>) -> Tensor<f64, D> {
-    // Scale rows to the diagonal first: entries range over many orders of magnitude, and det may underflow.
+    // Rows are scaled to the diagonal first. Entries range over many orders of magnitude, and det may underflow.
     let diagonal = Vector::<f64, D>::from_fn(|i, _| {
         let d = block[(i, i)].abs();
         if d > 0.0 && d.is_finite() { d } else { 1.0 }
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn a_block_is_inverted_at_any_size_of_its_rows() {
-        // A stiff node beside a nearly empty one: as they stand, the determinant underflows.
+        // A stiff row beside a nearly empty one: without scaling the determinant underflows.
         for (large, small) in [(1.0, 1.0), (1e12, 1e-9), (1e-150, 1e-200)] {
             let block = Tensor::<f64, 3>::new(
                 4.0 * large,
@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    /// Blocks that are given.
+    /// An operator with the given diagonal blocks.
     struct Given(Vec<Tensor<f64, 2>>);
 
     impl DiagonalBlocks for Given {
@@ -136,7 +136,7 @@ mod tests {
     fn a_singular_block_gives_the_inverse_of_its_diagonal() {
         let singular = Tensor::<f64, 2>::new(4.0, 8.0, 1.0, 2.0);
         assert_eq!(invert_block(&singular), Tensor::<f64, 2>::new(0.25, 0.0, 0.0, 0.5));
-        // What nothing reaches stays as it is.
+        // A row without entries gives a row of the identity.
         let nothing = Tensor::<f64, 2>::new(0.0, 0.0, 0.0, 8.0);
         assert_eq!(invert_block(&nothing), Tensor::<f64, 2>::new(1.0, 0.0, 0.0, 0.125));
     }

@@ -1,7 +1,7 @@
-//! The tangent as a sparse matrix, factorised by faer: for systems so small that this costs less than the iterations it saves.
+//! The tangent as a sparse matrix, factorised by faer. It is for systems so small that the factor costs less than the iterations it saves.
 //!
-//! One product shows the columns of all nodes that share no row, and some (2r + 1)^D D products show every entry, r the reach of a node:
-//! entries have whatever the product has, and its accuracy.
+//! One product with the tangent gives the columns of all nodes of one colour, which share no row. About (2r + 1)^D D products give all
+//! entries, with r the reach of a node. The entries contain every term of the product, with the accuracy of the product.
 
 use super::{BlockJacobi, Neighbours, Preconditioner};
 use crate::solver::vector::Entry;
@@ -12,10 +12,10 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 use std::collections::{HashMap, HashSet};
 
-/// Sums have one order, whatever the number of threads.
+/// One thread, so that the order of sums does not depend on the number of threads.
 const PAR: Par = Par::Seq;
 
-/// K⁻¹ = L⁻ᵀ L⁻¹ of the first tangent it is prepared with; of one that is not symmetric, as if the upper half were as the lower one.
+/// K⁻¹ = L⁻ᵀ L⁻¹ of the first tangent it is prepared with. Of an unsymmetric tangent only the lower half is used, and mirrored.
 ///
 /// ```
 /// use bfree::pooled::Pooled;
@@ -42,7 +42,7 @@ const PAR: Par = Par::Seq;
 ///     }
 /// }
 ///
-/// // u = i (n + 1 − i)/2 hangs under a load of one.
+/// // A load of one on every node gives u = i (n + 1 − i)/2.
 /// let (laplacian, mut direct, mut u) = (Laplacian(1000), Direct::<1>::default(), vec![0.0; 1000]);
 /// direct.prepare(&laplacian).apply(&vec![1.0; 1000], &mut u);
 /// assert!(u.iter().zip(1..).all(|(u, i)| (u - 0.5 * f64::from(i * (1001 - i))).abs() < 1e-6));
@@ -55,11 +55,11 @@ pub struct Direct<const D: usize> {
 #[derive(Debug)]
 enum Made<const D: usize> {
     Factors(Box<Factors>),
-    /// Of a tangent that is not positive definite, or tells nothing of neighbours.
+    /// Block-Jacobi, for a tangent that is not positive definite or has no known sparsity pattern.
     Blocks(BlockJacobi<D>),
 }
 
-/// L of K = L Lᵀ, rows and columns in the order that fills it least.
+/// L of K = L Lᵀ, with rows and columns in a fill-reducing order.
 #[derive(Debug)]
 struct Factors {
     symbolic: SymbolicCholesky<usize>,
@@ -87,7 +87,7 @@ impl Lower {
                 tangent.apply(&x, &mut y);
                 for (column, around) in colour.iter().map(|node| (node * D + k, &sharing[*node])) {
                     let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
-                    // A diagonal of zero is that of what is fixed.
+                    // A zero on the diagonal belongs to a fixed value, which gets the identity's row.
                     let value = |row: usize| if row == column && y[row] == S::zero() { 1.0 } else { y[row].value() };
                     columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
                 }
@@ -102,7 +102,7 @@ impl Lower {
         lower
     }
 
-    /// `None` of a matrix that is not positive definite.
+    /// The Cholesky factor; `None` if the matrix is not positive definite.
     fn factors(&self) -> Option<Box<Factors>> {
         let size = self.starts.len() - 1;
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.starts, None, &self.rows);
@@ -117,7 +117,8 @@ impl Lower {
     }
 }
 
-/// The nodes with which each node may share an entry, ascending: those within reach of it and of its followers, and what these follow.
+/// The nodes with which each node may share an entry, ascending. They are the nodes within reach of the node and of its followers, and the
+/// nodes that these nodes follow.
 fn sharing<const D: usize>(neighbours: &Neighbours) -> Vec<Vec<usize>> {
     let Neighbours { nodes, reach, leaders, .. } = neighbours;
     let numbers: HashMap<[u32; 3], usize> = nodes.iter().enumerate().map(|(number, &at)| (at, number)).collect();
@@ -136,7 +137,7 @@ fn sharing<const D: usize>(neighbours: &Neighbours) -> Vec<Vec<usize>> {
     sharing
 }
 
-/// Nodes by colour: two of a colour share no row.
+/// The nodes of each colour. Two nodes of one colour share no row.
 fn colours(sharing: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let (mut colours, mut of_row): (Vec<Vec<usize>>, Vec<HashSet<usize>>) =
         (Vec::new(), vec![HashSet::new(); sharing.len()]);
@@ -218,7 +219,7 @@ mod tests {
     use crate::solver::{DiagonalBlocks, direct_bytes};
     use crate::tensor::{Tensor, Vector};
 
-    /// Nodes on a square that pull at those beside them in both components, held at the first node, on springs.
+    /// Nodes on a square lattice. Each node pulls at its neighbours in both components and sits on a spring. The first node is fixed.
     struct Net {
         side: u32,
         spring: f64,
@@ -284,7 +285,7 @@ mod tests {
 
     #[test]
     fn diagonal_blocks_stand_in_where_there_is_no_factor() {
-        // Not definite, and without neighbours.
+        // One operator is not definite, the other has no known sparsity pattern.
         let (net, dense) = (Net { side: 5, spring: -7.0 }, Dense::from_fn(3, |i, k| if i == k { 4.0 } else { 0.0 }));
         let (mut direct, mut z) = (Direct::<2>::default(), vec![0.0; 50]);
         direct.prepare(&net).apply(&vec![1.0; 50], &mut z);

@@ -1,4 +1,4 @@
-//! Approximate inverses for Krylov methods, one file each.
+//! Preconditioners: approximate inverses for Krylov methods, one file each.
 
 mod block_jacobi;
 #[cfg(feature = "direct")]
@@ -17,37 +17,39 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 
-/// What a tangent tells of its entries, in double precision even where its products are not.
+/// The entries of a tangent that preconditioners are made from. They are in double precision, even where products are in single precision.
 pub trait DiagonalBlocks {
-    /// The square blocks on the diagonal, one after the other, each column by column, with the identity's row and column at prescribed
-    /// degrees of freedom. A positive factor that all have in common does not matter.
+    /// The square blocks on the diagonal, one after the other, each column by column. Prescribed degrees of freedom have the row and column
+    /// of the identity. A common positive factor does not matter.
     fn diagonal_blocks(&self) -> Pooled<f64>;
 
-    /// The operator as a form on the cells of a grid, from which coarser ones are made; `None` if it has no such form.
+    /// The operator as a form on the cells of a grid, from which multigrid makes coarser levels; `None` if it has no such form.
     fn local_form(&self) -> Option<LocalForm> {
         None
     }
 
-    /// Which unknowns may share an entry; `None` if nothing is known of it.
+    /// The sparsity pattern; `None` if it is unknown.
     fn neighbours(&self) -> Option<Neighbours> {
         None
     }
 }
 
-/// Where nodes are in a grid, and how far an entry reaches.
+/// The sparsity pattern of a tangent: positions of the nodes in the grid, and the reach of an entry.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Neighbours {
     /// Index of each node; 0 along axes that do not exist.
     pub nodes: Vec<[u32; 3]>,
-    /// Along any axis, the largest difference of the indices of two nodes that share an entry, or more, if no node follows others.
+    /// The largest index difference along any axis of two nodes that share an entry, or an upper bound. Entries that arise where nodes
+    /// follow others do not count.
     pub reach: u32,
-    /// The nodes that each node follows, as far as it does.
+    /// The nodes that each node follows; empty for a node that follows none.
     pub leaders: Vec<Vec<usize>>,
-    /// Which values are no unknowns, node after node: prescribed ones, and those that follow others.
+    /// The values that are no unknowns, node after node: they are prescribed, or follow others.
     pub fixed: Vec<bool>,
 }
 
-/// What makes approximate inverses of the tangents of a step: `apply` of one is z = M⁻¹ r. A positive factor does not matter.
+/// A preconditioner for the tangents of a step. It makes approximate inverses M⁻¹, whose `apply` is z = M⁻¹ r. A positive factor of M
+/// does not matter.
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
@@ -68,7 +70,7 @@ pub struct Neighbours {
 ///     }
 /// }
 ///
-/// // Blocks of one row are the whole matrix, M⁻¹A = I: one iteration, however far apart the entries lie.
+/// // Blocks of one row are the whole matrix, so M⁻¹A = I takes one iteration, however different the entries are.
 /// let (matrix, mut inverse, mut x) = (Diagonal(vec![1.0, 1e3, 1e6]), BlockJacobi::<1>::default(), [0.0; 3]);
 /// let inverse = inverse.prepare(&matrix);
 /// let report = gmres(&matrix, &*inverse, &[1.0, 2e3, 3e6], &mut x, &GmresSettings::default(), &Pool::default())?;
@@ -77,59 +79,60 @@ pub struct Neighbours {
 /// # Ok::<(), bfree::solver::LinearError>(())
 /// ```
 pub trait Preconditioner {
-    /// The approximate inverse of a tangent, from the tangents that came before it if they serve.
+    /// The approximate inverse of a tangent. It may be made from an earlier tangent of the step.
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a>;
 
-    /// As [`Self::prepare`], in single precision.
+    /// The approximate inverse of a tangent in single precision; see [`Self::prepare`].
     fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a>;
 }
 
-/// What preconditions the linear systems.
+/// The preconditioner of the linear systems.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioning {
-    /// Multigrid for large bodies, and for those that may flow or hardly change their volume, without inertia or in steps of Courant numbers above 10, else the diagonal
-    /// blocks; for small elastic ones of those in 1D and 2D the direct solve, where the program has it.
+    /// Block-Jacobi where inertia dominates. Without inertia, or in steps at Courant numbers above 10, the body decides. Multigrid serves
+    /// bodies that are large, may flow plastically or hardly change their volume. The direct solve serves small elastic bodies in 1D and
+    /// 2D, where the program has it. Other bodies take block-Jacobi.
     #[default]
     Automatic,
-    /// The inverses of the diagonal blocks: cheap, and enough where inertia dominates.
+    /// Block-Jacobi: the inverses of the diagonal blocks. It is cheap, and enough where inertia dominates.
     BlockJacobi,
-    /// One V-cycle of multigrid: iterations hardly grow as the grid is refined.
+    /// One V-cycle of multigrid. Iterations hardly grow as the grid is refined.
     Multigrid,
-    /// The assembled tangent, factorised once a step: for small systems. Only in programs that are built with the feature `direct`.
+    /// The assembled tangent, factorised once a step, for small systems. Only programs built with the feature `direct` have it.
     Direct,
-    /// Nothing.
+    /// No preconditioner.
     None,
 }
 
-/// What the choice of a preconditioner looks at.
+/// The properties of a problem that decide the choice of its preconditioner.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Preconditioned {
-    /// How many there are.
+    /// Number of particles.
     pub particles: usize,
-    /// Whether the functions are B-splines.
+    /// Whether the shape functions are B-splines.
     pub splines: bool,
-    /// Whether these are cubic, and outer coefficients follow others: in 3D diagonal blocks then take up to 30 times the iterations of multigrid
-    /// (`scenes/block_static.json`).
+    /// Whether the splines are cubic and outer coefficients follow others. In 3D block-Jacobi then takes up to 30 times the iterations of
+    /// multigrid (`scenes/block_static.json`).
     pub follow_cubics: bool,
     /// Whether inertia does not dominate the steps.
     pub long: bool,
-    /// Whether steps follow a path of equilibria, by GMRES.
+    /// Whether steps follow an equilibrium path, solved by GMRES.
     pub on_path: bool,
-    /// Whether a law has plastic strain: near a limit load, multigrid takes a fourth to a sixtieth of the iterations of diagonal blocks
+    /// Whether a law has plastic strain. Near a limit load, multigrid takes a fourth to a sixtieth of the iterations of block-Jacobi
     /// (`docs/src/tutorial/plasticity.md`).
     pub flows: bool,
-    /// Whether a body changes its volume so little that diagonal blocks find no step (`docs/src/choosing.md`).
+    /// Whether a body changes its volume so little that block-Jacobi finds no step (`docs/src/choosing.md`).
     pub isochoric: bool,
 }
 
-/// Particles in 1D, 2D and 3D from which on multigrid was the faster one; and with splines, which diagonal blocks serve better: in 3D it is
-/// not at half a million (`docs/src/choosing.md`).
+/// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi. Block-Jacobi serves splines better: in 3D
+/// multigrid was not faster with half a million particles (`docs/src/choosing.md`).
 const MANY: [usize; 3] = [500, 10_000, 50_000];
 const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
 
-/// Particles up to which a factorisation, in programs that have it, was the fastest in beams and no slower than what else would be taken in
-/// blocks; in 3D it never was (`docs/src/choosing.md`).
+/// Numbers of particles in 1D, 2D and 3D up to which a direct solve is taken, in programs that have it. It was the fastest in beams, and no
+/// slower than the alternative in blocks. In 3D it never was (`docs/src/choosing.md`).
 const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
 const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
 
@@ -137,7 +140,7 @@ impl Preconditioning {
     /// Whether this program can factorise.
     pub const HAS_DIRECT: bool = cfg!(feature = "direct");
 
-    /// What is used for a body in `D` dimensions; and why.
+    /// The preconditioner used for a body in `D` dimensions, and the reason.
     ///
     /// ```
     /// use bfree::solver::Preconditioning::{Automatic, BlockJacobi, Multigrid};
@@ -155,7 +158,7 @@ impl Preconditioning {
     /// assert_eq!(Automatic.chosen::<3>(cubic), (Multigrid, "outer coefficients follow cubic polynomials"));
     /// let on_path = Preconditioned { on_path: true, ..long };
     /// assert_eq!(Automatic.chosen::<3>(on_path), (Multigrid, "restarts lose what few iterations keep"));
-    /// // What is asked for is used.
+    /// // A preconditioner that is asked for is used.
     /// assert_eq!(Multigrid.chosen::<3>(small), (Multigrid, "it was asked for"));
     /// ```
     pub fn chosen<const D: usize>(self, of: Preconditioned) -> (Self, &'static str) {
@@ -184,12 +187,12 @@ impl Preconditioning {
         }
     }
 
-    /// That preconditioner for `D` unknowns a node, prepared with nothing yet.
+    /// A new preconditioner of this kind for `D` unknowns a node, not yet prepared with a tangent.
     ///
     /// ```
     /// use bfree::solver::Preconditioning;
     ///
-    /// // What preconditioning saves in a step: on regular nodes little, beside nodes with hardly any mass much.
+    /// // Preconditioning saves iterations in a step: few on regular nodes, many beside nodes with hardly any mass.
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &["boundary.left=fixed".parse()?])?;
     /// let iterations = |preconditioner| {
     ///     let mut simulation = scene.build::<2>("scenes".as_ref())?;
@@ -226,11 +229,11 @@ impl Display for Preconditioning {
     }
 }
 
-/// Bytes of the assembled tangent of so many nodes and its factor, at most: that of a band across a body as long as wide.
+/// An upper bound on the bytes of the assembled tangent and its factor. The factor counts as a band across a body as long as wide.
 pub(crate) fn direct_bytes(nodes: usize, dimension: usize, reach: usize) -> usize {
     let across = (nodes as f64).powf(1.0 - 1.0 / dimension as f64).ceil() as usize;
     let band = dimension * (reach + 1) * across;
-    // The lower half: lists of its columns, these one after the other, and in the order of the factor.
+    // The lower half is stored three times, values and row numbers: as lists of columns, in one array, and in the order of the factor.
     let row = dimension * ((2 * reach + 1).pow(dimension as u32) / 2 + 1);
     dimension * nodes * (band + 6 * row) * size_of::<f64>()
 }

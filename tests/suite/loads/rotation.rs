@@ -11,7 +11,7 @@ fn built<const D: usize>(written: &Value) -> Result<Simulation<D>, Failure> {
     Ok(scene::read(&written.to_string(), &[])?.build("scenes".as_ref())?)
 }
 
-/// Half a disc, all of which rotates about a point beside it: `angle` within a unit of time.
+/// Half a disc. The whole body rotates about a point beside it, by `angle` within a unit of time.
 fn carried(angle: f64, more: &Value) -> Value {
     let mut scene = json!({
         "grid": {"size": [8, 8], "spacing": 0.5, "renewed": "never"},
@@ -39,7 +39,8 @@ fn rotated(x: &Vector<f64, 2>, angle: f64) -> Vector<f64, 2> {
 
 #[test]
 fn what_rotates_as_a_whole_is_where_it_should_be_and_does_not_strain() -> Result<(), Failure> {
-    // One step of a quarter turn; and eight, over grids that are kept and that are not: splines are exact for affine motion.
+    // One step of a quarter turn; and eight steps, with one reference configuration and with a reset in every step. Splines are exact for
+    // affine motion.
     let renewed = json!({"grid": {"size": [8, 8], "spacing": 0.5, "renewed": "every_step"}});
     for (more, steps) in [(json!({}), 1), (json!({}), 8), (renewed, 8)] {
         let mut simulation = built::<2>(&carried(FRAC_PI_2, &more))?;
@@ -52,7 +53,7 @@ fn what_rotates_as_a_whole_is_where_it_should_be_and_does_not_strain() -> Result
         for (x, start) in particles.position.iter().zip(&start) {
             assert!((x - rotated(start, FRAC_PI_2)).norm() < 1e-13, "{steps}: {x}");
         }
-        // W is of the order of E |strain|², and the strain round-off.
+        // W is of the order of E |strain|², and the strain is round-off.
         assert!(simulation.strain_energy() < 100.0 * 2.0 * 1e-28, "{:e}", simulation.strain_energy());
     }
     Ok(())
@@ -60,15 +61,15 @@ fn what_rotates_as_a_whole_is_where_it_should_be_and_does_not_strain() -> Result
 
 #[test]
 fn what_circles_is_held_by_its_centripetal_force() -> Result<(), Failure> {
-    // m ω² r towards the axis. Newmark's acceleration of a circle lags by ω Δt / 3 of it, of which the velocity of the wall gives back
-    // half: along the circle, so that it counts as a torque.
+    // The force is m ω² r towards the axis. On a circle Newmark's acceleration lags by the share ω Δt / 3. The velocity of the wall gives
+    // half of that back, along the circle, so it counts as a torque.
     let (omega, dt) = (2.0, 0.01);
     let more = json!({"time": {"step": dt, "end": 1}, "transfer": "flip"});
     let mut simulation = built::<2>(&carried(omega, &more))?;
     let v = |x: &Vector<f64, 2>| Vector::from([-omega * (x[1] - 4.0), omega * (x[0] - 4.0)]);
     simulation.set_velocity_on_nodes(v)?;
     simulation.set_initial_acceleration()?;
-    // The first step gives back the angular momentum that lumped masses lose where particles become nodes.
+    // Lumped masses lose angular momentum in the particle-to-grid transfer. The first step gives it back.
     simulation.advance()?;
     for _ in 0..5 {
         let report = simulation.advance()?;
@@ -78,7 +79,7 @@ fn what_circles_is_held_by_its_centripetal_force() -> Result<(), Failure> {
             particles.mass.iter().zip(&particles.position).map(|(m, x)| arm(x) * (-m * omega * omega)).sum();
         let apart = (report.reactions[0].force - force).norm();
         assert!(apart < omega * dt / 5.0 * force.norm(), "{:?} {force}", report.reactions[0]);
-        // No particle is farther away than 2.
+        // No particle is farther than 2 from the axis.
         assert!(report.reactions[0].torque.abs() < 2.0 * omega * dt / 5.0 * force.norm(), "{:?}", report.reactions[0]);
     }
     Ok(())
@@ -86,7 +87,7 @@ fn what_circles_is_held_by_its_centripetal_force() -> Result<(), Failure> {
 
 #[test]
 fn a_round_bar_twists_by_its_torque() -> Result<(), Failure> {
-    // T = G J θ / L with J = π R⁴ / 2 (Coulomb): exact for a bar of any length, since a circle does not warp.
+    // T = G J θ / L with J = π R⁴ / 2 (Coulomb). The formula is exact for a bar of any length, since a circular section does not warp.
     let (shear, angle) = (40.0, 1e-3);
     let rotation = json!({"center": [2, 2, 0], "axis": [0, 0, 2], "angle": [[0, 0], [1, angle]]});
     let mut simulation = built::<3>(&json!({
@@ -105,10 +106,10 @@ fn a_round_bar_twists_by_its_torque() -> Result<(), Failure> {
     assert_eq!(fixed.torque, 0.0, "it does not rotate, and has no axis");
     let turned = turned.torque;
     assert!((turned / exact - 1.0).abs() < 5e-3, "{turned} for {exact}");
-    // Work and energy of a torque that grows with its angle.
+    // The work and the energy of a torque that grows with its angle.
     assert!((simulation.external_work / (0.5 * turned * angle) - 1.0).abs() < 1e-6);
     assert!((simulation.strain_energy() / simulation.external_work - 1.0).abs() < 5e-3);
-    // Along the axis there is a force of second order in the angle (Poynting), none across.
+    // Along the axis there is a force of second order in the angle (Poynting); across the axis there is none.
     let force = report.reactions[1].force;
     assert!(force.norm() < 2.0 * angle * turned && force.xy().norm() < 1e-6 * turned, "{force}");
     Ok(())

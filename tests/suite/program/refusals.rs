@@ -1,4 +1,4 @@
-//! What the program refuses, in a sentence that names the place, what was found and what is allowed.
+//! Refusals of the program: each message names the place, the value found and the values allowed.
 
 use super::{program, rebound, scene};
 use crate::support::Failure;
@@ -19,7 +19,7 @@ fn limits_of_the_shell_are_told_in_a_sentence() -> Result<(), Failure> {
     assert!(code == Some(1) && text.contains("cannot write") && text.contains("File too large"), "{text}");
     let (code, text) = under("ulimit -v 400000", "block_static.json", "--set grid.spacing=0.02")?;
     assert!(code == Some(2) && text.contains("memory"), "{text}");
-    // Nobody writes into it.
+    // No process writes into the pipe.
     let pipe = directory.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status()?.success());
     let output = program().arg("check").arg(&pipe).output()?;

@@ -1,4 +1,4 @@
-//! What a run and `bfree check` tell: the report, the history, progress, warnings.
+//! The messages of a run and of `bfree check`: the report, the history, progress, warnings.
 
 use super::{program, rebound, report, scene};
 use crate::support::Failure;
@@ -56,7 +56,7 @@ fn the_report_says_what_was_asked_for() -> Result<(), Failure> {
     assert_eq!(report["settings"]["time"]["end"], 0.3);
     assert_eq!(report["steps"].as_array().map(Vec::len), Some(4));
     assert_eq!((&report["outcome"], &report["surfaces"]), (&"finished".into(), &Value::Array(Vec::new())));
-    // 3 spacings beyond the disc of radius 1.5 around (2.5, 2.5), and half a diagonal of ¼ from its centre
+    // 3 spacings beyond the disc of radius 1.5 around (2.5, 2.5), and half a diagonal of ¼ from its centre.
     assert!(report["probes"][0]["distance"].as_f64().is_some_and(|distance| distance > 10.0), "{report}");
     assert_eq!(report["probes"][1]["distance"].as_f64(), Some(0.125 * 2.0_f64.sqrt()));
     assert_eq!(report["probes"][1]["warning"], Value::Null);
@@ -105,7 +105,7 @@ fn seconds_of_set_up_are_told_apart() -> Result<(), Failure> {
 #[test]
 fn a_failed_run_reports_every_attempt_and_its_work() -> Result<(), Failure> {
     let directory = tempfile::tempdir()?;
-    // One iteration never suffices, and the step is halved twice.
+    // One iteration is never enough, so the step is halved twice.
     let few = ["--set", "solver.newton.max_iterations=1", "--set", "time.max_halvings=2", "--steps", "400", "--quiet"];
     let output = rebound(directory.path(), &[&few[..], &["--set", "solver.newton.tolerance=1e-14"]].concat())?;
     let message = String::from_utf8(output.stderr)?;
@@ -149,10 +149,10 @@ fn a_program_that_watches_reads_json() -> Result<(), Failure> {
     assert_eq!((last["balance"].as_f64(), last["krylov"].to_string()), (row[7].parse().ok(), row[11].to_owned()));
     assert!(last["seconds_left"].as_f64() == Some(0.0) && last["seconds"].as_f64() > Some(0.0), "{last}");
     assert!(steps.is_sorted_by_key(|step| step["step"].as_u64()));
-    // what was warned of is in the report too
+    // The report contains the warnings too.
     let warned = lines.iter().filter(|line| line["event"] == "warning" && line["kind"].is_string()).count();
     assert_eq!(report(directory.path())?["warnings"].as_array().map(Vec::len), Some(warned));
-    // and so is an error
+    // The progress contains errors too.
     let wrong = rebound(directory.path(), &["--progress", "json", "--set", "time.step=-1"])?;
     let error: Value = serde_json::from_slice(&wrong.stderr)?;
     assert_eq!((&error["event"], &error["code"], wrong.status.code()), (&"error".into(), &2.into(), Some(2)));
@@ -207,7 +207,7 @@ fn a_run_says_what_solves_its_systems_and_warns_of_those_left_unsolved() -> Resu
     Ok(())
 }
 
-/// Runs a scene that is given as text; what it printed, on standard output and standard error, and its report.
+/// Runs a scene given as text. Returns standard output, standard error, and the report.
 fn ran(text: &Value) -> Result<(String, String, Value), Failure> {
     let directory = tempfile::tempdir()?;
     let (path, out) = (directory.path().join("scene.json"), directory.path().join("out"));
@@ -234,14 +234,14 @@ fn a_ring_that_bounces_says_how_much_energy_it_lost_and_where() -> Result<(), Fa
         first["kind"] == "energy_lost" && lost["kind"] == "energy_lost" && lost["time"] == report["time"],
         "{report}"
     );
-    // As large as it became, beside the largest energy without the work of the weight.
+    // The message gives the final loss, relative to the largest energy without the work of the weight.
     let balance = report["energies"]["balance"].as_f64().ok_or("no balance")?;
     let message = lost["message"].as_str().unwrap_or_default();
     assert!(message.contains(&format!("{:.3e}", -balance)) && message.contains("shorten time.step"), "{message}");
     Ok(())
 }
 
-/// Two blocks, the upper one above `gap`, that are thrown apart or at each other.
+/// Two blocks with the distance `gap`. They start with velocities that separate them, or that make them collide.
 fn blocks(gap: f64, apart: f64) -> Value {
     let block = |name: &str, y: f64, v: f64| {
         json!({"name": name, "density": 1, "velocity": [0, v], "shape": {"box": {"min": [2, y], "max": [6, y + 2.0]}},
@@ -267,12 +267,12 @@ fn bodies_that_are_glued_say_so() -> Result<(), Failure> {
         (&"upper".into(), &true.into(), &Value::Null)
     );
     assert!(contact["pulled_apart"].as_f64().is_some_and(|time| time < 0.1), "{report}");
-    // Pressed together, they are in contact and nothing is wrong with it.
+    // Blocks pressed together are in contact, which causes no warning.
     let mut pressed = blocks(0.0, -0.5);
     pressed["time"]["end"] = 0.2.into();
     let (_, warned, report) = ran(&pressed)?;
     assert!(!warned.contains("pulled apart") && report["contact"][0]["pulled_apart"].is_null(), "{warned}");
-    // Far apart, they share nothing.
+    // Blocks far apart share no nodes.
     let (said, _, report) = ran(&blocks(3.0, 0.1))?;
     assert!(!said.contains("contact") && report["contact"] == json!([]), "{said}");
     Ok(())

@@ -1,4 +1,4 @@
-//! No value, text or override, however wrong, brings the reader down.
+//! No value, text or override, however wrong, makes the reader panic.
 
 use super::{GOOD, overridden};
 use bfree::scene::{self, Scene, SceneError};
@@ -70,7 +70,7 @@ fn mutate(value: &mut Value, pick: &mut usize, junk: &Value, action: u8) -> bool
     true
 }
 
-/// What every refusal must be: a message of bounded length, with something in it.
+/// Every refusal must be a message of bounded length, and not empty.
 fn refused_well(result: Result<Scene, SceneError>) -> Result<(), TestCaseError> {
     if let Err(error) = result {
         let message = error.to_string();

@@ -1,9 +1,9 @@
-//! Every value that a scene may not have, with where it is refused and which words the message has.
+//! Every value that a scene may not have, with the place of its refusal and words of the message.
 
 use super::{GOOD, good_on_nodes};
 use bfree::scene::{self, Place, SceneError};
 
-/// (what stands in the good scene, what replaces it, the key to be named, words of the message)
+/// (text of the good scene, its replacement, the key to be named, words of the message)
 const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""aggregation": true"#, r#""ghost_stiffness": -1"#, "ghost_stiffness", &["-1 is not", "0", "1"]),
     (r#""along": [0, 2]"#, r#""along": [0, 0]"#, "gravity.profile.along", &["zero vector", "direction"]),
@@ -197,7 +197,7 @@ const WRONG_VALUES: &[(&str, &str, &str, &[&str])] = &[
     (r#""point": [2, 1]"#, r#""point": [2]"#, "output.probes[1].at.point", &["length 1"]),
 ];
 
-/// The same for text that is no scene at all.
+/// (text of the good scene, its replacement, the place to be named, words of the message), for text that is no scene at all.
 const WRONG_TEXT: &[(&str, &str, &str, &[&str])] = &[
     (
         r#""density": 2"#,

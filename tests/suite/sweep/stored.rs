@@ -1,8 +1,8 @@
-//! How particles fill lanes and windows, and how many bytes are stored for them.
+//! The assignment of particles to lanes and windows, and the bytes stored for them.
 
 use super::*;
 
-/// How often each window (nodes along each axis, particles) is there.
+/// The number of windows of each kind (nodes along each axis, particles).
 fn windows<const D: usize>(cells: [u32; D], per_axis: u32) -> Vec<([usize; 3], usize, usize)> {
     let (grid, positions) = regular(cells, per_axis);
     let (supports, _) = Supports::new(&Approximation::from(Linear), &grid, &positions).unwrap();
@@ -13,16 +13,16 @@ fn windows<const D: usize>(cells: [u32; D], per_axis: u32) -> Vec<([usize; 3], u
 
 #[test]
 fn a_regular_layout_fills_the_vector_lanes() {
-    // Eight particles a cell, 2×2×2 nodes; four a cell, two cells side by side; two a cell, four side by side.
+    // Eight particles per cell, 2×2×2 nodes; four per cell, two adjacent cells; two per cell, four adjacent cells.
     assert_eq!(windows([6, 5, 4], 2), [([2, 2, 2], 8, 120)]);
     assert_eq!(windows([32, 20], 2), [([3, 2, 1], 8, 320)]);
     assert_eq!(windows([64], 2), [([5, 1, 1], 8, 16)]);
-    // One a cell: no more cells side by side than six nodes hold, and none from another block (32 cells in 1D, 16 in
-    // 2D, 4 in 3D) or another row.
+    // One particle per cell: a window holds adjacent cells of at most six nodes, none from another block (32 cells in 1D, 16 in 2D, 4 in
+    // 3D) or another row.
     assert_eq!(windows([64], 1), [([3, 1, 1], 2, 2), ([6, 1, 1], 5, 12)]);
     assert_eq!(windows([32, 3], 1), [([2, 2, 1], 1, 6), ([6, 2, 1], 5, 18)]);
     assert_eq!(windows([8, 2, 2], 1), [([5, 2, 2], 4, 8)]);
-    // Nine or more in a cell: eight, and the rest.
+    // Nine or more in a cell: a group of eight, and the rest.
     assert_eq!(windows([3, 1], 3), [([2, 2, 1], 1, 3), ([2, 2, 1], 8, 3)]);
     assert_eq!(windows([2], 9), [([2, 1, 1], 1, 2), ([2, 1, 1], 8, 2)]);
     // Cells apart do not share a window.
@@ -42,8 +42,7 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
     let (plain, nodes) = Supports::plain(&Approximation::from(Linear), &grid, &positions)?;
     let entries: usize = (0..positions.len()).map(|p| plain.of(p).count()).sum();
     assert!(positions.len() <= 256, "one block");
-    // An entry is a place in the list of nodes, N and ∇N; particles say where they lie in memory and where their
-    // entries begin.
+    // An entry is a position in the list of nodes, N and ∇N. Each particle stores its position in memory and the start of its entries.
     assert_eq!(plain.bytes(), entries * (4 + 8 + 8 * D) + 4 * (nodes.len() + 2 * positions.len() + 1));
     let many: Vec<_> = positions.iter().cycle().take(600).copied().collect();
     assert_eq!(bytes(&many)?, bytes(&many[..256])? + bytes(&many[256..512])? + bytes(&many[512..])?);
@@ -85,7 +84,7 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
     let mut particles = Particles::default();
     positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
-    // A, the upper triangle of B, κ and q; those of b and c where the law has them; 𝔸 itself without a closed form.
+    // A, the upper triangle of B, κ and q; also b and c if the law has them; 𝔸 itself without a closed form.
     let triangle = D * (D + 1) / 2;
     let closed = law.closed(&identity(), &Deformation::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
     let ClosedTangent { both, .. } = closed;
@@ -94,7 +93,7 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let general =
         [Body { name: "body".into(), law: General(law.clone()), density: 1.0, dilatation: Default::default() }];
     for (precision, size) in [(Precision::Double, 8), (Precision::Mixed, 4)] {
-        // Eight lanes a group, whether they are full or not.
+        // Eight lanes per group, full or not.
         let lanes = 8 * tiled.windows().len();
         let counted = frozen_bytes(&particles, &bodies, &tiled, precision);
         assert_eq!(counted, lanes * numbers * size, "{D}D {law:?}, {precision:?}");

@@ -4,7 +4,7 @@ use bfree::mechanics::sweep::Supports;
 use bfree::tensor::{Tensor, Vector};
 use rayon::prelude::*;
 
-/// Which nodes share a particle: the sparsity of the tangent.
+/// The sparsity of the tangent: the pairs of nodes that share a particle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     /// `columns[starts[I]..starts[I + 1]]` are the neighbours of node I.
@@ -12,11 +12,11 @@ pub struct Pattern {
     columns: Vec<u32>,
 }
 
-/// More pairs of nodes than the memory given to them.
+/// The tangent has more pairs of nodes than the allowed memory holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the assembled tangent has more than {allowed} blocks; take a smaller problem")]
 pub struct TooManyBlocks {
-    /// The most blocks allowed.
+    /// The largest number of blocks allowed.
     pub allowed: usize,
 }
 
@@ -24,7 +24,7 @@ impl Pattern {
     /// The pattern of the active nodes `0..count`.
     ///
     /// # Errors
-    /// More than `allowed` blocks.
+    /// The pattern has more than `allowed` blocks.
     pub fn new<const D: usize>(supports: &Supports<D>, count: usize, allowed: usize) -> Result<Self, TooManyBlocks> {
         let mut rows: Vec<Vec<u32>> = vec![Vec::new(); count];
         let mut list = Vec::new();
@@ -34,7 +34,7 @@ impl Pattern {
             for &row in &list {
                 let row = &mut rows[row as usize];
                 row.extend_from_slice(&list);
-                // Neighbouring particles name the same nodes: keep the lists short on the way.
+                // Neighbouring particles list the same nodes, so the lists are shortened on the way.
                 if row.len() > 4096 {
                     row.sort_unstable();
                     row.dedup();
@@ -84,12 +84,12 @@ pub struct BlockMatrix<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> BlockMatrix<'a, D> {
-    /// All blocks zero.
+    /// A matrix of zero blocks.
     pub fn zeros(pattern: &'a Pattern) -> Self {
         Self { pattern, blocks: vec![Tensor::zeros(); pattern.len()] }
     }
 
-    /// K_IJ += block; a pair outside the pattern is left out, and there is none where the pattern is that of the supports.
+    /// K_IJ += block. A pair outside the pattern is ignored; a pattern made from the same supports contains every pair.
     #[inline]
     pub fn add(&mut self, row: usize, column: usize, block: &Tensor<f64, D>) {
         if let Ok(place) = self.pattern.row(row).binary_search(&(column as u32)) {

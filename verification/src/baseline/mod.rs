@@ -1,7 +1,6 @@
-//! The tangent as a matrix, the way most programs have it: to be compared with the matrix-free product.
+//! The tangent as an assembled matrix, as in most programs, for comparison with the matrix-free product.
 //!
-//! Two assemblies of the same blocks from the same supports: [`assemble`] with `b_free` (eqs. 34, 38) or `voigt`
-//! (BᵀDB).
+//! Two assemblies of the same blocks from the same shape-function values: [`assemble`] with `b_free` (eqs. 34, 38) or `voigt` (BᵀDB).
 
 mod b_free;
 mod blocks;
@@ -17,11 +16,11 @@ use bfree::material::{Law, Start, admissible};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 
-/// A way to the D×D block that two nodes share at one particle, geometric and material stiffness together.
+/// A formula for the D×D block of two nodes at one particle, geometric and material stiffness together.
 pub trait Stiffness<const D: usize> {
-    /// The blocks of all pairs of nodes of a particle with reference volume `volume` that comes from `start` to the
-    /// state `at`, from the nodes' gradients in the reference configuration: `add(I, J, K_IJ)`, I and J numbering
-    /// `gradients`.
+    /// The blocks of all pairs of nodes of one particle. `volume` is its reference volume, `start` its state at tₙ and `at` its current
+    /// state. `gradients` holds the nodal gradients in the reference configuration. The result goes to `add(I, J, K_IJ)`, where I and J
+    /// index `gradients`.
     fn blocks<L: Law>(
         &self,
         law: &L,
@@ -33,8 +32,7 @@ pub trait Stiffness<const D: usize> {
     );
 }
 
-/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, every row and column, prescribed ones included; follower pressure and damping are left
-/// out.
+/// K(Δφ) = α₁ M̃ + Σ_p V₀ {…}, with every row and column, prescribed ones included; without follower pressure and damping.
 ///
 /// # Errors
 /// The first particle with det F ≤ 0.

@@ -1,4 +1,4 @@
-//! The equilibrium of a step with its tangent as a matrix, for Newton's method.
+//! The equilibrium of a step with an assembled tangent, for Newton's method.
 
 use super::{BFree, BlockMatrix, Pattern, assemble};
 use bfree::material::Law;
@@ -7,8 +7,7 @@ use bfree::pooled::Pooled;
 use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
 use bfree::tensor::{Tensor, Vector};
 
-/// An equilibrium whose tangent is assembled anew at every linearisation, on a given pattern; without follower pressure
-/// and damping.
+/// An equilibrium whose tangent is assembled at every linearisation, on a given pattern; without follower pressure and damping.
 #[derive(Clone, Copy)]
 pub struct Assembled<'a, const D: usize, L> {
     /// The equilibrium of the step.

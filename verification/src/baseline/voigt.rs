@@ -5,10 +5,10 @@ use bfree::material::{Law, Start};
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 use nalgebra::SMatrix;
 
-/// Components of a symmetric tensor in Voigt's order, in at most three dimensions.
+/// The number of components of a symmetric tensor in Voigt's order, in three dimensions.
 const MOST: usize = 6;
 
-/// The pairs of Voigt's order: 11, 22, 33, 23, 13, 12, as far as they exist.
+/// The pairs of Voigt's order, 11, 22, 33, 23, 13, 12, that exist in this dimension.
 const fn pairs(dimension: usize) -> &'static [(usize, usize)] {
     match dimension {
         1 => &[(0, 0)],
@@ -32,7 +32,7 @@ fn strain_matrix<const D: usize>(f: &Tensor<f64, D>, grad: &Vector<f64, D>) -> S
     b
 }
 
-/// V₀ D; rows and columns beyond those of the dimension are zero and are never read.
+/// V₀ D. Rows and columns beyond the dimension are zero and are never read.
 fn moduli<L: Law, const D: usize>(
     law: &L,
     at: &Deformation<f64, D>,
@@ -54,7 +54,7 @@ fn moduli<L: Law, const D: usize>(
 }
 
 impl<const D: usize> Stiffness<D> for Voigt {
-    /// D B_J is formed once a node, not once a pair.
+    /// D B_J is formed once per node, not once per pair.
     fn blocks<L: Law>(
         &self,
         law: &L,
@@ -73,7 +73,7 @@ impl<const D: usize> Stiffness<D> for Voigt {
         let s_grad: Vec<_> = gradients.iter().map(|grad| stress * grad).collect();
         for (i, grad_i) in gradients.iter().enumerate() {
             for j in 0..gradients.len() {
-                // Only the rows that exist are multiplied.
+                // Only the rows that exist enter the product.
                 let material =
                     Tensor::<f64, D>::from_fn(|a, c| (0..count).map(|row| b[i][(row, a)] * d_b[j][(row, c)]).sum());
                 add(i, j, material + scaled(&identity(), grad_i.dot(&s_grad[j])));

@@ -1,4 +1,4 @@
-//! A shape function against its promises: consistency, gradients, the trace at walls.
+//! A shape function against its required properties: consistency, gradients, the trace at walls.
 
 use crate::random::Random;
 use crate::report::{Bound, Report};
@@ -9,10 +9,10 @@ use bfree::tensor::{Tensor, Vector, identity};
 /// Cells along each axis of the grid.
 const CELLS: u32 = 7;
 
-/// Points tried at each kind of place.
+/// Number of points tried at each kind of position.
 const TRIES: usize = 12;
 
-/// Step of the differences over the spacing.
+/// Step of the finite differences over the spacing.
 const STEP: f64 = 1e-6;
 
 /// Consistency: sums of a few dozen terms of size one.
@@ -21,7 +21,7 @@ const CONSISTENCY: f64 = 1e-12;
 /// Differences of step δ h and fourth order: δ⁴ of truncation, and eps/δ of round-off times some tens.
 const DIFFERENCES: f64 = 1e-8;
 
-/// Where points lie with respect to the nodes.
+/// The position of a point relative to the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Inside,
@@ -60,11 +60,11 @@ impl Place {
     }
 }
 
-/// Checks a shape function in 1, 2 and 3 dimensions: partition of unity, first-order consistency, their gradients, ∇N against
-/// differences of N, and that on a wall only the nodes of the wall count. Lengths are in units of the spacing, which is not 1.
+/// Checks a shape function in 1, 2 and 3 dimensions: partition of unity, first-order consistency, their gradients, and ∇N against
+/// differences of N. On a wall only the nodes of the wall may have N ≠ 0. Lengths are in units of the spacing, which is not 1.
 /// Labels are (quantity, D, place).
 ///
-/// ∇N is compared where the same nodes are listed on both sides, so that the kinks of piecewise functions do not count against them.
+/// ∇N is compared only where the same nodes are listed on both sides, which excludes the kinks of piecewise functions.
 pub fn check_approximation<A: ShapeFunction>(shape: &A) -> Report {
     let mut report = Report::new("shape function", &["quantity", "D", "place"]);
     dimension::<A, 1>(shape, &mut report);
@@ -145,8 +145,8 @@ fn quantities<A: ShapeFunction, const D: usize>(
     Ok([sum.abs(), first.amax(), gradient.amax(), largest(&first_gradient), differences, off_wall])
 }
 
-/// The largest difference between ∇N and [8 N(x + δ) − 8 N(x − δ) − N(x + 2δ) + N(x − 2δ)]/12δ, in units of 1/h, over the axes
-/// along which all four points lie in the box and list the nodes that x lists.
+/// The largest difference between ∇N and [8 N(x + δ) − 8 N(x − δ) − N(x + 2δ) + N(x − 2δ)]/12δ, in units of 1/h. An axis counts only if all
+/// four points lie in the box and list the nodes that x lists.
 fn differences<A: ShapeFunction, const D: usize>(
     shape: &A,
     grid: &Grid<D>,

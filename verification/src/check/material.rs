@@ -1,5 +1,4 @@
-//! A law against itself: energy, stress, elasticity, tangent density and closed tangent must be derivatives of each
-//! other.
+//! A law against itself: energy, stress, elasticity, tangent density and closed tangent must be derivatives of each other.
 
 use super::regime::{Regime, condition, rotation, round_off};
 use crate::random::Random;
@@ -11,11 +10,11 @@ use num_dual::Dual64;
 /// Deformations tried in each regime.
 const TRIES: usize = 8;
 
-/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20; a law with memory in
-/// a step of length 1 from rest.
+/// Checks a law at a point, in 1, 2 and 3 dimensions, from strains of 1e-8 to J = 0.05 and J = 20. A law with internal variables is checked
+/// in a step of length 1 from rest.
 ///
-/// Every derivative is compared with dual numbers through the function it is the derivative of: S with W, ℂ with S, the
-/// closed form of the tangent, where there is one, with P; its blocks with its product; and S must not see a rotation.
+/// Every derivative is compared with dual numbers through its own primitive: S with W, ℂ with S, the closed form of the tangent, if there
+/// is one, with P. The blocks of the closed form are compared with its product. S must not change under a rotation.
 /// Labels are (quantity, D, regime).
 pub fn check_material<L: Law>(law: &L) -> Report {
     let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
@@ -28,8 +27,8 @@ pub fn check_material<L: Law>(law: &L) -> Report {
     report
 }
 
-/// As [`check_material`], of a law with memory in a step that starts with `start`: all but that there is nothing at
-/// rest.
+/// Like [`check_material`], for a law with internal variables in a step that starts with `start`. It omits the check that energy and stress
+/// vanish at rest.
 ///
 /// ```
 /// use bfree::material::{Law, Remembered, Start};
@@ -100,7 +99,7 @@ fn dimension<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Re
     }
 }
 
-/// The value that uses most of its bound.
+/// The value that uses the largest share of its bound.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     value: f64,
@@ -109,7 +108,7 @@ struct Worst {
 
 impl Worst {
     fn take(&mut self, value: f64, bound: f64) {
-        // NaN is taken and kept.
+        // The comparison accepts NaN and keeps it.
         let (share, worst) = (value / bound, self.value / self.bound);
         if self.bound == 0.0 || (!self.value.is_nan() && (share.is_nan() || share > worst)) {
             *self = Self { value, bound };
@@ -151,7 +150,7 @@ fn quantities<L: Law, const D: usize>(
     let (volume, l, m) = (random.between(0.5, 2.0), random.tensor::<D>(), random.tensor::<D>());
     let (a, v, b) = (random.vector::<D>(), random.vector::<D>(), random.vector::<D>());
 
-    // F = ΔF F_n with a ΔF of its own, so that the pull-back by F_n shows.
+    // F = ΔF F_n with a separate ΔF, so that a wrong pull-back by F_n shows.
     let f_n = inverse(&(identity::<f64, D>() + random.tensor() * (0.3 / D as f64))) * f;
     let delta_f = l * f_n;
     let dual_at = admissible(h.zip_map(&delta_f, Dual64::new))?;
@@ -160,7 +159,7 @@ fn quantities<L: Law, const D: usize>(
     let dual_stress = dual_stress.map(|s| s.eps);
 
     let elasticity = law.elasticity(&at, start, &(f.transpose() * delta_f));
-    // Round-off in F alone changes S by eps times this; near F = I that is more than eps times S.
+    // Round-off in F changes S by eps times this stiffness; near F = I that is more than eps times S.
     let stiffness = law.elasticity(&at, start, &(f.transpose() * f)).norm();
 
     let density = law.tangent_density(&at, start, &v, &b);
@@ -170,7 +169,7 @@ fn quantities<L: Law, const D: usize>(
     let work = (f * stress).norm() * delta_f.norm() + dual_piola.norm();
 
     let closed = law.closed(&f_n, &at, volume);
-    // V₀ (δF S + F [ℂ : Fᵀ δF]) F_nᵀ where there is no closed form
+    // V₀ (δF S + F [ℂ : Fᵀ δF]) F_nᵀ if there is no closed form.
     let product = |l: &Tensor<f64, D>| match &closed {
         Some(closed) => closed.apply(l),
         None => {
@@ -201,11 +200,11 @@ fn quantities<L: Law, const D: usize>(
         Some((turned - stress).norm() / (stress.norm() + stiffness)),
         Some((upper_left::<3, D>(&embedded) - stress).norm() / (stress.norm() + stiffness)),
     ];
-    // The pull-back goes through F_n too.
+    // The pull-back adds the condition of F_n.
     Ok((values, round_off(condition(&f).max(condition(&f_n)))))
 }
 
-/// A tensor cut to, or filled by zeros to, another dimension.
+/// A tensor truncated, or padded with zeros, to another dimension.
 fn upper_left<const D: usize, const E: usize>(a: &Tensor<f64, D>) -> Tensor<f64, E> {
     Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { 0.0 })
 }

@@ -2,7 +2,7 @@
 
 mod approximation;
 mod material;
-// The studies use more of it than the checks do.
+// The studies use items of this module that the checks do not use.
 #[cfg_attr(not(feature = "studies"), allow(dead_code))]
 pub(crate) mod regime;
 pub(crate) mod tangent;

@@ -1,4 +1,4 @@
-//! The deformations every law is tried at.
+//! The deformations at which every law is tried.
 
 use crate::random::Random;
 use bfree::tensor::{Tensor, determinant, identity, inverse};
@@ -10,7 +10,7 @@ pub enum Regime {
     Small,
     /// Stretches and shears of some tenths.
     Moderate,
-    /// Turned by more than 2 radians, and moderately strained.
+    /// Rotated by more than 2 radians, and moderately strained.
     Rotation,
     /// J = 0.05
     Crushed,
@@ -21,10 +21,10 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Those that suit any law.
+    /// The regimes that suit any law.
     pub const GENERAL: [Self; 5] = [Self::Small, Self::Moderate, Self::Rotation, Self::Crushed, Self::Swollen];
 
-    /// Its name.
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Small => "F=I+1e-8",
@@ -41,7 +41,7 @@ impl Regime {
         dimension > 1 || self != Self::Rotation
     }
 
-    /// Size of a further small deformation that does not leave the regime.
+    /// Size of a further small deformation within the regime.
     pub fn increment(self) -> f64 {
         match self {
             Self::Small => 1e-8,
@@ -71,7 +71,7 @@ fn strained<const D: usize>(random: &mut Random) -> Tensor<f64, D> {
     identity::<f64, D>() + random.tensor() * (0.6 / (D as f64 + 1.0))
 }
 
-/// A deformation of the given J, turned at random.
+/// A deformation of the given J, with a random rotation.
 fn of_volume<const D: usize>(jacobian: f64, random: &mut Random) -> Tensor<f64, D> {
     let f = rotation::<D>(random) * strained(random);
     f * (jacobian / determinant(&f)).powf(1.0 / D as f64) - identity::<f64, D>()
@@ -92,13 +92,13 @@ pub(crate) fn rotation<const D: usize>(random: &mut Random) -> Tensor<f64, D> {
 
 /// κ(F) = ‖F‖ ‖F⁻¹‖ / 3 in Frobenius norms: 1 for a rotation, never more than the condition number in the spectral norm.
 ///
-/// F is the 3×3 one: uniaxial strain of 20 is diag(20, 1, 1), whose condition is not that of the number 20.
+/// F is the 3×3 tensor: uniaxial strain of 20 is diag(20, 1, 1), whose condition differs from that of the number 20.
 pub(crate) fn condition<const D: usize>(f: &Tensor<f64, D>) -> f64 {
     let missing = (3 - D) as f64;
     ((f.norm_squared() + missing) * (inverse(f).norm_squared() + missing)).sqrt() / 3.0
 }
 
-/// The bound every derivative must meet: min(64 eps κ(F)², 1e-10).
+/// The bound for every derivative: min(64 eps κ(F)², 1e-10).
 pub(crate) fn round_off(condition: f64) -> f64 {
     (64.0 * f64::EPSILON * condition * condition).min(1e-10)
 }

@@ -19,24 +19,24 @@ const DIRECTIONS: usize = 3;
 /// Nodes whose diagonal block is compared.
 const BLOCKS: usize = 24;
 
-/// Halvings of an increment until it is admissible.
+/// The most halvings of an increment until it is admissible.
 const HALVINGS: u32 = 30;
 
-/// The relative difference allowed to a product in single precision.
+/// The largest relative difference of a product in single precision.
 const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
 
-/// What is added to the name of a piece whose product is in single precision.
+/// The suffix of the name of a piece whose product is in single precision.
 pub(crate) const IN_SINGLE: &str = ", f32";
 
-/// The piece whose contributions cancel in 1D, and which has no symmetric tangent.
+/// The piece whose contributions cancel in 1D and whose tangent is not symmetric.
 const PRESSURE: &str = "follower pressure";
 
-/// Checks the tangent of the coming step of a simulation: every piece of it, frozen alone, and the whole, by the
-/// product that the solver applies, against dual numbers through the residual, in single precision too where the
-/// simulation uses it; the blocks of the preconditioner against the product; and, where they exist, symmetry and the
-/// residual against the gradient of the potential. Labels are (quantity, Δφ).
+/// Checks the tangent of the next step of a simulation. Every piece, linearised alone, and the whole tangent are compared with dual numbers
+/// through the residual, by the solver's product. The comparison includes single precision if the simulation uses it. The blocks of the
+/// preconditioner are compared with the product. If symmetry and a potential exist, symmetry is checked, and the residual against the
+/// gradient of the potential. Labels are (quantity, Δφ).
 ///
-/// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle is crushed.
+/// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle has det F ≤ 0.
 pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Report {
     let mut report = Report::new("tangent of the coming step", &["quantity", "increment"]);
     let prepared = match Prepared::new(simulation) {
@@ -90,16 +90,16 @@ impl Measured {
     }
 }
 
-/// The name of the asymmetry of the follower pressure.
+/// The name of the entry for the asymmetry of the follower pressure.
 pub(crate) const PRESSURE_ASYMMETRY: &str = "pressure: u.Kw - w.Ku";
 
-/// The symmetry of the whole.
+/// The name of the entry for the symmetry of the whole tangent.
 pub(crate) const SYMMETRY: &str = "u.Kw - w.Ku";
 
-/// The residual against the potential.
+/// The name of the entry for the residual against the potential.
 pub(crate) const POTENTIAL: &str = "dual(Pi) - R.u";
 
-/// Everything that can be asked of the tangent at one Δφ.
+/// All measurements of the tangent at one Δφ.
 pub(crate) fn measure<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     dphi: &[Vector<f64, D>],
@@ -115,9 +115,9 @@ pub(crate) fn measure<const D: usize, L: Law>(
         })
         .collect();
     let mut measured = Vec::new();
-    // Of the last whole term, whose parts follow it.
+    // The scales of the last whole term; its parts follow it in the list.
     let mut of_term = [0.0; DIRECTIONS];
-    // Of each diagonal block: the parts that it is the sum of may cancel, and what is rounded is of their size.
+    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
     let mut sizes = vec![0.0; dphi.len()];
     let pieces = equilibrium.terms.pieces();
     for &piece in &pieces {
@@ -138,7 +138,7 @@ pub(crate) fn measure<const D: usize, L: Law>(
                 *of_term = scale;
             }
             if let Some(single) = &single {
-                // In 1D the rounded numbers of a part may cancel: where J is large, those of the material one.
+                // In 1D the numbers rounded to single precision may cancel within a part, such as the material part at large J.
                 let scale = if D == 1 { scale.max(*of_term) } else { scale };
                 worst_in_single = worse(worst_in_single, relative(&product_in_single(single, u), &dual, scale));
             }
@@ -210,8 +210,8 @@ fn product_in_single<const D: usize>(tangent: &Tangent<'_, D, f32>, u: &[Vector<
     out.iter().map(|x| x.map(f64::from) * tangent.scale()).collect()
 }
 
-/// What differences of a product are relative to: its norm. In 1D cof F = 1: a pressure is a dead load, the two parts
-/// of its tangent cancel, and each is of the size of the force times that of the gradients of u.
+/// The scale of differences of a product: its norm. In 1D cof F = 1, so a pressure is a dead load and the two parts of its tangent cancel.
+/// Each part has the size of the force times that of the gradients of u.
 fn scale<const D: usize, L: Law>(
     equilibrium: &Equilibrium<'_, D, L>,
     piece: Piece,
@@ -225,7 +225,7 @@ fn scale<const D: usize, L: Law>(
     Ok(product)
 }
 
-/// The blocks of a scaled tangent, with the identity's rows of prescribed degrees of freedom unscaled again.
+/// The blocks of a scaled tangent. The identity rows of prescribed degrees of freedom are scaled back.
 fn free_rows<const D: usize, L>(
     equilibrium: &Equilibrium<'_, D, L>,
     mut blocks: Vec<Tensor<f64, D>>,
@@ -252,7 +252,7 @@ fn columns<const D: usize, L>(
     columns
 }
 
-/// The largest difference of blocks from their columns, relative to their sizes.
+/// The largest difference between blocks and their columns, relative to their sizes.
 fn apart<const D: usize>(blocks: &[Tensor<f64, D>], columns: &[(usize, usize, Vector<f64, D>)], sizes: &[f64]) -> f64 {
     columns.iter().fold(0.0, |value, (node, k, column)| {
         let difference = (column - blocks[*node].column(*k)).norm();
@@ -279,7 +279,7 @@ fn asymmetry<const D: usize>(directions: &[Vec<Vector<f64, D>>], products: &[Vec
     value
 }
 
-/// The larger one, and NaN if either is.
+/// The larger number, or NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
@@ -293,7 +293,7 @@ fn worst_condition<const D: usize, L: Law>(equilibrium: &Equilibrium<'_, D, L>, 
     })
 }
 
-/// ‖a − b‖ / scale, zero where both are zero.
+/// ‖a − b‖ / scale; zero if both vectors are zero.
 fn relative<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>], scale: f64) -> f64 {
     let difference = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>().sqrt();
     if difference == 0.0 { 0.0 } else { difference / scale }

@@ -5,25 +5,26 @@ use bfree::scalar::Real;
 use bfree::tensor::Vector;
 use std::f64::consts::{E, PI};
 
-/// u_i = A t Π_k w(X_k), w(x) = sin(πx) e^{sx}, in the unit square or cube; of u₂ the mirror image, x ↦ 1 − x. u = 0 on all walls. Without
-/// inertia t is a factor of the load.
+/// u_i = A t Π_k w(X_k), w(x) = sin(πx) e^{sx}, in the unit square or cube; u₂ takes the mirror image, x ↦ 1 − x. u = 0 on all walls.
+/// Without inertia t is a factor of the load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// A, a length.
     pub amplitude: f64,
-    /// s: if it is 0, u is odd about every wall.
+    /// s; for s = 0, u is odd about every wall.
     pub skew: f64,
 }
 
 impl Block {
-    /// As much u″ at the walls as inside: a shape function that bends wrongly there shows. J is between 1 − c and 1 + c at t = 1, in `D`
-    /// dimensions, for c = `change`, and takes both values at a wall: it is 1 ± A |w′(1)| max wᴰ⁻¹ there.
+    /// u″ at the walls is as large as inside, so a shape function with wrong curvature there shows. J is between 1 − c and 1 + c at t = 1,
+    /// in `D` dimensions, for c = `change`. It takes both values at a wall: it is 1 ± A |w′(1)| max wᴰ⁻¹ there.
     pub fn curved_at_walls<const D: usize>(change: f64) -> Self {
         let largest = PI / PI.hypot(1.0) * (1.0 - PI.atan() / PI).exp();
         Self { amplitude: change / (PI * E * largest.powi(D as i32 - 1)), skew: 1.0 }
     }
 
-    /// No u″ at the walls: what the shape functions do there does not show. J as above, inside, where all cos² πx are 1/D.
+    /// u″ = 0 at the walls, which hides the behaviour of the shape functions there. J has the same range; it takes the extreme values
+    /// inside, where all cos² πx are 1/D.
     pub fn straight_at_walls<const D: usize>(change: f64) -> Self {
         let others = D as f64 - 1.0;
         let slope = PI * (others + 1.0).sqrt() * (others / (others + 1.0)).powf(0.5 * others);
@@ -49,7 +50,7 @@ mod tests {
     use crate::manufactured::state;
     use bfree::tensor::Deformation;
 
-    /// The least and the largest J on a lattice of places, and the largest displacement at walls.
+    /// The least and the largest J on a lattice of points, and the largest displacement at walls.
     fn extremes<const D: usize>(block: Block, parts: usize) -> (f64, f64, f64) {
         let places = (0..(parts + 1).pow(D as u32)).map(|code| {
             Vector::<f64, D>::from_fn(|k, _| (code / (parts + 1).pow(k as u32) % (parts + 1)) as f64 / parts as f64)

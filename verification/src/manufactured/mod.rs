@@ -57,7 +57,7 @@ fn gradient<M: Motion<D>, T: Real, const D: usize>(motion: &M, x: &Vector<T, D>,
     h
 }
 
-/// The force per unit mass under which a solid of density ρ₀ moves so: φ_tt − (1/ρ₀) DIV P.
+/// The force per unit mass under which a solid of density ρ₀ has this motion: φ_tt − (1/ρ₀) DIV P.
 pub fn body_force<M: Motion<D>, L: Law, const D: usize>(
     motion: &M,
     law: &L,
@@ -77,7 +77,7 @@ pub fn body_force<M: Motion<D>, L: Law, const D: usize>(
     acceleration - divergence / density
 }
 
-/// The same as a load of a simulation whose particle `id` has the reference position `reference[id]`.
+/// The body force as a load of a simulation whose particle `id` has the reference position `reference[id]`.
 pub fn force_field<M: Motion<D> + Send + 'static, L: Law + 'static, const D: usize>(
     motion: M,
     law: L,
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use bfree::material::{Lame, LameError, NeoHookean};
 
-    /// For a diagonal F the neo-Hookean P_ii depends on F₁₁ and F₂₂ alone, and its divergence can be written down.
+    /// For a diagonal F the neo-Hookean P_ii depends on F₁₁ and F₂₂ alone, so its divergence has a closed form.
     #[test]
     fn the_force_of_the_axis_aligned_motion_agrees_with_its_closed_form() -> Result<(), LameError> {
         let lame = Lame::new(0.7, 0.4)?;

@@ -6,8 +6,9 @@ use bfree::tensor::Vector;
 
 /// x = Q(α) X with α(R, t) = A sin(ωt) (1 − R²)⁵ inside R = |X| < 1, and no motion outside.
 ///
-/// The published profile on an annulus is once differentiable at its rims and shears by 6 A; this one is four times differentiable, and the
-/// body force twice, so that particles integrate it and orders up to four can be seen. J = 1 everywhere; the rim R = 1 is free of stress.
+/// The published profile on an annulus is once differentiable at its rims and has a shear of 6 A. This profile is four times
+/// differentiable, and the body force twice, so that the quadrature over particles shows orders up to four. J = 1 everywhere; the rim R = 1
+/// is free of stress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vortex {
     /// A, the largest rotation in radians.

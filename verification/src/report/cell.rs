@@ -1,9 +1,9 @@
-//! One measured value, its bound and its verdict; and how many there are of each kind.
+//! One measured value with its bound and verdict; and the counts of each kind of cell.
 
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// What a value must satisfy.
+/// The requirement on a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bound {
     /// Not more than this.
@@ -12,12 +12,12 @@ pub enum Bound {
     AtLeast(f64),
     /// Not less than the first, not more than the second.
     Between(f64, f64),
-    /// Finite; shown, and otherwise not judged.
+    /// Finite; the value is shown and not judged further.
     Reported,
 }
 
 impl Bound {
-    /// Whether `value` is within; NaN never is.
+    /// Whether `value` meets the bound; NaN never does.
     pub fn holds(&self, value: f64) -> bool {
         match *self {
             Self::AtMost(high) => value <= high,
@@ -27,10 +27,10 @@ impl Bound {
         }
     }
 
-    /// How much of the bound is used up: 1 at the bound, more beyond it, infinite for NaN.
+    /// The used share of the bound: 1 at the bound, more beyond it, infinite for NaN.
     pub(super) fn used(&self, value: f64) -> f64 {
         let used = match *self {
-            // A bound of zero is met by zero alone.
+            // Only zero meets a bound of zero.
             Self::AtMost(high) => {
                 if value == 0.0 {
                     0.0
@@ -39,7 +39,7 @@ impl Bound {
                 }
             }
             Self::AtLeast(low) if value > 0.0 => low / value,
-            // Of what is not positive there is no ratio.
+            // Values that are not positive have no ratio.
             Self::AtLeast(low) => {
                 if value >= low {
                     0.0
@@ -77,7 +77,7 @@ impl Serialize for Bound {
     }
 }
 
-/// A number in as few characters as tell what matters.
+/// A number in the fewest characters that show its size.
 pub fn short(x: f64) -> String {
     if x == 0.0 {
         "0".into()
@@ -89,18 +89,18 @@ pub fn short(x: f64) -> String {
     }
 }
 
-/// What the list of known failures says of a cell.
+/// The entry of a cell in the list of known failures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Listed {
-    /// The value measured when it was listed.
+    /// The value measured at the time of listing.
     pub value: f64,
-    /// A value that misses the bound so many times further is a new failure.
+    /// A value that misses the bound by this factor more is a new failure.
     pub factor: f64,
-    /// Whether seconds decide: on a busy machine their scatter is wider, and the cell may pass.
+    /// Whether the value is a time in seconds. On a busy machine the scatter is larger, and the cell may pass.
     pub timed: bool,
 }
 
-/// What is to be said of a cell.
+/// The verdict on a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Judged, and within its bound.
@@ -127,11 +127,11 @@ impl fmt::Display for Verdict {
 /// One measured value.
 #[derive(Clone, Debug, Serialize)]
 pub struct Cell {
-    /// What was measured: one label for each column of the report.
+    /// The labels of the measured value, one for each column of the report.
     pub labels: Vec<String>,
     /// The value.
     pub value: f64,
-    /// What it must satisfy.
+    /// The requirement on the value.
     pub bound: Bound,
     /// Its entry in the list of known failures.
     pub listed: Option<Listed>,
@@ -160,7 +160,7 @@ impl Cell {
         self.verdict() != Verdict::Failed
     }
 
-    /// Value and bound, and what the list of known failures says.
+    /// Value and bound, and the entry in the list of known failures.
     pub fn finding(&self) -> String {
         let found = format!("{} ({})", short(self.value), self.bound);
         match self.listed {
@@ -184,16 +184,16 @@ impl Cell {
     }
 }
 
-/// How many cells there are of each kind.
+/// The number of cells of each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// With a bound, met or not; without known failures.
+    /// Cells with a bound, met or not; without known failures.
     pub judged: usize,
-    /// Without a bound.
+    /// Cells without a bound.
     pub shown: usize,
     /// Known failures.
     pub known: usize,
-    /// Of those judged, the ones that fail.
+    /// Judged cells that fail.
     pub failed: usize,
 }
 
@@ -242,9 +242,9 @@ impl fmt::Display for Counts {
     }
 }
 
-/// The cell closest to its bound, the first of equals.
+/// The cell closest to its bound; the first one if several are equal.
 pub(crate) fn worst<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<&'a Cell> {
-    // A known failure that passes again is a failure, however far within its bound.
+    // A known failure that passes again is a failure, however far it is within its bound.
     let badness = |cell: &Cell| (cell.verdict() == Verdict::Failed, cell.bound.used(cell.value));
     cells.fold(None, |worst: Option<&Cell>, cell| match worst {
         Some(worst) if badness(worst) >= badness(cell) => Some(worst),

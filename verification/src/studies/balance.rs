@@ -1,7 +1,8 @@
-//! Global balances: a body under gravity and a traction gains the momentum of its loads, and its centre moves as a mass point does.
+//! Global balances: under gravity and a traction a body gains the momentum of its loads, and its centre moves as a point mass.
 //!
-//! Inside forces cancel and shape functions sum to one, so this holds exactly for any shape function and any ε; the trapezoidal rule is
-//! exact for a constant force. It sees what no derivative of the residual can: the size of the mass, of the loads, of the updates.
+//! Internal forces cancel and shape functions sum to one, so this holds exactly for any shape function and any ε. The trapezoidal rule is
+//! exact for a constant force. The study detects errors that no derivative of the residual shows: in the size of the mass, the loads, the
+//! updates.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
@@ -15,26 +16,25 @@ use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "momentum, centre of mass and work of a body under gravity and traction, exactly";
 
-/// Relative to the change that the loads make: Newton stops at 1e-14 of the forces, over a few steps.
+/// The error relative to the change by the loads: Newton's method stops at 1e-14 of the forces, over a few steps.
 const EXACT: f64 = 1e-12;
 
 const SPACING: f64 = 0.5;
 const STEP: f64 = 0.02;
 const STEPS: u32 = 5;
 const DENSITY: f64 = 2.0;
-/// Factors in time of gravity and of the traction: not 1, so that leaving them out shows.
+/// Factors in time of gravity and of the traction. They differ from 1, so that an omitted factor shows.
 const FACTORS: [f64; 2] = [0.5, 2.0];
 
-/// All families that have a lumped mass; of LME the paper's width.
+/// All families with a lumped mass; LME with the paper's width.
 fn families() -> Vec<(&'static str, Approximation)> {
     let left_out = |name: &str| matches!(name, "lme 0.8" | "lme 1.8" | "lme circle 1.8") || name.starts_with("not-a-knot");
     Approximation::examples().into_iter().filter(|(name, _)| !left_out(name)).collect()
 }
 
-/// Runs the study.
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new(
         "a free body under gravity and traction, errors over the effect of the loads",
@@ -107,7 +107,7 @@ fn fall<const D: usize>(name: &str, shape: &Approximation, lumping: f64, report:
             force += load.points.iter().map(|point| traction * (FACTORS[1] * point.area)).sum::<Vector<f64, D>>();
         }
     }
-    // The rule takes a_n from the step before: the first one must start with the acceleration that the loads make.
+    // The rule takes a_n from the step before, so the first step must start with the acceleration of the loads.
     simulation.particles.acceleration.fill(force / mass);
     let (x, v) = (centre(&simulation.particles, mass), simulation.particles.velocity[0]);
     for _ in 0..STEPS {

@@ -1,7 +1,7 @@
 //! A column compacted by its own weight in load steps without inertia, against its analytical stress and displacement.
 //!
-//! In uniaxial strain the column carries the weight above, whatever its law: P(X) = −ρ₀ g (H − X). The law gives the stretch,
-//! P(λ) = P(X), and u(X) = ∫ (λ − 1) dX.
+//! In uniaxial strain the stress is the weight above, for any law: P(X) = −ρ₀ g (H − X). The law gives the stretch, P(λ) = P(X), and u(X) =
+//! ∫ (λ − 1) dX.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
@@ -11,14 +11,14 @@ use bfree::material::{Law, Material, Start, admissible};
 use bfree::simulation::Simulation;
 use bfree::tensor::Tensor;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "a column compacted by its own weight without inertia, against its analytical stress";
 
 /// ρ₀, g and H of the scene.
 const WEIGHT: (f64, f64, f64) = (2700.0, 9.81, 1.0);
 
-/// (name, scene key, least order of the stress in one load step, largest error of the stress in ten, and of the displacement of the top with
-/// ten cells)
+/// (name, scene key, least order of the stress in one load step, largest error of the stress in ten, largest error of the displacement of
+/// the top with ten cells)
 const SHAPES: [(&str, &str, f64, f64, f64); 6] = [
     ("linear", "\"linear\"", 0.95, 0.2, 0.015),
     ("uGIMP", "\"gimp\"", 0.95, 0.03, 0.015),
@@ -102,7 +102,6 @@ fn column(shape: &str, cells: u32, steps: u32) -> Result<Errors, StudyError> {
     })
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let cells: &[u32] = if *effort == Effort::Full { &[10, 20, 40, 80] } else { &[10, 20, 40] };
     let mut report =

@@ -1,4 +1,4 @@
-//! Section 4.2: a block compacted by its own weight, beside finite elements through the same residual.
+//! Section 4.2: a block compacted by its own weight, against finite elements with the same residual.
 
 use super::{Effort, Outcome, StudyError};
 use crate::elements::Elements;
@@ -13,20 +13,20 @@ use bfree::tensor::Vector;
 use plotters::prelude::SeriesLabelPosition;
 use rayon::prelude::*;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "a block compacted by its own weight (section 4.2), beside Q8 finite elements through the same residual";
 
-/// The place that is watched: that of a particle, next to the middle of the top.
+/// The observed position: that of a particle next to the middle of the top.
 const PROBE: [f64; 2] = [0.525, 0.975];
 const STEPS: usize = 500;
 
-/// What an independent program found.
+/// Results of an independent program.
 struct Independent {
     elements: &'static str,
     lme_3: &'static str,
 }
 
-/// (scene, what it is called, reference)
+/// (scene, name, reference)
 const SIDES: [(&str, &str, Independent); 2] = [
     (
         "compaction",
@@ -46,12 +46,12 @@ const SIDES: [(&str, &str, Independent); 2] = [
     ),
 ];
 
-/// What two correct programs differ by after hundreds of steps (tests/reference/README.md).
+/// The difference of two correct programs after hundreds of steps (tests/reference/README.md).
 const AGREEMENT: f64 = 1e-8;
 
 const LME: &str = r#"approximation={"lme":{"gamma":3}}"#;
 
-/// The paper's, and the independent program's.
+/// The functions of the paper and of the independent program.
 const LME_ON_CIRCLE: &str = r#"approximation={"lme":{"gamma":3,"support":"circle"}}"#;
 
 const SMOOTH_LME: &str = r#"approximation={"lme":{"gamma":1.4}}"#;
@@ -72,7 +72,7 @@ const METHODS: [(&str, &[&str]); 8] = [
 ];
 const PAPER: usize = 3;
 const IMPROVED: [usize; 3] = [4, 5, 6];
-/// Drawn, and in which colour of the palette.
+/// The drawn methods, with the number of their colour.
 const DRAWN: [(usize, usize); 5] = [(0, 2), (1, 3), (2, 4), (PAPER, 1), (5, 5)];
 
 /// u_y at the probe: (t, u) of every step.
@@ -113,14 +113,14 @@ fn distance(u: &History, w: &History) -> f64 {
     of(&|k| u[k].1 - w[k].1) / of(&|k| w[k].1)
 }
 
-/// From after the ramp, t ≥ 1: half the range of u.
+/// Half the range of u after the ramp, t ≥ 1.
 fn amplitude(u: &History) -> f64 {
     let after = || u.iter().filter(|(t, _)| *t >= 1.0).map(|at| at.1);
     0.5 * (after().fold(f64::NEG_INFINITY, f64::max) - after().fold(f64::INFINITY, f64::min))
 }
 
-/// The delay τ of u behind w, in seconds, that leaves the least ∫ (u(t + τ) − w(t))² dt for 1.5 ≤ t ≤ 4.5, both without their
-/// means there; at most a quarter of the period of 0.6 s.
+/// The delay τ of u behind w, in seconds. It minimises ∫ (u(t + τ) − w(t))² dt over 1.5 ≤ t ≤ 4.5, both without their means there, with τ
+/// at most a quarter of the period of 0.6 s.
 fn lag(u: &History, w: &History) -> f64 {
     let dt = w[1].0 - w[0].0;
     let at = |t: f64| {
@@ -144,7 +144,7 @@ fn lag(u: &History, w: &History) -> f64 {
 
 /// The column u_y(0.525,0.975) of a reference, beside the time.
 fn rows(text: &str) -> History {
-    // The names of places have commas in them: "t,u_y(0.5,1),u_y(0.525,0.975)".
+    // The names of columns contain commas: "t,u_y(0.5,1),u_y(0.525,0.975)".
     let mut names = text.lines().next().unwrap_or_default().split("),");
     let column = names.position(|name| name.ends_with("u_y(0.525,0.975")).map_or(usize::MAX, |place| place + 1);
     let row = |line: &str| {
@@ -155,7 +155,6 @@ fn rows(text: &str) -> History {
     text.lines().skip(1).map(row).collect()
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("distance ‖u − u_Q8‖ / ‖u_Q8‖ over 5 s at (0.525, 0.975)", &["of", "sides"]);
     let mut outcome = Outcome::default();
@@ -185,7 +184,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
                 format!("{:.0}", 1e3 * lag(u, &q8)),
                 format!("{:.2}", 100.0 * far),
             ]);
-            // How far a method may be from elements, nothing says; how far the paper's is, an independent program.
+            // No theory bounds the distance of a method from elements; an independent program gives that of the paper's method.
             report.push(&[name, sides], far, Bound::Reported);
             if *k == PAPER {
                 let apart = distance(u, &rows(independent.lme_3));

@@ -1,7 +1,7 @@
-//! The digits of the laws at tiny strains: H = F − I is kept so that none are lost.
+//! The digits of the laws at tiny strains: the code uses H = F − I so that no digits are lost.
 //!
-//! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Formed from F or from J, S would keep
-//! 4 digits and W none. The checks of derivatives see only part of that: where W and S lose the same digits, they agree.
+//! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Computed from F or J, S would have 4 correct
+//! digits and W none. The checks of derivatives see only part of such a loss: if W and S lose the same digits, they still agree.
 
 use super::{Effort, Outcome, StudyError, short};
 use crate::random::Random;
@@ -9,20 +9,19 @@ use crate::report::{Bound, Report};
 use bfree::material::{Lame, Law, Material, Start};
 use bfree::tensor::{Deformation, Tensor, contract, symmetric};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "the laws keep their digits at strains of 1e-12";
 
 /// Size of the strain.
 const STRAIN: f64 = 1e-12;
 
-/// What is left out is of the next order; a moderate factor for its coefficients.
+/// The neglected terms are of the next order; the factor allows for their coefficients.
 const LINEAR: f64 = 100.0 * STRAIN;
 
-/// Runs the study.
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("strains of 1e-12 against the linear law", &["quantity", "law", "D"]);
     for (name, law) in &Material::examples(Lame::from_young_poisson(1000.0, 0.3)?) {
-        // Fibres are linear on either side of rest.
+        // Fibres have different stiffness in tension and compression, and are linear in each.
         if matches!(law, Material::FibreReinforced(_)) {
             continue;
         }
@@ -51,7 +50,7 @@ fn linear<const D: usize>(name: &str, law: &Material, report: &mut Report) {
     report.push(&["W = E:C:E / 2", name, &dimension], energy, Bound::AtMost(LINEAR));
 }
 
-/// The larger one, and NaN if either is.
+/// The larger number, or NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }

@@ -1,15 +1,15 @@
-//! A thick cylinder of metal that is all but rigid until it flows, widened from a = 10 to 85 mm in plane strain: a quarter of it between planes
-//! of symmetry, with linear functions and the mean dilatation of cells, on a grid that is kept.
+//! A thick cylinder of nearly rigid-plastic metal, widened from a = 10 to 85 mm in plane strain: a quarter between planes of symmetry, with
+//! linear functions and the mean dilatation of cells, in total Lagrangian steps.
 //!
-//! G = 3.8 GPa, K = 40 GPa, σ_Y = 0.5 MPa, a₀ = 10 mm, b₀ = 20 mm (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). Where volumes stay
-//! as they are, r² = R² + a² − a₀², and the stress at the hole falls all along the path:
+//! G = 3.8 GPa, K = 40 GPa, σ_Y = 0.5 MPa, a₀ = 10 mm, b₀ = 20 mm (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). At
+//! constant volume r² = R² + a² − a₀², and the stress at the hole falls along the whole path:
 //!
 //! ```text
 //! σ_rr(a) = σ_Y/√3 ln [a²/(b₀² + a² − a₀²)]
 //! ```
 //!
-//! No pressure could be given that falls. So the nodes in the hole are moved, as what fills it would if it kept its volume but for the a² − a₀² that
-//! are pumped in at the axis; and the stress is what makes their forces work: −σ_rr dV = Σ f·dx with V = π a²/4.
+//! A falling pressure cannot be prescribed as a load. Therefore the nodes in the hole are moved like an incompressible filling into which
+//! a² − a₀² is pumped at the axis. The stress follows from the work of their forces: −σ_rr dV = Σ f·dx with V = π a²/4.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
@@ -21,7 +21,7 @@ use bfree::simulation::{Simulation, StepReport};
 use bfree::tensor::Vector;
 use std::f64::consts::PI;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "a rigid-plastic cylinder whose hole is widened from 10 to 85 mm, against the formula of its stress";
 
 /// a at the start and the end, b at the start, and σ_Y.
@@ -29,27 +29,27 @@ const INNER: [f64; 2] = [10.0, 85.0];
 const OUTER: f64 = 20.0;
 const YIELD: f64 = 0.5;
 
-/// a at which the short effort ends.
+/// The radius a at which the short effort ends.
 const DOUBLED: f64 = 2.0 * INNER[0];
 
-/// Five cells across the wall.
+/// The spacing, for five cells across the wall.
 const SPACING: f64 = 2.0;
 
-/// Steps in which a grows by the same factor each.
+/// The number of steps; a grows by the same factor in each.
 const STEPS: u32 = 100;
 
 /// Relative error of the stress.
 const BOUND: f64 = 0.01;
 
-/// Every so many steps a row.
+/// The number of steps per row of the table.
 const ROWS: u64 = 5;
 
-/// a at the time t, 0 to 1.
+/// The radius a at the time t, 0 to 1.
 fn inner(t: f64) -> f64 {
     INNER[0] * (INNER[1] / INNER[0]).powf(t)
 }
 
-/// Where what was at X is when the hole has the radius a.
+/// The position of the point X when the hole has the radius a.
 fn moved(x: &Vector<f64, 2>, a: f64) -> Vector<f64, 2> {
     x * (1.0 + (a * a - INNER[0] * INNER[0]) / x.norm_squared()).sqrt()
 }
@@ -59,7 +59,7 @@ fn known(a: f64) -> f64 {
     YIELD / 3.0_f64.sqrt() * (a * a / (OUTER * OUTER + a * a - INNER[0] * INNER[0])).ln()
 }
 
-/// The cylinder on a grid of spacing `h`, and the nodes that are moved; the conditions that move them are the last ones.
+/// The cylinder on a grid of spacing `h`, and the prescribed nodes; their conditions are the last ones of the simulation.
 fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> {
     let box_side = (INNER[1] * 1.1 / h).ceil() * h;
     let body = format!(
@@ -77,7 +77,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
         ),
         r#"bodies.0.volumetric="mean_dilatation""#.to_owned(),
         "pressures=[]".to_owned(),
-        // It would hold second differences of the whole motion, which are large here.
+        // Aggregation would constrain second differences of the whole motion, which are large here.
         "aggregation=false".to_owned(),
         r#"solver={"newton":{"tolerance":1e-6,"max_iterations":60}}"#.to_owned(),
         "output={}".to_owned(),
@@ -86,7 +86,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
     let mut simulation: Simulation<2> = shipped::scene("tube", &overrides)?.build(&shipped::folder())?;
     let side = (INNER[0] / h) as u32;
     let all = (0..=side).flat_map(|i| (0..=side).map(move |k| Vector::from([f64::from(i) * h, f64::from(k) * h])));
-    // Linear functions reach no farther than a cell.
+    // Linear functions have a support of one cell to each side.
     let nodes: Vec<_> = all.filter(|x| (INNER[0] - 1.5 * h..=INNER[0]).contains(&x.norm())).collect();
     for x in &nodes {
         let curve = |i: usize| {
@@ -102,7 +102,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
     Ok((simulation, nodes))
 }
 
-/// σ_rr by the work of the forces on the nodes that are moved.
+/// σ_rr from the work of the forces on the prescribed nodes.
 fn stress(step: &StepReport<2>, nodes: &[Vector<f64, 2>], a: f64) -> f64 {
     let forces = step.reactions.iter().rev().zip(nodes.iter().rev());
     // dx/da = a x/|x|²
@@ -113,7 +113,6 @@ fn stress(step: &StepReport<2>, nodes: &[Vector<f64, 2>], a: f64) -> f64 {
     -power.sum::<f64>() / (0.5 * PI * a)
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let end = if *effort == Effort::Full { INNER[1] - 1e-6 } else { DOUBLED };
     let mut table = Table::new(
@@ -121,7 +120,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         ["inner radius", "computed", "formula", "error", "Newton", "Krylov"],
     );
     let (mut simulation, nodes) = cylinder(SPACING)?;
-    // The largest error while a is at most doubled, and how far all errors are within the bound.
+    // The largest error until a has doubled, and the radius up to which all errors are within the bound.
     let (mut doubled, mut reached) = (0.0_f64, INNER[0]);
     let (mut newton, mut krylov) = (0, 0);
     while inner(simulation.clock.time()) < end {

@@ -1,7 +1,7 @@
 //! Uniform stress under tractions and pressures: every family, every offset in the cell, oblique faces and a disc.
 //!
-//! Loads P N on the free faces and two planes of symmetry hold a homogeneous deformation F exactly, whatever the shape of the body.
-//! Displacement and stress are read where users read them: at the particles, and at the points of the loaded surface.
+//! Loads P N on the free faces and two planes of symmetry keep a homogeneous deformation F exactly, for any shape of the body. Displacement
+//! and stress are read where users read them: at the particles and at the points of the loaded surface.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "uniform stress under tractions and pressures, at the particles and at the loaded faces";
 
 /// E and ν of the law.
@@ -24,17 +24,17 @@ const POISSON: f64 = 0.3;
 /// λ − 1 along x under tension, and in all directions under pressure.
 const STRAIN: f64 = 0.01;
 
-/// Cells in a unit of length: the errors are judged at the first, and must fall to the second.
+/// Cells per unit of length: the errors at the first are judged, and must fall to the second.
 const CELLS: [u32; 2] = [8, 16];
 
-/// Of uGIMP in boxes the sum over particles is exact, and errors are round-off times the condition of the stiffness: 2e-16 × 5e3.
+/// uGIMP in boxes has exact sums over particles, so the errors are round-off times the condition of the stiffness: 2e-16 × 5e3.
 const EXACT: f64 = 1e-12;
 /// Error of the displacement of the loaded face at `CELLS[0]`, relative to the greatest displacement.
 const DISPLACEMENT: f64 = 0.01;
-/// Error of the stress at the loaded face at `CELLS[0]`, relative to the stress that is applied.
+/// Error of the stress at the loaded face at `CELLS[0]`, relative to the applied stress.
 const STRESS: f64 = 0.1;
 
-/// Spacings by which the points of a loaded surface lie below it.
+/// The depth of the points of a loaded surface below it, in spacings.
 const DEPTH: f64 = 1e-6;
 
 /// An error below this share of its bound need not fall.
@@ -57,7 +57,7 @@ fn families() -> [(&'static str, Value); 6] {
 enum Form {
     /// A box whose free faces lie this many spacings beyond a line of the grid.
     Box { offset: f64 },
-    /// A box turned by 27°, as far as the planes of symmetry leave it.
+    /// A box rotated by 27°, cut at the planes of symmetry.
     Turned,
     /// A quarter of a disc.
     Disc,
@@ -90,7 +90,7 @@ const CASES: [Case; 7] = [
 ];
 
 impl Form {
-    /// The shape, as a scene writes it.
+    /// The shape in the form of a scene.
     fn shape(self, spacing: f64) -> Value {
         match self {
             Self::Box { offset } => json!({ "box": { "min": [0, 0], "max": [1.0 + offset * spacing, 0.75 + offset * spacing] } }),
@@ -104,7 +104,7 @@ impl Form {
         }
     }
 
-    /// The flat faces that are free: a point and the outward normal of each.
+    /// The free flat faces: a point and the outward normal of each.
     fn faces(self, spacing: f64) -> Vec<([f64; 2], [f64; 2])> {
         match self {
             Self::Box { offset } => {
@@ -119,13 +119,13 @@ impl Form {
     }
 }
 
-/// The axes of a box that is turned by 27°.
+/// The axes of a box rotated by 27°.
 fn turned() -> [[f64; 2]; 2] {
     let (sine, cosine) = 27.0_f64.to_radians().sin_cos();
     [[cosine, sine], [-sine, cosine]]
 }
 
-/// The deformation that is to come out, and its first Piola–Kirchhoff stress.
+/// The exact deformation, and its first Piola–Kirchhoff stress.
 struct Exact {
     gradient: Tensor<f64, 2>,
     piola: Tensor<f64, 2>,
@@ -152,7 +152,7 @@ impl Exact {
         let stretched = |across: f64| Tensor::<f64, 2>::new(STRAIN, 0.0, 0.0, across);
         let gradient = match load {
             Load::Pressure => stretched(STRAIN) * -1.0,
-            // The face across is free; bisection ends at neighbouring numbers.
+            // The lateral face is free; bisection ends at neighbouring numbers.
             Load::Tension => {
                 let (mut low, mut high) = (-STRAIN, 0.0);
                 for _ in 0..100 {
@@ -198,12 +198,12 @@ fn scene(case: &Case, family: &Value, cells: u32, exact: &Exact, law: &Material)
     scene
 }
 
-/// Greatest errors, relative: of displacements at the particles and at the loaded faces, of stresses there, and of the energy.
+/// The largest relative errors: displacements at the particles and at the loaded faces, stresses at both, and the energy.
 #[derive(Clone, Copy, Debug)]
 struct Errors {
     displacement: [f64; 2],
     stress: [f64; 2],
-    /// Energy that was dissipated, over the strain energy.
+    /// The dissipated energy over the strain energy.
     dissipated: f64,
     particles: usize,
 }
@@ -225,7 +225,7 @@ fn errors(case: &Case, family: &Value, cells: u32) -> Result<Errors, StudyError>
         dissipated: simulation.dissipated.abs() / simulation.strain_energy(),
         particles: now.len(),
     };
-    // The motion that a point of a surface shows is that of the surface itself.
+    // The displacement of a surface point is that of the surface itself.
     let mut shown = start.clone();
     for point in simulation.loads.surface.iter().flat_map(|load| &load.points) {
         shown[simulation.particles.id[point.particle] as usize] += point.normal * (DEPTH / f64::from(cells));
@@ -235,7 +235,7 @@ fn errors(case: &Case, family: &Value, cells: u32) -> Result<Errors, StudyError>
         let where_read = usize::from(!now.is_solid(p));
         let displacement = (now.position[p] - x - exact.gradient * shown[p]).norm() / greatest;
         let stress = (cauchy(&law, now.displacement_gradient[p]) - stress).norm() / stress.norm();
-        // `max` would drop what is not a number.
+        // `max` would drop NaN.
         for (worst, one) in [(&mut found.displacement[where_read], displacement), (&mut found.stress[where_read], stress)] {
             if one.is_nan() || one > *worst {
                 *worst = one;
@@ -245,7 +245,7 @@ fn errors(case: &Case, family: &Value, cells: u32) -> Result<Errors, StudyError>
     Ok(found)
 }
 
-/// Judges what was found at both spacings.
+/// Judges the errors at both spacings.
 fn judge(report: &mut Report, names: [&str; 2], exact: bool, [coarse, fine]: [Errors; 2]) {
     let mut push = |what: &str, value: f64, bound: Bound| report.push(&[names[0], names[1], what], value, bound);
     let places = ["particles", "loaded face"];
@@ -256,7 +256,7 @@ fn judge(report: &mut Report, names: [&str; 2], exact: bool, [coarse, fine]: [Er
     }
     push("dissipated over strain energy", coarse.dissipated, Bound::AtMost(EXACT));
     if exact {
-        // Round-off does not fall.
+        // Round-off does not fall with the spacing.
         return;
     }
     let falls = |[fine, coarse]: [f64; 2], bound: f64| fine.max(SMALL * bound) / coarse.max(SMALL * bound);
@@ -266,7 +266,6 @@ fn judge(report: &mut Report, names: [&str; 2], exact: bool, [coarse, fine]: [Er
     push("stress at the face, h/2 over h", of_stress, Bound::AtMost(1.0));
 }
 
-/// Runs the study.
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("greatest errors, relative", &["case", "shape", "of"]).as_matrix(&[0, 2], 1, 1);
     let header = ["case", "shape", "cells", "particles", "displacement", "at the face", "stress", "at the face", "dissipated"];
@@ -293,7 +292,7 @@ pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
         match found {
             [Ok(coarse), Ok(fine)] => judge(&mut report, [case.name, family], exact, [coarse, fine]),
             [Err(error), _] | [_, Err(error)] => {
-                // Runs that found no equilibrium.
+                // Runs without an equilibrium.
                 report.push(&[case.name, family, "run"], 1.0, Bound::AtMost(0.0));
                 report.note(format!("{}, {family}: {error}", case.name));
             }
@@ -306,7 +305,7 @@ pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
 mod tests {
     use super::*;
 
-    /// Under tension the face across is free; under pressure the stress is the same in all directions.
+    /// Under tension the lateral face is free; under pressure the stress is equal in all directions.
     #[test]
     fn the_loads_are_those_of_the_deformation() -> Result<(), StudyError> {
         let law = law()?;

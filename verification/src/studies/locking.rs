@@ -1,8 +1,8 @@
-//! Cook's membrane of ν = 0.3 … 0.4999 in load steps, with the volume of every particle and with the mean of cells.
+//! Cook's membrane with ν = 0.3 … 0.4999 in load steps, with the volume of every particle and with the mean dilatation of cells.
 //!
-//! The known displacements of the middle of the free edge are those of nine-node elements with a volume linear in each of them (the potential
-//! of the mean dilatation with three numbers an element), 32 × 32 of them, of the same law, computed by another program
-//! (`verification/reference/cook_mixed.py`); 16 × 16 of them differ by 0.03 to 0.1 %.
+//! The reference displacements of the middle of the free edge come from another program (`verification/reference/cook_mixed.py`): 32 × 32
+//! nine-node elements of the same law, with a linear volume in each (the potential of the mean dilatation with three numbers per element).
+//! Displacements from 16 × 16 elements differ by 0.03 to 0.1 %.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
@@ -15,18 +15,18 @@ use bfree::tensor::Vector;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "Cook's membrane near incompressibility, with and without the mean dilatation of cells";
 
-/// ν, and how far the middle of the free edge comes.
+/// ν, and the reference displacement of the middle of the free edge.
 const KNOWN: [(f64, f64); 4] = [(0.3, 14.507), (0.49, 12.135), (0.499, 12.003), (0.4999, 11.990)];
 
-/// Relative error at 32 cells an edge.
+/// The relative error with 32 cells per edge.
 const BOUND: f64 = 0.01;
 
 const SHAPES: [(&str, &str); 2] = [("linear", "\"linear\""), ("cubic B-splines", r#"{"bspline":{"degree":3}}"#)];
 
-/// What comes out of a run.
+/// The results of a run.
 struct End {
     tip: f64,
     /// The part of the pressure that alternates between neighbouring cells, over its scatter.
@@ -57,7 +57,7 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
     let now = simulation.particles.by_id();
     let away = |p: usize| (start.position[p] - Vector::from([48.0, 52.0])).norm();
     let tip = (0..start.len()).min_by(|&a, &b| away(a).total_cmp(&away(b))).ok_or("no particles")?;
-    // Means of the cells that particles were in at first.
+    // Means over the cells of the initial particle positions.
     let pressure = Field::Pressure.values(&simulation, &reference)?;
     let mut cells: HashMap<[u32; 2], (f64, f64)> = HashMap::new();
     for (p, x) in (0..start.len()).filter(|&p| start.is_solid(p)).zip(&pressure) {
@@ -85,13 +85,12 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
     })
 }
 
-/// In ascending order, so that it does not depend on that of a map.
+/// The values are sorted, so that the sum does not depend on the order of a map.
 fn root_mean_square(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let (cells, known): (&[u32], _) = match effort {
         Effort::Full => (&[8, 16, 32], &KNOWN[..]),
@@ -105,7 +104,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut table = Table::new("Cook's membrane, beside elements of the same law", header);
     let of_shape = |shape| [false, true].into_iter().flat_map(move |averaged| known.iter().map(move |of| (shape, averaged, of)));
     let cases: Vec<_> = SHAPES.iter().flat_map(of_shape).flat_map(|case| cells.iter().map(move |&n| (case, n))).collect();
-    // Side by side: a small membrane keeps one core busy.
+    // Runs in parallel: a small membrane keeps one core busy.
     let ends = cases.into_par_iter().with_max_len(1).map(|(case @ ((_, shape), averaged, (poisson, _)), n)| {
         (case, n, membrane(shape, *poisson, n, averaged).map_err(|error| chain(&*error)))
     });
@@ -114,7 +113,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         let volume = if averaged { "mean of cells" } else { "pointwise" };
         let error = (tip / known - 1.0).abs();
         let bound = match n {
-            // Of order one at least.
+            // The order is at least one.
             16.. if averaged => Bound::AtMost(BOUND * 32.0 / f64::from(n)),
             _ => Bound::Reported,
         };

@@ -1,5 +1,5 @@
-//! Manufactured solutions with large rotation and large strain, the grid renewed in every step: observed orders in space. Those on a grid that
-//! is kept, and those in time, are in the study `order`.
+//! Manufactured solutions with large rotation and large strain and a grid reset in every step: observed orders in space. The study `order`
+//! has the total Lagrangian orders, and those in time.
 
 use super::{Effort, Outcome, StudyError};
 use crate::figure::{Axis, Figure, Line};
@@ -17,7 +17,7 @@ use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "orders in space on a vortex and on an axis-aligned motion, the grid renewed in every step";
 
 /// Particles along each axis of a cell.
@@ -28,22 +28,22 @@ const STEP_OVER_SPACING: f64 = 0.4;
 
 /// The least order in space of the position error where ∇N is continuously differentiable.
 ///
-/// With the particles of a cell fixed, the sums over particles leave a force error of σ/h times a number that does not
-/// fall with h (Steffen, Kirby, Berzins 2008); on the scale of the grid it moves nodes by h times that number: order 1,
-/// once the interpolation error, of order 2, is below it. Of that 1, 0.8 is asked for.
+/// With fixed particles per cell, the sums over particles leave a force error of σ/h times a number that does not fall with h (Steffen,
+/// Kirby, Berzins 2008). On the scale of the grid this error moves nodes by h times that number. So the order is 1 once the interpolation
+/// error, of order 2, is smaller. The study requires 0.8 of that order.
 const ORDER: f64 = 0.8;
 
 /// One family.
 struct Family {
     name: &'static str,
     shape: Approximation,
-    /// Whether ∇N is continuously differentiable, to rounding. Where it jumps or has kinks (LME of a large γ̂ is nearly
-    /// linear), that number is large and changes as particles cross faces: it shakes the grid, undamped and more often
-    /// the finer it is, and nothing is promised.
+    /// Whether ∇N is continuously differentiable, to rounding. If it has jumps or kinks (LME with a large γ̂ is nearly linear), the number
+    /// is large and changes as particles cross faces. It then shakes the grid without damping, more often on finer grids, and no order is
+    /// guaranteed.
     smooth: bool,
 }
 
-/// All families that have a lumped mass; of LME the widest and the paper's.
+/// All families with a lumped mass; LME with the largest width and with the paper's.
 fn families(effort: Effort) -> Vec<Family> {
     let left_out = |name| match name {
         "lme 1.8" | "lme circle 1.8" | "not-a-knot quadratic" | "not-a-knot cubic" => true,
@@ -70,7 +70,7 @@ trait Problem: Motion<2> + Copy + Send + 'static {
     fn holds(&self, x: &Vector<f64, 2>) -> bool;
     /// Whether the body touches the walls of the box.
     const WALLS: bool;
-    /// The finest h in units of 1/8, as a number of halvings.
+    /// The number of halvings from h = 1/8 to the finest h.
     fn halvings(&self, effort: Effort) -> i32;
 }
 
@@ -100,8 +100,7 @@ impl Problem for Vortex {
     }
 }
 
-/// A run to t = 1 in `steps` steps on cells of edge `h`: the final particles in the order of their ids, and their
-/// reference positions.
+/// A run to t = 1 in `steps` steps on cells of edge `h`. Returns the final particles, ordered by id, and their reference positions.
 fn simulate<P: Problem>(
     problem: &P,
     shape: &Approximation,
@@ -169,7 +168,7 @@ fn errors<P: Problem>(problem: &P, simulation: &Simulation<2>, reference: &[Vect
     Errors { position, velocity, strain }
 }
 
-/// log of the ratio of two errors over that of the two sizes they belong to.
+/// The logarithm of the ratio of two errors over that of their sizes.
 fn order(coarse: f64, fine: f64, ratio: f64) -> f64 {
     (coarse / fine).ln() / ratio.ln()
 }
@@ -178,7 +177,6 @@ fn text(order: f64) -> String {
     if order.is_finite() { format!("{order:.2}") } else { "-".into() }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
     let mut report = Report::new("orders of the manufactured solutions", &["quantity", "shape", "motion"]);
@@ -193,7 +191,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(outcome)
 }
 
-/// h refined, Δt in proportion.
+/// The study in space: h is refined, with Δt in proportion.
 fn space<P: Problem>(
     problem: &P,
     motion: &str,

@@ -1,7 +1,7 @@
-//! Laws with memory at a point: each regime of the return maps, in which derivatives must hold as they do in elastic ones.
+//! Laws with internal variables at a point: derivatives must hold in each regime of the return maps, as in elastic regimes.
 //!
-//! Tangents are compared with dual numbers through the local solve. What is remembered is judged by what it must give back: at the end of a
-//! step the new memory and no time give the stress of the step again.
+//! Tangents are compared with dual numbers through the local solve. The internal variables at the end of a step must reproduce its stress
+//! when no further time passes.
 
 use super::{Effort, Outcome, StudyError};
 use crate::random::Random;
@@ -10,35 +10,35 @@ use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, Start, ad
 use bfree::tensor::{Deformation, Tensor, contract, identity, inverse};
 use num_dual::{Dual2_64, Dual64};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "return maps and relaxation: tangents, potentials and memory in every regime";
 
-/// What every derivative must meet, as `--check-tangent` asks at most.
+/// The bound for every derivative, equal to the largest bound of `--check-tangent`.
 const EXACT: f64 = 1e-10;
 
 /// States tried in each regime.
 const TRIES: u32 = 20;
 
-/// Which laws flow in the steps of a regime.
+/// The laws with plastic flow in the steps of a regime.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Flows {
-    /// Plastic ones, in every step.
+    /// Plastic laws flow in every step.
     Always,
-    /// As above, but for those that pressure strengthens.
+    /// Plastic laws flow in every step, except those that pressure strengthens.
     Metals,
-    /// None.
+    /// No law flows.
     Never,
-    /// Some, in some steps.
+    /// Some laws flow in some steps.
     Sometimes,
 }
 
-/// How a step reaches its end: what happened before, over which Δt it goes, and where it ends.
+/// The path of a step: its history, its Δt, and its final deformation.
 struct Regime {
     name: &'static str,
-    /// Whether a step before it has left the body flowed.
+    /// Whether the step before caused plastic flow.
     flowed: bool,
     dt: f64,
-    /// What deforms the body then: all stretches, how much longer the first and the third are, and anything.
+    /// The deformation of the step: a factor on all stretches, additions to the first and the third, and a random part.
     stretch: f64,
     first: f64,
     third: f64,
@@ -64,7 +64,6 @@ const REGIMES: &[Regime] = &[
     Regime { dt: 1e3, ..regime("dt=1e3", true, [0.9, 0.3, 0.02], Flows::Sometimes) },
 ];
 
-/// Runs the study.
 pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let title = "laws with memory: worst relative error of a regime";
     let mut report = Report::new(title, &["quantity", "law", "D", "regime"]);
@@ -78,7 +77,7 @@ pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(Outcome { reports: vec![report], ..Outcome::default() })
 }
 
-/// F of a regime: its stretches, then anything small.
+/// F of a regime: its stretches, and a small random part.
 fn end<const D: usize>(regime: &Regime, random: &mut Random) -> Tensor<f64, D> {
     let longer = [regime.first, 0.0, regime.third];
     let stretch = |i: usize| regime.stretch * (1.0 + longer[i]);
@@ -123,29 +122,29 @@ fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) ->
     Ok(())
 }
 
-/// The step before, in the regimes that have one.
+/// The step before the regimes that have one.
 fn regime_of_flow() -> Regime {
     regime("before", false, [0.95, 0.3, 0.1], Flows::Always)
 }
 
-/// What is measured, and what is allowed.
+/// The measured quantities with their bounds.
 const QUANTITIES: [(&str, f64); 7] = [
     ("C:X against dual(S)", EXACT),
     ("blocks against C:X", EXACT),
     ("S against dual(W)", EXACT),
-    // Where eigenvalues are within 1e-5 a second divided difference has 11 digits.
+    // If eigenvalues agree to 1e-5, a second divided difference has 11 digits.
     ("dual2(W) against dual(P)", 1e-9),
     ("S of the new memory", EXACT),
     ("energy gained by flow", 1e-14),
     ("symmetry of the tangent", EXACT),
 ];
 
-/// NaN if either is.
+/// The larger number, or NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// Errors of all [`QUANTITIES`], 0 of those that the law does not have, and whether it flowed.
+/// Errors of all [`QUANTITIES`], 0 for those that the law lacks, and whether the step had plastic flow.
 fn errors<const D: usize>(
     law: &Material,
     start: &Start<'_>,

@@ -1,4 +1,4 @@
-//! An independent minimiser on the incremental potential lands where Newton does.
+//! An independent minimiser of the incremental potential must find the increment of Newton's method.
 
 use super::{Effort, Outcome, StudyError};
 use crate::prepared::Prepared;
@@ -15,16 +15,16 @@ use bfree::pooled::Pool;
 use bfree::solver::{BlockJacobi, Forcing, NewtonSettings, NonlinearProblem, newton};
 use bfree::tensor::Vector;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "argmin minimises the potential and lands on the increment that Newton found";
 
 /// Round-off of the difference of two values of Π, relative to the sum of the magnitudes of its n contributions.
 ///
-/// Each value is a plain sum: n additions, each wrong by at most eps/2 of a partial sum, which the sum of the magnitudes bounds. As
-/// independent errors, spread evenly, those of both values have a standard deviation of √(2n/3) eps/2 at most: √n eps is more than two
-/// of them, and if the contributions have one sign, so that the partial sums grow from nothing, more than four. A contribution itself,
-/// V W, is wrong by about 4 eps of its own, and by 4 more through H: W is of second order in H, which is composed of two gradients
-/// and so rounded to 2 eps.
+/// Each value is a plain sum of n additions. Each addition is wrong by at most eps/2 of a partial sum, which the sum of the magnitudes
+/// bounds. If the errors are independent and uniform, the standard deviation for both values is at most √(2n/3) eps/2. So √n eps is more
+/// than two standard deviations. If all contributions have one sign, the partial sums grow from zero, and it is more than four. A
+/// contribution V W has an error of about 4 eps from its own evaluation, and 4 more through H. W is of second order in H, and H is composed
+/// of two gradients and so rounded to 2 eps.
 fn round_off(contributions: usize) -> f64 {
     ((contributions as f64).sqrt() + 8.0) * f64::EPSILON
 }
@@ -32,14 +32,14 @@ fn round_off(contributions: usize) -> f64 {
 /// Pairs of vectors L-BFGS remembers.
 const MEMORY: usize = 20;
 
-/// Iterations allowed; at the round-off of Π it finds nothing better until then.
+/// The largest number of iterations; at the round-off of Π no improvement follows.
 const MOST_ITERATIONS: u64 = 400;
 
 /// Π and R in the variables y = √diag(K) x of the free degrees of freedom, in which the tangent has a unit diagonal.
 struct Potential<'a> {
     equilibrium: &'a Equilibrium<'a, 2, Material>,
     scale: &'a [f64],
-    /// Π at the start, taken off so that no digits are lost to a constant.
+    /// Π at the start. It is subtracted, so that a constant costs no digits.
     start: f64,
 }
 
@@ -54,7 +54,7 @@ impl CostFunction for Potential<'_> {
     type Output = f64;
 
     fn cost(&self, y: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        // Beyond det F ≤ 0 the potential is infinite; there is none under follower pressure.
+        // For det F ≤ 0 the potential is infinite; under follower pressure there is none.
         let potential = NonlinearProblem::potential(self.equilibrium, &self.increment(y));
         Ok(potential.map_or(f64::NAN, |value| value.map_or(f64::INFINITY, |(value, _)| value - self.start)))
     }
@@ -72,7 +72,6 @@ impl Gradient for Potential<'_> {
     }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("argmin's L-BFGS against Newton", &["quantity", "step"]);
     let mut table = Table::new(
@@ -144,7 +143,7 @@ fn case(
     let result = match executor.timer(false).ctrlc(false).run() {
         Ok(result) => result,
         Err(error) => {
-            // Counted as a failure of this step; the others go on.
+            // The error is a failure of this step; the other steps go on.
             report.push_error(&["L-BFGS", label], error.as_ref());
             return Ok(());
         }
@@ -164,7 +163,7 @@ fn case(
     let norm = bfree::solver::vector::norm;
     let relative = norm(&difference) / norm(by_newton);
     report.push(&["|difference| / |dphi|", label], relative, Bound::Reported);
-    // Newton's point is a minimum: the other one does not lie lower.
+    // Newton's result is a minimum: the other result must not be lower.
     let lower = (least - potential(&equilibrium, &found)?.0) / magnitude;
     report.push(&["(Pi Newton - Pi L-BFGS) / magnitude", label], lower, Bound::AtMost(round_off));
     table.push([

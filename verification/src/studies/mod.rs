@@ -1,4 +1,4 @@
-//! The studies: one file a study, one list.
+//! The studies: one file each, and one list.
 
 use crate::figure::Figure;
 use crate::known;
@@ -6,23 +6,23 @@ use crate::report::{Counts, Report};
 use crate::sheet::Sheet;
 use crate::table::Table;
 
-/// How much a study does.
+/// The amount of work of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effort {
-    /// What CI runs: seconds.
+    /// The effort in CI: seconds.
     Short,
-    /// Long sweeps too: minutes.
+    /// Long sweeps included: minutes.
     Full,
 }
 
-/// What a study found.
+/// The results of a study.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// What is judged.
+    /// Reports with judged cells.
     pub reports: Vec<Report>,
-    /// What is only shown.
+    /// Tables without judgement.
     pub tables: Vec<Table>,
-    /// What there is to say, in sentences.
+    /// Remarks, in sentences.
     pub remarks: Vec<String>,
     /// Pictures.
     pub figures: Vec<Figure>,
@@ -31,35 +31,35 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether every report passes, and there is one.
+    /// Whether there is a report and every report passes.
     pub fn passed(&self) -> bool {
         !self.reports.is_empty() && self.reports.iter().all(Report::passed)
     }
 
-    /// How many cells of all reports are judged, shown, known to fail.
+    /// The numbers of judged, shown and known failing cells of all reports.
     pub fn counts(&self) -> Counts {
         self.reports.iter().map(Report::counts).sum()
     }
 }
 
-/// Why a study could not be finished: whatever the simulations in it can fail with.
+/// An error that ends a study, such as an error of its simulations.
 pub type StudyError = Box<dyn std::error::Error>;
 
 /// A study.
 #[derive(Clone, Copy, Debug)]
 pub struct Study {
-    /// What it is called on the command line.
+    /// The name on the command line.
     pub name: &'static str,
-    /// What it shows, in a sentence.
+    /// A one-sentence summary.
     pub about: &'static str,
     run: fn(&Effort) -> Result<Outcome, StudyError>,
 }
 
 impl Study {
-    /// Runs it, and holds what fails against the list of known failures.
+    /// Runs the study, and compares its failures with the list of known failures.
     ///
     /// # Errors
-    /// Those of the simulations in it.
+    /// Errors of the simulations in the study.
     pub fn run(&self, effort: Effort) -> Result<Outcome, StudyError> {
         let mut outcome = (self.run)(&effort)?;
         known::mark(known::KNOWN, self.name, effort, &mut outcome.reports);
@@ -75,7 +75,7 @@ fn short(name: &str) -> String {
     name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")
 }
 
-/// The list of studies. A word here makes a study known to the program.
+/// The list of studies. One word here registers a study.
 macro_rules! studies {
     ($($study:ident),* $(,)?) => {
         $(mod $study;)*

@@ -1,4 +1,4 @@
-//! What holds for any layout of particles: affine motion, rigid motion, momentum; and what does not.
+//! Properties that hold for any layout of particles: affine motion, rigid motion, momentum; and properties that do not.
 
 use super::{Effort, Outcome, StudyError};
 use crate::check_approximation;
@@ -20,14 +20,14 @@ use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity, inverse};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "affine motion, the patch test, rigid motion, momentum";
 
-/// Sums of a few dozen products of size one, times the few cells that the patch is wide.
+/// The error of sums of a few dozen products of size one, times the few cells of the patch.
 const EXACT: f64 = 1e-12;
 
-/// Balance of a homogeneous state, relative to the magnitudes that are summed: N and ∇N have the round-off of places, some ten spacings
-/// from the origin, and max-ent that of its multipliers.
+/// Balance of a homogeneous state, relative to the summed magnitudes. N and ∇N have the round-off of positions, some ten spacings from the
+/// origin; max-ent also has that of its multipliers.
 const BALANCE: f64 = 1e-13;
 
 /// Linear momentum over whole steps, relative to Σ m |v|.
@@ -36,12 +36,11 @@ const MOMENTUM: f64 = 1e-13;
 /// Cells along each axis of the patch.
 const CELLS: u32 = 6;
 
-/// All families, LME as wide and as narrow as usual.
+/// All families, LME with the usual largest and smallest width.
 fn families() -> Vec<(&'static str, Approximation)> {
     Approximation::examples().into_iter().filter(|(name, _)| !matches!(*name, "lme 1.8" | "lme circle 1.8")).collect()
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut affine = Report::new("affine motion, random layouts with points on nodes, faces, walls and corners", &["quantity", "shape", "D"]);
     let mut shapes = Report::new("shape functions, worst place", &["quantity", "D", "place", "shape"]).as_matrix(&[0, 1], 3, 2);
@@ -114,7 +113,7 @@ fn layout<const D: usize>(grid: &Grid<D>, count: usize, random: &mut Random) -> 
         .collect()
 }
 
-/// Δφ_I = (A − I)(x_I − c) + b moves every particle by the same map and multiplies its F by A.
+/// Δφ_I = (A − I)(x_I − c) + b must move every particle by the same map and multiply its F by A.
 fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     let mut random = Random::new(17);
     let grid = grid::<D>();
@@ -149,23 +148,23 @@ fn affine_motion<const D: usize>(name: &str, shape: &Approximation, report: &mut
     report.push(&["x = A x + b", name, &dimension], position, Bound::AtMost(EXACT));
     report.push(&["F = A F_n", name, &dimension], strain, Bound::AtMost(EXACT));
 
-    // An affine velocity on the nodes reaches the particles as it is.
+    // An affine velocity of the nodes must reach the particles unchanged.
     let velocity = supports.values(&dphi);
     let error = velocity.iter().zip(&particles.position).fold(0.0, |worst, (v, x)| worse(worst, (v - map(x)).amax()));
     report.push(&["v = A x + b", name, &dimension], error, Bound::AtMost(EXACT));
     Ok(())
 }
 
-/// Where particles lie in the patch, two a cell and axis.
+/// The positions of the particles in the patch, two per cell and axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Layout {
     /// On the quarter points of the cells.
     Regular,
-    /// The same, all moved by one vector.
+    /// The quarter points, all moved by one vector.
     Moved,
-    /// In each cell at m ± s_k along each axis, m its middle, with an s of its own.
+    /// In each cell at m ± s_k along each axis, with the middle m and a separate s.
     Mirrored,
-    /// Each moved by up to a tenth of a spacing, and left in its cell.
+    /// Each particle moved by up to a tenth of a spacing, within its cell.
     Jittered,
     /// Anywhere.
     Random,
@@ -228,10 +227,10 @@ impl Layout {
     }
 }
 
-/// The patch test: the internal forces of a homogeneous deformation on nodes that no rim reaches, over the sums of their magnitudes. No wall
-/// reaches them either, not even through the lists of other nodes, of which max-ent makes its functions.
+/// The patch test: the internal forces of a homogeneous deformation, over the sums of their magnitudes, at nodes outside the influence of
+/// the rim. The influence of walls must not reach them either, not even through the node lists of max-ent functions.
 fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
-    // Lists reach up to 4.2 spacings: the particles lie 5 or more from the walls, and 5 or more beyond the nodes that are judged.
+    // Node lists reach up to 4.2 spacings. The particles lie at least 5 from the walls and at least 5 beyond the judged nodes.
     let (cells, first, count, judged) = (22, 5, 12, 10..=12);
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [cells; D] };
     let volume = 0.5_f64.powi(D as i32);
@@ -305,7 +304,7 @@ fn rotation<const D: usize>(random: &mut Random) -> Tensor<f64, D> {
     half * half
 }
 
-/// A square that spins and vibrates in the middle of a large box, with jittered particles.
+/// A square with jittered particles that spins and vibrates in the middle of a large box.
 pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2>, StudyError> {
     let mut random = Random::new(31);
     let centre = Vector::from([6.0, 6.0]);
@@ -377,7 +376,7 @@ fn free_flight(
     Ok(())
 }
 
-/// The larger one, and NaN if either is.
+/// The larger number, or NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }

@@ -17,7 +17,7 @@ use plotters::prelude::SeriesLabelPosition;
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "an elastic cylinder between two walls (section 4.3): energies, Table 2, Table 3, and where the energy goes";
 
 const SHAPES: [(&str, &str); 3] = [
@@ -33,7 +33,7 @@ const RULES: [(&str, [&str; 2]); 2] =
 /// The energy before the first impact.
 const ENERGY: f64 = 3.5;
 
-/// Of energies, over 1600 steps of sums of some hundred terms.
+/// The round-off of energies, over 1600 steps of sums of some hundred terms.
 const ROUND_OFF: f64 = 1e-10 * ENERGY;
 
 /// Seconds of the paper's Table 2.
@@ -48,22 +48,22 @@ fn cylinder(shape: &str, rule: [&str; 2], more: &[&str]) -> Result<Simulation<2>
     Ok(shipped::scene("rebound", &overrides)?.build(&shipped::folder())?)
 }
 
-/// What a step did to the energy. Their sum is the change of the particles' energy.
+/// The energy changes of a step. Together they are the change of the particles' energy.
 #[derive(Clone, Copy, Debug, Default)]
 struct Ledger {
-    /// Kinetic energy that the particles change beyond what their nodes do: eqs. 42 and 51.
+    /// The change of the particles' kinetic energy beyond that of their nodes: eqs. 42 and 51.
     transfer: f64,
-    /// ½ Δφ·(M̃ a_n + f_n): the acceleration brought along from the old supports against the forces on the new ones.
-    /// The force is a sum over quadrature points, and jumps when they change cells.
+    /// ½ Δφ·(M̃ a_n + f_n): the acceleration from the old connectivity against the forces of the new one. The force is a sum over
+    /// quadrature points, and jumps when they change cells.
     supports: f64,
-    /// The rest of what happens on the nodes: the quadrature of Newmark's rule in time.
+    /// The other change on the nodes: the quadrature of Newmark's rule in time.
     rule: f64,
-    /// ½ Δv·(M − M_L)Δv, which `transfer` must be: the projection keeps Σ m v_p N, so only the square of Δv is left, and it is
-    /// weighed by M on the particles and by M_L on the nodes.
+    /// ½ Δv·(M − M_L)Δv, which must equal `transfer`. The projection keeps Σ m v_p N, so only the square of Δv remains. M weighs it on the
+    /// particles, M_L on the nodes.
     lumping: f64,
-    /// What `rule` must be, from the end points of the step alone; see [`of_newmark`].
+    /// The required value of `rule`, from the end points of the step alone; see [`of_newmark`].
     predicted: f64,
-    /// What the residual that Newton's method left may do to it, ½ Σ |Δφ·R|.
+    /// A bound of the effect of Newton's remaining residual on `rule`, ½ Σ |Δφ·R|.
     left: f64,
 }
 
@@ -82,11 +82,11 @@ impl Ledger {
     }
 }
 
-/// The change of the nodes' kinetic energy by Newmark's rule beyond ½ Δφ·M(a_n + a_{n+1}), δa being the change of a:
-/// (γ−½) Δφ·M δa + Δt² (γ/2−β) δa·M [½ (a_n + a_{n+1}) + (γ−½) δa], of which nothing is left for γ = ½, β = ¼.
+/// The change of the nodes' kinetic energy by Newmark's rule beyond ½ Δφ·M(a_n + a_{n+1}), with the change δa of a: (γ−½) Δφ·M δa + Δt²
+/// (γ/2−β) δa·M [½ (a_n + a_{n+1}) + (γ−½) δa]. It vanishes for γ = ½, β = ¼.
 ///
-/// It follows from Δφ = Δt v_n + Δt² [(½−β) a_n + β a_{n+1}] and Δv = Δt [(1−γ) a_n + γ a_{n+1}]. With M a_{n+1} = −f_{n+1} the rule as a
-/// whole takes ½ Δφ·(f_n + f_{n+1}) − ΔW less this.
+/// The formula follows from Δφ = Δt v_n + Δt² [(½−β) a_n + β a_{n+1}] and Δv = Δt [(1−γ) a_n + γ a_{n+1}]. With M a_{n+1} = −f_{n+1} the
+/// whole rule takes ½ Δφ·(f_n + f_{n+1}) − ΔW less this change.
 fn of_newmark(alphas: &Alphas, dphi: &Vector<f64, 2>, a: &Vector<f64, 2>, change: &Vector<f64, 2>) -> f64 {
     let dt = alphas.dt;
     let (beta, gamma) = (1.0 / (alphas.a1 * dt * dt), alphas.a4 / (alphas.a1 * dt));
@@ -94,7 +94,7 @@ fn of_newmark(alphas: &Alphas, dphi: &Vector<f64, 2>, a: &Vector<f64, 2>, change
     half * dphi.dot(change) + dt * dt * damping * change.dot(&(a + change * (0.5 + half)))
 }
 
-/// One step of Algorithm 1, as [`Simulation::step`] does it for walls at rest and no loads, with the books kept.
+/// One step of Algorithm 1, like [`Simulation::step`] with resting walls and no loads, with a ledger of its energies.
 fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     let prepared = Prepared::new(simulation)?;
     let (settings, particles) = (&simulation.settings, &simulation.particles);
@@ -110,7 +110,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
         &Pool::default(),
     )?;
 
-    // M̃ a_n + f_n: the residual at Δφ = 0 and a = a_n. Walls at rest do no work.
+    // M̃ a_n + f_n: the residual at Δφ = 0 and a = a_n. Resting walls do no work.
     let at_rest = vec![Vector::zeros(); dphi.len()];
     let start = simulation.equilibrium(&prepared.supports, &prepared.nodal, &prepared.prescribed, Alphas::START, prepared.end);
     let unbalanced = start.residual::<f64>(&at_rest)?;
@@ -133,7 +133,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
             change_a[dof.component] = 0.0;
             free[dof.component] = 0.0;
         }
-        // f_n = (M a_n + f_n) − M a_n, and the same at the end
+        // f_n = (M a_n + f_n) − M a_n; the force at the end follows in the same way.
         let f_n = unbalanced[node] - a * nodal.mass[node];
         let f_end = residual[node] - (a + change_a) * nodal.mass[node];
         forces += 0.5 * dphi[node].dot(&(f_n + f_end));
@@ -155,7 +155,7 @@ fn step(simulation: &mut Simulation<2>) -> Result<Ledger, StudyError> {
     Ok(Ledger { transfer, supports, rule, lumping, predicted: stored - forces + damping, left })
 }
 
-/// One run with its books.
+/// One run with its ledgers.
 struct Run {
     /// (t, kinetic, strain) before and after every step.
     energies: Vec<(f64, f64, f64)>,
@@ -177,12 +177,12 @@ fn follow(mut simulation: Simulation<2>, end: f64) -> Result<Run, StudyError> {
 }
 
 impl Run {
-    /// Steps at which the body flies freely between two impacts: in the middle between two reversals.
+    /// Steps in free flight between two impacts: halfway between two reversals.
     fn flights(&self) -> Vec<usize> {
         let reversals: Vec<usize> = (1..self.velocity.len())
             .filter(|&k| self.velocity[k].signum() != self.velocity[k - 1].signum())
             .collect();
-        // Chatter at a wall is one impact.
+        // Repeated reversals at a wall are one impact.
         let apart: Vec<usize> = reversals.iter().copied().enumerate().filter(|&(i, k)| i == 0 || k - reversals[i - 1] > 40).map(|(_, k)| k).collect();
         let mut flights = vec![0];
         flights.extend(apart.windows(2).map(|pair| (pair[0] + pair[1]) / 2));
@@ -195,7 +195,6 @@ impl Run {
     }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let end = if *effort == Effort::Full { 80.0 } else { 30.0 };
     let mut report = Report::new("the cylinder", &["quantity", "shape", "rule"]);
@@ -214,7 +213,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     );
     for ((shape, rule), run) in cases.iter().zip(&runs) {
         let lost = ENERGY - run.total(run.books.len());
-        // Passive walls give nothing. How much is lost, theory says: the parts of the books, each by a formula of its own.
+        // Passive walls add no energy. Theory gives the loss: each entry of the ledger has its own formula.
         report.push(&["energy lost, of 3.5", shape.0, rule.0], lost, Bound::AtLeast(0.0));
         let mut sum = Ledger::default();
         run.books.iter().for_each(|entry| sum.add(entry));

@@ -1,8 +1,8 @@
-//! Iterations of linear solves where systems are hard: statics against refinement, cuts, near incompressibility, contrast; long time steps.
-//! And whether what comes out is right.
+//! Iterations of linear solves for hard systems: statics against refinement, cut cells, near incompressibility and contrast; long time
+//! steps. The results are checked, too.
 //!
-//! A body of size one stands on what is fixed and carries its weight, one load step of it, each linear system to 1e-8. Iterations are counts:
-//! they are judged. The bounds: what a method whose work grows with the unknowns must keep to, and what users can plan with.
+//! A body of size one stands on fixed nodes and carries its weight in one load step. Each linear system is solved to 1e-8. Iterations are
+//! counts, so they are judged. The bounds suit a method whose work grows with the unknowns, and give users numbers for planning.
 
 mod snap;
 
@@ -19,23 +19,23 @@ use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use snap::snap_through;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and whether statics are right";
 
-/// Iterations a Newton iteration in the plane and in space, and by how much the last refinement may raise them.
+/// The most linear iterations per Newton iteration in 2D and in 3D, and the largest growth by the last refinement.
 const MOST: [f64; 2] = [20.0, 30.0];
 const GROWTH: f64 = 1.3;
 
-/// Steps of 1 to 1000 Courant numbers.
+/// The most iterations for steps of 1 to 1000 Courant numbers.
 const MOST_IN_TIME: f64 = 20.0;
 
-/// Over all places of the body in a cell: the most over the least.
+/// The largest over the smallest count, for all positions of the body in a cell.
 const BY_CUTS: f64 = 2.0;
 
 const CONTRAST: f64 = 1e4;
 const MOST_BY_CONTRAST: f64 = 50.0;
 
-/// ν, and the iterations allowed in the plane.
+/// ν, and the iterations allowed in 2D.
 const NEARLY_INCOMPRESSIBLE: [(f64, f64); 3] = [(0.45, 30.0), (0.49, 50.0), (0.499, 100.0)];
 
 fn families() -> [(&'static str, Value); 6] {
@@ -49,14 +49,14 @@ fn families() -> [(&'static str, Value); 6] {
     ]
 }
 
-/// What carries its weight.
+/// The body that carries its weight.
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
-    /// A box that hangs between cell faces, on the fixed floor.
+    /// A box on the fixed floor. Its other sides lie between cell faces.
     Block,
     /// A ball whose lower part is held.
     Ball,
-    /// A box turned by 27° in the first and last axis, whose lower part is held.
+    /// A box rotated by 27° in the plane of the first and last axis, whose lower part is held.
     Turned,
 }
 
@@ -64,7 +64,7 @@ impl Shape {
     const ALL: [(Self, &'static str); 3] = [(Self::Block, "block"), (Self::Ball, "ball"), (Self::Turned, "turned block")];
 }
 
-/// The scene, with keys replaced.
+/// The scene with replaced keys.
 fn scene<const D: usize>(shape: Shape, family: &Value, h: f64, more: &Value) -> Result<Simulation<D>, StudyError> {
     let up = D - 1;
     let (mut min, mut max, mut down) = (vec![0.53; D], vec![1.53; D], vec![0.0; D]);
@@ -108,14 +108,14 @@ fn scene<const D: usize>(shape: Shape, family: &Value, h: f64, more: &Value) -> 
     Ok(simulation)
 }
 
-/// Linear iterations a Newton iteration in one step.
+/// Linear iterations per Newton iteration in one step.
 fn iterations<const D: usize>(mut simulation: Simulation<D>, by: Preconditioning) -> Result<f64, Box<StepError>> {
     simulation.settings.preconditioner = by;
     let history = simulation.step()?.newton.history;
     Ok(history.counts.krylov_iterations as f64 / history.iterations.len() as f64)
 }
 
-/// Adds them to a report, or why there are none; then they are no number.
+/// Adds the iterations to a report and returns them. If the step fails, it adds the error and returns NaN.
 fn push<const D: usize>(
     report: &mut Report,
     labels: &[&str],
@@ -135,7 +135,6 @@ fn push<const D: usize>(
     }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut refined = Report::new("iterations against refinement, statics", &["quantity", "body", "D", "shape", "h"]);
     let (plane, space): (&[f64], &[f64]) = match effort {
@@ -157,11 +156,11 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(Outcome { reports: vec![refined, others, elastica()?, any_number_of_steps()?, long_steps()?, snap_through(*effort)?], ..Outcome::default() })
 }
 
-/// How much longer than those of plain Newton load steps may be.
+/// The least ratio of load-step lengths: the program's over plain Newton's.
 const LONGER: f64 = 10.0;
 
-/// The fewest equal load steps that bend the elastica to PL²/EI = 30: with the program's search and truncated steps, and with plain Newton,
-/// which takes every step whole.
+/// The fewest equal load steps that bend the elastica to PL²/EI = 30: with the program's line search and truncated steps, and with plain
+/// Newton, which takes full steps.
 fn long_steps() -> Result<Report, StudyError> {
     let mut report = Report::new("load steps of the elastica to PL²/EI = 30", &["quantity"]);
     let few = |plain: bool| -> Result<f64, StudyError> {
@@ -182,7 +181,7 @@ fn long_steps() -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// Whether every one of so many load steps converges; by plain Newton from each of them to the next.
+/// Whether all `steps` load steps converge; for `plain`, plain Newton must also converge from each of them to the next.
 fn reaches<const D: usize>(mut simulation: Simulation<D>, steps: u32, plain: bool) -> Result<bool, StudyError> {
     for _ in 0..steps {
         if (plain && !plainly(&simulation)?) || simulation.step().is_err() {
@@ -192,7 +191,7 @@ fn reaches<const D: usize>(mut simulation: Simulation<D>, steps: u32, plain: boo
     Ok(true)
 }
 
-/// Newton's method without a search, from Δφ = 0.
+/// Newton's method without a line search, from Δφ = 0.
 fn plainly<const D: usize>(simulation: &Simulation<D>) -> Result<bool, StudyError> {
     let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
     let (nodal, prescribed) = (simulation.project(&supports)?, simulation.prescribed(&nodes));
@@ -218,15 +217,15 @@ fn plainly<const D: usize>(simulation: &Simulation<D>) -> Result<bool, StudyErro
     Ok(false)
 }
 
-/// PL²/EI, u/L and w/L of the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J. Numer. Methods Eng. 17, 1981), reached in
-/// the tenths of the load that they are.
+/// Tenths of the load, which equal PL²/EI, with u/L and w/L of the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J.
+/// Numer. Methods Eng. 17, 1981).
 const ELASTICA: [(u64, f64, f64); 4] =
     [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (5, 0.38763, 0.71379), (10, 0.55500, 0.81061)];
 
-/// A beam of L/h = 20 shears and stretches, too: a percent is allowed.
+/// A beam of L/h = 20 also shears and stretches: a percent is allowed.
 const BEAM: f64 = 0.01;
 
-/// The shipped scene, 8 cells deep, with what it says nothing about.
+/// The shipped scene, 8 cells deep, with default settings.
 fn elastica() -> Result<Report, StudyError> {
     let mut report = Report::new("the elastica in ten load steps, by default settings", &["quantity", "PL²/EI"]);
     let overrides = ["grid.spacing=0.125", "output.probes=[]"];
@@ -251,8 +250,8 @@ fn elastica() -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// The place of the beam's end under the whole load, in one load step and in more: over a grid that is kept it is the same, to what Newton's
-/// method leaves.
+/// The position of the beam's end under the whole load, in one load step and in more. With one reference configuration it is the same, to
+/// the tolerance of Newton's method.
 fn any_number_of_steps() -> Result<Report, StudyError> {
     const SAME: f64 = 1e-6;
     let mut report = Report::new("the elastica's end, PL²/EI = 10, beside that of one load step, over its way", &["shape", "steps"]);
@@ -284,7 +283,7 @@ fn refinement<const D: usize>(
     report: &mut Report,
 ) -> Result<(), StudyError> {
     let (dimension, mut before) = (D.to_string(), None);
-    // A body of five cells is mostly surface: growth is that from the second refinement on.
+    // A body of five cells is mostly surface, so the growth is judged from the second refinement on.
     for (number, &h) in spacings.iter().enumerate() {
         let labels = [body, &dimension, name, &h.to_string()];
         let with = |quantity| [&[quantity], &labels[..]].concat();
@@ -317,7 +316,7 @@ fn time_steps(name: &str, family: &Value, report: &mut Report) -> Result<(), Stu
     Ok(())
 }
 
-/// The block moved through a cell along each axis and along both.
+/// The block, shifted within a cell along each axis and along both.
 fn cuts(name: &str, family: &Value, effort: Effort, report: &mut Report) -> Result<(), StudyError> {
     let h = 0.1;
     let parts = if effort == Effort::Full { 40 } else { 8 };
@@ -335,7 +334,7 @@ fn cuts(name: &str, family: &Value, effort: Effort, report: &mut Report) -> Resu
     Ok(())
 }
 
-/// ν near one half, and two bodies, one of them stiffer.
+/// ν near one half, and two bodies of different stiffness.
 fn materials(name: &str, family: &Value, report: &mut Report) -> Result<(), StudyError> {
     let body = |low: f64, high: f64, young: f64, poisson: f64| {
         json!({

@@ -1,14 +1,14 @@
-//! Scenes that must agree, drawn at random over families, laws, schemes, loads and fillings, under eight transformations.
+//! Scenes that must agree under eight transformations, drawn at random over families, laws, schemes, loads and fillings.
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 use crate::symmetry::{Devices, SymmetryError, TRANSFORMATIONS, Transformation, compare, draw};
 use rayon::prelude::*;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "random scenes and their mirror images, turned, moved, halved, split, thickened and scaled";
 
-/// Scenes under each transformation.
+/// The number of scenes for each transformation.
 fn scenes(effort: Effort) -> u64 {
     match effort {
         Effort::Short => 30,
@@ -16,10 +16,9 @@ fn scenes(effort: Effort) -> u64 {
     }
 }
 
-/// Of the scenes that are drawn, this share at most cannot be run and is left out: no equilibrium is found where little holds a node.
+/// The largest share of scenes without an equilibrium, which are left out: nodes with little mass may have too little stiffness.
 const LEFT_OUT: f64 = 0.25;
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new(
         "largest difference over round-off times the condition of the problem",
@@ -46,7 +45,7 @@ fn judge(transformation: Transformation, scenes: u64, report: &mut Report, left_
         match found {
             Ok(found) => {
                 for one in found {
-                    // Bits are the same or they are not.
+                    // The bits either agree or do not.
                     let (value, bound) = if pair_of_bits(transformation) { (one.difference, 0.0) } else { (one.used(), 1.0) };
                     report.push(&[transformation.name(), one.quantity, &name], value, Bound::AtMost(bound));
                 }

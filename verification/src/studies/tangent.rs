@@ -1,5 +1,5 @@
-//! Every piece of the tangent against dual numbers, by the product that the solver applies: every law × every shape
-//! function × both ways of the sweep × both precisions × D = 1, 2, 3 × every regime.
+//! Every piece of the tangent against dual numbers, by the solver's product: every law × every shape function × both transfers × both
+//! precisions × D = 1, 2, 3 × every regime.
 
 use super::{Effort, Outcome, StudyError, short};
 use crate::check::regime::Regime;
@@ -43,7 +43,7 @@ impl Energy for Murnaghan {
     }
 }
 
-/// All families, under the names of this report; LME of one width, for the formulas are the same for all.
+/// All families, under the names of this report. LME has one width, since the formulas are the same for all.
 fn shapes() -> Vec<(&'static str, Approximation)> {
     let named = |(name, shape)| {
         let name = match name {
@@ -59,7 +59,7 @@ fn shapes() -> Vec<(&'static str, Approximation)> {
     Approximation::examples().into_iter().filter_map(named).collect()
 }
 
-/// Pieces and the whole product of K against dual numbers, symmetry where there is a potential.
+/// Pieces and the whole product of K against dual numbers; symmetry if there is a potential.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let columns = ["quantity", "law", "D", "regime", "shape function"];
     let mut report = Report::new(
@@ -135,7 +135,7 @@ fn dimension<const D: usize, L: Law + Clone>(
                         random.field(prepared.nodes.len()).iter().map(|x| x * size).collect();
                     prepared.prescribe(&mut dphi);
                     for measured in measure(&equilibrium, &dphi, SPACING, &mut random)? {
-                        // What does not depend on the pressure, or on the mean of cells, was measured with and without.
+                        // The other quantities do not depend on the pressure or the mean dilatation, so they are not listed twice.
                         let of_all = |name: &&str| measured.quantity.starts_with(name);
                         let here: &[&str] = match averaged {
                             false => &[SYMMETRY, POTENTIAL],
@@ -144,8 +144,8 @@ fn dimension<const D: usize, L: Law + Clone>(
                         if !pressed && !here.iter().any(&of_all) {
                             continue;
                         }
-                        // In 1D all deformation is a change of volume: the term is the difference of two that are nearly the same,
-                        // and what rounding leaves of it is judged in the whole product.
+                        // In 1D every deformation is a change of volume, so the term is the difference of two nearly equal terms. Its
+                        // round-off is judged in the whole product.
                         if D == 1 && of_all(&MEAN) {
                             continue;
                         }
@@ -163,13 +163,13 @@ fn dimension<const D: usize, L: Law + Clone>(
     Ok(())
 }
 
-/// The term by which cells see the mean of their changes of volume, as the residual calls it.
+/// The name of the mean-dilatation term in the residual.
 const MEAN: &str = "mean dilatation";
 
-/// What is added to the name of a quantity of a body that has it.
+/// The suffix of the name of a quantity of a body with the mean dilatation.
 const WITH_MEAN: &str = ", mean dilatation";
 
-/// Gives the body the mean dilatation of cells, on a grid that is not the first; `false` if its law has none.
+/// Gives the body the mean dilatation of cells, as after a grid reset; returns `false` if its law has no volumetric part.
 fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &mut Random) -> bool {
     let [body] = simulation.bodies.as_mut_slice() else { return false };
     body.dilatation = Dilatation::MeanDilatation;
@@ -177,9 +177,8 @@ fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &m
     body.law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some()
 }
 
-/// Particles of one body, jittered, two along each axis of some cells at a wall: deformed at random, damped, under
-/// gravity and under pressure on part of their surface, for products in both precisions. Speeds and step are such that
-/// inertia is as large as stiffness.
+/// Jittered particles of one body, two along each axis of some cells at a wall. They are randomly deformed and damped, under gravity and
+/// under pressure on part of their surface, for products in both precisions. Speeds and step make inertia as large as stiffness.
 pub(super) fn cloud<const D: usize, L: Law>(
     law: L,
     approximation: Approximation,

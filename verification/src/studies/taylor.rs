@@ -19,19 +19,19 @@ pub(super) const ABOUT: &str = "slopes 2 and 3 of the remainders of the potentia
 /// Points s = 2⁰, 2⁻¹, …
 const POINTS: i32 = 30;
 
-/// A remainder counts while it is this many times its round-off.
+/// A remainder counts if it is at least this many times its round-off.
 const ABOVE_FLOOR: f64 = 200.0;
 
-/// The slope is the median of this many local ones, the last above the floor.
+/// The slope is the median of this many local slopes, the last ones above the floor.
 const LOCAL_SLOPES: usize = 5;
 
 /// One steep rise and two gentle falls.
 const SAWTOOTH: [f64; 3] = [0.0, 1.0, 0.5];
 
-/// How far a slope may be from a whole number.
+/// The largest distance of a slope from a whole number.
 const TOLERANCE: f64 = 0.1;
 
-/// Π(x + s u) and R(x + s u) less their expansions at x, for shrinking s.
+/// Π(x + s u) and R(x + s u) minus their expansions at x, for shrinking s.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let steps = if *effort == Effort::Full { 40 } else { 2 };
     let mut study = Study {
@@ -74,7 +74,7 @@ impl Study {
         steps: usize,
         end: f64,
     ) -> Result<(), StudyError> {
-        // At its end a scene may ask for all that its body bears, and the step looked at is on a grid that is new.
+        // The last load of a scene may be the limit of its body, and the tested step starts on a reset grid; so the run ends earlier.
         for _ in 0..steps {
             if simulation.clock.time() > 0.75 * end {
                 break;
@@ -92,14 +92,14 @@ impl Study {
             &simulation.settings.newton,
             &Pool::default(),
         )?;
-        // A deformation of some percent at random, so that no term is at rest.
+        // A random deformation of some percent, so that every term contributes.
         let mut random = Random::new(3);
         let size = 0.02 * simulation.grid.spacing;
         let mut shift = random.field::<D>(x.len());
         equilibrium.clear_prescribed(&mut shift);
         x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
-        // A direction of the same size, a skew sawtooth: stretches and compressions of equal shape would cancel in the third
-        // derivative of Π and show the fourth.
+        // A direction of similar size, a skew sawtooth. Stretches and compressions of equal shape would cancel in the third derivative of Π
+        // and show the fourth.
         let indices = prepared.nodes.positions(&simulation.grid);
         let mut u: Vec<Vector<f64, D>> = indices
             .map(|(index, _)| {
@@ -141,14 +141,14 @@ struct Point {
     floor: f64,
 }
 
-/// The median of the last local slopes, log₂ of the ratio over a halving of s; `None` if there are too few.
+/// The median of the last local slopes, log₂ of the ratio over a halving of s; `None` if there are too few slopes.
 fn slope(remainders: &[f64]) -> Option<f64> {
     let mut local: Vec<f64> = remainders.windows(2).rev().take(LOCAL_SLOPES).map(|w| (w[0] / w[1]).log2()).collect();
     local.sort_by(f64::total_cmp);
     (local.len() >= 3).then(|| local[local.len() / 2])
 }
 
-/// The remainders of [`NAMES`]; those of Π are empty where there is none.
+/// The remainders of [`NAMES`]; those of Π are empty if there is no potential.
 fn remainders<const D: usize>(
     equilibrium: &Equilibrium<'_, D, Material>,
     x: &[Vector<f64, D>],

@@ -1,12 +1,12 @@
-//! Two scenes that must agree are run and compared; differences are measured by round-off times the condition of the problem.
+//! Runs two scenes that must agree, and compares them. Differences are measured in round-off times the condition of the problem.
 //!
-//! Positions and deformation gradients are known to round-off, and so is everything that follows from them in a step. The condition of the
-//! problem is therefore measured: the scene is run again with positions and deformation gradients that are perturbed at random by δ = √ε, relative
-//! to the size of coordinates and to 1, and each difference of the answers over δ tells how much of a round-off comes out. Where round-off decides,
-//! the answer jumps, and a jump is 1/√ε ≈ 7e7 times larger than what it makes the bound.
+//! Positions and deformation gradients are known to round-off, and so are all results of a step. Therefore the condition of the problem is
+//! measured. The scene runs again with random perturbations of positions and deformation gradients: δ = √ε, relative to the size of
+//! coordinates and to 1. Each difference of the answers over δ gives the amplification of round-off. Where round-off decides, the answer
+//! jumps; such a jump raises the bound to a value 1/√ε ≈ 7e7 times smaller than the jump.
 //!
-//! Where the image has other linear systems, Newton's method ends elsewhere within its tolerance. How far is measured by the scene itself, its linear
-//! systems solved less far.
+//! If the image has other linear systems, Newton's method ends elsewhere within its tolerance. The size of this difference is measured with
+//! the scene itself, by solving its linear systems less accurately.
 
 use super::scene::{FACES, Scene};
 use super::transform::{Map, Pair};
@@ -17,32 +17,32 @@ use bfree::tensor::{Tensor, Vector};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The relative size of perturbations, √ε: linear in the answer, and far above round-off.
+/// The relative size of perturbations, √ε: the answer is linear in it, and it is far above round-off.
 const PERTURBATION: f64 = 1.490_116_119_384_765_6e-8;
 
-/// Random perturbations of which the largest effect counts.
+/// The number of random perturbations; the largest effect counts.
 const PERTURBED: u64 = 2;
 
-/// Roundings between the state and the answer of a step, as if each of them were as large as the last bit: about sixteen nodes a particle, four
-/// particles a cell, and Newton's method ends at sixteen times the round-off of its residual.
+/// Roundings between the state and the answer of a step, each as large as the last bit. There are about sixteen nodes per particle and four
+/// particles per cell, and Newton's method ends at sixteen times the round-off of its residual.
 const ROUNDINGS: f64 = 128.0;
 
-/// How much less far linear systems are solved to see what Newton's method leaves.
+/// The factor on the tolerance of the linear systems, which shows the error that Newton's method leaves.
 const LESS_FAR: f64 = 30.0;
 
-/// The difference of two solutions is a sample of what Newton's method leaves; another may be so many times larger.
+/// The difference of two solutions is one sample of the error that Newton's method leaves; another sample may be larger by this factor.
 const SOLVED: f64 = 16.0;
 
-/// The speed of waves of pressure, in plain units: strains, whose size is 1, come at this speed.
+/// The speed of pressure waves, in plain units. A strain of size 1 corresponds to this speed.
 const SOUND: f64 = 36.7;
 
-/// Particles that are the same lie nearer than this, in spacings.
+/// Corresponding particles lie nearer to each other than this, in spacings.
 const SAME: f64 = 1e-3;
 
-/// A quantity that two scenes do not have in common, or how nearly they do.
+/// The agreement of two scenes in one quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disagreement {
-    /// The quantity that differs.
+    /// The compared quantity.
     pub quantity: &'static str,
     /// The largest difference, over the size of the quantity.
     pub difference: f64,
@@ -51,20 +51,20 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
-    /// The share of the bound that is used; infinite for what is not a number.
+    /// The used share of the bound; infinite for NaN.
     pub fn used(&self) -> f64 {
         let used = if self.difference == 0.0 { 0.0 } else { self.difference / self.bound };
         if used.is_nan() { f64::INFINITY } else { used }
     }
 }
 
-/// Why two scenes could not be compared.
+/// The reasons why two scenes could not be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum SymmetryError {
-    /// The first one cannot be run, so that nothing can be compared: draw another.
+    /// The first scene cannot be run, so there is nothing to compare: draw another one.
     #[error("the scene cannot be run")]
     Scene(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// The first one can, and its image cannot.
+    /// The first scene can be run, but its image cannot.
     #[error("the scene can be run, and its image cannot")]
     Image(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
@@ -81,7 +81,7 @@ struct Answer {
     reactions: BTreeMap<String, [f64; 2]>,
 }
 
-/// Runs both, and says of each quantity how far it differs; the particles of both are found by their places at the start.
+/// Runs both scenes and returns the difference in each quantity. The initial positions identify the particles of both scenes.
 ///
 /// # Errors
 /// See [`SymmetryError`].
@@ -164,7 +164,7 @@ fn run<const D: usize>(scene: &Scene, seed: Option<u64>) -> Result<Answer, Box<d
     })
 }
 
-/// Positions by δ times the size of coordinates, deformation gradients by δ.
+/// Perturbs positions by δ times the size of coordinates, and deformation gradients by δ.
 fn perturb<const D: usize>(simulation: &mut Simulation<D>, random: &mut Random) {
     let particles = &mut simulation.particles;
     let size = particles.position.iter().map(Vector::amax).fold(0.0, f64::max);
@@ -176,7 +176,7 @@ fn perturb<const D: usize>(simulation: &mut Simulation<D>, random: &mut Random) 
     }
 }
 
-/// The particles of the image that stand for each particle: one, or the layers of a slab; `None` if one has none.
+/// The particles of the image for each particle: one, or the layers of a slab; `None` if a particle has no image.
 fn matched(one: &Answer, other: &Answer, map: &Map, spacing: f64) -> Option<Vec<Vec<usize>>> {
     let near = |x: &[f64; 2]| {
         let image = map.point(*x);
@@ -190,7 +190,7 @@ fn matched(one: &Answer, other: &Answer, map: &Map, spacing: f64) -> Option<Vec<
     one.start.iter().map(near).collect()
 }
 
-/// Each quantity, the largest difference, and its size.
+/// Each quantity with its largest difference and its size.
 fn differences(one: &Answer, other: &Answer, places: &[Vec<usize>], pair: &Pair) -> Vec<(&'static str, f64, f64)> {
     let map = &pair.map;
     let mut largest = [0.0_f64; 5];
@@ -231,7 +231,7 @@ fn differences(one: &Answer, other: &Answer, places: &[Vec<usize>], pair: &Pair)
     all
 }
 
-/// Of the faces that both scenes hold.
+/// The reactions of the faces that both scenes hold.
 fn reactions(one: &Answer, other: &Answer, pair: &Pair) -> (&'static str, f64, f64) {
     let (mut difference, mut size) = (0.0_f64, 0.0_f64);
     for face in 0..4 {
@@ -239,7 +239,7 @@ fn reactions(one: &Answer, other: &Answer, pair: &Pair) -> (&'static str, f64, f
         let (Some(here), Some(there)) = (here, there) else { continue };
         let mut expected = pair.map.vector(*here).map(|force| force * pair.times);
         if pair.scenes[1].cells[0] == 2 * pair.scenes[0].cells[0] {
-            // Those of the halves cancel across the plane.
+            // The reactions of the two halves cancel across the plane.
             expected[0] = 0.0;
         }
         let apart = (expected[0] - there[0]).hypot(expected[1] - there[1]);

@@ -5,12 +5,12 @@ use super::transform::{Pair, Transformation};
 use crate::random::Random;
 use serde_json::{Value, json};
 
-/// Whether scenes have what stabilises nodes that see little of a body.
+/// Whether scenes use the stabilisation of nodes with little mass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Devices {
     /// The program's default, and loads on surfaces of shapes.
     Default,
-    /// None where there is inertia, and loads on particles.
+    /// No stabilisation with inertia; loads on particles.
     Off,
 }
 
@@ -24,25 +24,25 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
     let half = transformation == Transformation::Doubled;
     let held = !inertia || one_of(random, &[true, false]);
     let (family_name, family) = family(random, half);
-    // Gauss's rule for quadratic functions has half cells where a body ends: there are more particles along a cut, and across a slab.
+    // Gauss's rule for quadratic functions has half cells at the ends of a body. So there are more particles along a cut and across a slab.
     let regular = family_name == "uGIMP"
         || family_name == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
     let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
-    // Particles of uGIMP's that lie on grid lines see nodes at the edge of their support, and round-off decides which.
+    // Particles of uGIMP on grid lines have nodes at the edge of their support, and round-off decides which.
     let on_lines = devices == Devices::Default || family_name != "uGIMP";
     let (form_name, form) = form(random, spacing, transformation, held, on_lines);
-    // Points that integrate polynomials over cut cells are not those of the mirror image.
+    // Points that integrate polynomials over cut cells differ from those of the mirror image.
     let fills: &[&str] =
         if devices == Devices::Off && layout == "gauss" { &["particles"] } else { &["cut", "particles"] };
     let law = law(random, half);
     let averaged = law.has_volumetric_part() && one_of(random, &[true, false]);
     let renewed = match transformation {
-        // Bodies that touch renew the grid in every step; without inertia they are bonded.
+        // Bodies in contact reset the grid in every step; without inertia they are bonded.
         Transformation::Split if inertia => json!("every_step"),
         _ => one_of(random, &[json!("every_step"), json!("never"), json!({ "strain": 0.02 })]),
     };
     let steps = 3;
-    // Without inertia bodies bear less.
+    // Without inertia bodies carry smaller loads.
     let share = if inertia { 1.0 } else { 0.3 };
     let mut scene = Scene {
         units: Units::ONE,
@@ -63,17 +63,17 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         ),
         load: None,
         scheme,
-        // A wave of pressure goes 0.3 to 3 cells in a step.
+        // A pressure wave travels 0.3 to 3 cells in a step.
         step: if inertia { spacing / 36.7 * random.between(0.3, 3.0) } else { steps_of_load(steps) },
         steps,
-        // The projection by a consistent mass is solved to 1e-12, here and there by other iterates.
+        // The projection by a consistent mass is solved to 1e-12, in both scenes with different iterates.
         lumping: if transformation.changes_systems() { 1.0 } else { one_of(random, &[1.0, 0.5]) },
-        // A plane of symmetry is no wall that stops particles: their velocities do not change where nodes are held.
+        // A plane of symmetry does not stop particles, so its prescribed nodes must not change their velocities.
         wall_update: if half { "literal" } else { one_of(random, &["literal", "consistent"]) },
-        // Velocities are drawn to those that are projected, in which a half lacks the other one.
+        // Blending uses the projected velocities, and the projection of a half lacks the other half.
         blend: if half { None } else { one_of(random, &[None, Some(10.0)]) },
         damping: one_of(random, &[None, Some([1.0, 1e-4])]),
-        // Without inertia nothing else holds nodes with little of a body.
+        // Without inertia only aggregation stabilises nodes with little mass.
         aggregation: (devices == Devices::Off).then_some(!inertia),
         forcing: 1e-9,
         slab: false,
@@ -100,8 +100,9 @@ fn one_of<T: Clone>(random: &mut Random, list: &[T]) -> T {
     list[(random.between(0.0, list.len() as f64) as usize).min(last)].clone()
 }
 
-/// Of halves those whose functions at a wall are the mirrored ones. All others are one-sided there: coefficients beyond a wall continue the
-/// field linearly, where a plane of symmetry would mirror it. So halves agree with the whole only as far as the grid resolves them.
+/// For halves, only families whose functions at a wall equal the mirrored ones. Other families are one-sided there: coefficients beyond a
+/// wall continue the field linearly, where a plane of symmetry would mirror it. With them, halves agree with the whole only to the
+/// resolution of the grid.
 fn family(random: &mut Random, half: bool) -> (&'static str, Value) {
     let lme = |gamma: f64| json!({ "lme": { "gamma": gamma } });
     let bspline = |degree: u32| json!({ "bspline": { "degree": degree } });
@@ -180,7 +181,7 @@ fn form(
     }
 }
 
-/// A body that stands on the bottom is held there, without inertia in both directions.
+/// A body on the bottom is held there, without inertia in both directions.
 fn faces(random: &mut Random, half: bool, held: bool, inertia: bool) -> [Option<Hold>; 4] {
     let across = if half { 0.0 } else { random.between(-0.02, 0.02) };
     let moves = Hold::Moves([across, random.between(-0.02, 0.02)]);
@@ -206,7 +207,7 @@ fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: De
         }
     };
     let h = scene.spacing;
-    // Beyond the body, so that no particle lies on the region's edge; a half begins at its plane.
+    // The region extends beyond the body, so that no particle lies on its edge; a half begins at its plane.
     let lower = if half { 0.0 } else { ends[0] - 0.1 * h };
     let region = Form::Box { min: [lower, top - 0.53 * h], max: [ends[1] + 0.1 * h, top + 0.1 * h] };
     let carried = (devices == Devices::Off).then_some(([0.0, 1.0], 0.5 * h));

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 /// The names of the faces of the box, in the order of their numbers: twice the axis, plus one at the upper end.
 pub const FACES: [&str; 6] = ["left", "right", "bottom", "top", "back", "front"];
 
-/// The units of length, time and density; numbers of a scene are multiples of them.
+/// The units of length, time and density; the numbers of a scene are multiples of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
     pub length: f64,
@@ -24,7 +24,7 @@ impl Units {
         self.density * self.velocity() * self.velocity()
     }
 
-    /// Per depth in two dimensions.
+    /// The force, per depth in two dimensions.
     pub fn force(self, dimension: i32) -> f64 {
         self.stress() * self.length.powi(dimension - 1)
     }
@@ -70,7 +70,7 @@ pub enum Hold {
 pub struct Load {
     pub region: Form,
     pub pressing: Pressing,
-    /// Outward normal and area of a particle, where particles carry the load themselves.
+    /// Outward normal and area of a particle, if particles carry the load.
     pub carried: Option<([f64; 2], f64)>,
 }
 
@@ -96,7 +96,7 @@ pub struct Scene {
     pub origin: [f64; 2],
     pub cells: [u32; 2],
     pub spacing: f64,
-    /// The shape functions, as a scene writes them.
+    /// The shape functions in the form of a scene.
     pub family: Value,
     pub layout: &'static str,
     pub fill: &'static str,
@@ -114,20 +114,20 @@ pub struct Scene {
     pub steps: u32,
     pub lumping: f64,
     pub wall_update: &'static str,
-    /// The rate at which velocities are drawn towards those of the nodes.
+    /// The rate at which velocities relax to those of the nodes.
     pub blend: Option<f64>,
     /// Rayleigh's constants, of mass and of stiffness.
     pub damping: Option<[f64; 2]>,
-    /// Whether nodes with little of a body follow others; the program's default if `None`.
+    /// Whether nodes with little mass follow others; `None` is the program's default.
     pub aggregation: Option<bool>,
-    /// How far each linear system is solved.
+    /// The tolerance of each linear system.
     pub forcing: f64,
     /// Whether the scene is a slab of one cell between sliding faces in three dimensions.
     pub slab: bool,
 }
 
 impl Form {
-    /// In a slab of this thickness, if there is one.
+    /// The shape as JSON; in a slab with this thickness, if there is one.
     fn json(&self, length: f64, thickness: Option<f64>) -> Value {
         let point = |x: [f64; 2], z: f64| {
             let plane = x.map(|x| x * length);
@@ -170,7 +170,7 @@ impl Law {
         }
     }
 
-    /// Whether its energy has a part that depends on the volume alone.
+    /// Whether its energy has a purely volumetric part.
     pub fn has_volumetric_part(self) -> bool {
         !matches!(self, Self::StVenantKirchhoff | Self::DruckerPrager)
     }
@@ -181,7 +181,7 @@ impl Scene {
         if self.slab { 3 } else { 2 }
     }
 
-    /// As a user writes it.
+    /// The scene in the form a user writes.
     pub fn json(&self) -> Value {
         let units = self.units;
         let in_space = |x: [f64; 2], unit: f64| {
@@ -273,7 +273,7 @@ impl Scene {
     ) {
         let Some(load) = &self.load else { return };
         let units = self.units;
-        // In a slab two layers of particles share its depth.
+        // In a slab, two layers of particles share its depth.
         let depth = thickness.map_or(1.0, |thickness| 0.5 * thickness * units.length);
         let loads = (0..self.bodies.len()).map(|number| {
             let region = load.region.json(units.length, thickness);

@@ -2,16 +2,16 @@
 
 use super::scene::{Form, Hold, Law, Load, Pressing, Scene, Units};
 
-/// A change of a scene that its answer follows.
+/// A change of a scene with a known effect on its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transformation {
     /// x to −x.
     Mirrored,
-    /// By 90°.
+    /// Rotation by 90°.
     Turned,
-    /// The box and all in it, by whole cells.
+    /// Translation of the box and its contents by whole cells.
     Moved,
-    /// The whole beside the half above a plane of symmetry, which is a sliding face.
+    /// The whole, against the half above a plane of symmetry, which is a sliding face.
     Doubled,
     /// A body cut into two of the same law along a line of the grid.
     Split,
@@ -23,7 +23,7 @@ pub enum Transformation {
     Scaled,
 }
 
-/// All of them.
+/// All transformations.
 pub const TRANSFORMATIONS: [Transformation; 8] = [
     Transformation::Mirrored,
     Transformation::Turned,
@@ -35,7 +35,7 @@ pub const TRANSFORMATIONS: [Transformation; 8] = [
     Transformation::Scaled,
 ];
 
-/// Where a scene's places and directions are in another: x′_i = signs_i x_axes_i + shift_i.
+/// The map of positions and directions from a scene to its image: x′_i = signs_i x_axes_i + shift_i.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Map {
     pub axes: [usize; 2],
@@ -46,17 +46,17 @@ pub struct Map {
 impl Map {
     pub const SAME: Self = Self { axes: [0, 1], signs: [1.0; 2], shift: [0.0; 2] };
 
-    /// A direction.
+    /// The image of a direction.
     pub fn vector(&self, x: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|i| self.signs[i] * x[self.axes[i]])
     }
 
-    /// A place.
+    /// The image of a position.
     pub fn point(&self, x: [f64; 2]) -> [f64; 2] {
         std::array::from_fn(|i| self.signs[i] * x[self.axes[i]] + self.shift[i])
     }
 
-    /// The number of a face of the box.
+    /// The image of a face of the box, as its number.
     pub fn face(&self, face: usize) -> usize {
         let (axis, upper) = (face / 2, face % 2 == 1);
         let image = usize::from(self.axes[1] == axis);
@@ -76,12 +76,12 @@ impl Map {
     }
 }
 
-/// Two scenes that must agree, and how to find the answer of the first in the second.
+/// Two scenes that must agree, and the map from the answer of the first to that of the second.
 #[derive(Clone, Debug)]
 pub struct Pair {
     pub scenes: [Scene; 2],
     pub map: Map,
-    /// How many times the first scene is in the second.
+    /// The number of copies of the first scene in the second.
     pub times: f64,
     /// Whether the second has the same bits.
     pub bits: bool,
@@ -90,7 +90,7 @@ pub struct Pair {
 }
 
 impl Transformation {
-    /// Its name.
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mirrored => "mirrored",
@@ -104,7 +104,7 @@ impl Transformation {
         }
     }
 
-    /// Whether the image has more unknowns: its linear systems are solved by other iterates.
+    /// Whether the image has more unknowns, so that the iterates of its linear systems differ.
     pub fn changes_systems(self) -> bool {
         matches!(self, Self::Doubled | Self::Slab)
     }
@@ -149,7 +149,7 @@ impl Transformation {
     }
 }
 
-/// The scene with all its places and directions mapped.
+/// The scene with all its positions and directions mapped.
 fn mapped(scene: &Scene, map: &Map, edges: [f64; 2]) -> Scene {
     let far = std::array::from_fn(|i| scene.origin[i] + edges[i]);
     let Form::Box { min: origin, .. } = map.form(&Form::Box { min: scene.origin, max: far }) else {
@@ -196,7 +196,7 @@ fn doubled(scene: &Scene, width: f64) -> Scene {
         Form::Polygon(corners) => {
             let plane = 2.0 * (scene.origin[0] + width);
             let right: Vec<[f64; 2]> = corners.iter().map(|x| [x[0] + width, x[1]]).collect();
-            // Corners run from the lower end of the plane to its upper one.
+            // Corners run from the lower end of the plane to its upper end.
             let left = right.iter().rev().filter(|x| x[0] > scene.origin[0] + width).map(|x| [plane - x[0], x[1]]);
             Form::Polygon(right.iter().copied().chain(left).collect())
         }

@@ -1,23 +1,25 @@
-//! Smoothing: Chebyshev polynomials over the diagonal blocks, and the eigenvalue that they need.
+//! Smoothing by Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
 use crate::solver::LinearOperator;
 use crate::solver::vector::dot;
 use nalgebra::DMatrix;
 
-/// Degree of the smoothing polynomials, and the part of the spectrum they see: [λ/PART, λ].
+/// Degree of the smoothing polynomials.
 const DEGREE: usize = 5;
+/// The polynomials damp the part [λ/PART, λ] of the spectrum.
 const PART: f64 = 30.0;
 
-/// Products that estimate the largest eigenvalue λ of D⁻¹K, and what is added to the estimate, which is from below.
+/// Number of products that estimate the largest eigenvalue λ of D⁻¹K.
 const ESTIMATE: usize = 10;
+/// The estimate is a lower bound and is multiplied by this factor.
 const MARGIN: f64 = 1.15;
 
-/// The largest eigenvalue of D⁻¹K, by the method of Lanczos in the inner product of D.
+/// The largest eigenvalue of D⁻¹K, estimated by the Lanczos method in the inner product of D, with a margin.
 pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n: usize) -> f64 {
     let mut r: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
     let (mut before, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let mut matrix = DMatrix::<f64>::zeros(ESTIMATE, ESTIMATE);
-    // Nothing of prescribed unknowns.
+    // Two products clear the entries at prescribed unknowns.
     jacobi(&r, &mut z);
     operator.apply(&z, &mut w);
     jacobi(&w, &mut z);
@@ -49,7 +51,7 @@ pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mu
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// x ← x + p(D⁻¹K) D⁻¹ (b − K x), p a Chebyshev polynomial; from x = 0 if `zero`.
+/// x ← x + p(D⁻¹K) D⁻¹ (b − K x) with a Chebyshev polynomial p. `zero` tells that x = 0 at the start, which saves a product.
 pub(super) fn chebyshev(
     operator: &dyn LinearOperator,
     jacobi: &dyn Fn(&[f64], &mut [f64]),

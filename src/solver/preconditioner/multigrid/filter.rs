@@ -1,29 +1,30 @@
-//! The finest smoother of cubic B-splines. Nodal values are [1 4 1]/6 of their coefficients along each axis, so coefficients that
-//! alternate from node to node hardly move the body: D⁻¹K is small there, and point smoothers see such patterns poorly. The filter Q Qᵀ with
-//! Q ≈ Π_axes ([1 4 1]/6)⁻¹ raises them: M = D⁻¹ + D^{−½} Q Qᵀ D^{−½} takes the place of D⁻¹.
+//! The finest smoother of cubic B-splines. Values at nodes are [1 4 1]/6 of their coefficients along each axis, so coefficients that
+//! alternate from node to node hardly move the body. D⁻¹K is small for such patterns, and point smoothers damp them poorly. The filter Q Qᵀ
+//! with Q ≈ Π_axes ([1 4 1]/6)⁻¹ amplifies them: M = D⁻¹ + D^{−½} Q Qᵀ D^{−½} takes the place of D⁻¹.
 
 use super::form::LocalForm;
 use crate::tensor::Tensor;
 use std::collections::HashMap;
 
-/// Steps of Chebyshev's iteration for ([1 4 1]/6)⁻¹, whose eigenvalues lie between these.
+/// Steps of the Chebyshev iteration for ([1 4 1]/6)⁻¹.
 const STEPS: usize = 3;
+/// Bounds of the eigenvalues of [1 4 1]/6.
 const SPECTRUM: [f64; 2] = [1.0 / 3.0, 1.0];
 
-/// A neighbour that is not there.
+/// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
-/// Q Qᵀ between the square roots of the diagonal.
+/// The filter D^{−½} Q Qᵀ D^{−½}.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Filter {
-    /// The neighbours of each node before and behind it along each axis.
+    /// The two neighbours of each node along each axis: before and behind the node.
     beside: [Vec<[u32; 2]>; 3],
-    /// D^{−½} of each unknown; 0 of values that are none.
+    /// D^{−½} of each unknown; 0 for values that are no unknowns.
     scale: Vec<f64>,
 }
 
 impl Filter {
-    /// Of the nodes of a form, with the inverse diagonal blocks of the tangent.
+    /// The filter for the nodes of a form, with the inverse diagonal blocks of the tangent.
     pub fn new<const D: usize>(form: &LocalForm, inverses: &[Tensor<f64, D>]) -> Self {
         let fixed: Vec<bool> =
             form.prescribed.iter().zip(&form.follows).map(|(held, follows)| *held || *follows).collect();

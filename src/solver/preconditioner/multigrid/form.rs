@@ -1,38 +1,38 @@
-//! What multigrid has to know of an operator, beyond its product.
+//! The data of an operator from which multigrid makes its coarse levels.
 
 use std::collections::HashMap;
 
-/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at their points, and Σ_nodes w·B u. Lengths are in cells.
+/// An operator as a form on the cells of a grid: Σ_cells ∇w:A∇u + m w·u at one point a cell, and Σ_nodes w·B u. Lengths are in cells.
 #[derive(Clone, Debug, Default)]
 pub struct LocalForm {
     /// Cells along each axis; 0 along axes that do not exist.
     pub grid: [u32; 3],
     /// Whether outer nodes follow inner ones, on coarser grids too.
     pub aggregated: bool,
-    /// The degree of the B-splines whose outer coefficients follow others; else 0 or 1.
+    /// The degree of the B-splines if their outer coefficients follow others; otherwise 0 or 1.
     pub degree: u32,
     /// Index of each node.
     pub nodes: Vec<[u32; 3]>,
-    /// Which values are prescribed, node after node.
+    /// Whether a value is prescribed, node after node.
     pub prescribed: Vec<bool>,
-    /// Which values follow others ([`aggregation`](crate::aggregation)) and are no unknowns, node after node.
+    /// Whether a value follows others ([`aggregation`](crate::aggregation)) and is no unknown, node after node.
     pub follows: Vec<bool>,
     /// B of each node, D×D, column by column.
     pub blocks: Vec<f64>,
-    /// Index of each cell with something in it.
+    /// Index of each cell that is not empty.
     pub cells: Vec<[u32; 3]>,
-    /// Where in the grid its centroid is.
+    /// Position in the grid of the centroid of each cell's filled part.
     pub centres: Vec<[f64; 3]>,
-    /// Its share that is filled.
+    /// Filled fraction of each cell.
     pub filled: Vec<f64>,
     /// m
     pub masses: Vec<f64>,
-    /// `A[i][k][j][l]` of ∂w_i/∂x_k and ∂u_j/∂x_l.
+    /// `A[i][k][j][l]` of each cell, the coefficient of ∂w_i/∂x_k ∂u_j/∂x_l.
     pub tangents: Vec<f64>,
 }
 
 impl LocalForm {
-    /// Room for one more cell.
+    /// Appends a cell of zeros, with `tiles` entries of A.
     pub(crate) fn push_cell(&mut self, index: [u32; 3], tiles: usize) {
         self.cells.push(index);
         self.centres.push([0.0; 3]);
@@ -41,14 +41,14 @@ impl LocalForm {
         self.tangents.extend(std::iter::repeat_n(0.0, tiles));
     }
 
-    /// Divides the sums of places by what they were weighted with.
+    /// Divides the weighted sums in `centres` by the sums of their weights, `filled`.
     pub(crate) fn finish_centres(&mut self) {
         for (centre, &filled) in self.centres.iter_mut().zip(&self.filled) {
             centre.iter_mut().for_each(|x| *x /= filled);
         }
     }
 
-    /// The cells of the next grid; of each of these, which it lies in.
+    /// Sums the cells into those of the next coarser grid. Returns for each cell the coarse cell in which it lies.
     pub(super) fn add_cells_to<const D: usize>(&self, next: &mut Self) -> Vec<usize> {
         let (tiles, mut places) = (D.pow(4), HashMap::new());
         let mut of_coarse = Vec::with_capacity(self.cells.len());
@@ -59,7 +59,7 @@ impl LocalForm {
                 next.cells.len() - 1
             });
             of_coarse.push(at);
-            // Lengths are in cells: volumes are smaller numbers by 2^D, gradients larger ones by 2.
+            // Lengths are in cells, so on the coarse grid a volume is smaller by 2^D, and a gradient larger by 2.
             let share = self.filled[cell] / f64::from(1 << D);
             next.filled[at] += share;
             next.masses[at] += self.masses[cell];
@@ -75,7 +75,7 @@ impl LocalForm {
 mod tests {
     use super::*;
 
-    /// A full cell and a quarter of the next one, in cells twice as large: 0.625 of one, its centroid at (1·0.5 + ¼·1.125)/1.25 of the fine cells.
+    /// A full cell and a quarter of the next one fill 0.625 of a coarse cell. Their centroid lies at (1·0.5 + ¼·1.125)/1.25 in fine cells.
     #[test]
     fn coarse_cells_have_the_centroid_of_what_is_in_them() {
         let mut fine = LocalForm { grid: [2, 0, 0], ..LocalForm::default() };

@@ -1,4 +1,4 @@
-//! A coarse grid: hat functions, the tangent on them as stencils, and the way up and down.
+//! A coarse grid: hat functions, the tangent on them as stencils, restriction to the grid and interpolation from it.
 
 use super::chebyshev::largest;
 use super::form::LocalForm;
@@ -9,23 +9,27 @@ use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// The middle of a stencil, and a neighbour that is not there.
+/// The middle of a stencil.
 const MIDDLE: usize = 13;
+/// The number of a neighbour that does not exist.
 const NONE: u32 = u32::MAX;
 
-/// A coarse level: a stencil of 3^D blocks a node.
+/// A coarse level, stored as a stencil of 3^D blocks for each node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Level<const D: usize> {
-    /// Of each node of the finer level, where it lies on this one: nodes and weights.
+    /// P: each node of the finer level as a weighted sum of nodes of this level.
     above: Vec<Vec<(u32, f64)>>,
-    /// Values of the finer level that are no unknowns.
+    /// Whether a value of the finer level is no unknown.
     fixed_above: Vec<bool>,
+    /// Whether a value of this level is zero, because it is prescribed or no cell reaches it.
     held: Vec<bool>,
-    /// Outer nodes, which follow others.
+    /// E: outer nodes, which follow others.
     followers: Followers<D>,
-    /// The neighbours of each node, and the entries.
+    /// The neighbours of each node, by their place in the stencil.
     neighbours: Vec<[u32; 27]>,
+    /// The blocks of K for these neighbours.
     entries: Vec<[Tensor<f64, D>; 27]>,
+    /// D⁻¹, the inverse diagonal blocks of Eᵀ K E.
     inverse: Vec<Tensor<f64, D>>,
     pub largest: f64,
 }
@@ -59,7 +63,7 @@ impl<const D: usize> Level<D> {
     }
 }
 
-/// The nodes of the grid of twice the spacing between which an index lies, with weights.
+/// The nodes of the grid of twice the spacing from which the node `index` is interpolated, with weights.
 fn between<const D: usize>(index: [u32; 3]) -> Vec<([u32; 3], f64)> {
     let mut all = vec![([0; 3], 1.0)];
     for k in 0..D {
@@ -76,14 +80,14 @@ fn between<const D: usize>(index: [u32; 3]) -> Vec<([u32; 3], f64)> {
     all
 }
 
-/// Where in the stencil of a node another one is.
+/// The place of the node `to` in the stencil of the node `from`.
 fn place(from: [u32; 3], to: [u32; 3]) -> usize {
     let [x, y, z] = [0, 1, 2].map(|k| (to[k] + 1 - from[k]) as usize);
     x + 3 * y + 9 * z
 }
 
 impl<const D: usize> Level<D> {
-    /// The next coarser level of a form, and its form.
+    /// The next coarser level of a form, and the form of that level.
     pub fn of(form: &LocalForm) -> (Self, LocalForm) {
         let mut next = LocalForm { grid: form.grid.map(|cells| cells.div_ceil(2)), ..LocalForm::default() };
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
@@ -126,7 +130,8 @@ impl<const D: usize> Level<D> {
         (level, next)
     }
 
-    /// What is held where both grids have a node; elsewhere, what any node is that lies between.
+    /// The held values of the coarse level. A coarse node that coincides with a finer node is held where that node is prescribed. Any other
+    /// coarse node is held where one of the finer nodes interpolated from it is prescribed.
     fn held(form: &LocalForm, above: &[Vec<(u32, f64)>], count: usize) -> Vec<bool> {
         let (mut held, mut same) = (vec![false; D * count], vec![false; count]);
         for (fine, list) in above.iter().enumerate() {
@@ -143,7 +148,7 @@ impl<const D: usize> Level<D> {
         held
     }
 
-    /// Adds what nodes have: Pᵀ B P, and for the next level its row sums.
+    /// Adds the nodal terms Pᵀ B P. The next form gets their row sums.
     fn add_nodes(&mut self, form: &LocalForm, next: &mut LocalForm) {
         let mut lumped = vec![Tensor::<f64, D>::zeros(); next.nodes.len()];
         for (fine, list) in self.above.iter().enumerate() {
@@ -159,7 +164,7 @@ impl<const D: usize> Level<D> {
         next.blocks = lumped.iter().flat_map(|block| block.iter().copied()).collect();
     }
 
-    /// Adds a cell of the finer grid, one point in the coarse cell `at`.
+    /// Adds a cell of the finer grid, as one quadrature point in the coarse cell `at`.
     fn add_cell(
         &mut self,
         form: &LocalForm,
@@ -196,7 +201,7 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// Lets outer nodes follow others, as far as nothing holds them.
+    /// Lets outer nodes follow others, except at held values.
     fn follow(&mut self, form: &LocalForm, next: &mut LocalForm) {
         (next.aggregated, next.follows) = (form.aggregated, vec![false; D * next.nodes.len()]);
         if !form.aggregated {
@@ -212,14 +217,14 @@ impl<const D: usize> Level<D> {
         }
     }
 
-    /// Holds unknowns that no cell reaches: what finer nodes have of one there has hardly mass and no stiffness.
+    /// Holds unknowns that no cell reaches. Finer nodes interpolated from them have hardly any mass and no stiffness.
     fn hold_empty(&mut self, next: &LocalForm) {
         for (k, held) in self.held.iter_mut().enumerate() {
             *held |= !next.follows[k] && self.entries[k / D][MIDDLE][(k % D, k % D)] == 0.0;
         }
     }
 
-    /// Nothing in the rows and columns of what is held.
+    /// Clears the rows and columns of held values.
     fn hold(&mut self) {
         let Self { entries, neighbours, held, .. } = self;
         for (node, (row, neighbours)) in entries.iter_mut().zip(neighbours).enumerate() {
@@ -236,7 +241,7 @@ impl<const D: usize> Level<D> {
     /// The inverse diagonal blocks of Eᵀ K E, with the identity at values that are no unknowns.
     fn invert_blocks(&mut self, next: &LocalForm) {
         let mut blocks: Vec<Tensor<f64, D>> = self.entries.iter().map(|row| row[MIDDLE]).collect();
-        // Of each node, the nodes that follow it.
+        // The nodes that follow each node.
         let mut of_leader: Vec<Vec<(usize, [bool; D], f64)>> = vec![Vec::new(); blocks.len()];
         for (outer, follows, leaders) in self.followers.rows() {
             leaders.for_each(|(leader, weight)| of_leader[leader].push((outer, follows, weight)));
@@ -264,7 +269,7 @@ impl<const D: usize> Level<D> {
         self.inverse = blocks.iter().map(|block| usable(inverse(block))).collect();
     }
 
-    /// The entry of two nodes, zero where they are no neighbours.
+    /// The block of K for two nodes; zero where they are not neighbours.
     fn entry(&self, nodes: &[[u32; 3]], from: usize, to: usize) -> Tensor<f64, D> {
         let beside = (0..3).all(|k| nodes[from][k].abs_diff(nodes[to][k]) <= 1);
         if beside { self.entries[from][place(nodes[from], nodes[to])] } else { Tensor::zeros() }
@@ -276,7 +281,7 @@ impl<const D: usize> Level<D> {
         let mut matrix = DMatrix::zeros(size, size);
         let mut unit = vec![0.0; size];
         for (k, mut column) in matrix.column_iter_mut().enumerate() {
-            // A held value is no unknown: the nodes that follow it must not put entries into its column.
+            // A held value is no unknown, so the nodes that follow it must not put entries into its column.
             if !self.held[k] {
                 unit[k] = 1.0;
                 self.apply(&unit, column.as_mut_slice());

@@ -1,10 +1,11 @@
 //! Multigrid on the background grid: one V-cycle as preconditioner.
 //!
-//! The finest level is the tangent itself, known by its product. Coarser ones are hat functions on grids of twice the spacing each, with the
-//! material of a cell of the finer grid at one point of it (its volume, centroid and tangent are summed up), stored as stencils. Outer nodes
-//! follow inner ones, as those of the finest level do. Motions go down by linear interpolation of nodal values, forces go up by its
-//! transpose. Smoothing: Chebyshev polynomials over the diagonal blocks, the same before and after, so that the whole is symmetric where the
-//! tangent is.
+//! - The finest level is the tangent itself, known by its product.
+//! - Each coarser level has hat functions on a grid of twice the spacing, and is stored as stencils. Every finer cell is one quadrature
+//!   point of it, with the cell's summed volume and tangent at its centroid. Outer nodes follow inner ones, as on the finest level.
+//! - Coarse motions are interpolated linearly to finer nodes. Finer forces are restricted by the transpose.
+//! - Chebyshev polynomials over block-Jacobi smooth before and after the coarse correction. Both smoothers are equal, so the cycle is
+//!   symmetric where the tangent is.
 
 mod chebyshev;
 mod filter;
@@ -21,34 +22,36 @@ use filter::Filter;
 use level::Level;
 use nalgebra::{DVector, Dyn, LU};
 
-/// Unknowns that are solved for directly, and the most that ever are.
+/// Coarsening ends at a level with at most this many unknowns, which is factorised.
 const BOTTOM: usize = 400;
+/// A last level with more unknowns than this is not factorised, and only gets block-Jacobi.
 const MOST: usize = 2000;
 
-/// One V-cycle, of levels made from the first tangent that is shown; smoothed by the present one.
+/// One V-cycle of multigrid. Its levels are made from the first tangent it is prepared with. The finest level uses the present tangent.
 #[derive(Clone, Debug, Default)]
 pub struct Multigrid<const D: usize> {
     blocks: BlockJacobi<D>,
-    /// Of cubic B-splines.
+    /// The filter of the finest smoother, for cubic B-splines.
     filter: Option<Filter>,
-    /// What the tangent was divided by that the levels are made from.
+    /// The scale by which the tangent was divided when the levels were made.
     scale: f64,
+    /// An estimate of the largest eigenvalue of M K, with the M of the finest smoother.
     largest: f64,
     levels: Vec<Level<D>>,
     bottom: Option<LU<f64, Dyn, Dyn>>,
 }
 
-/// Bytes of the levels below so many nodes in `dimension` dimensions, and of the form that they are made from.
+/// Bytes of the coarse levels for a finest level of `nodes` nodes, and of the [`LocalForm`] that they are made from.
 pub(crate) fn bytes(nodes: usize, dimension: usize) -> usize {
     let (block, tangent) = (dimension.pow(2) * size_of::<f64>(), dimension.pow(4) * size_of::<f64>());
     let transfer = 1.5_f64.powi(dimension as i32).ceil() as usize * size_of::<(u32, f64)>();
-    // Coarse grids have a half more nodes than their share, along surfaces.
+    // Coarse grids have a half more nodes than the share 1/2^D, because of surfaces.
     let coarse = 2 * nodes.div_ceil(1 << dimension);
     nodes * (tangent + transfer + size_of::<Vec<u32>>()) + coarse * (28 * block + 27 * size_of::<u32>())
 }
 
 impl<const D: usize> Multigrid<D> {
-    /// The levels of a tangent.
+    /// Makes the levels of a tangent.
     fn build(&mut self, form: Option<LocalForm>, fine: &dyn LinearOperator) {
         self.filter =
             form.as_ref().filter(|form| form.degree == 3).map(|form| Filter::new::<D>(form, self.blocks.inverses()));
@@ -69,7 +72,7 @@ impl<const D: usize> Multigrid<D> {
         }
     }
 
-    /// z = M r of the finest smoother.
+    /// z = M r, with the M of the finest smoother.
     fn smooth(&self, r: &[f64], z: &mut [f64]) {
         self.blocks.apply(r, z);
         if let Some(filter) = &self.filter {
@@ -77,7 +80,7 @@ impl<const D: usize> Multigrid<D> {
         }
     }
 
-    /// x = M⁻¹ b below level `from`.
+    /// The approximate solution of level `from` and all coarser levels, for the right-hand side b.
     fn coarse(&self, from: usize, b: &[f64]) -> Vec<f64> {
         let level = &self.levels[from];
         let mut x = vec![0.0; b.len()];
@@ -95,7 +98,7 @@ impl<const D: usize> Multigrid<D> {
         x
     }
 
-    /// Adds to x what level `to` makes of the residual.
+    /// Adds to x the correction of level `to` for the residual b − K x.
     fn correct(&self, to: usize, operator: &dyn LinearOperator, b: &[f64], x: &mut [f64]) {
         let Some(level) = self.levels.get(to) else { return };
         let mut r = vec![0.0; b.len()];
@@ -105,13 +108,13 @@ impl<const D: usize> Multigrid<D> {
     }
 }
 
-/// A V-cycle with the present tangent.
+/// A V-cycle whose finest level is the present tangent.
 struct Cycle<'a, const D: usize, S> {
     levels: &'a Multigrid<D>,
     tangent: Doubled<'a, S>,
 }
 
-/// The tangent in double precision, whatever its own, and times what brings it to the levels' scale.
+/// A tangent of either precision as an operator in double precision, times the factor that brings it to the scale of the levels.
 struct Doubled<'a, S>(&'a dyn Linearization<S>, f64);
 
 impl<S: Entry> LinearOperator for Doubled<'_, S> {
@@ -142,7 +145,7 @@ impl<const D: usize> Multigrid<D> {
             self.scale = tangent.scale();
             self.build(tangent.local_form(), &Doubled(tangent, 1.0));
         }
-        // Systems that single precision could not solve come again in double.
+        // A system that single precision could not solve comes again in double precision, with another scale.
         let tangent = Doubled(tangent, tangent.scale() / self.scale);
         Box::new(Cycle { levels: self, tangent })
     }

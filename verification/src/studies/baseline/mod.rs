@@ -1,4 +1,4 @@
-//! The tangent as a matrix, B-free and by Voigt, beside the matrix-free product.
+//! The tangent as a matrix, B-free and in Voigt's notation, against the matrix-free product.
 
 mod statics;
 
@@ -22,19 +22,18 @@ use bfree::tensor::{Deformation, Tensor, Vector, identity};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "the tangent assembled B-free and by Voigt's BtDB, beside the matrix-free product";
 
-/// Sums of at most some hundred products of size one.
+/// The error of sums of at most some hundred products of size one.
 const ENTRIES: f64 = 1e-13;
 
-/// The most blocks assembled: 2.4 GB in 3D.
+/// The largest number of assembled blocks: 2.4 GB in 3D.
 const MOST_BLOCKS: usize = 30_000_000;
 
-/// A relative residual that GMRES reaches.
+/// A relative residual within the reach of GMRES.
 const SOLVE: f64 = 1e-10;
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut study = Study {
         report: Report::new("the same tangent three ways", &["quantity", "case"]),
@@ -54,13 +53,14 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         Effort::Short => (16, 4),
         Effort::Full => (64, 10),
     };
-    // One of each formula: that of the volume costs the same.
+    // One law of each formula: the laws with another volumetric part cost the same.
     let mut laws = Material::examples(settling::lame()?);
     laws.retain(|(name, _)| *name != "neo-Hookean, logarithmic");
     let shapes = [("linear", Approximation::from(Linear)), ("lme 3", Lme::new(3.0, 1e-6).into())];
     for (law_name, law) in &laws {
         let law_name = law_name.trim_end_matches(", Ciarlet");
-        // Blocks of a law without a closed form are one product each: of LME's 4·10⁵ in 3D, up to three minutes of what linear functions show.
+        // Blocks of a law without a closed form need one product each. LME has 4·10⁵ of them in 3D, which take up to three minutes and show
+        // no more than linear functions.
         let is_closed = law.closed::<3>(&identity(), &Deformation::new(Tensor::zeros()), 1.0).is_some();
         for (name, shape) in shapes.iter().take(if is_closed { 2 } else { 1 }) {
             study.case::<2>(name, shape, law, law_name, plane)?;
@@ -208,7 +208,7 @@ impl<const D: usize> bfree::solver::LinearOperator for Held<'_, D> {
     }
 }
 
-/// The assembled tangent, and the seconds it took.
+/// The assembled tangent, and the seconds of the assembly.
 fn built<'p, const D: usize, S: Stiffness<D>>(
     equilibrium: &Equilibrium<'_, D, Material>,
     dphi: &[Vector<f64, D>],
@@ -220,7 +220,7 @@ fn built<'p, const D: usize, S: Stiffness<D>>(
     Ok((matrix, start.elapsed().as_secs_f64()))
 }
 
-/// The shortest of five runs after one to warm up.
+/// The shortest of five runs, after one warm-up run.
 fn best(mut run: impl FnMut()) -> f64 {
     run();
     (0..5).fold(f64::INFINITY, |best: f64, _| {
@@ -238,8 +238,8 @@ fn distance<const D: usize>(a: &[Vector<f64, D>], b: &[Vector<f64, D>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>().sqrt()
 }
 
-/// The settling block, every particle strained by tenths and moving at random. Half the mass is consistent; the Courant number is
-/// about 5, so that inertia and stiffness both count.
+/// The settling block. Every particle is strained by some tenths and has a random velocity. Half of the mass is consistent. The Courant
+/// number is about 5, so that inertia and stiffness both count.
 fn strained_block<const D: usize>(
     approximation: Approximation,
     law: Material,

@@ -1,4 +1,4 @@
-//! One linear system of the static block, solved three ways: what assembling and factorising costs beside iterating.
+//! One linear system of the static block, solved in three ways: the cost of assembly and factorisation against iteration.
 
 use super::{Effort, StudyError};
 use crate::prepared::Prepared;
@@ -13,17 +13,17 @@ use bfree::solver::{
     ConjugateGradientSettings, LinearReport, Preconditioner, Preconditioning, conjugate_gradient,
 };
 
-/// The relative residual asked for.
+/// The required relative residual.
 const SOLVE: f64 = 1e-8;
 
-/// What a factorisation may take; its seconds grow as the square of the unknowns in space.
+/// The limits of a factorisation. Its seconds grow as the square of the unknowns in 3D.
 const MOST_SECONDS: f64 = 60.0;
 const MOST_BYTES: u64 = 8 << 30;
 
 const FAMILIES: [(&str, &str); 3] =
     [("linear", "\"linear\""), ("cubic", "{\"bspline\": {\"degree\": 3}}"), ("LME 3", "{\"lme\": {\"gamma\": 3}}")];
 
-/// K d = −R at the first state of Newton's method, half of the load applied, by one thread.
+/// K d = −R at the first state of Newton's method, with half of the load, on one thread.
 pub(super) fn run(effort: Effort) -> Result<(Report, Table), StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let run = || measured(effort).map_err(|error| error.to_string());
@@ -38,7 +38,7 @@ fn measured(effort: Effort) -> Result<(Report, Table), StudyError> {
     );
     let cells: &[u32] = if effort == Effort::Full { &[7, 16, 30] } else { &[4] };
     for (name, family) in FAMILIES {
-        // Of the last factorisation: unknowns and seconds.
+        // The unknowns and seconds of the last factorisation.
         let mut factorised: Option<(f64, f64)> = None;
         for &cells in cells {
             let mut simulation = block(family, cells)?;
@@ -107,7 +107,7 @@ fn solve(simulation: &Simulation<3>, by: Preconditioning) -> Result<Solved, Stud
     Ok(Solved { report, seconds, factor: 0 })
 }
 
-/// Bytes of what a solve reads, but for the factor, of which a plan knows a bound only.
+/// The bytes that a solve reads, without the factor, for which a plan knows only a bound.
 fn read(plan: &Plan) -> u64 {
     let arrays = plan.arrays.iter().filter(|array| {
         let of_solve = ["shape functions", "frozen tangent", "preconditioner", "Krylov vectors"];

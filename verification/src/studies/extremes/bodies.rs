@@ -1,4 +1,4 @@
-//! Small bodies of regular particles, and the simulations they are in.
+//! Small bodies of regular particles, and their simulations.
 
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
@@ -13,11 +13,10 @@ use bfree::tensor::{Tensor, Vector};
 /// Linear momentum over whole steps, relative to Σ m |v|.
 pub(super) const MOMENTUM: f64 = 1e-13;
 
-/// Newton ends where ‖R‖ is below 16 floors of 4 eps of the sum of the magnitudes of the contributions to R, if not before.
+/// Newton's method ends at the latest when ‖R‖ is below 16 floors of 4 eps of the sum of the magnitudes of the contributions to R.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
-/// A bound of Σ_I |R_I| where Newton's method ends: over n nodes √n ‖R‖ at most. Momentum changes by Δt Σ_I R_I, whatever the
-/// stresses are.
+/// A bound of Σ_I |R_I| at the end of Newton's method: over n nodes at most √n ‖R‖. The momentum changes by Δt Σ_I R_I, for any stresses.
 pub(super) fn left_by_newton<const D: usize>(settings: &Settings, step: &StepReport<D>) -> f64 {
     let history = &step.newton.history;
     let number = |measured: Option<f64>| measured.unwrap_or(f64::NAN);
@@ -56,17 +55,17 @@ pub(super) fn fill<const D: usize>(
     }
 }
 
-/// Newton to the last digit: what a study then finds is no matter of tolerances.
+/// Newton's method converges to the last digit, so that results do not depend on tolerances.
 pub(super) const TOLERANCE: f64 = 1e-14;
 
-/// With that tolerance.
+/// Settings with the tolerance [`TOLERANCE`].
 pub(super) fn settings(lumping: f64) -> Settings {
     Settings {
         lumping,
         newton: NewtonSettings {
             relative_tolerance: TOLERANCE,
             forcing: Forcing::Fixed(1e-8),
-            // The list of known failures was measured with it.
+            // The list of known failures was measured with this method.
             krylov: Krylov::Gmres { restart: 30 },
             max_krylov_iterations: 5000,
             ..NewtonSettings::default()
@@ -99,17 +98,17 @@ pub(super) fn face<const D: usize>(axis: usize, upper: bool, motion: [Option<Mot
     Prescribed { name: format!("face {axis} {upper}"), on: Selection::Face { axis, upper }, motion }
 }
 
-/// The normal component held, or moved.
+/// The normal component of a face, held or moved.
 pub(super) fn normal<const D: usize>(axis: usize, upper: bool, motion: Motion<D>) -> Prescribed<D> {
     face(axis, upper, std::array::from_fn(|k| (k == axis).then(|| motion.clone())))
 }
 
-/// All faces sliding.
+/// The conditions of a box with sliding faces.
 pub(super) fn sliding<const D: usize>() -> Vec<Prescribed<D>> {
     (0..D).flat_map(|axis| [false, true].map(|upper| normal(axis, upper, Motion::Rest))).collect()
 }
 
-/// The same gravity for all time.
+/// Gravity that is constant in time.
 pub(super) fn gravity<const D: usize>(acceleration: Vector<f64, D>) -> Gravity<D> {
     Gravity { acceleration, curve: Curve::constant(1.0) }
 }

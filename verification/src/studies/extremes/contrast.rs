@@ -11,16 +11,16 @@ use bfree::particles::Particles;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::{Deformation, Tensor, Vector};
 
-/// Roundings of a sum over the particles of a few nodes.
+/// Round-off of a sum over the particles of a few nodes.
 const ROUNDINGS: f64 = 64.0;
 
-/// So many times longer than a wave needs that inertia is below the last digit.
+/// The step over the time of a wave: inertia is then below the last digit.
 const QUASI_STATIC: f64 = 1e10;
 
 pub(super) fn run() -> Result<Report, StudyError> {
     let mut report = rows("contrasts: errors relative to the exact answer, or to the sum of magnitudes");
     for poisson in [0.3, 0.49, 0.4999, 0.499_999_9] {
-        // With these two the particles integrate a uniform stress exactly.
+        // With these two families the particles integrate a uniform stress exactly.
         for (name, shape) in [("linear", Approximation::from(Linear)), ("gimp", Gimp::particles_per_axis(2).into())] {
             confined::<1>(poisson, name, &shape, &mut report)?;
             confined::<2>(poisson, name, &shape, &mut report)?;
@@ -45,7 +45,7 @@ pub(super) fn run() -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// A block that fills its box, pressed by one wall in one long step: H is uniform, and the wall's force that of the law.
+/// A block that fills its box, pressed by one wall in one long step. H is uniform, and the force of the wall follows from the law.
 fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     const CELLS: u32 = 3;
     let lame = Lame::from_young_poisson(1.0, poisson)?;
@@ -70,7 +70,7 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     let reaction = stepped.as_ref().map(|report| (report.reactions[moving].force[D - 1] / force - 1.0).abs());
     let strains = simulation.particles.displacement_gradient.iter().map(|h| (h - exact).norm() / exact.norm());
     let strains = strains.fold(0.0, worse);
-    // Round-off of the pressure, Λ eps |H|, is taken up by shear alone: an error of H that is Λ/G times larger.
+    // Only shear resists the round-off of the pressure, Λ eps |H|, so the error of H is Λ/G times larger.
     let bound = ROUNDINGS * f64::EPSILON * (1.0 + lame.lambda / lame.shear);
     match reaction {
         Ok(reaction) => {
@@ -82,7 +82,7 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     Ok(())
 }
 
-/// A free block that vibrates without a change of volume to first order.
+/// A free block that vibrates without change of volume to first order.
 fn vibrating<const D: usize>(poisson: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     let lame = Lame::from_young_poisson(1.0, poisson)?;
     let mut simulation = bodies::block::<D>(if D == 3 { 2 } else { 3 }, shape.clone(), 0.2 / lame.shear.sqrt());
@@ -108,7 +108,7 @@ fn flight<const D: usize>(simulation: &mut Simulation<D>, steps: u32) -> Result<
     Ok(worst)
 }
 
-/// Two bars of two cells each in series, one `contrast` times as stiff, pressed together by a wall at the end of the second.
+/// Two bars of two cells each in series, one stiffer by the factor `contrast`. A wall at the end of the second bar presses them together.
 fn in_series(contrast: f64, stiff_last: bool, report: &mut Report) -> Result<(), StudyError> {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [4] };
     let mut particles = Particles::<1>::default();
@@ -136,7 +136,7 @@ fn in_series(contrast: f64, stiff_last: bool, report: &mut Report) -> Result<(),
     let case = format!("contrast {contrast:e}");
     match stepped {
         Ok(_) => {
-            // A stiff bar moved as a whole, its nodes by numbers that are rounded: strains of eps, whose stress is contrast × eps.
+            // A stiff bar moves as a whole by rounded nodal displacements: its strains of eps have the stress contrast × eps.
             let bound = ROUNDINGS * f64::EPSILON * if stiff_last { contrast } else { 1.0 };
             solvable(report, &what, &format!("{case}: soft"), Ok::<_, StepError>(in_soft), bound);
             solvable(report, &what, &format!("{case}: stiff"), Ok::<_, StepError>(in_stiff), bound);
@@ -156,14 +156,14 @@ fn series(soft: &Material, stiff: &Material, sum: f64) -> (f64, f64) {
     let modulus = |law: &Material| law.elasticity(&rest, &Start::NONE, &Tensor::from_element(1.0))[0];
     let slope = modulus(soft) + modulus(stiff);
     let mut in_stiff = 0.0;
-    // Contracts by the relative change of the moduli, a few tenths.
+    // The iteration contracts by the relative change of the moduli, a few tenths.
     for _ in 0..200 {
         in_stiff += (nominal(soft, sum - in_stiff) - nominal(stiff, in_stiff)) / slope;
     }
     (sum - in_stiff, in_stiff)
 }
 
-/// Two blocks that share nodes, the right one `contrast` times as dense.
+/// Two blocks that share nodes; the right one is denser by the factor `contrast`.
 fn pair<const D: usize>(contrast: f64, shape: &Approximation, dt: f64) -> Simulation<D> {
     let mut simulation = bodies::block::<D>(4, shape.clone(), dt);
     let grid = simulation.grid;
@@ -180,7 +180,7 @@ fn pair<const D: usize>(contrast: f64, shape: &Approximation, dt: f64) -> Simula
     simulation
 }
 
-/// Both fall as one, whatever their mass.
+/// Both blocks fall together, for any masses.
 fn falling<const D: usize>(contrast: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     let mut simulation = pair::<D>(contrast, shape, 0.1);
     let g: Vector<f64, D> = Vector::from_fn(|k, _| -0.1 - 0.1 * k as f64);
@@ -192,14 +192,14 @@ fn falling<const D: usize>(contrast: f64, name: &str, shape: &Approximation, rep
     let speed = g * simulation.clock.time();
     let velocity = simulation.particles.velocity.iter().map(|v| (v - speed).norm() / speed.norm()).fold(0.0, worse);
     let strain = simulation.particles.displacement_gradient.iter().map(Tensor::norm).fold(0.0, worse);
-    // Newton stops at a few eps of the heavy body's forces, which may lie on a node of the light one.
+    // Newton's method stops at a few eps of the heavy body's forces, which may act on a node of the light body.
     let bound = ROUNDINGS * f64::EPSILON * contrast;
     solvable(report, &what, &format!("{case}: velocity"), fallen.map(|()| velocity), bound);
     solvable(report, &what, &format!("{case}: strain"), Ok::<_, StepError>(strain), bound);
     Ok(())
 }
 
-/// The heavy one runs into the light one, which rests.
+/// The heavy block collides with the light one, which is at rest.
 fn colliding<const D: usize>(contrast: f64, name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     let mut simulation = pair::<D>(contrast, shape, 0.2);
     simulation.clock = Clock::new(0.2, 10);

@@ -1,4 +1,4 @@
-//! Particles pushed through zero volume in one step: a halved step, or an error; never an answer.
+//! Particles pushed through zero volume in one step: the step must be halved or fail, and never return a result.
 
 use super::bodies::{self, PLAIN, body, fill, normal, simulation};
 use super::{Report, StudyError, refused, rows, solvable};
@@ -14,7 +14,7 @@ use bfree::tensor::{Deformation, Vector};
 /// Cells along each axis of the box, which the body fills.
 const CELLS: u32 = 4;
 
-/// Halvings allowed where the row is solvable: the wall then moves 1e-3 of a cell at least.
+/// Halvings allowed if the row is solvable: the wall then moves at least 1e-3 of a cell.
 const HALVINGS: u32 = 14;
 
 pub(super) fn run() -> Result<Report, StudyError> {
@@ -30,7 +30,7 @@ pub(super) fn run() -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// The lower end of a box of `length` times its width, filled; all faces slide.
+/// The lower end of a box of `length` times its width is filled; all faces slide.
 fn filled<const D: usize>(shape: &Approximation, length: u32) -> Simulation<D> {
     let mut grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [CELLS; D] };
     grid.cells[0] *= length;
@@ -41,7 +41,7 @@ fn filled<const D: usize>(shape: &Approximation, length: u32) -> Simulation<D> {
     simulation
 }
 
-/// Runs `steps` nominal steps, however often they are halved, and counts particles without a positive volume.
+/// Runs `steps` nominal steps with any number of halvings. Returns the number of particles without a positive volume.
 fn survive<const D: usize>(simulation: &mut Simulation<D>, steps: u64) -> Result<f64, AdvanceError> {
     let mut wrong = 0;
     while simulation.clock.nominal_steps() < steps {
@@ -56,7 +56,7 @@ fn inadmissible(error: &StepError) -> bool {
     matches!(error, StepError::Newton(newton) if matches!(newton.cause, NewtonFailure::Inadmissible { iteration: 0, .. }))
 }
 
-/// A wall that crosses more than its cell in one step.
+/// A wall that moves by more than its cell in one step.
 fn driven<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) -> Result<(), StudyError> {
     for cells in [1.5, 3.0] {
         let mut simulation = filled::<D>(shape, 1);
@@ -71,9 +71,9 @@ fn driven<const D: usize>(name: &str, shape: &Approximation, report: &mut Report
     Ok(())
 }
 
-/// A body that in one step would fly through the wall it touches.
+/// A body that would fly through the adjacent wall in one step.
 fn thrown<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) {
-    // There is room to fly back.
+    // The body has room to fly back.
     let mut simulation = filled::<D>(shape, 3);
     // Half the speed of sound, and steps of several cells.
     let speed = 0.5 * PLAIN.p_wave_modulus().sqrt();

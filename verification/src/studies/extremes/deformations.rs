@@ -1,4 +1,4 @@
-//! Compression to J = 1e-6, stretch and shear of 1e3, rotation by any angle; and what no body can do.
+//! Compression to J = 1e-6, stretch and shear of 1e3, rotation by any angle; and deformations that no body can have.
 
 use super::points::{Errors, Precision, Rounding, judge, laws};
 use super::strains::ROUNDINGS;
@@ -88,7 +88,7 @@ fn dimension<T: Precision, const D: usize>(report: &mut Report) {
     }
 }
 
-/// By `angle` from the first axis to the last one.
+/// A rotation by `angle` from the first axis to the last one.
 fn plane_rotation<const D: usize>(angle: f64) -> Tensor<f64, D> {
     let (sin, cos) = angle.sin_cos();
     let mut q = identity::<f64, D>();
@@ -97,7 +97,7 @@ fn plane_rotation<const D: usize>(angle: f64) -> Tensor<f64, D> {
     q
 }
 
-/// F with det F ≤ 0, or no number, by kind.
+/// F with det F ≤ 0, or with entries that are not finite, by kind.
 pub(super) fn bad<const D: usize>() -> Vec<(&'static str, Vec<Tensor<f64, D>>)> {
     let first = |stretch: f64| {
         let mut f = identity::<f64, D>();
@@ -114,7 +114,7 @@ pub(super) fn bad<const D: usize>() -> Vec<(&'static str, Vec<Tensor<f64, D>>)> 
     vec![
         ("det F = 0", vec![first(0.0), Tensor::zeros()]),
         ("det F = -1e-6 .. -1e3", [1e-6, 1e-3, 1.0, 1e3].map(|x| first(-x)).into()),
-        // J² = det C > 0: by way of C they would pass.
+        // J² = det C > 0: a code that used C would accept these.
         ("mirrored, det C > 0", mirrored.collect()),
         ("not a number", vec![first(f64::NAN), Tensor::from_element(f64::NAN)]),
         ("infinite", vec![first(f64::INFINITY), first(f64::NEG_INFINITY)]),
@@ -126,7 +126,7 @@ fn impossible<T: Precision, const D: usize>(report: &mut Report) {
         let answers = list.iter().map(|f| admissible((f - identity::<f64, D>()).map(T::lit)));
         let what = format!("one point, {}, D = {D}", T::NAME);
         refused(report, &what, case, "NonPositiveJacobian", answers, |NonPositiveJacobian { det_f }| {
-            // Refused for what it is: not positive, or not finite.
+            // The error must state the cause: not positive, or not finite.
             !(*det_f > 0.0 && det_f.is_finite())
         });
     }

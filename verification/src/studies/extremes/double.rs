@@ -1,4 +1,4 @@
-//! The judge itself: double-double arithmetic against identities and known digits.
+//! The reference itself: double-double arithmetic against identities and known digits.
 
 use super::{rows, solvable, worse};
 use crate::double_double::DoubleDouble;
@@ -9,7 +9,7 @@ use num_traits::One;
 use std::convert::Infallible;
 use twofloat::consts::{LN_10, SQRT_2};
 
-/// A dozen operations, each good to a few rounding units.
+/// The error of a dozen operations, each with a few rounding units.
 const BOUND: f64 = 64.0 * DoubleDouble::EPSILON;
 
 pub(super) fn run() -> Report {
@@ -22,7 +22,7 @@ pub(super) fn run() -> Report {
         let (x, y) = (number(&mut random, 30.0), number(&mut random, 30.0));
         quotient = worse(quotient, difference(x * y / y, x));
         root = worse(root, difference(x.sqrt() * x.sqrt(), x));
-        // Of sums of logarithms that do not cancel.
+        // The logarithms in this sum do not cancel.
         let (a, b) = (number(&mut random, 10.0) + 2.0, number(&mut random, 10.0) + 2.0);
         product = worse(product, difference((a * b).ln(), a.ln() + b.ln()));
         // ln(1 + x) − ln(1 − x) = ln((1 + x)/(1 − x)) = ln(1 + 2x/(1 − x)), for x below and above the switch.

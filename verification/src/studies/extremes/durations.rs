@@ -1,4 +1,4 @@
-//! Steps from 1e-12 to 1e6 times the time a wave needs for a cell; nothing that moves or loads; a body at rest.
+//! Steps from 1e-12 to 1e6 times the time a wave needs for a cell; a body without motion and loads; a body at rest under stress.
 
 use super::bodies::{self, PLAIN, fill, simulation, sliding, stir, sum_of_momenta};
 use super::{Effort, Outcome, Report, StudyError, at_most, refused, rows, solvable, steps, worse};
@@ -10,7 +10,7 @@ use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, Vector};
 
-/// Roundings of sums over the particles of a few nodes.
+/// Round-off of sums over the particles of a few nodes.
 const ROUNDINGS: f64 = 64.0;
 
 /// Largest speed over that of sound.
@@ -35,7 +35,7 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyErr
         nothing::<2>(name, &shape, &mut report);
         nothing::<3>(name, &shape, &mut report);
     }
-    // With these two the particles integrate a uniform stress exactly: a discrete equilibrium.
+    // With these two families the particles integrate a uniform stress exactly: a discrete equilibrium.
     for (name, shape) in [("linear", Linear.into()), ("gimp", Gimp::particles_per_axis(2).into())] {
         let counts = if *effort == Effort::Full { [10_000; 3] } else { [1000, 100, 30] };
         pressed::<1>(name, &shape, counts[0], &mut report);
@@ -47,7 +47,7 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyErr
     Ok(())
 }
 
-/// A free block that starts to deform without turning: for short steps it has barely changed; for long ones each step ends at rest.
+/// A free block that starts to deform without rotation. In short steps it hardly changes; in long steps each step ends at rest.
 fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, report: &mut Report) {
     let sound = PLAIN.p_wave_modulus().sqrt();
     let ratio = 10.0_f64.powi(exponent);
@@ -69,24 +69,24 @@ fn vibrating<const D: usize>(name: &str, shape: &Approximation, exponent: i32, r
         strain = particles.displacement_gradient.iter().map(|h| h.norm()).fold(strain, worse);
         Ok::<_, StudyError>(())
     });
-    // In long steps the forces that balance are large impulses, and so is what Newton leaves of them.
+    // In long steps the internal forces are large impulses, and so is the residual that Newton's method leaves.
     let bound = if exponent > 0 { impulse / scale } else { bodies::MOMENTUM };
     at_most(report, &what, &format!("{case}: linear momentum"), momentum, bound);
     let particles = simulation.particles.by_id();
     let waves = f64::from(taken) * ratio;
     if exponent <= -3 {
-        // Stresses grow to Λ |A| t at most; the change of speed is a few times c |A| t × t c/h.
+        // Stresses grow to at most Λ |A| t; the change of speed is a few times c |A| t × t c/h.
         let changed = particles.velocity.iter().zip(&start.velocity).map(|(v, v_0)| (v - v_0).norm()).fold(0.0, worse);
         let bound = 10.0 * waves * waves + ROUNDINGS * f64::EPSILON;
         at_most(report, &what, &format!("{case}: change of velocity"), changed / fastest, bound);
     } else if exponent >= 2 {
-        // α₁ M Δφ + K Δφ = α₂ M v: a velocity v leaves the strain 4 (v/c) h/(c Δt), some larger where the motion is longer.
+        // α₁ M Δφ + K Δφ = α₂ M v: a velocity v leaves the strain 4 (v/c) h/(c Δt), and more where the motion is longer.
         let length = f64::from(2 * cells);
         at_most(report, &what, &format!("{case}: strain"), strain, 10.0 * length * MACH / ratio);
     }
 }
 
-/// Neither velocity nor gravity: not a bit changes.
+/// Without velocity and gravity not one bit changes.
 fn nothing<const D: usize>(name: &str, shape: &Approximation, report: &mut Report) {
     let mut simulation = bodies::block::<D>(2, shape.clone(), 0.5);
     simulation.loads.gravity = Some(bodies::gravity(Vector::zeros()));
@@ -99,7 +99,7 @@ fn nothing<const D: usize>(name: &str, shape: &Approximation, report: &mut Repor
     solvable(report, &format!("zero velocity, zero gravity, 100 steps, {name}, D = {D}"), "what has changed", changed, 0.0);
 }
 
-/// A block that fills its box under uniform stress: a discrete equilibrium, in which only round-off moves.
+/// A block under uniform stress that fills its box: a discrete equilibrium in which only round-off moves.
 fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report: &mut Report) {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [if D == 3 { 2 } else { 3 }; D] };
     let mut particles = Particles::default();
@@ -116,13 +116,14 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);
     let at = Deformation::new(strain);
     let stress = bodies::body(PLAIN, 1.0).law.stress(&at, &Start::NONE).norm() / PLAIN.p_wave_modulus();
-    // Each step adds a rounding of the stresses, at random: a sum that grows with the root of their number, and its sum with another.
+    // Each step adds a random rounding of the stresses. Velocities grow with the root of the number of steps; displacements sum them once
+    // more.
     let bound = ROUNDINGS * f64::EPSILON * stress * f64::from(steps).sqrt();
     solvable(report, &what, "speed over that of sound", rested.map(|()| speed), bound);
     solvable(report, &what, "displacement over spacing", Ok::<_, StudyError>(moved), bound * f64::from(steps));
 }
 
-/// Bodies without stiffness are none of the laws'.
+/// No law accepts a body without stiffness.
 fn no_stiffness(report: &mut Report) {
     let answers = [Lame::new(0.0, 0.0), Lame::from_bulk_shear(1.0, 0.0)];
     refused(report, "zero stiffness", "Lame::new", "Shear", answers, |error| matches!(error, LameError::Shear(_)));

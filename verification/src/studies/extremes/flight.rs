@@ -12,10 +12,10 @@ use bfree::simulation::{InitialGuess, Simulation};
 use bfree::tensor::{Tensor, Vector};
 use std::sync::Arc;
 
-/// Of the angular momentum: what Newton's tolerance leaves in 10⁴ steps.
+/// The change of angular momentum that Newton's tolerance allows in 10⁴ steps.
 const SPIN: f64 = 1e-10;
 
-/// Steps over the time a wave needs for a cell.
+/// The step over the time a wave needs for a cell.
 const STEP: f64 = 0.1;
 
 pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
@@ -66,9 +66,9 @@ fn square(shape: &Approximation, lumping: f64, dt: f64, (spin, breath): (f64, f6
     simulation
 }
 
-/// The worst change over `steps` steps, in which the square crosses two cells.
+/// The largest change over `steps` steps, in which the square crosses two cells.
 fn flies(name: &str, shape: &Approximation, motion: &str, stirred: (f64, f64), steps: u32, report: &mut Report) {
-    // A rotation is slowed down for the long run, a vibration is not.
+    // A rotation is slower in the long run; a vibration is not.
     let (spin, breath) = stirred;
     let mut simulation = square(shape, 1.0, STEP, (spin, 0.25 * breath));
     let speed = 2.0 / (f64::from(steps) * simulation.clock.step());
@@ -83,7 +83,7 @@ fn flies(name: &str, shape: &Approximation, motion: &str, stirred: (f64, f64), s
     solvable(report, &format!("{motion}, {steps} steps"), name, flown, bodies::MOMENTUM);
 }
 
-/// Σ m x × v about the centre of mass, the square not moving as a whole.
+/// Σ m x × v about the centre of mass, of a square without translation.
 fn angular_momentum(particles: &Particles<2>) -> f64 {
     let mass: f64 = particles.mass.iter().sum();
     let centre = particles.position.iter().zip(&particles.mass).map(|(x, &m)| x * m).sum::<Vector<f64, 2>>() / mass;
@@ -94,8 +94,8 @@ fn angular_momentum(particles: &Particles<2>) -> f64 {
     (0..particles.len()).map(spin).sum()
 }
 
-/// The worst change of the angular momentum on a grid that is kept, by the midpoint rule and with a consistent mass: nothing of the method
-/// changes it.
+/// The largest change of the angular momentum on a total Lagrangian grid, with the midpoint rule and a consistent mass. The method then
+/// conserves angular momentum exactly.
 fn spins(shape: &Approximation, steps: u32) -> Result<f64, StudyError> {
     let mut simulation = square(shape, 0.0, STEP, (0.2, 0.0));
     simulation.settings.renewal = Renewal::Never;

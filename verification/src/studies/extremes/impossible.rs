@@ -1,4 +1,4 @@
-//! Deformations no body can have, as the state of one particle of a body at the start of a step.
+//! Deformations that no body can have, as the state of one particle at the start of a step.
 
 use super::{Report, bodies, deformations::bad, refused, rows};
 use bfree::approximation::Linear;

@@ -1,7 +1,8 @@
-//! The extremes: whether rows said beforehand to be solvable are solved, and to what accuracy, and the others refused for the right reason.
+//! The extremes. Each row says beforehand whether it is solvable. Solvable rows must reach the stated accuracy; the others must be refused
+//! for the right reason.
 //!
-//! A solvable row ends with its error against arithmetic of higher precision, an exact answer or a balance, and a bound from theory;
-//! a row to be refused with the number of answers that were not the one error expected: none.
+//! A solvable row holds its error against arithmetic of higher precision, an exact answer or a balance, with a bound from theory. A row to
+//! be refused holds the number of answers that differ from the expected error; the number must be zero.
 
 mod bodies;
 mod contrast;
@@ -21,13 +22,12 @@ mod units;
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, lone particles, time steps and overlaps at their extremes";
 
-/// What is written in the column `beforehand` of a row that must be solved.
+/// The entry in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
     outcome.reports.push(double::run());
@@ -45,12 +45,12 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(outcome)
 }
 
-/// A report of rows: what is done, to what, and what was said of it beforehand.
+/// A report of rows: the action, the case, and the expectation stated beforehand.
 fn rows(title: &str) -> Report {
     Report::new(title, &["what", "case", "beforehand"])
 }
 
-/// A row that must be solved: its error against a bound, or why it failed.
+/// A row that must be solved: its error with a bound, or the cause of its failure.
 fn solvable<E: Into<StudyError>>(report: &mut Report, what: &str, case: &str, measured: Result<f64, E>, bound: f64) {
     match measured {
         Ok(error) => at_most(report, what, case, error, bound),
@@ -58,12 +58,12 @@ fn solvable<E: Into<StudyError>>(report: &mut Report, what: &str, case: &str, me
     }
 }
 
-/// A row that was solved: its error against a bound.
+/// A row that was solved: its error with a bound.
 fn at_most(report: &mut Report, what: &str, case: &str, error: f64, bound: f64) {
     report.push(&[what, case, SOLVABLE], error, Bound::AtMost(bound));
 }
 
-/// Takes `asked` steps, or as many as can be, with a row for how many; and says how many.
+/// Takes `asked` steps, or as many as possible, and adds a row with their number. Returns the number.
 fn steps<E: Into<StudyError>>(
     report: &mut Report,
     what: &str,
@@ -81,7 +81,7 @@ fn steps<E: Into<StudyError>>(
     taken
 }
 
-/// A row that must be refused with the error named: the value counts answers that are another one.
+/// A row that must be refused with the error named: the value counts the other answers.
 fn refused<T, E: std::error::Error>(
     report: &mut Report,
     what: &str,
@@ -102,12 +102,12 @@ fn refused<T, E: std::error::Error>(
         wrong += 1;
         report.note(format!("{what}, {case}: {found}"));
     }
-    // Without an answer nothing was refused.
+    // Without an answer there was no refusal.
     let value = if answered > 0 { f64::from(wrong) } else { f64::NAN };
     report.push(&[what, case, &beforehand], value, Bound::AtMost(0.0));
 }
 
-/// The larger one, and NaN if either is.
+/// The larger number, or NaN if either is NaN.
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }

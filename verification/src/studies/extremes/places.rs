@@ -1,19 +1,19 @@
-//! Shape functions from γ̂ = 0.1 to 1e4 at particles on nodes, edges, corners and the hull, next to them, and just outside.
+//! Shape functions from γ̂ = 0.1 to 1e4 at particles on nodes, edges, corners and walls of the box, next to them, and just outside.
 
 use super::{Report, refused, rows, solvable, worse};
 use bfree::approximation::{Approximation, ApproximationError, Bspline, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction, Support};
 use bfree::grid::Grid;
 use bfree::tensor::{Tensor, Vector, identity, outer};
 
-/// Each axis: a dozen roundings, and one for each of its nodes.
+/// Round-off along each axis: a dozen roundings, and one for each node.
 const ROUNDINGS: f64 = 12.0;
 
 const SPACING: f64 = 0.5;
 
-/// Wide enough for γ̂ = 0.1, whose functions reach 12 nodes to each side.
+/// The number of cells fits γ̂ = 0.1, whose functions reach 12 nodes to each side.
 const CELLS: u32 = 26;
 
-/// Next to a place: as close to it as numbers allow.
+/// The smallest distance from a position.
 const TINY: f64 = 1e-300;
 
 const GAMMAS: [f64; 9] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4];
@@ -29,7 +29,7 @@ fn families() -> Vec<(String, Approximation)> {
     families
 }
 
-/// Coordinates by name. Tiny distances are from node 0, where numbers are that dense; elsewhere the next number is meant.
+/// Coordinates with their names. Tiny distances are measured from node 0, where numbers are that dense; elsewhere the next number is used.
 fn places() -> [(&'static str, f64); 9] {
     let end = f64::from(CELLS) * SPACING;
     [
@@ -54,7 +54,7 @@ pub(super) fn run() -> Report {
     }
     for gamma in [0.3, 1.0, 3.0, 9.0] {
         let (name, circle) = (format!("LME on the circle {gamma}"), LmeCircle::new(gamma, 1e-6).into());
-        // What is on a wall is treated a little inside.
+        // A point on a wall is evaluated slightly inside.
         dimension::<1>(&name, &circle, LmeCircle::INSET, &mut report);
         dimension::<2>(&name, &circle, LmeCircle::INSET, &mut report);
     }
@@ -70,13 +70,13 @@ fn grid<const D: usize>() -> Grid<D> {
     Grid { origin: Vector::zeros(), spacing: SPACING, cells: [CELLS; D] }
 }
 
-/// All places along the first axis with the other coordinates in a cell, at the same place (edges and corners), and on a node.
+/// All positions along the first axis. The other coordinates are inside a cell, equal to the first (edges and corners), or on a node.
 fn dimension<const D: usize>(name: &str, shape: &Approximation, inset: f64, report: &mut Report) {
     let wide = matches!(shape, Approximation::Lme(lme) if lme.gamma() < 1.0);
     for (place, x) in places() {
         let others: &[f64] = match D {
             1 => &[0.0],
-            // A thousand nodes and more at each place.
+            // Each position has a thousand nodes and more.
             3 if wide => &[x],
             _ => &[x, 5.3 * SPACING, 7.0 * SPACING],
         };
@@ -96,7 +96,7 @@ fn dimension<const D: usize>(name: &str, shape: &Approximation, inset: f64, repo
     }
 }
 
-/// How far `x` is moved, in spacings: what is on a node to 32 roundings of its place is on it (`Axis::local`).
+/// The shift of `x`, in spacings: a point within 32 roundings of a node is treated as on the node (`Axis::local`).
 fn onto_node(x: f64) -> f64 {
     let s = x / SPACING;
     let distance = (s - s.round()).abs();
@@ -122,7 +122,7 @@ fn errors<const D: usize>(x: &Vector<f64, D>, support: &Support<D>) -> f64 {
     [one.abs(), centre.norm() / distance_size, zero.norm() / gradient_size, unit.norm() / unit_size].into_iter().fold(0.0, worse)
 }
 
-/// Particles that are not in the box.
+/// Particles outside the box.
 fn not_there<const D: usize>(report: &mut Report) {
     let end = f64::from(CELLS) * SPACING;
     for (case, x) in [("1e-300 outside", -TINY), ("an ulp outside", end.next_up()), ("not a number", f64::NAN), ("infinite", f64::INFINITY)] {
@@ -132,7 +132,7 @@ fn not_there<const D: usize>(report: &mut Report) {
             .map(|(_, shape)| shape)
             .chain([LmeCircle::new(3.0, 1e-6).into()])
             .map(|shape| {
-                // Outside along the last axis alone.
+                // The point is outside along the last axis only.
                 let at = Vector::<f64, D>::from_fn(|k, _| if k == D - 1 { x } else { SPACING });
                 shape.evaluate(&grid(), &at, &mut scratch, &mut support)
             })
@@ -142,7 +142,7 @@ fn not_there<const D: usize>(report: &mut Report) {
     }
 }
 
-/// Parameters that mean nothing.
+/// Invalid parameters.
 fn no_such_shape(report: &mut Report) {
     let (mut scratch, mut support) = (Scratch::default(), Support::default());
     let mut at_rest = |shape: Approximation| shape.evaluate(&grid::<2>(), &Vector::repeat(1.3), &mut scratch, &mut support);

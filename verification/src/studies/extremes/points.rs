@@ -1,4 +1,4 @@
-//! Energy and stress at one deformation, in a precision to be judged, in double-double, and by the formulas of textbooks.
+//! Energy and stress at one deformation: in a precision under test, in double-double, and by textbook formulas.
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
@@ -7,7 +7,7 @@ use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
 
-/// A precision to be judged.
+/// A precision under test.
 pub(super) trait Precision: Real {
     const NAME: &'static str;
     /// The distance from 1 to the next number.
@@ -24,43 +24,43 @@ impl Precision for f32 {
     const EPSILON: f64 = Self::EPSILON as f64;
 }
 
-/// ν = 0.3; the constants have few digits, so that they are the same in every precision. Laws in logarithmic strains have no textbook formula
-/// that every precision could evaluate.
+/// ν = 0.3. The constants have few digits, so that they are equal in every precision. Laws in logarithmic strains have no textbook formula
+/// that every precision could evaluate, and are left out.
 pub(super) fn laws() -> Vec<(String, Material)> {
     let closed = |(name, law): (&str, Material)| {
         let spectral = matches!(
             law,
             Material::Ogden(_) | Material::Viscoelastic(_) | Material::VonMises(_) | Material::DruckerPrager(_)
         );
-        // e^{k₂ (I₄ − 1)²} is beyond every precision there.
+        // e^{k₂ (I₄ − 1)²} exceeds the range of every precision there.
         let exponential = matches!(law, Material::FibreReinforced(_));
         (!spectral && !exponential).then(|| (short(name), law))
     };
     Material::examples(Lame { lambda: 576.0, shear: 384.0 }).into_iter().filter_map(closed).collect()
 }
 
-/// What a rounding of the input is.
+/// A model for the rounding of the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rounding {
-    /// H changes by eps ‖H‖ in any direction: what storing H, and composing it from increments, does.
+    /// H changes by eps ‖H‖ in any direction, as it does when H is stored or composed from increments.
     Displacement,
     /// Every entry of F changes by eps of itself: for deformations along the axes, whose F is exact.
     Entries,
-    /// H changes by eps ‖H‖, and det F by eps of the six products it is the sum of: they are as large as ‖F‖³, and where one stretch is
-    /// much larger than the others and not along an axis, so that they cancel, no smaller error can be had without pivoting.
+    /// H changes by eps ‖H‖, and det F by eps of its six products. The products are as large as ‖F‖³. If one stretch is much larger than
+    /// the others and not along an axis, they cancel, and no smaller error is possible without pivoting.
     Products,
 }
 
 /// Errors at one deformation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Errors {
-    /// |δW| and ‖δS‖ over what rounding of result and input implies, eps (|W| + κ) and eps (‖S‖ + κ): a number of roundings.
+    /// |δW| and ‖δS‖ over the effect of rounding result and input, eps (|W| + κ) and eps (‖S‖ + κ): a number of roundings.
     pub energy: f64,
     pub stress: f64,
-    /// The same relative to the result.
+    /// The errors relative to the result.
     pub relative_energy: f64,
     pub relative_stress: f64,
-    /// The formulas of textbooks, relative to the result.
+    /// The errors of the textbook formulas, relative to the result.
     pub naive_energy: f64,
     pub naive_stress: f64,
 }
@@ -88,10 +88,10 @@ impl Errors {
     }
 }
 
-/// Judges `law` in precision `T` at `h`, rounded to `T`.
+/// Measures the errors of `law` in precision `T` at `h`, rounded to `T`.
 ///
-/// First-order in eps the rounding of the input changes S by ‖∂S/∂H‖ eps ‖H‖ and W by ‖P‖ eps ‖H‖; where W itself is of second order in
-/// a strain below eps, by ½ ‖∂P/∂H‖ (eps ‖H‖)² too.
+/// To first order in eps, rounding of the input changes S by ‖∂S/∂H‖ eps ‖H‖ and W by ‖P‖ eps ‖H‖. If W is of second order in a strain
+/// below eps, it also changes by ½ ‖∂P/∂H‖ (eps ‖H‖)².
 pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
     let given: Tensor<T, D> = h.map(T::lit);
     let h = given.map(T::value);
@@ -120,7 +120,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
     let (change_w, change_s) = match rounding {
         Rounding::Displacement => (piola.norm() * h.norm(), stiffness * h.norm()),
         Rounding::Products => {
-            // δF = F δJ/(D J) is a change of volume alone.
+            // δF = F δJ/(D J) is a purely volumetric change.
             let volume = permanent(&near.f.abs()) / (D as f64 * near.jacobian);
             let response = law.elasticity(&near, &Start::NONE, &(near.f.transpose() * near.f)).norm();
             let change_w = piola.norm() * h.norm() + contract(&piola, &near.f).abs() * volume;
@@ -142,7 +142,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
     }
 }
 
-/// The generic formulas in double-double against those of textbooks in double-double, relative to the result.
+/// The generic formulas against the textbook formulas, both in double-double, relative to the result.
 pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f64 {
     let h = h.map(DoubleDouble::from);
     let at = Deformation::new(h);
@@ -152,7 +152,7 @@ pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f
     super::worse((w - naive_w).abs().magnitude() / w.magnitude(), stress)
 }
 
-/// The sum of the products that make the determinant, all with the sign +.
+/// The sum of the products in the determinant, all with the sign +.
 fn permanent<const D: usize>(a: &Tensor<f64, D>) -> f64 {
     let minor = |i: usize, k: usize| a[(1, i)] * a[(2, k)] + a[(1, k)] * a[(2, i)];
     match D {
@@ -166,7 +166,7 @@ fn ratio(error: f64, size: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / size }
 }
 
-/// W and S by way of C = FᵀF, with ln J = ½ ln det C and tr C − 3: what is usually written.
+/// W and S through C = FᵀF, with ln J = ½ ln det C and tr C − 3: the usual formulas.
 fn naive<T: Real, const D: usize>(law: &Material, h: &Tensor<T, D>) -> (T, Tensor<T, D>) {
     let one = identity::<T, D>();
     let f = one + h;

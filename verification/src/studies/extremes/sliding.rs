@@ -1,4 +1,5 @@
-//! A body slides into the next cells by fractions of h: nodes of tiny mass and stiffness, and what the linear solver makes of them.
+//! A body slides into the next cells by fractions of h. Nodes then have tiny mass and stiffness; the study shows the effect on the linear
+//! solver.
 
 use super::bodies::{self, stir};
 use super::{Effort, Outcome, Report, StudyError, rows, solvable, worse};
@@ -16,19 +17,19 @@ use bfree::tensor::{Tensor, Vector};
 use nalgebra::{DMatrix, SymmetricEigen};
 use plotters::prelude::SeriesLabelPosition;
 
-/// The linear systems are solved so far.
+/// The tolerance of the linear systems.
 const TOLERANCE: f64 = 1e-8;
 
-/// The offset, in cells, that others are compared with.
+/// The reference offset, in cells.
 const REFERENCE: f64 = 0.25;
 
-/// Iterations may double, and conditions grow fourfold: iterations go with the root of the condition.
+/// Iterations may double, and condition numbers may grow fourfold: iterations scale with the root of the condition number.
 const MORE: f64 = 2.0;
 
-/// A step of so many wave times: inertia does not hide the stiffness.
+/// The step in wave times. It is long enough for stiffness to dominate inertia.
 const STEP: f64 = 10.0;
 
-/// What is done to the linear system before it is solved.
+/// The scaling of the linear system before its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scaling {
     Nothing,
@@ -48,7 +49,7 @@ impl Scaling {
     }
 }
 
-/// Iterations and condition with each scaling.
+/// Iterations and condition number with each scaling.
 struct Solved {
     iterations: [f64; 3],
     conditions: [f64; 3],
@@ -124,13 +125,13 @@ fn panel(name: &str, curves: [Vec<(f64, f64)>; 3]) -> Panel {
     }
 }
 
-/// A square of 4 × 4 cells whose outermost particles are `overlap` cells beyond a line of nodes, along both axes.
+/// A square of 4 × 4 cells. Along both axes its outermost particles lie `overlap` cells beyond a line of nodes.
 fn square(shape: &Approximation, lumping: f64, overlap: f64) -> Simulation<2> {
     let sound = bodies::PLAIN.p_wave_modulus().sqrt();
     let mut simulation = bodies::block::<2>(4, shape.clone(), STEP / sound);
     simulation.settings.lumping = lumping;
     for x in &mut simulation.particles.position {
-        // From ¼ before the line to `overlap` after it, exactly.
+        // The square moves from ¼ before the line to `overlap` after it, exactly.
         *x += Vector::repeat(0.25 + overlap);
     }
     stir(&mut simulation, &(Tensor::<f64, 2>::new(0.1, 0.04, 0.02, -0.07) * sound));
@@ -153,7 +154,7 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<Solved, St
     let iterations = |with: &dyn LinearOperator| -> Result<f64, StudyError> {
         let mut solution = dphi.clone();
         let report = gmres(&tangent, with, &right, &mut solution, &settings, &Pool::default())?;
-        // Where the tolerance is not met there is no number of iterations that does.
+        // If the tolerance is not met, the number of iterations is undefined.
         Ok(if report.converged() { report.iterations as f64 } else { f64::NAN })
     };
     let iterations = [iterations(&Identity)?, iterations(&diagonal)?, iterations(&blocks)?];
@@ -162,7 +163,7 @@ fn solve(shape: &Approximation, lumping: f64, overlap: f64) -> Result<Solved, St
     Ok(Solved { iterations, conditions })
 }
 
-/// The inverse of the diagonal alone.
+/// The inverse of the diagonal.
 struct Diagonal(Vec<f64>);
 
 impl Diagonal {
@@ -191,7 +192,7 @@ fn dense(tangent: &impl LinearOperator, n: usize) -> DMatrix<f64> {
     matrix
 }
 
-/// λ_max/λ_min of L⁻¹ K L⁻ᵀ, where L Lᵀ is what K is scaled by.
+/// λ_max/λ_min of L⁻¹ K L⁻ᵀ, where L Lᵀ is the scaling of K.
 fn condition(matrix: &DMatrix<f64>, scaling: Scaling) -> f64 {
     let n = matrix.nrows();
     // L⁻¹ of each block, lower triangular.
@@ -211,6 +212,6 @@ fn condition(matrix: &DMatrix<f64>, scaling: Scaling) -> f64 {
     let values = SymmetricEigen::new((&scaled + scaled.transpose()) * 0.5).eigenvalues;
     let largest = values.iter().copied().fold(0.0, worse);
     let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    // Below round-off of the largest one it is not resolved.
+    // Eigenvalues below round-off of the largest one are not resolved.
     largest / smallest.max(f64::EPSILON * largest)
 }

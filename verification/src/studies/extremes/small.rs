@@ -1,4 +1,4 @@
-//! One particle, one particle a cell, nodes of mass 1e-300, and a consistent mass that is singular: whole steps of free fall.
+//! Whole steps of free fall with one particle, one particle per cell, nodes of mass 1e-300, and a singular consistent mass.
 
 use super::bodies::{self, PLAIN, body, fill, gravity, left_by_newton, normal, settings, simulation, stir, sum_of_momenta};
 use super::{Outcome, Report, at_most, refused, rows, steps, worse};
@@ -10,12 +10,12 @@ use bfree::simulation::{InitialGuess, Simulation, StepError};
 use bfree::tensor::{Deformation, Tensor, Vector};
 
 const STEPS: u32 = 5;
-/// Of blocks of one particle a cell.
+/// Steps of blocks with one particle per cell.
 const STEPS_OF_BLOCKS: u32 = 200;
 
 const STEP: f64 = 0.1;
 
-/// The projection (42) is solved to 1e-12, of velocity and of acceleration; M̃ ≥ ε M_L makes no more than 1/ε of it.
+/// The projection (42) of velocity and of acceleration is solved to 1e-12 each. M̃ ≥ ε M_L amplifies this error by at most 1/ε.
 const PROJECTED: f64 = 2e-12;
 
 fn families() -> [(&'static str, Approximation); 6] {
@@ -29,7 +29,8 @@ fn families() -> [(&'static str, Approximation); 6] {
     ]
 }
 
-/// Where a lone particle starts, in cells: the first `axes` coordinates, and the others. At the hull those first ones are held.
+/// The initial position of a lone particle, in cells: the first `axes` coordinates, and the others. On a wall of the box the first ones are
+/// held.
 struct Place {
     name: &'static str,
     at: f64,
@@ -37,7 +38,7 @@ struct Place {
     others: f64,
 }
 
-/// 1e-300 and 1e-13 off the hull nodes have so much of the particle's mass: less and more than what counts as light.
+/// 1e-300 and 1e-13 off the wall, nodes have this share of the particle's mass: one below and one above the limit of a light node.
 const PLACES: [Place; 7] = [
     Place { name: "in a cell", at: 2.3, axes: 1, others: 3.6 },
     Place { name: "on a face of a cell", at: 3.0, axes: 1, others: 3.6 },
@@ -76,7 +77,7 @@ pub(super) fn run(outcome: &mut Outcome) {
     );
 }
 
-/// A single particle that starts at `place`, at rest along axes that are held.
+/// A single particle that starts at `place`, without velocity along held axes.
 fn lone<const D: usize>(place: &Place, shape: &Approximation, lumping: f64) -> (Simulation<D>, Vector<f64, D>) {
     let grid = Grid { origin: Vector::zeros(), spacing: 1.0, cells: [6; D] };
     let near = |k: usize| k < place.axes;
@@ -87,9 +88,9 @@ fn lone<const D: usize>(place: &Place, shape: &Approximation, lumping: f64) -> (
     particles.push(position, velocity, 1.0, 1.0, 0);
     let mut simulation = simulation(grid, shape.clone(), particles, vec![body(PLAIN, 1.0)], STEP);
     simulation.settings = settings(lumping);
-    // From Δφ = 0 nodes with hardly any mass would have to be found by finite rotations.
+    // From Δφ = 0, nodes with almost no mass would reach their solution only through finite rotations.
     simulation.settings.initial_guess = InitialGuess::Velocity;
-    // On the hull round-off alone would take it out of the box.
+    // On a wall, round-off alone would move it out of the box.
     simulation.loads.prescribed = (0..D).filter(|&k| held(k)).map(|k| normal(k, false, Motion::Rest)).collect();
     let g = Vector::from_fn(|k, _| if held(k) { 0.0 } else { -0.2 });
     simulation.loads.gravity = Some(gravity(g));
@@ -97,7 +98,7 @@ fn lone<const D: usize>(place: &Place, shape: &Approximation, lumping: f64) -> (
     (simulation, g)
 }
 
-/// A lone particle flies as a mass point.
+/// A lone particle moves as a point mass.
 fn lonely<const D: usize>(name: &str, shape: &Approximation, lumping: f64, report: &mut Report) {
     for place in &PLACES {
         let (mut simulation, g) = lone::<D>(place, shape, lumping);
@@ -113,23 +114,23 @@ fn lonely<const D: usize>(name: &str, shape: &Approximation, lumping: f64, repor
         let particles = &simulation.particles;
         let t = f64::from(taken) * STEP;
         let velocity = (particles.velocity[0] - start - g * t).norm();
-        // As a speed, without steps too.
+        // The error of position as a speed; the divisor covers runs without a step.
         let way = (particles.position[0] - position - start * t - g * (0.5 * t * t)).norm() / t.max(STEP);
-        // Where all is held nothing moves: the error is then that of a speed of 1.
+        // If every axis is held nothing moves; the error is then relative to a speed of 1.
         let speed = if start.norm() > 0.0 { start.norm() } else { 1.0 };
-        // A point has no orientation: where no node near it has mass, rotation costs nothing.
+        // A point has no orientation: if no node near it has mass, rotation costs nothing.
         let strain = Deformation::new(particles.displacement_gradient[0]).green_lagrange().norm();
-        // v = Σ Δt (g − R/m), m being 1; velocities and places are rounded in each step.
+        // v = Σ Δt (g − R/m) with m = 1; velocities and positions are rounded in each step.
         let rounding = f64::from(STEPS) * f64::EPSILON * (1.0 + position.norm() / t.max(STEP));
         let projected = if lumping < 1.0 { PROJECTED / lumping } else { 0.0 };
         let bound = impulse / speed + rounding + projected;
         at_most(report, &what, &format!("{case}: velocity, place"), worse(velocity, way) / speed, bound);
-        // What R is left over is stress: Σ_I |R_I| ≥ V ‖P‖ (Σ |∇N|²)^½, with V = G = 1 a strain of half of it over a root above 0.2.
+        // The remaining R is stress: Σ_I |R_I| ≥ V ‖P‖ (Σ |∇N|²)^½. With V = G = 1 the strain is half of it over a root above 0.2.
         at_most(report, &what, &format!("{case}: strain"), strain, 2.5 * residual + rounding);
     }
 }
 
-/// A hair outside of the box.
+/// A particle slightly outside the box.
 fn outside<const D: usize>(report: &mut Report) {
     let place = Place { name: "", at: -1e-300, axes: 1, others: 3.0 };
     let answers: Vec<_> = families().iter().map(|(_, shape)| lone::<D>(&place, shape, 1.0).0.step()).collect();
@@ -160,7 +161,7 @@ fn sparse<const D: usize>(name: &str, shape: &Approximation, lumping: f64, repor
     });
     let moved = simulation.particles.by_id().position.into_iter().zip(positions).map(|(x, x_0)| (x - x_0).norm());
     let moved = moved.fold(0.0, worse);
-    // No particle has more than all the energy there is, that of the start.
+    // No particle has more than the total energy, which is that of the start.
     let way = f64::from(STEPS_OF_BLOCKS) * STEP * energy.sqrt();
     at_most(report, &what, &format!("{case}: momentum"), momentum, bodies::MOMENTUM);
     at_most(report, &what, &format!("{case}: way over what energy allows"), moved / way, 1.0);

@@ -12,16 +12,16 @@ use bfree::material::Material;
 use bfree::tensor::{Tensor, determinant, identity};
 use plotters::prelude::SeriesLabelPosition;
 
-/// Roundings on the longest way from H to S in 3D: 8 in j, 5 in a cofactor, 3 in C⁻¹, 5 in E, 5 in their product; each is half an eps.
+/// Roundings on the longest path from H to S in 3D: 8 in j, 5 in a cofactor, 3 in C⁻¹, 5 in E, 5 in their product; each is half an eps.
 pub(super) const ROUNDINGS: f64 = 13.0;
 
-/// Constants such as 1/3 in a series are written in double precision: double-double is then good to a rounding, a tenth of what it judges.
+/// Constants such as 1/3 in a series have double precision. Double-double is then exact to one rounding, a tenth of the error under test.
 const REFERENCE: f64 = f64::EPSILON;
 
-/// Deformations tried of each kind and size.
+/// Deformations tried for each kind and size.
 const TRIES: usize = 20;
 
-/// From where on to 1 the formulas of textbooks keep enough digits in double-double to check the reference by them.
+/// From this strain up to 1 the textbook formulas in double-double keep enough digits to check the reference.
 const RESOLVED: f64 = 1e-3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl Kind {
         }
     }
 
-    /// H of the given size with det F > 0; `None` where there is none of this kind.
+    /// H of the given size with det F > 0; `None` if this kind has none.
     fn displacement<const D: usize>(self, size: f64, random: &mut Random) -> Option<Tensor<f64, D>> {
         if D == 1 && self != Self::Random {
             return None;
@@ -98,11 +98,11 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
     outcome.sheets.push(sheet(&double, &single));
 }
 
-/// The generic code in double-double against other formulas.
+/// The generic code in double-double against the textbook formulas.
 fn check<const D: usize>(law: &Material, size: f64) -> f64 {
     let mut random = Random::new(43);
     (0..TRIES).filter_map(|_| Kind::Random.displacement::<D>(size, &mut random)).fold(0.0, |worst, h| {
-        // Close to det F = 0 the formulas of textbooks lose digits.
+        // Close to det F = 0 the textbook formulas lose digits.
         let resolved = determinant(&(identity::<f64, D>() + h)) > 0.01;
         if resolved { super::worse(worst, reference(law, &h)) } else { worst }
     })
@@ -116,7 +116,7 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// All kinds in all dimensions; `random` gathers the worst of those that are not turned.
+    /// All kinds in all dimensions; `random` collects the largest errors of the kinds without rotation.
     fn all<T: Precision>(&mut self, random: &mut Errors) {
         for kind in Kind::ALL {
             for errors in [self.one::<T, 1>(kind), self.one::<T, 2>(kind), self.one::<T, 3>(kind)].into_iter().flatten() {
@@ -145,7 +145,7 @@ impl Cells<'_> {
 
 type Series = [(f64, Errors)];
 
-/// What is shown of a series: a name, and the value.
+/// A column of a table of errors: its name and its value.
 type Shown = (&'static str, fn(&Errors) -> f64);
 
 const SHOWN: [[Shown; 2]; 2] = [

@@ -14,10 +14,10 @@ use bfree::tensor::{Tensor, Vector};
 /// Steps over which answers are compared.
 const STEPS: u32 = 10;
 
-/// What the issue asks for: inputs rounded in other places, over some steps.
+/// The requirement of the issue: inputs are rounded elsewhere, and the answers are compared after some steps.
 const DIMENSIONLESS: f64 = 1e-12;
 
-/// A unit of length, of mass and of time, in the plain ones.
+/// A unit of length, of mass and of time, in plain units.
 #[derive(Clone, Copy)]
 struct Units {
     length: f64,
@@ -27,7 +27,7 @@ struct Units {
 
 const ONE: Units = Units { length: 1.0, mass: 1.0, time: 1.0 };
 
-/// How units are made large and small.
+/// The way in which units are made large and small.
 #[derive(Clone, Copy)]
 struct Scaling {
     name: &'static str,
@@ -67,7 +67,7 @@ fn dimension<const D: usize>(
             plain.iter().zip(&other).filter(|(a, b)| a.0.to_bits() != b.0.to_bits()).count() as f64
         });
         solvable(report, &what, &case(two), bits, 0.0);
-        // Half of the box is one in all units.
+        // One half has the same value in all units.
         if precision == Precision::Double {
             let difference = answer::<D>(units(ten), precision)
                 .map(|other| plain.iter().zip(&other).fold(0.0, |worst, (a, b)| worse(worst, (a.0 - b.0).abs() / a.1)));
@@ -77,7 +77,7 @@ fn dimension<const D: usize>(
     Ok(())
 }
 
-/// The answer without units, each number with the size it is compared with.
+/// The answer without units, each number with its reference size.
 fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64, f64)>, StudyError> {
     let Units { length, time, .. } = units;
     let mut simulation = problem::<D>(units, precision)?;
@@ -85,7 +85,7 @@ fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64
         simulation.step()?;
     }
     let particles = simulation.particles.by_id();
-    // Sizes of the problem in plain units: the box, the speed and the acceleration that the loads make, a strain of 1.
+    // Sizes of the problem in plain units: the box, the speed and acceleration from the loads, a strain of 1.
     let vectors = |list: &[Vector<f64, D>], unit: f64, size: f64| {
         list.iter().flat_map(|x| x.iter().map(|x| (x / unit, size)).collect::<Vec<_>>()).collect::<Vec<_>>()
     };
@@ -96,7 +96,7 @@ fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64
     Ok(numbers)
 }
 
-/// A block in a corner, under gravity that grows, and a pressure on one side; half consistent mass.
+/// A block in a corner, under growing gravity and a pressure on one side; half of the mass is consistent.
 fn problem<const D: usize>(units: Units, precision: Precision) -> Result<Simulation<D>, StudyError> {
     let Units { length, mass, time } = units;
     let grid = Grid { origin: Vector::repeat(0.25 * length), spacing: 0.5 * length, cells: [5; D] };

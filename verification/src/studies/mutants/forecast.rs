@@ -1,9 +1,9 @@
-//! Which cells a fault must turn red, written down beforehand, against those it does turn red.
+//! The cells that a fault must turn red, written down beforehand, against the cells that it does turn red.
 
 use crate::report::{Bound, Report};
 
-/// Cells that must turn red: those of a quantity (first label), in some of the places named by the second label (the dimension, mostly),
-/// except where the third label is one of `except`.
+/// A forecast: cells of one quantity (first label) that must turn red. The second label (mostly the dimension) is in `within`; the third
+/// label is not in `except`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Red {
     pub quantity: &'static str,
@@ -11,18 +11,18 @@ pub(super) struct Red {
     pub except: &'static [&'static str],
 }
 
-/// In every dimension.
+/// Every dimension.
 pub(super) const ALL: &[&str] = &["1", "2", "3"];
-/// Where there are shears and rotations; in 1D such a fault is no fault.
+/// The dimensions with shears and rotations; in 1D such a fault has no effect.
 pub(super) const PLANE_AND_SPACE: &[&str] = &["2", "3"];
 
-/// Every cell of a quantity within some dimensions.
+/// The forecast of every cell of a quantity within some dimensions.
 pub(super) const fn red(quantity: &'static str, within: &'static [&'static str]) -> Red {
     Red { quantity, within, except: &[] }
 }
 
 impl Red {
-    /// The same but for the places where the fault is too small to be seen, or none.
+    /// The forecast without the cases in which the fault is invisible or absent.
     pub(super) const fn except(self, except: &'static [&'static str]) -> Self {
         Self { except, ..self }
     }
@@ -33,7 +33,7 @@ impl Red {
     }
 }
 
-/// The report of the study: one cell for each fault, the number of cells that are not as foretold.
+/// The report of the study: one cell per fault, with the number of cells whose colour is not the forecast one.
 pub(super) fn report() -> Report {
     Report::new(
         "faults in laws and shape functions: cells whose colour is not the one foretold",
@@ -41,7 +41,7 @@ pub(super) fn report() -> Report {
     )
 }
 
-/// Compares what a check found with the forecast. An empty forecast belongs to an equivalent mutant: everything stays green.
+/// Compares the result of a check with the forecast. An equivalent mutant has an empty forecast: every cell stays green.
 pub(super) fn judge(report: &mut Report, fault: &str, check: &str, found: &Report, forecast: &[Red]) {
     let mut wrong = 0;
     let mut places: Vec<String> = Vec::new();
@@ -57,7 +57,7 @@ pub(super) fn judge(report: &mut Report, fault: &str, check: &str, found: &Repor
             places.push(place);
         }
     }
-    // A forecast that no cell answers to is a forecast of nothing.
+    // A forecast without a matching cell predicts nothing.
     for red in forecast.iter().filter(|red| !found.cells().iter().any(|cell| red.holds(&cell.labels))) {
         wrong += 1;
         report.note(format!("{fault}: no cell measures {} within {:?}", red.quantity, red.within));

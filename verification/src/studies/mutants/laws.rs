@@ -12,7 +12,7 @@ use bfree::material::{ClosedTangent, Elastic, Lame, Law, Material, NeoHookean, S
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
-/// What is wrong with a law.
+/// The fault of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     EnergyFactor,
@@ -46,12 +46,12 @@ struct Wrong {
     right: Material,
     lame: Lame,
     fault: Fault,
-    /// Whether it has no closed form, so that a step is by ℂmat.
+    /// Whether the law has no closed form, so that a step uses ℂmat.
     general: bool,
 }
 
 impl Wrong {
-    /// The law, with the Λ of plane stress where the fault is that and D = 2.
+    /// The law; for the fault `PlaneStress` and D = 2 with the Λ of plane stress.
     fn law<const D: usize>(&self) -> Material {
         if self.fault == Fault::PlaneStress && D == 2 {
             let Lame { lambda, shear } = self.lame;
@@ -71,7 +71,7 @@ fn hooke<T: Real, const D: usize>(lame: Lame, x: &Tensor<T, D>) -> Tensor<T, D> 
     scaled(&identity(), T::lit(lame.lambda) * trace(x)) + scaled(x, T::lit(2.0 * lame.shear))
 }
 
-/// Λ tr(X) e₁ ⊗ e₁, part of no symmetric ℂ.
+/// Λ tr(X) e₁ ⊗ e₁, which belongs to no symmetric ℂ.
 fn along_one<T: Real, const D: usize>(lame: Lame, x: &Tensor<T, D>) -> Tensor<T, D> {
     let trace = T::lit(0.01 * lame.lambda) * trace(x);
     Tensor::from_fn(|i, k| if (i, k) == (0, 0) { trace } else { T::zero() })
@@ -105,10 +105,10 @@ impl Elastic for Wrong {
         match self.fault {
             Fault::ElasticityFactor => scaled(&right, T::lit(2.0)),
             Fault::ElasticityScaled => scaled(&right, T::lit(1.0 + SMALL)),
-            // Of St. Venant and Kirchhoff: the tensor is taken for symmetric; G in place of 2G.
+            // St. Venant–Kirchhoff's law: X is treated as symmetric; G in place of 2G.
             Fault::ElasticityUnsymmetrised => hooke(self.lame, x),
             Fault::ElasticityHalfShear => right - scaled(&symmetric(x), T::lit(self.lame.shear)),
-            // Of Ciarlet: ΛJ in place of ΛJ².
+            // Ciarlet's law: ΛJ in place of ΛJ².
             Fault::ElasticitySingleJacobian => {
                 let f_inv_t = at.inverse_transpose();
                 let c_inv = f_inv_t.transpose() * f_inv_t;
@@ -130,14 +130,14 @@ impl Elastic for Wrong {
         let right = |v, b| self.law::<D>().tangent_density(at, &Start::NONE, v, b);
         match self.fault {
             Fault::DensitySwapped => right(b, v),
-            // The last term of St. Venant and Kirchhoff's, + G b⊗v, with the other sign.
+            // The last term of St. Venant–Kirchhoff's law, + G b⊗v, with the other sign.
             Fault::DensitySign => right(v, b) - scaled(&outer(b, v), T::lit(2.0 * self.lame.shear)),
             // Λ (e₁·v) e₁ ⊗ b
             Fault::NoPotential => {
                 let e_1 = Vector::from_fn(|i, _| if i == 0 { T::one() } else { T::zero() });
                 right(v, b) + scaled(&outer(&e_1, b), T::lit(0.01 * self.lame.lambda) * v[0])
             }
-            // By ℂ, where that is wrong.
+            // ℂmat from ℂ, if the fault is in ℂ.
             _ if self.general => Tensor::from_columns(&std::array::from_fn::<_, D, _>(|k| {
                 let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
                 Elastic::elasticity(self, at, &outer(&e_k, b)) * v
@@ -186,7 +186,7 @@ const C: &str = "C:X against dual(S)";
 const CMAT: &str = "Cmat against C:X";
 const FROZEN: &str = "frozen product against dual(P)";
 
-/// At strains of 1e-8 the work of the stress is 1e-8 of the stiffness that round-off is relative to.
+/// At strains of 1e-8 the work of the stress is 1e-8 of the stiffness, which is the scale of round-off.
 const TINY_WORK: &[&str] = &["F=I+1e-8"];
 
 /// At strains of 1e-8, FᵀF and FFᵀ differ by their square: less than round-off.
@@ -250,7 +250,7 @@ const MUTANTS: &[Mutant] = &[
     ("closed form without q", ciarlet, Fault::ClosedWithoutQ, &[red(FROZEN, ALL)]),
 ];
 
-/// Those without a closed form.
+/// Faults in laws without a closed form.
 const BY_DENSITY: &[Mutant] = &[(
     "no potential, and not symmetric (but in 1D)",
     ciarlet,
@@ -264,7 +264,7 @@ const BY_DENSITY: &[Mutant] = &[(
 /// Every increment of [`check_tangent`].
 const INCREMENTS: &[&str] = &["zero", "dt v_n", "random"];
 
-/// The pieces that hold the material part, and the whole.
+/// The pieces with the material part, and the whole.
 macro_rules! material {
     ($($more:expr),*) => {
         &[
@@ -276,7 +276,7 @@ macro_rules! material {
     };
 }
 
-/// As above, with the rows in single precision.
+/// The pieces of `material`, with the rows in single precision.
 macro_rules! material_in_both {
     ($($more:expr),*) => {
         material![
@@ -288,8 +288,7 @@ macro_rules! material_in_both {
     };
 }
 
-/// Some of the faults in a whole step, with the cells of [`check_tangent`] that must turn red; a law with a closed form
-/// is applied by it.
+/// Some of the faults in a whole step, with the cells of [`check_tangent`] that must turn red. A law with a closed form acts through it.
 const IN_A_STEP: &[Mutant] = &[
     ("W 1% too large, in a step", ciarlet, Fault::EnergyFactor, &[red("dual(Pi) - R.u", INCREMENTS)]),
     (
@@ -305,7 +304,7 @@ const IN_A_STEP: &[Mutant] = &[
     ("v and b swapped in Cmat, beside a closed form: not called", kirchhoff, Fault::DensitySwapped, &[]),
 ];
 
-/// Others by ℂmat.
+/// Faults in a whole step of laws that use ℂmat.
 const IN_A_STEP_BY_DENSITY: &[Mutant] = &[
     ("v and b swapped in Cmat, in a step", kirchhoff, Fault::DensitySwapped, material_in_both![]),
     ("sign of the last term of Cmat, in a step", kirchhoff, Fault::DensitySign, material_in_both![]),

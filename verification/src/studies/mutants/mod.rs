@@ -1,7 +1,7 @@
-//! Faults put in on purpose: each must turn exactly the cells red that are written down beside it.
+//! Deliberate faults: each must turn red exactly the cells that are written down beside it.
 //!
-//! Wrong laws and wrong shape functions are made here and judged by the public checks, cell by cell. Full effort also
-//! patches the files under `src/`, those of the terms and of the sweep among them, in a copy of the workspace, and runs
+//! Wrong laws and wrong shape functions are built here, and the public checks judge them cell by cell. Full effort also patches files under
+//! `src/`, including the terms and the transfer, in a copy of the workspace, and runs the copy's own checks (see [`schemata`]).
 //! the copy's own checks (see [`schemata`]).
 
 mod forecast;
@@ -13,10 +13,9 @@ mod shipped;
 
 use super::{Effort, Outcome, StudyError};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "faults put in on purpose, each caught by the check named beforehand";
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = forecast::report();
     laws::judge(&mut report)?;

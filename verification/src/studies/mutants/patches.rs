@@ -1,18 +1,18 @@
-//! The faults put into the shipped files, with the checks that must see them.
+//! The faults in the shipped files, with the checks that must detect them.
 
 /// A check of the patched copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Check {
     /// A study of this program.
     Study(&'static str),
-    /// A module of the library's test program, by the beginning of its tests' names.
+    /// A module of the library's test program, named by the common beginning of its tests' names.
     Test(&'static str),
-    /// A module of the library's unit tests, likewise.
+    /// A module of the library's unit tests, named by the common beginning of its tests' names.
     Unit(&'static str),
 }
 
 impl Check {
-    /// What it is called on the command line.
+    /// The name on the command line.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Study(name) | Self::Test(name) | Self::Unit(name) => name,
@@ -57,16 +57,16 @@ pub(super) const CHECKS: &[Check] = &[
     BONDS,
 ];
 
-/// What is to become of a patch.
+/// The expected result of a patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Fate {
-    /// Each of the first must fail; the others, which look at something else, must still pass.
+    /// The checks of the first list must fail; those of the second, which test other properties, must still pass.
     Killed(&'static [Check], &'static [Check]),
-    /// The program computes the same, for this reason: all checks must pass.
+    /// The program computes the same results, for this reason: all checks must pass.
     Equivalent(&'static str),
 }
 
-/// A fault: a piece of a shipped file, there exactly once, and what takes its place.
+/// A fault: a piece of a shipped file, which must occur exactly once, and its replacement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
     pub name: &'static str,
@@ -163,7 +163,7 @@ const LOCAL_FORM: &str = "src/solver/preconditioner/multigrid/form.rs";
 
 use Fate::{Equivalent, Killed};
 
-/// The list. A statement ends in `;` on both sides or is replaced by `{}`; all else is an expression.
+/// The list. A statement ends in `;` on both sides or becomes `{}`; every other piece is an expression.
 #[rustfmt::skip]
 pub(super) const PATCHES: &[Patch] = &[
     patch("R without the consistent inertia", INERTIA,
@@ -325,7 +325,7 @@ pub(super) const PATCHES: &[Patch] = &[
     patch("eps for 1 - eps in the consistent inertia", MASS,
         "(self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])",
         "(self.lumping < 1.0).then(|| self.lumping * self.particles.mass[p])",
-        // The projection, and the force of damping, have the right one.
+        // The projection and the damping force keep the right factor.
         Killed(&[BALANCE, TANGENT], &[DYNAMICS])),
     patch("eps for 1 - eps in the projection", MASS,
         "factor * (1.0 - self.lumping)",

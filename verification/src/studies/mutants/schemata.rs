@@ -1,16 +1,16 @@
-//! All faults in one program: every patched piece becomes a choice, made by an environment variable when the program runs.
+//! All faults in one program: every patched piece becomes a choice, made by an environment variable at run time.
 //!
 //! Untch, Offutt, Harrold, "Mutation analysis using mutant schemata", 1993: one build for all mutants.
 
 use super::patches::Patch;
 
-/// The environment variable that holds the number of the fault; 0 or nothing is the program as shipped.
+/// The environment variable with the number of the fault; without it, or with 0, the program is as shipped.
 pub(super) const VARIABLE: &str = "BFREE_MUTANT";
 
 /// The module added to the library, and the line that declares it.
 pub(super) const MODULE: (&str, &str) = ("src/mutant.rs", "mod mutant;\n");
 
-/// What the module holds.
+/// The source of the module.
 pub(super) fn module() -> String {
     format!(
         "//! Which fault is on.\n\
@@ -31,12 +31,12 @@ pub(super) enum Misfit {
     Overlap { first: &'static str, second: &'static str, file: &'static str },
 }
 
-/// The text of `file` with every patch of that file as a choice: `(if on(k) { fault } else { as shipped })`. Patches number from 1.
+/// The text of `file` with every patch of that file as a choice: `(if on(k) { fault } else { as shipped })`. Patch numbers start at 1.
 ///
 /// # Errors
-/// A piece that is not there exactly once, or pieces that overlap.
+/// A piece does not occur exactly once, or pieces overlap.
 pub(super) fn apply(file: &str, text: &str, patches: &[Patch]) -> Result<String, Misfit> {
-    // Each different piece: its place, and the numbered patches of it.
+    // Each distinct piece: its position, and its numbered patches.
     let mut pieces: Vec<(usize, Vec<(usize, &Patch)>)> = Vec::new();
     for (number, patch) in (1..).zip(patches).filter(|(_, patch)| patch.file == file) {
         let found: Vec<usize> = text.match_indices(patch.find).map(|(place, _)| place).collect();

@@ -6,7 +6,7 @@ use crate::report::Report;
 use bfree::approximation::{ApproximationError, AxisWeights, Bspline, Linear, Separable, Validate};
 use bfree::grid::Axis;
 
-/// What is wrong with a shape function.
+/// The fault of a shape function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     GradientUnscaled,
@@ -67,7 +67,7 @@ impl Separable for Wrong {
     }
 }
 
-/// Splines of a longer axis; the nodes beyond the walls are dropped instead of folded back.
+/// Splines of a longer axis. The nodes beyond the walls are dropped instead of folded back.
 fn without_ghosts(axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
     const BEYOND: u32 = 3;
     let origin = axis.origin - f64::from(BEYOND) * axis.spacing;
@@ -89,14 +89,14 @@ const FIRST_GRADIENT: &str = "sum x_I grad N = I";
 const DIFFERENCES: &str = "grad N against differences";
 const OFF_WALL: &str = "N = 0 off the wall";
 
-/// Where every coordinate is a node's, so that N is 0 or 1 and differences would step over a kink.
+/// Positions with only nodal coordinates: N is 0 or 1, and differences would step over a kink.
 const ON_NODES: &[&str] = &["on a node", "in a corner"];
 /// In 1D faces are nodes, and walls corners.
 const LINE: &[&str] = &["1"];
 const ON_NODES_OF_A_LINE: &[&str] = &["on a face", "on a node", "on a wall", "in a corner"];
-/// Where no coordinate is a node's.
+/// Positions without nodal coordinates.
 const OFF_NODES: &[&str] = &["inside a cell", "near a wall"];
-/// Where no point is on a wall; faces and nodes are drawn from all, those of the walls too.
+/// Positions off the walls. Faces and nodes are drawn from all, including those of the walls.
 const OFF_WALLS: &[&str] = OFF_NODES;
 
 const MUTANTS: &[(&str, Fault, &[Red])] = &[

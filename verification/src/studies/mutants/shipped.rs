@@ -1,4 +1,4 @@
-//! Faults in the shipped files: a patched copy of the workspace is built once, and its own checks must see each fault.
+//! Faults in the shipped files: a patched copy of the workspace is built once, and its own checks must detect each fault.
 
 use super::patches::{CHECKS, Check, Fate, PATCHES, Patch};
 use super::schemata::{MODULE, Misfit, VARIABLE, apply, module};
@@ -14,10 +14,10 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// A check that takes longer than this hangs because of the fault.
+/// A check that takes longer hangs because of the fault.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Why the faults could not be tried.
+/// The reasons why the faults could not be tried.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ShippedFaultError {
     #[error(transparent)]
@@ -34,12 +34,12 @@ pub(super) enum ShippedFaultError {
     Unsound { name: &'static str },
 }
 
-/// Where the workspace is.
+/// The root of the workspace.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Whether every patch still fits its file: read, not built, so that the list cannot rot between two full runs.
+/// Whether every patch still fits its file. The check reads and does not build, so the list stays valid between two full runs.
 pub(super) fn fit() -> Result<(), ShippedFaultError> {
     let mut files: Vec<&str> = PATCHES.iter().map(|patch| patch.file).collect();
     files.dedup();
@@ -70,7 +70,7 @@ pub(super) fn run(outcome: &mut Outcome) -> Result<(), ShippedFaultError> {
         "faults in the shipped files: checks whose verdict is not the one foretold",
         &["fault", "file", "killed by", "still green", "seconds"],
     );
-    // Side by side: most checks keep one core busy, and none is timed.
+    // The patches run in parallel: most checks keep one core busy, and none is timed.
     let judged = PATCHES.par_iter().enumerate().map(|(k, patch)| judge(&programs, &source, k + 1, patch));
     for (patch, judged) in PATCHES.iter().zip(judged.collect::<Result<Vec<_>, _>>()?) {
         judged.notes.into_iter().for_each(|note| report.note(note));
@@ -81,12 +81,12 @@ pub(super) fn run(outcome: &mut Outcome) -> Result<(), ShippedFaultError> {
     Ok(())
 }
 
-/// What became of a fault.
+/// The result of a fault.
 struct Judged {
     killers: String,
     spared: String,
     seconds: String,
-    /// Verdicts that are not those foretold.
+    /// Number of verdicts that differ from the expected ones.
     wrong: u32,
     notes: Vec<String>,
 }
@@ -122,8 +122,8 @@ fn judge(programs: &Programs, source: &Path, number: usize, patch: &Patch) -> Re
     Ok(Judged { killers: names(killers), spared: names(spared), seconds, wrong, notes })
 }
 
-/// Copies every file git knows or would add, patched, to `source`; files that are there already stay untouched, and so stay built, others
-/// go.
+/// Copies every file that git tracks or would add, patched, to `source`. Unchanged files stay untouched, so they stay built; other files
+/// are removed.
 fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
     let list = output(Command::new("git").args(["ls-files", "--cached", "--others", "--exclude-standard", "-z"]).current_dir(root))?;
     let mut files: Vec<(&str, Vec<u8>)> = Vec::new();
@@ -131,7 +131,7 @@ fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
         let path = root.join(file);
         match fs::read(&path) {
             Ok(bytes) => files.push((file, bytes)),
-            // Removed, and not yet committed.
+            // The file was removed, and the removal is not yet committed.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(source) => return Err(ShippedFaultError::Copy { path, source }),
         }
@@ -158,7 +158,7 @@ fn copy(root: &Path, source: &Path) -> Result<(), ShippedFaultError> {
     Ok(())
 }
 
-/// Removes what an earlier copy had and this one has not: a module may have become a folder.
+/// Removes files of an earlier copy that this copy lacks: a module may have become a folder.
 fn remove_others(folder: &Path, kept: &HashSet<PathBuf>) -> io::Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -184,7 +184,7 @@ const STUDIES: &str = "verification";
 /// The test program of the library.
 const SUITE: &str = "suite";
 
-/// The program of its unit tests.
+/// The program of the library's unit tests.
 const UNITS: &str = "bfree";
 
 fn build(source: &Path, target: &Path) -> Result<Programs, ShippedFaultError> {
@@ -199,7 +199,7 @@ fn build(source: &Path, target: &Path) -> Result<Programs, ShippedFaultError> {
     let artifacts = messages.iter().flat_map(|text| text.lines());
     let artifacts = artifacts.filter_map(|line| serde_json::from_str::<Value>(line).ok());
     Ok(artifacts
-        // Not the program of the library, which has its name.
+        // The program of the library has the same name and is excluded.
         .filter(|artifact| artifact["profile"]["test"] == true || artifact["target"]["name"] == STUDIES)
         .filter_map(|artifact| {
             let program = artifact["executable"].as_str()?;
@@ -208,20 +208,20 @@ fn build(source: &Path, target: &Path) -> Result<Programs, ShippedFaultError> {
         .collect())
 }
 
-/// What a command that succeeds prints.
+/// The standard output of a command, which must succeed.
 fn output(command: &mut Command) -> Result<String, ShippedFaultError> {
     let text = format!("{command:?}");
     let output = command.output().map_err(|source| ShippedFaultError::Start { command: text.clone(), source })?;
     if output.status.success() {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     } else {
-        // Cargo's messages for people go to the second stream.
+        // Cargo writes messages for people to the second stream.
         let output_text = String::from_utf8_lossy(&output.stderr).into_owned();
         Err(ShippedFaultError::Failed { command: text, status: output.status, output: output_text })
     }
 }
 
-/// What a check says.
+/// The result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     Passes,
@@ -229,7 +229,7 @@ enum Verdict {
     Hangs,
 }
 
-/// Runs a check with fault `number` on.
+/// Runs a check with fault `number` switched on.
 fn attempt(programs: &Programs, source: &Path, check: Check, number: usize) -> Result<Verdict, ShippedFaultError> {
     let (name, arguments): (&'static str, &[&str]) = match check {
         Check::Study(study) => (STUDIES, &[study, "--first"]),

@@ -1,9 +1,9 @@
-//! Products with the tangent by differences of the residual, as Jacobian-free Newton–Krylov methods make them.
+//! Products with the tangent by differences of the residual, as in Jacobian-free Newton–Krylov methods.
 
 use bfree::pooled::Pooled;
 use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
 
-/// A problem whose tangent is known through its residual only; the blocks of the exact one precondition it.
+/// A problem whose tangent is known only through its residual; the blocks of the exact tangent precondition it.
 pub(super) struct Difference<'a, P> {
     pub problem: &'a P,
     /// Length of the step, in units of x.
@@ -30,7 +30,7 @@ impl<P: NonlinearProblem> LinearOperator for DifferenceTangent<'_, P> {
         let moved: Vec<f64> = self.x.iter().zip(u).map(|(x, u)| x + factor * u).collect();
         match self.problem.residual(&moved, y) {
             Ok(()) => y.iter_mut().zip(&self.r).for_each(|(y, r)| *y = (*y - r) / factor),
-            // Outside the domain there is no difference to take; the Krylov method reports it.
+            // Outside the domain there is no difference; the Krylov method reports the error.
             Err(_) => y.fill(f64::NAN),
         }
     }

@@ -7,22 +7,22 @@ use bfree::particles::Particles;
 use bfree::tensor::Vector;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// An eigenvalue below this part of the largest one is zero.
+/// An eigenvalue below this fraction of the largest one counts as zero.
 const NULL: f64 = 1e-13;
 
-/// What the eigenvalues say.
+/// A summary of the eigenvalues.
 pub(super) struct Spectrum {
     pub largest: f64,
     pub smallest: f64,
-    /// Largest over smallest of those that are not null.
+    /// Largest over smallest nonzero eigenvalue.
     pub condition: f64,
     pub null_modes: usize,
-    /// The same of D^(−½) M̃ D^(−½), D the diagonal: what a Jacobi-preconditioned method sees.
+    /// The condition number of D^(−½) M̃ D^(−½), with the diagonal D: it governs a Jacobi-preconditioned method.
     pub scaled_condition: f64,
     pub scaled_null_modes: usize,
 }
 
-/// Of M̃ = (1−ε) M + ε lumped(M), M_IJ = Σ_p m N_I N_J, on all active nodes.
+/// The spectrum of M̃ = (1−ε) M + ε lumped(M), M_IJ = Σ_p m N_I N_J, on all active nodes.
 pub(super) fn spectrum<const D: usize>(particles: &Particles<D>, prepared: &Prepared<D>, lumping: f64) -> Spectrum {
     let count = prepared.nodes.len();
     let mut mass = DMatrix::<f64>::zeros(count, count);
@@ -44,8 +44,8 @@ pub(super) fn spectrum<const D: usize>(particles: &Particles<D>, prepared: &Prep
     Spectrum { largest, smallest, condition, null_modes, scaled_condition, scaled_null_modes }
 }
 
-/// Condition number and null modes of D^(−½) K D^(−½) on the free degrees of freedom, D the diagonal of K. K is symmetric: there is
-/// no follower pressure here.
+/// Condition number and null modes of D^(−½) K D^(−½) on the free degrees of freedom, with the diagonal D of K. K is symmetric, since there
+/// is no follower pressure.
 pub(super) fn tangent<L: Law>(
     equilibrium: &Equilibrium<'_, 2, L>,
     dphi: &[Vector<f64, 2>],

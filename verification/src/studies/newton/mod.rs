@@ -1,4 +1,4 @@
-//! How Newton's method converges on steps of the rebound, beside the paper's Table 3.
+//! The convergence of Newton's method on steps of the rebound, against the paper's Table 3.
 
 mod difference;
 mod mass;
@@ -21,7 +21,7 @@ use difference::Difference;
 
 pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound, beside the paper's Table 3";
 
-/// A step of a scene: from the converged state before it.
+/// A step of a scene, started from the converged state before it.
 struct Case {
     name: &'static str,
     scene: &'static str,
@@ -41,15 +41,15 @@ const LUMPINGS: [(f64, &str); 4] = [(1.0, "1 (lumped)"), (0.5, "0.5"), (0.01, "0
 const REFERENCE: [f64; 3] = [1.3314e2, 1.778e-2, 1.18e-8];
 const TABLE_3: [f64; 3] = [1.3336e2, 2.0710e-2, 2.4353e-8];
 
-/// How the products with the tangent are made.
+/// The method for products with the tangent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Product {
     Exact,
-    /// Forward differences over this length, in units of the spacing.
+    /// Forward differences with this step length, in units of the spacing.
     Difference(f64),
 }
 
-/// No restart within the number of unknowns: with ε = 0 the blocks of the tangent precondition badly, and GMRES(30) stagnates.
+/// GMRES has no restart within the number of unknowns. With ε = 0 the blocks of the tangent precondition badly, and GMRES(30) stagnates.
 const RESTART: &str = r#"solver.krylov.method={"gmres":{"restart":200}}"#;
 
 struct Method {
@@ -58,7 +58,7 @@ struct Method {
     forcing: Forcing,
 }
 
-/// Tight: as far as a Krylov method can go in double precision.
+/// A tight tolerance, at the limit of Krylov methods in double precision.
 const TIGHT: Forcing = Forcing::Fixed(1e-12);
 
 const METHODS: [Method; 4] = [
@@ -68,7 +68,7 @@ const METHODS: [Method; 4] = [
     Method { name: "difference 1e-3", product: Product::Difference(1e-3), forcing: Forcing::Fixed(1e-6) },
 ];
 
-/// Residuals of Newton's iterations by each method, and the order of single steps towards the solution.
+/// Residuals of Newton's iterations with each method, and the order of single steps towards the solution.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut study = Study::new();
     for (lumping, label) in LUMPINGS {
@@ -92,12 +92,12 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(study.outcome())
 }
 
-/// The state a step with ε = 0 starts from is reached with this ε: with ε = 0 the tangent is singular to round-off, and a run of its
-/// own does not get there (`full` shows how far).
+/// The ε of the run up to a step with ε = 0. With ε = 0 throughout, the tangent is singular to round-off, and the run does not reach the
+/// step (full effort shows how far it comes).
 const LEAST_LUMPING: f64 = 0.01;
 
 impl Case {
-    /// Whole steps before it.
+    /// The number of whole steps before it.
     fn start(&self, simulation: &Simulation<2, Material>) -> u64 {
         (self.end / simulation.clock.nominal()).round() as u64 - 1
     }
@@ -179,7 +179,7 @@ impl Study {
         let mut solution = None;
         for method in &METHODS {
             let settings = NewtonSettings {
-                // To round-off: the floor ends it.
+                // The residual goes to round-off: the floor ends the iterations.
                 relative_tolerance: 0.0,
                 forcing: method.forcing,
                 krylov: Krylov::Gmres { restart: 200 },
@@ -209,7 +209,7 @@ impl Study {
             self.list(case, label, method.name, &residuals, &krylov.collect::<Vec<_>>(), magnitude);
             let last = residuals.last().copied().unwrap_or(f64::NAN) / (f64::EPSILON * magnitude);
             let iterations = history.iterations.len().to_string();
-            // Products by differences are not what runs: they are there for contrast.
+            // Products by differences are shown for contrast; the program does not use them.
             let bound = if method.product == Product::Exact { Bound::AtMost(ROUND_OFF) } else { Bound::Reported };
             self.converged.push(&[case.name, label, method.name, &iterations], last, bound);
             lines.push(Line {
@@ -236,7 +236,7 @@ impl Study {
         Ok(())
     }
 
-    /// How far a run with ε = 0 throughout gets.
+    /// Shows the progress of a run with ε = 0 throughout.
     fn consistent_alone(&mut self, scene: &'static str, label: &str) -> Result<(), StudyError> {
         let mut simulation = rebound(scene, 0.0)?;
         let Some(case) = CASES.iter().rfind(|case| case.scene == scene) else { return Ok(()) };
@@ -255,7 +255,7 @@ impl Study {
         Ok(())
     }
 
-    /// How much of its way to the start of the step a run with the same eps throughout has made.
+    /// The share of the way to the step that a run with the same ε throughout has reached.
     fn reached(&mut self, case: &Case, label: &str, simulation: &Simulation<2, Material>) {
         let asked = case.start(simulation) as f64 * simulation.clock.nominal();
         let run = format!("{}, t={asked:.2}", case.scene);
@@ -309,8 +309,8 @@ impl Study {
     }
 
     fn compare(&mut self, residuals: &[f64]) {
-        // The last one is the square of a residual times a curvature: it repeats any difference doubled, and the program's
-        // circle of nodes differs from the box in the fifth digit; its digits given are two to five.
+        // The last residual is the square of a residual times a curvature, so it doubles any relative difference. The circle of nodes of
+        // the independent program differs from the box in the fifth digit. The program gives two to five digits.
         for (k, (reference, tolerance)) in REFERENCE.into_iter().zip([1e-3, 1e-2, 5e-2]).enumerate() {
             let here = residuals.get(k).copied().unwrap_or(f64::NAN);
             let shown = [here, reference, TABLE_3[k]].map(|x| format!("{x:.4e}"));
@@ -322,8 +322,8 @@ impl Study {
         }
     }
 
-    /// One Newton step from many distances to the solution: its order shows over as many decades as there are above round-off,
-    /// however few iterations the whole solution takes.
+    /// One Newton step from many distances to the solution. The order shows over all decades above round-off, even if the whole solution
+    /// takes few iterations.
     #[allow(clippy::too_many_arguments)] // the ingredients of one experiment
     fn single_steps(
         &mut self,
@@ -360,7 +360,7 @@ impl Study {
                 }
             }
             let bound = if product == Product::Exact { Bound::Between(1.9, 2.1) } else { Bound::Reported };
-            // The far end is no neighbourhood of the solution: the half nearer to it counts.
+            // The far end is not in the neighbourhood of the solution; only the nearer half counts.
             let near = &pairs[pairs.len() / 2..];
             let ends = |k: Option<&(f64, f64)>| k.map_or_else(|| "-".into(), |pair| format!("{:.1e}", pair.0));
             let labels = [case.name, label, name, &ends(near.first()), &ends(near.last())].map(String::from);
@@ -397,7 +397,7 @@ impl Study {
     }
 }
 
-/// Residuals below this many eps times the magnitude are round-off.
+/// Residuals below this many eps times the round-off bound (magnitude) are round-off.
 const ROUND_OFF: f64 = 64.0;
 
 /// ‖R‖ before and after one full Newton step from `x`, its linear system solved as tightly as possible.

@@ -1,4 +1,4 @@
-//! The same answer from the fast and the plain sweep, for every law, shape function and D.
+//! The fast and the plain transfer must agree, for every law, shape function and D.
 
 use super::general::General;
 use crate::settling::{block, lame};
@@ -15,18 +15,18 @@ use bfree::tensor::{Tensor, Vector};
 
 const SAME: f64 = 1e-12;
 
-/// A sum of some hundred products of numbers rounded to single precision.
+/// The error of a sum of some hundred products of numbers in single precision.
 const SAME_IN_SINGLE: f64 = 16.0 * f32::EPSILON as f64;
 
-/// h; 1 would hide a power of it that is missing.
+/// h; the value 1 would hide a missing power of h.
 const SPACING: f64 = 0.3;
 
-/// What is compared, in this order.
+/// The compared quantities, in this order.
 const QUANTITIES: [&str; 5] = ["tangent product", "residual", "magnitude", "diagonal blocks", "projected velocity"];
 
-/// Compares a strained, jittered block of `cells`ᴰ cells; half the mass is consistent.
+/// Compares a strained, jittered block of `cells`ᴰ cells; half of the mass is consistent.
 pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(), StudyError> {
-    // All products; of LME the widest and the paper's.
+    // All products of functions of one coordinate; LME with the largest width and with the paper's.
     let judged = |(name, shape): &(&str, Approximation)| shape.separable().is_some() && *name != "lme 1.8";
     let shapes: Vec<_> = Approximation::examples().into_iter().filter(judged).collect();
     for (law_name, law) in &Material::examples(lame()?) {
@@ -48,7 +48,7 @@ pub(super) fn judge<const D: usize>(report: &mut Report, cells: u32) -> Result<(
     Ok(())
 }
 
-/// Compares the two sweeps on a block.
+/// Compares the two transfers on a block.
 fn compare<const D: usize, L: Law>(
     simulation: &Simulation<D, L>,
     mut random: Random,
@@ -99,7 +99,7 @@ fn compare<const D: usize, L: Law>(
     Ok(())
 }
 
-/// The largest difference, relative to the largest entry of `b`; infinite if there is none, and NaN counts as largest.
+/// The largest difference, relative to the largest entry of `b`. It is infinite if there is none; NaN counts as largest.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {
         return f64::INFINITY;

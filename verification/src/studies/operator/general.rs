@@ -1,10 +1,10 @@
-//! A law as a user writes one.
+//! A law in the form a user writes it.
 
 use bfree::material::{Elastic, Law, Material, Start};
 use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector};
 
-/// A law without its closed form: frozen from ℂmat, block by block.
+/// A law without its closed form: the linearisation uses ℂmat, block by block.
 #[derive(Clone, Debug)]
 pub(super) struct General(pub Material);
 

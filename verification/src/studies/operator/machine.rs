@@ -1,13 +1,13 @@
-//! What the processor can do: fused multiply-adds, copied bytes and read bytes a second, one core.
+//! The limits of the processor per second: fused multiply-adds, copied bytes and read bytes, on one core.
 
 use pulp::{Arch, Simd, WithSimd};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Chains of multiply-adds that do not wait for each other.
+/// Independent chains of multiply-adds.
 const CHAINS: usize = 16;
 
-/// Multiply-adds of each chain.
+/// Number of multiply-adds of each chain.
 const LENGTH: usize = 1_000_000;
 
 struct Chains;
@@ -34,7 +34,7 @@ impl WithSimd for Chains {
     }
 }
 
-/// Floating-point operations a second with the widest vectors, the best of several.
+/// Floating-point operations per second with the widest vectors, the best of several runs.
 pub(super) fn peak() -> f64 {
     (0..9).fold(0.0, |best: f64, _| {
         let start = Instant::now();
@@ -43,7 +43,7 @@ pub(super) fn peak() -> f64 {
     })
 }
 
-/// The sum of an array, in chains that do not wait for each other.
+/// The sum of an array, in independent chains.
 struct Sum<'a>(&'a [f64]);
 
 impl WithSimd for Sum<'_> {
@@ -62,7 +62,7 @@ impl WithSimd for Sum<'_> {
     }
 }
 
-/// Bytes a second of reading what does not fit into the caches: the limit of a product with a matrix in memory, which writes next to
+/// Bytes per second when reading an array larger than the caches. This rate limits a product with a matrix in memory, which writes almost
 /// nothing.
 pub(super) fn read_bandwidth() -> f64 {
     const NUMBERS: usize = 1 << 26;
@@ -74,7 +74,7 @@ pub(super) fn read_bandwidth() -> f64 {
     })
 }
 
-/// Bytes a second, those read and those written, of a copy that does not fit into the caches.
+/// Bytes per second, read and written, when copying an array larger than the caches.
 pub(super) fn copy_bandwidth() -> f64 {
     const NUMBERS: usize = 1 << 26;
     let from = vec![1.0_f64; NUMBERS];

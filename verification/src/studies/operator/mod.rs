@@ -1,6 +1,6 @@
-//! The tangent product near the machine's limit: the fast sweep against the plain one, and what everything costs.
+//! The tangent product near the machine's limit: the fast transfer against the plain one, and the cost of every part.
 //!
-//! Short effort compares answers and counts operations. Full effort measures as well: times are tables, never verdicts.
+//! Short effort compares results and counts operations. Full effort also measures: times are tables, never verdicts.
 
 mod equality;
 mod general;
@@ -11,10 +11,9 @@ mod work;
 use super::{Effort, Outcome, StudyError};
 use crate::report::Report;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "the fast sweep against the plain one; operations, bytes, rates and seconds a step (full effort)";
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("fast sweep - plain sweep, relative to the largest entry", &["quantity", "D", "law", "shape"]);
     equality::judge::<1>(&mut report, 9)?;

@@ -23,7 +23,7 @@ use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// The most blocks assembled: 1.1 GB in 3D.
+/// The largest number of assembled blocks: 1.1 GB in 3D.
 const MOST_BLOCKS: usize = 14_000_000;
 
 fn shapes() -> [(&'static str, Approximation); 2] {
@@ -56,7 +56,7 @@ pub(super) fn measure(outcome: &mut Outcome) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Rates of the product and of all else that a step is made of.
+/// Rates of the product and of all other parts of a step.
 fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, StudyError> {
     let mut table = Table::new(
         "one tangent product, and the other parts of a step in units of it",
@@ -108,7 +108,7 @@ fn product<const D: usize, L: Law>(
         None => f64::NAN,
     };
     let particles = simulation.particles.len() as f64;
-    // As a step does: in the memory of the last step's, particles having moved, by 0.05 h along each axis.
+    // The memory of the last step is reused, as in a step, and the particles have moved by 0.05 h along each axis.
     let (grid, before) = (&simulation.grid, &simulation.particles.position);
     let after: Vec<_> = before.iter().map(|x| x.add_scalar(0.05 * grid.spacing)).collect();
     let (pool, mut spare) = (Pool::default(), Some(Supports::new(shape, grid, &after)?.0));
@@ -136,7 +136,7 @@ fn product<const D: usize, L: Law>(
     Ok(())
 }
 
-/// The same product by an assembled matrix of 3×3 blocks.
+/// The same product with an assembled matrix of 3×3 blocks.
 fn matrices(copy: f64, read: f64) -> Result<Table, StudyError> {
     let mut table = Table::new(
         "the product by an assembled block matrix, 3D",
@@ -241,7 +241,7 @@ fn step<const D: usize>(
 /// Cells along an edge of the block, for 10⁵ and 10⁶ particles in 3D.
 const GROWING: [u32; 2] = [23, 50];
 
-/// How the time of a step grows with the number of particles, at a fixed Courant number.
+/// The growth of the step time with the number of particles, at a fixed Courant number.
 fn growth() -> Result<Table, StudyError> {
     let mut table = Table::new(
         "the second step of a block in 3D, Newton to 1e-8, Courant 1: time ~ N^p",

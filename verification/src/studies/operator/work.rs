@@ -11,12 +11,12 @@ use bfree::solver::Precision;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, Vector, identity};
 
-/// What one product does, summed over all particles.
+/// The work of one product, summed over all particles.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
-    /// Floating-point operations (a fused multiply-add is two) on the nodes that each particle sees.
+    /// Floating-point operations (a fused multiply-add counts as two) on the nodes in each particle's connectivity.
     pub useful: f64,
-    /// The same with what the lanes compute besides: windows of groups, empty lanes, rows rounded up to eight.
+    /// The useful operations and the padding of the lanes: windows of groups, empty lanes, rows rounded up to eight.
     pub padded: f64,
     /// Bytes read and written at least once: weights, tangents, the field and the result.
     pub bytes: f64,
@@ -33,19 +33,19 @@ fn gather(width: [usize; 3], d: usize) -> usize {
     }
 }
 
-/// Those of a scatter with `rows` rows of `x` nodes: products of the weights, forces of a row, then the nodes of the row.
+/// Fused multiply-adds of a scatter with `rows` rows of `x` nodes: products of the weights, forces of a row, then the nodes of the row.
 fn scatter(rows: usize, x: usize, d: usize) -> usize {
     let products = if d == 3 { 3 } else { 0 };
     rows * (products + d * d + 2 * d * x)
 }
 
-/// Those of the closed tangent of a neo-Hookean solid, or of one without a closed form.
+/// Fused multiply-adds of the closed tangent of a neo-Hookean solid, or of a tangent without a closed form.
 fn point(d: usize, closed: bool) -> usize {
     if closed { d * d * (3 * d + 3) + 1 } else { d.pow(4) }
 }
 
 impl Work {
-    /// Of the product on the given supports.
+    /// The work of the product with the given shape-function values.
     pub(super) fn of<const D: usize, L: Law>(
         simulation: &Simulation<D, L>,
         prepared: &Prepared<D>,
@@ -76,7 +76,7 @@ impl Work {
     }
 }
 
-/// Operations and bytes a particle for moderate and for large jitter.
+/// Operations and bytes per particle for moderate and for large jitter.
 pub(super) fn table() -> Result<Table, StudyError> {
     let mut table = Table::new(
         "one tangent product, a particle (neo-Hookean, 2^D particles a cell)",

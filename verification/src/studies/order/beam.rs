@@ -9,7 +9,7 @@ use bfree::tensor::Vector;
 /// PL²/EI = 10: u/L and w/L of an inextensible beam that does not shear (Mattiasson, Int. J. Numer. Methods Eng. 17, 1981).
 const END: [f64; 2] = [0.55500, 0.81061];
 
-/// How far its end is from the formula's, over w/L.
+/// The distance of its end from the formula's, over w/L.
 fn error(length: f64) -> Result<f64, StudyError> {
     // EI = 100
     let force = 10.0 * 100.0 / (length * length);
@@ -34,7 +34,8 @@ fn error(length: f64) -> Result<f64, StudyError> {
     Ok((end - Vector::from(END)).norm() / END[1])
 }
 
-/// A real beam shears and stretches, by (h/L)² of its way: the bounds are those of an independent prototype (0.65 and 0.10 %), with room.
+/// A real beam shears and stretches, by (h/L)² of its displacement. The bounds are those of an independent prototype (0.65 and 0.10 %),
+/// with a margin.
 pub(super) fn run(outcome: &mut Outcome) -> Result<(), StudyError> {
     let mut report = Report::new("the elastica, PL²/EI = 10, 4 cells deep: error of the end over w", &["L/h"]);
     for (length, most) in [(20.0, 0.007), (40.0, 0.002)] {

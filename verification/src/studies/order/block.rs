@@ -1,4 +1,4 @@
-//! In space, without inertia: a block between walls, J from 0.3 to 1.7.
+//! Orders in space, without inertia: a block between walls, J from 0.3 to 1.7.
 
 use super::{GAUSS, GAUSS_3, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
 use crate::manufactured::Block;
@@ -16,16 +16,16 @@ use std::sync::Arc;
 /// J is between 1 − this and 1 + this.
 const CHANGE: f64 = 0.7;
 
-/// Load steps: with the grid kept, the answer is the same for any number of them that Newton's method can take.
+/// The number of load steps. With one reference configuration the answer does not depend on it, as long as Newton's method converges.
 const STEPS: u32 = 4;
 
-/// Shape functions on a layout, and the least orders in h, of displacement and stress.
+/// Shape functions with a layout of particles, and the least orders in h of displacement and stress.
 struct Case {
     name: &'static str,
     shape: Approximation,
     layout: &'static Layout,
     orders: [f64; 2],
-    /// The most of the stress that may be left where the grid has been made anew once, in 2D on 32 cells.
+    /// The largest remaining stress error after one grid reset, in 2D on 32 cells.
     floor: Option<f64>,
 }
 
@@ -39,15 +39,16 @@ impl Case {
     }
 }
 
-/// What is asked where u″ at the walls is not zero.
+/// The requirements if u″ at the walls is not zero.
 ///
-/// Functions that are consistent to first order: 2 and 1. B-splines at a wall continue the field linearly, u″ = 0 where it is not: an error
-/// of O(h) in the stress over a layer of width h, 1.5 in the mean square, and 2.5 of the displacement, if the particles are Gauss points of
-/// the pieces; if they are not, their sums leave the displacement 2. Quadratic functions have their kinks in the middle of cells.
-/// Without a knot there, nothing is lost: of degree p, p + 1 and p; but two points a cell are Gauss's for the forces of cubic ones away from
-/// walls only, where errors of neighbours cancel: 3.5 and 2.5 are asked of them, less than the 3.7 and 2.8 of an independent prototype.
+/// Functions of first-order consistency: 2 and 1. At a wall, B-splines continue the field linearly, with u″ = 0 where it is not. The stress
+/// then has an error of O(h) over a layer of width h: 1.5 in the mean square, and 2.5 for the displacement, if the particles are the Gauss
+/// points of the polynomial pieces. Otherwise the sums over particles limit the displacement to 2. Quadratic functions have their kinks in
+/// the middle of cells. Not-a-knot functions of degree p keep p + 1 and p. For cubic ones two points per cell are Gauss points of the
+/// forces only away from walls, where errors of neighbours cancel. So 3.5 and 2.5 are required, less than the 3.7 and 2.8 of an independent
+/// prototype.
 ///
-/// After a renewal, what an independent prototype found not to fall with h any more, with 2 × 2 regular particles.
+/// After a grid reset: the errors that no longer fell with h in an independent prototype, with 2 × 2 regular particles.
 fn curved() -> Vec<Case> {
     let (lme, wide) = (Lme::new(3.0, 1e-6), Lme::new(1.4, 1e-6));
     let (quadratic, cubic) = (Bspline::Quadratic, Bspline::Cubic);
@@ -70,7 +71,7 @@ fn curved() -> Vec<Case> {
     ]
 }
 
-/// What is asked of Gauss points where u″ at the walls is zero, and the walls do not show: of degree p, p + 1 and p.
+/// The requirements for Gauss points if u″ = 0 at the walls, so that the walls have no effect: for degree p, p + 1 and p.
 fn straight() -> [Case; 2] {
     [
         Case::new("quadratic", Bspline::Quadratic, &GAUSS_OF_MIDDLES, [3.0, 2.0]),
@@ -120,7 +121,7 @@ fn kept(effort: Effort, outcome: &mut Outcome) {
     let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
     let plane = [8, 16, 32];
     let space: &[u32] = if effort == Effort::Full { &[4, 8, 16] } else { &[4, 8] };
-    // Lines by layout and by what errs.
+    // Lines by layout and by kind of error.
     let mut lines = [(); 2].map(|()| [(); 2].map(|()| Vec::new()));
     for case in curved() {
         let mut refining = Refining { case: &case, walls: "curved", report: &mut report, table: &mut table };
@@ -149,7 +150,7 @@ fn kept(effort: Effort, outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-/// The same in 2D with inertia and a consistent mass: the motion is in proportion to time.
+/// The block in 2D with inertia and a consistent mass: the motion is proportional to time.
 fn with_inertia(outcome: &mut Outcome) {
     let title = "that block in 2D with inertia, eps = 0, the grid kept, dt = h / 2";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout"]);
@@ -178,7 +179,7 @@ fn with_inertia(outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-/// The same in 2D with the grid made anew after half of the load, and after every eighth of it.
+/// The block in 2D with a grid reset after half of the load, and after every eighth of it.
 fn renewed(effort: Effort, outcome: &mut Outcome) {
     let title = "that block in 2D, the grid renewed";
     let mut report = Report::new(format!("{title}: error of the stress, 32 cells"), &["grid", "shape", "layout"]);

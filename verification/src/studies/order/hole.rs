@@ -1,4 +1,4 @@
-//! A block with a round hole that cuts cells: on the hole act the tractions P N of the known motion.
+//! A block with a round hole that cuts cells. The tractions P N of the known motion act on the hole.
 
 use super::{GAUSS, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
 use crate::manufactured::Block;
@@ -14,11 +14,11 @@ use bfree::simulation::Settings;
 use bfree::tensor::Vector;
 use std::sync::Arc;
 
-/// J is between 1 − this and 1 + this: the surface of a hole that is compressed by half wrinkles.
+/// J is between 1 − this and 1 + this: a hole compressed by half has a wrinkled surface.
 const CHANGE: f64 = 0.3;
 
-/// Of the displacement 2, and of the stress 2 where functions are of a degree above 1: what the issue asks of bodies whose surface cuts cells.
-/// Of the greatest error of the stress at the hole, 1.5.
+/// Required orders for a body whose surface cuts cells, as in the issue: 2 for the displacement, and 2 for the stress of functions of a
+/// degree above 1; 1.5 for the largest error of the stress at the hole.
 pub(super) fn run(outcome: &mut Outcome) {
     let title = "a block with a round hole under tractions, J from 0.7 to 1.3, no inertia, the grid kept";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape", "layout"]);

@@ -1,5 +1,5 @@
-//! Orders in h and in Δt at large deformation: whole steps on a grid that is kept, against solutions that are known; what renewing it
-//! costs; and the energy that an impact loses.
+//! Orders in h and in Δt at large deformation: whole total Lagrangian steps against known solutions; the errors of grid resets; and the
+//! energy that an impact loses.
 
 mod beam;
 mod block;
@@ -25,15 +25,15 @@ use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, Seed, Shape, fi
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::tensor::{Deformation, Tensor, Vector};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str =
     "orders in h and dt at large deformation on a grid that is kept; what its renewal costs; the energy that the rebound loses";
 
-/// How far below its limit an order may be seen: an error C hᵖ (1 + c h) of a body with c = 2, from 16 to 32 cells across, has
-/// p + 2 (1/16 − 1/32)/ln 2.
+/// The allowed shortfall of an observed order. An error C hᵖ (1 + c h) of a body with c = 2, from 16 to 32 cells across, shows the order p
+/// + 2 (1/16 − 1/32)/ln 2.
 const NEAR: f64 = 0.1;
 
-/// Where the particles of a cell are.
+/// The positions of the particles of a cell.
 struct Layout {
     name: &'static str,
     filling: Filling,
@@ -47,21 +47,21 @@ impl Layout {
 
 const REGULAR: Layout = Layout::new("regular", 2, shape::Layout::Regular, 1);
 
-/// Those of functions that are polynomials between nodes.
+/// Gauss points of functions that are polynomials between nodes.
 const GAUSS: Layout = Layout::new("Gauss", 2, shape::Layout::Gauss, 3);
 
-/// Those of quadratic B-splines, which are polynomials from the middle of a cell to that of the next.
+/// Gauss points of quadratic B-splines, which are polynomials from the middle of one cell to the middle of the next.
 const GAUSS_OF_MIDDLES: Layout = Layout::new("Gauss, of middles", 2, shape::Layout::Gauss, 2);
 
 const GAUSS_3: Layout = Layout::new("Gauss 3", 3, shape::Layout::Gauss, 3);
 
-/// A body that fills the box of its grid and is held at its faces, moved by the body force of a known motion.
+/// A body that fills the box of its grid, held at its faces. The body force of a known motion moves it.
 struct Held<M, const D: usize> {
     motion: M,
     simulation: Simulation<D>,
     /// X of the particles, by id.
     reference: Vec<Vector<f64, D>>,
-    /// Products with the tangent, times particles.
+    /// The number of products with the tangent, times the number of particles.
     work: f64,
 }
 
@@ -116,7 +116,7 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
         Ok(self)
     }
 
-    /// √(Σ V d²) over √(Σ V s²), of what is found and what is exact, and of that by itself.
+    /// √(Σ V d²) over √(Σ V s²), with the difference d from the exact value and the exact value s.
     fn relative(&self, squares: impl Fn(&Particles<D>, usize, &State<D>) -> [f64; 2]) -> f64 {
         let particles = &self.simulation.particles;
         let mut sums = [0.0; 2];
@@ -128,7 +128,7 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
         (sums[0] / sums[1]).sqrt()
     }
 
-    /// Of the displacement.
+    /// The relative error of the displacement.
     fn displacement(&self) -> f64 {
         self.relative(|particles, p, exact| {
             let x = self.reference[particles.id[p] as usize];
@@ -136,14 +136,14 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
         })
     }
 
-    /// Of the velocity.
+    /// The relative error of the velocity.
     fn velocity(&self) -> f64 {
         self.relative(|particles, p, exact| {
             [(particles.velocity[p] - exact.velocity).norm_squared(), exact.velocity.norm_squared()]
         })
     }
 
-    /// Of the Kirchhoff stress τ = F S Fᵀ.
+    /// The relative error of the Kirchhoff stress τ = F S Fᵀ.
     fn stress(&self) -> f64 {
         let law = &self.simulation.bodies[0].law;
         let tau = |h: Tensor<f64, D>| {
@@ -157,14 +157,14 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
     }
 }
 
-/// The tractions P N of the motion at t = 1 on a hole, in proportion to t: a load for each point of the surface, which becomes a particle.
+/// The tractions P N of the motion at t = 1 on a hole, proportional to t. Each point of the surface becomes a particle with a load.
 fn tractions<M: Motion<D>, const D: usize>(
     (motion, law): (&M, &Material),
     grid: &Grid<D>,
     (body, hole): (&Shape<D>, &Ball<D>),
     particles: &mut Particles<D>,
 ) -> Result<Vec<SurfaceLoad<D>>, StudyError> {
-    // As in scenes with Gauss's points.
+    // The number of boxes per cell, as in scenes with Gauss points.
     const BOXES: usize = 2;
     let edges = Vector::repeat(grid.spacing / BOXES as f64);
     let around = Ball { radius: hole.radius + grid.spacing, ..hole.clone() }.into();
@@ -181,7 +181,7 @@ fn tractions<M: Motion<D>, const D: usize>(
             let at = Deformation::new(state(motion, &facet.position, 1.0).displacement_gradient);
             let traction = at.f * law.stress(&at, &Start::NONE) * facet.normal;
             let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
-            // A hair inside, in the cell where the body is.
+            // The particle lies slightly inside, in the cell of the body.
             particles.push_without_inertia(facet.position - facet.normal * (1e-6 * grid.spacing), 0.0, 0.0, 0);
             let curve = Curve::new(vec![[0.0, 0.0], [1.0, 1.0]])?;
             loads.push(SurfaceLoad { pressing: Pressing::Traction(traction), curve, points: vec![point] });
@@ -190,16 +190,16 @@ fn tractions<M: Motion<D>, const D: usize>(
     Ok(loads)
 }
 
-/// Errors of one case on finer and finer grids.
+/// Errors of one case on a sequence of grids.
 struct Refined<'a, const N: usize> {
     report: &'a mut Report,
     table: &'a mut Table,
-    /// What is measured, and the least order of each.
+    /// The measured quantities, and the least order of each.
     least: [(&'static str, Bound); N],
 }
 
 impl<const N: usize> Refined<'_, N> {
-    /// Runs the case at each number of cells, which gives its errors and its work. The orders between the last two are judged.
+    /// Runs the case for each number of cells; the closure returns its errors and its work. The orders between the last two are judged.
     fn run(
         self,
         labels: &[&str],
@@ -241,14 +241,14 @@ impl<const N: usize> Refined<'_, N> {
     }
 }
 
-/// The line of a case, with its last slope.
+/// The line of a case in a figure, with its last slope.
 fn line(name: &str, points: impl Iterator<Item = (f64, f64)>) -> Line {
     let points: Vec<_> = points.collect();
     let slope = points.windows(2).last().map_or(f64::NAN, |pair| (pair[0].1 / pair[1].1).ln() / (pair[1].0 / pair[0].0).ln());
     Line { name: format!("{name}: {slope:.1}"), points }
 }
 
-/// Errors against cells.
+/// A figure of errors against cells.
 fn figure(name: &str, title: &str, lines: Vec<Line>) -> Figure {
     Figure {
         name: format!("order-{name}"),
@@ -259,7 +259,6 @@ fn figure(name: &str, title: &str, lines: Vec<Line>) -> Figure {
     }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
     block::run(*effort, &mut outcome);

@@ -1,4 +1,4 @@
-//! Whole steps that renew the grid, where the projection and the wall update cost accuracy: the energy an impact loses.
+//! Whole steps with grid resets, in which the projection and the wall update cost accuracy: the energy that an impact loses.
 
 use crate::figure::{Axis, Figure, Line};
 use crate::report::{Bound, Report};
@@ -11,23 +11,23 @@ use bfree::simulation::Simulation;
 /// The energy before the impact.
 const ENERGY: f64 = 3.5;
 
-/// When the energies are compared: after the first impact.
+/// The time of the comparison of energies: after the first impact.
 const END: f64 = 30.0;
 
 /// Energies at t = 30 of an independent program against Δt at ε = 1 (shared/reference/README.md), given to three decimals.
 const BY_STEP: [(f64, Option<f64>); 5] =
     [(0.2, None), (0.1, None), (0.05, Some(3.038)), (0.025, Some(3.162)), (0.0125, Some(3.289))];
 
-/// The same against ε at Δt = 0.05.
+/// Energies at t = 30 of the same program against ε at Δt = 0.05.
 const BY_LUMPING: [(f64, Option<f64>); 4] = [(1.0, Some(3.038)), (0.5, Some(3.128)), (0.1, Some(3.279)), (0.01, None)];
 
-/// Half of their last decimal; what two programs differ by, 1e-8 of an energy (tests/reference/README.md), is nothing beside it.
+/// Half of the last decimal. Two programs differ by 1e-8 of an energy (tests/reference/README.md), which is negligible here.
 const AGREEMENT: f64 = 5e-4;
 
 /// The two readings of Algorithm 1 at a resting wall.
 const WALLS: [(WallUpdate, &str); 2] = [(WallUpdate::Literal, "literal"), (WallUpdate::Consistent, "consistent")];
 
-/// One run.
+/// The result of one run.
 struct Run {
     energy: f64,
     /// Largest number of Newton iterations in a step.
@@ -40,7 +40,7 @@ impl Run {
     }
 }
 
-/// A passive wall gives nothing; how much is lost, only the independent program says, and of no order is anything known.
+/// A passive wall adds no energy. The loss is known only from the independent program, and no order is known.
 fn judge(report: &mut Report, case: &str, (walls, name): (WallUpdate, &str), run: &Run, expected: Option<f64>) {
     if let (Some(expected), WallUpdate::Literal) = (expected, walls) {
         report.push(&["energy - reference", case, name], (run.energy - expected).abs(), Bound::AtMost(AGREEMENT));
@@ -65,7 +65,7 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyErro
     let mut lines = Vec::new();
 
     let mut by_step = Table::new("energy lost of 3.5 against dt (eps = 1)", ["dt", "walls", "energy", "lost", "order", "Newton"]);
-    // Against the independent program; then with the shipped support, smaller steps, and the other wall update.
+    // Runs against the independent program; then runs with the shipped support, smaller steps, and the other wall update.
     let steps = match effort {
         Effort::Short => &BY_STEP[1..4],
         Effort::Full => &BY_STEP[..],

@@ -1,4 +1,4 @@
-//! A thick ring under inner pressure, by a third wider at its hole: the shipped scene against the solution at finite strain.
+//! A thick ring under inner pressure, whose hole grows by a third: the shipped scene against the solution at finite strain.
 
 use super::{NEAR, Refined, figure, line};
 use crate::report::{Bound, Report};
@@ -15,13 +15,13 @@ const LAMBDA: f64 = 1000.0;
 const SHEAR: f64 = 1000.0;
 const PRESSURE: f64 = 200.0;
 
-/// Steps of the Runge–Kutta method over the ring: of order 4, below 1e-10 here.
+/// The number of Runge–Kutta steps over the ring; the method has order 4 and an error below 1e-10 here.
 const PARTS: u32 = 200;
 
 /// r(R) and λ_r = dr/dR, in plane strain with λ_θ = r/R.
 type At = [f64; 2];
 
-/// Ciarlet's law by hand: P_i = Λ/2 (J² − 1)/λ_i + G (λ_i − 1/λ_i), J = λ_r λ_θ.
+/// Ciarlet's law, written out: P_i = Λ/2 (J² − 1)/λ_i + G (λ_i − 1/λ_i), J = λ_r λ_θ.
 fn piola(one: f64, other: f64) -> f64 {
     0.5 * LAMBDA * (one * other * other - one.recip()) + SHEAR * (one - one.recip())
 }
@@ -35,7 +35,7 @@ fn slope(radius: f64, [r, stretch]: At) -> At {
     [stretch, -rest / (radius * by_stretch)]
 }
 
-/// From the hole to `radius`.
+/// The solution from the hole to `radius`.
 fn integrated(start: At, radius: f64) -> At {
     let step = (radius - RADII[0]) / f64::from(PARTS);
     let moved = |at: At, by: At, part: f64| [at[0] + part * step * by[0], at[1] + part * step * by[1]];
@@ -49,13 +49,13 @@ fn integrated(start: At, radius: f64) -> At {
     })
 }
 
-/// At the hole, with λ_θ = `hoop` there: the pressure follows it, P_r = −p λ_θ, which is quadratic in λ_r.
+/// The state at the hole with λ_θ = `hoop`. The pressure follows the surface, P_r = −p λ_θ, which is quadratic in λ_r.
 fn at_hole(hoop: f64, pressure: f64) -> At {
     let (c, d) = (0.5 * LAMBDA * hoop * hoop + SHEAR, 0.5 * LAMBDA + SHEAR);
     [RADII[0] * hoop, ((pressure * hoop).powi(2) + 4.0 * c * d).sqrt() / (2.0 * c) - pressure * hoop / (2.0 * c)]
 }
 
-/// λ_θ at the hole for which the outer surface is free, by bisection.
+/// λ_θ at the hole that makes the outer surface free, by bisection.
 fn shot(pressure: f64) -> f64 {
     let outside = |hoop: f64| {
         let [r, stretch] = integrated(at_hole(hoop, pressure), RADII[1]);
@@ -69,7 +69,7 @@ fn shot(pressure: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Errors of the hole's displacement (its mean), of the displacement, and of the Kirchhoff stress; and the work.
+/// Errors of the mean displacement of the hole, of the displacement, and of the Kirchhoff stress; and the work.
 fn ring(family: &str, cells: u32, hole: At) -> Result<([f64; 3], f64), StudyError> {
     let overrides = [
         format!("approximation={family}"),
@@ -114,12 +114,12 @@ fn ring(family: &str, cells: u32, hole: At) -> Result<([f64; 3], f64), StudyErro
     Ok(([(inner[0] / inner[1] - 1.0).abs(), relative(displacement), relative(stress)], work))
 }
 
-/// The area of the planes that stand for the hole's circle is wrong by this part of it (`docs/src/limits.md`), and with it the load: an error of
-/// the displacement below it shows no order.
+/// The relative error of the area of the planes that approximate the hole's circle (`docs/src/limits.md`), and so of the load. A smaller
+/// error of the displacement shows no order.
 const CIRCLE: f64 = 1e-5;
 
-/// Surfaces cut cells: of the displacement 2 and of the stress 1.5 is asked, of linear functions 1; of the hole itself 1.5. From 4 to 16 cells
-/// at once: the hole's displacement is then known to 1e-5, to which the circle itself is drawn.
+/// Required orders for surfaces that cut cells: 2 for the displacement, 1.5 for the stress, 1 for that of linear functions, and 1.5 for the
+/// hole. The study goes from 4 to 16 cells at once: the displacement of the hole is then known to 1e-5, the accuracy of the circle itself.
 pub(super) fn run(outcome: &mut Outcome) {
     let title = "a thick ring under inner pressure, its hole a third wider";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape"]);
@@ -135,7 +135,7 @@ pub(super) fn run(outcome: &mut Outcome) {
     ] {
         let [mut hole_moves, displacement, stress] = [1.5, 2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));
         if name == "cubic" {
-            // It errs by little more than CIRCLE at both numbers of cells: no order shows, and the error itself is judged.
+            // Its error is little more than CIRCLE for both numbers of cells, so no order shows, and the error itself is judged.
             hole_moves = Bound::Reported;
         }
         let least = [("hole, ring", hole_moves), ("displacement, ring", displacement), ("stress, ring", stress)];
@@ -156,7 +156,7 @@ pub(super) fn run(outcome: &mut Outcome) {
 mod tests {
     use super::*;
 
-    /// u(a) = p a²/(2G (b² − a²)) ((1 − 2ν) a + b²/a), ν = ¼, and what is left of it at a thousandth of the pressure is a thousandth.
+    /// For small pressure u(a) = p a²/(2G (b² − a²)) ((1 − 2ν) a + b²/a), ν = ¼. The relative difference is proportional to the pressure.
     #[test]
     fn under_a_small_pressure_it_is_lames() {
         let [a, b] = RADII;

@@ -1,4 +1,4 @@
-//! A thick sphere under inner pressure, an eighth of it between planes of symmetry, its surfaces across cells of space: Lamé's solution.
+//! An eighth of a thick sphere under inner pressure, between planes of symmetry, against Lamé's solution. Its surfaces cut cells.
 
 use super::{NEAR, Refined, figure, line};
 use crate::report::{Bound, Report};
@@ -75,7 +75,7 @@ fn shell(family: &str, cells: u32) -> Result<([f64; 2], f64), StudyError> {
     Ok(([relative(displacement), relative(stress)], (products * reference.len()) as f64))
 }
 
-/// As in 2D: of the displacement 2 and of the stress 1.5 is asked, of linear functions 1.
+/// The required orders are those in 2D: 2 for the displacement, 1.5 for the stress, 1 for that of linear functions.
 pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     let title = "a thick sphere under inner pressure, the grid kept";
     let mut report = Report::new(format!("{title}: order in h"), &["of", "shape"]);
@@ -86,7 +86,7 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     for (name, family, sizes, of_stress) in [
         ("linear", "\"linear\"", few, 1.0),
         ("quadratic", r#"{"bspline":{"degree":2}}"#, few, 1.5),
-        // What centroids of boxes leave shows from here on: order 1.3.
+        // From here on the error of the centroids of boxes shows: order 1.3.
         ("cubic", r#"{"bspline":{"degree":3}}"#, &[4, 8], 1.5),
     ] {
         let [displacement, stress] = [2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));

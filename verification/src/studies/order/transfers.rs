@@ -1,5 +1,5 @@
-//! From particles to nodes and back, side by side: what errors are left where the grid is made anew in every step, and what that takes from a
-//! body that spins.
+//! Particle-to-grid and grid-to-particle transfers compared: their errors with a grid reset in every step, and the losses of a spinning
+//! body.
 
 use super::{Layout, REGULAR, vortex};
 use crate::report::{Bound, Report};
@@ -14,16 +14,16 @@ use bfree::mechanics::transfer::Projection;
 use bfree::simulation::Settings;
 use std::sync::Arc;
 
-/// Of the momenta, relative: what the projection's tolerance of 1e-12 leaves in 40 steps.
+/// The relative change of the momenta: the projection's tolerance of 1e-12 allows this in 40 steps.
 const CONSERVED: f64 = 1e-10;
 
-/// A way from particles to nodes and back.
+/// A transfer from particles to nodes and back.
 struct Transfer {
     name: &'static str,
-    /// ε of the mass that projects and resists.
+    /// ε of the mass matrix in the projection and in the inertia.
     lumping: f64,
     projection: Projection,
-    /// k of PIC (1) and FMPM; none for FLIP.
+    /// The order k of PIC (1) and FMPM; none for FLIP.
     order: Option<u32>,
 }
 
@@ -48,7 +48,7 @@ fn families() -> [(&'static str, Approximation); 2] {
     [("linear", Linear.into()), ("cubic", Bspline::Cubic.into())]
 }
 
-/// Errors of the vortex, its grid new in every step.
+/// Errors of the vortex with a grid reset in every step.
 fn errors(effort: Effort, outcome: &mut Outcome) {
     let title = "a vortex, the grid new in every step, dt = 2.56 h^2";
     let header = ["shape", "transfer", "cells", "displacement", "velocity", "stress"];
@@ -72,11 +72,11 @@ fn errors(effort: Effort, outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-/// Steps of a fortieth of a radian.
+/// Number of steps, each of a fortieth of a radian.
 const STEPS: u32 = 40;
 
-/// What a radian takes from the angular momentum and from the energy, each over its start, and the linear momentum over Σ m |v|; with the grid
-/// made anew after those steps.
+/// The changes over one radian of rotation: of the linear momentum over Σ m |v|, and of angular momentum and energy over their initial
+/// values. The grid is reset after the steps that `renewed_after` selects.
 fn lost(shape: &Approximation, transfer: &Transfer, renewed_after: impl Fn(u32) -> bool) -> Result<[f64; 3], StudyError> {
     let mut simulation = spinning(shape, transfer.lumping, 2.0 / f64::from(STEPS))?;
     simulation.settings = transfer.settings(simulation.settings);
@@ -95,8 +95,8 @@ fn lost(shape: &Approximation, transfer: &Transfer, renewed_after: impl Fn(u32) 
     Ok([moved, change(angular_momentum(particles), spin), change(energy(&simulation), before)])
 }
 
-/// Linear momentum is conserved by each of them, angular momentum by a consistent mass: Σ N_I (x_I − x_p) = 0. PIC with a lumped mass is a mean
-/// of means, and takes energy.
+/// Every transfer conserves linear momentum. A consistent mass conserves angular momentum: Σ N_I (x_I − x_p) = 0. PIC with a lumped mass
+/// takes a mean of means, and dissipates energy.
 fn losses(outcome: &mut Outcome) {
     let title = "a square that spins by a radian in 40 steps and breathes, midpoint rule";
     let mut report = Report::new(format!("{title}: what transfers take"), &["of", "grid", "shape", "transfer"]);
@@ -121,7 +121,7 @@ fn losses(outcome: &mut Outcome) {
                         }
                         found.push([angular, energy]);
                     }
-                    // Null modes of a consistent mass on a grid that is new (study `newton`).
+                    // A consistent mass has null modes on a reset grid (study `newton`).
                     Err(_) if transfer.lumping == 0.0 && renewals > 0 => found.push([f64::NAN; 2]),
                     Err(error) => {
                         report.push_error(&labels("run"), error.as_ref());

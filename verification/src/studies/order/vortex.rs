@@ -1,4 +1,4 @@
-//! With inertia: the vortex of Kamojjala, Brannon, Sadeghirad and Guilkey, in a square that it leaves at rest along its edges.
+//! With inertia: the vortex of Kamojjala, Brannon, Sadeghirad and Guilkey, in a square whose edges stay at rest.
 
 use super::{GAUSS, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
 use crate::manufactured::Vortex;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Half of the square's edge.
 const HALF: f64 = 1.25;
 
-/// When errors are looked at: at t = 1 the vortex stands still.
+/// The time of the error measurement; at t = 1 the vortex would be at rest.
 const END: f64 = 0.8;
 
 /// A run to the end.
@@ -31,9 +31,9 @@ pub(super) fn spun(
     Held::new(Vortex::default(), grid, (shape, layout), None, END / f64::from(steps), settings)?.after(steps)
 }
 
-/// Δt falls with h², so that the time scheme does not show. With ε = 1 the lumped mass makes errors of order 2, whatever the functions; with
-/// ε = 0 the orders on Gauss points are those of functions of degree p: p + 1, p + 1 and p. The stress of cubic ones under a lumped mass is
-/// shown: on these grids its own error, of order 3, is not small beside that of the mass.
+/// Δt falls with h², so that the error of the time scheme stays invisible. With ε = 1 the lumped mass limits the orders to 2, for any
+/// functions. With ε = 0 functions of degree p on Gauss points have the orders p + 1, p + 1 and p. The stress of cubic ones under a lumped
+/// mass is only shown: on these grids its own error, of order 3, is not small beside that of the mass.
 fn in_space(effort: Effort, outcome: &mut Outcome) {
     use Effort::{Full, Short};
     let title = "a vortex, the grid kept, dt = 2.56 h^2";
@@ -67,7 +67,7 @@ fn in_space(effort: Effort, outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-/// √Σ over the particles of the squares of what places and velocities differ by.
+/// √Σ over the particles of the squared differences of positions and velocities.
 fn apart(a: &Particles<2>, b: &Particles<2>) -> [f64; 2] {
     let apart = |a: &[Vector<f64, 2>], b: &[Vector<f64, 2>]| {
         a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>().sqrt()
@@ -75,8 +75,8 @@ fn apart(a: &Particles<2>, b: &Particles<2>) -> [f64; 2] {
     [apart(&a.position, &b.position), apart(&a.velocity, &b.velocity)]
 }
 
-/// Newmark's rule is of order 2 for γ = ½ and of order 1 otherwise (Hughes, The Finite Element Method, 9.1), the generalised-α method of
-/// order 2 for every ρ∞ (Chung and Hulbert, 1993). Between Δt and Δt/2 at one h nothing else differs.
+/// Newmark's rule is of order 2 for γ = ½ and of order 1 otherwise (Hughes, The Finite Element Method, 9.1). The generalised-α method is of
+/// order 2 for every ρ∞ (Chung and Hulbert, 1993). The runs with Δt and Δt/2 at one h differ in nothing else.
 fn in_time(effort: Effort, outcome: &mut Outcome) -> Result<(), StudyError> {
     let title = "a vortex, the grid kept: order in dt, from what dt, dt/2 and dt/4 differ by";
     let mut report = Report::new(title, &["of", "scheme", "shape"]);

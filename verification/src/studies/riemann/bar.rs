@@ -1,4 +1,4 @@
-//! One run of the bar, by particles or by elements, and what is measured of it.
+//! One run of the bar, with particles or with elements, and its measured results.
 
 use crate::elements::Elements;
 use crate::riemann::{PSystem, Riemann, State};
@@ -19,9 +19,9 @@ use std::sync::Arc;
 
 const DENSITY: f64 = 2600.0;
 const POISSON: f64 = 0.3;
-/// When the profiles are compared.
+/// The time of the comparison of profiles.
 const END: f64 = 3e-3;
-/// Where the jump is at the start.
+/// The initial position of the jump.
 const MIDDLE: f64 = 50.0;
 
 /// A jump of velocity in a bar of a given stiffness.
@@ -33,10 +33,10 @@ pub struct Jump {
 }
 
 impl Jump {
-    /// The paper's.
+    /// The jump of the paper.
     pub const PAPER: Self = Self { young: 1e10, left: 10.0, right: 0.0 };
 
-    /// A jump of the given size in the stiffer bar, > 0 compressive, < 0 expansive.
+    /// A jump of the given size in the stiffer bar: positive is compressive, negative expansive.
     pub const fn of(size: f64) -> Self {
         if size > 0.0 {
             Self { young: 5e10, left: size, right: 0.0 }
@@ -64,17 +64,17 @@ impl Jump {
         Ok(system.solve(side(self.left), side(self.right))?)
     }
 
-    /// √(E/ρ) · 1.02, the speed that the paper's Courant number refers to.
+    /// √(E/ρ) · 1.02, the speed in the paper's Courant number.
     fn courant_speed(&self) -> f64 {
         (self.young / DENSITY).sqrt() / 0.9806
     }
 }
 
-/// How particles are run.
+/// The settings of a particle run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Method {
     pub name: &'static str,
-    /// The shape functions, as in scenes.
+    /// The shape functions, in the form of a scene.
     pub shape: &'static str,
     pub particles_per_cell: u32,
     pub lumping: f64,
@@ -94,11 +94,11 @@ pub enum Transfer {
 }
 
 impl Transfer {
-    /// The weakest uniform blend that leaves no ringing at all: it acts like a viscosity κ h². To keep pace with dispersion a linear
-    /// front needs an exponent of 1/3, a steady shock 0; 1/4 serves both.
+    /// The weakest uniform blend without any ringing. It acts like a viscosity κ h². To keep pace with dispersion, a linear front needs the
+    /// exponent 1/3 and a steady shock 0; 1/4 serves both.
     pub const MONOTONE: Self = Self::Blend(1, 1.2, 0.25);
 
-    /// As scenes write it.
+    /// The transfer in the form of a scene.
     fn json(self, speed: f64, h: f64) -> String {
         let rate = |factor: f64, exponent: f64| factor * speed / h * (h / (speed * END)).powf(exponent);
         match self {
@@ -116,7 +116,7 @@ impl Method {
         Self { name, shape, particles_per_cell: 4, lumping: 0.8, gamma: 0.5, transfer: Transfer::Flip }
     }
 
-    /// What `scenes/riemann_jump.json` recommends.
+    /// The settings that `scenes/riemann_jump.json` recommends.
     pub const RECOMMENDED: Self = Self {
         name: "recommended",
         shape: r#"{"lme":{"gamma":1.4}}"#,
@@ -126,7 +126,7 @@ impl Method {
         transfer: Transfer::Limited(0.8),
     };
 
-    /// The same without its smoothing.
+    /// The recommended settings without smoothing.
     pub const UNDISSIPATED: Self =
         Self { name: "recommended, undissipated", transfer: Transfer::Flip, ..Self::RECOMMENDED };
 }
@@ -138,7 +138,7 @@ pub struct Mesh {
     pub courant: f64,
 }
 
-/// What is measured of a profile at 3 ms.
+/// The measured results of a profile at 3 ms.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// (Σ V₀ (v_p − v)²)^½ over the particles (Gauss points).
@@ -149,11 +149,11 @@ pub struct Measured {
     pub overshoot: f64,
     /// Largest |v − v*| between the fronts, in parts of the jump.
     pub plateau: f64,
-    /// From 10 % to 90 % of the front to the right, in metres.
+    /// The distance from 10 % to 90 % of the front to the right, in metres.
     pub width: f64,
-    /// Energy lost, in parts of the energy at the start, in the frame of the middle state.
+    /// Energy lost in the frame of the middle state, over the initial energy.
     pub lost: f64,
-    /// What the exact solution loses in its shocks, in the same parts.
+    /// Energy that the exact solution dissipates in its shocks, over the same initial energy.
     pub lost_by_shocks: f64,
     pub seconds: f64,
     pub steps: u64,
@@ -161,10 +161,10 @@ pub struct Measured {
     pub profile: Vec<(f64, f64)>,
 }
 
-/// What is left out at the ends of the bar when errors are measured.
+/// The length at each end of the bar that the error measurement omits.
 const ENDS: f64 = 0.5;
 
-/// Half the length of the bar: the waves, and room before its ends for all of their fronts.
+/// Half the length of the bar: the way of the waves, and room beyond it for all of their fronts.
 fn half_length(exact: &Riemann) -> f64 {
     exact.waves[1].edges().1 * END + 2.5 + ENDS
 }
@@ -209,7 +209,7 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     }
     let seconds = start.elapsed().as_secs_f64();
 
-    // At the nodes: the projected velocity, at the projected X.
+    // The nodal profile: the projected velocity at the projected X.
     let particles = simulation.particles.by_id();
     let mut carrier = particles.clone();
     carrier.acceleration = reference.iter().map(|&x| Vector::from([x])).collect();
@@ -257,7 +257,7 @@ pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, St
     let lost = 1.0 - bar.energy(&Vector::from([middle]))? / before;
     let mean = 2.0 * count * mesh.h / bar.points().len() as f64;
     let mut measured = measure(jump, &exact, profile, mean, nodal, lost, seconds, steps);
-    // Gauss points differ in weight.
+    // Gauss points have different weights.
     let weighted = (bar.points().position.iter().zip(&bar.points().volume).zip(&velocity)).map(|((x, &w), v)| (x[0], w, v[0]));
     measured.particles = distance(&exact, weighted.filter(|point| inside(point.0)));
     Ok(measured)
@@ -303,7 +303,7 @@ fn measure(
             plateau = plateau.max((v - star).abs() / jump.size());
         }
     }
-    // The outermost place where the front to the right passes a level.
+    // The outermost position at which the front to the right crosses a level.
     let crossing = |level: f64| {
         let part = |v: f64| (v - right) / (star - right);
         let pairs = profile.windows(2).rev();

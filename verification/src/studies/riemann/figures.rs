@@ -1,14 +1,14 @@
-//! The pictures: Figs. 5, 6 and 7, and strong jumps.
+//! The figures: Figs. 5, 6 and 7, and strong jumps.
 
 use super::*;
 use crate::figure::Axis;
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use plotters::prelude::SeriesLabelPosition;
 
-/// Spacings shown of the paper's scheme for strong jumps.
+/// The spacing at which the paper's scheme for strong jumps is shown.
 const STRONG_SPACING: f64 = 0.05;
 
-/// A name, and the case of a number: γ, h or Δt.
+/// A name, and a function from a number (γ, h or Δt) to its case.
 type Family = (&'static str, fn(f64) -> Case);
 
 /// The discretisations of Fig. 5, as functions of γ.
@@ -41,7 +41,7 @@ pub(super) fn all(runs: &Runs) -> Result<Vec<Sheet>, StudyError> {
     Ok(vec![profiles(runs)?, convergence(runs)?, time_steps(runs)?, strong(runs)?, trade(runs)?])
 }
 
-/// The exact velocity at 3 ms between two places.
+/// The exact velocity at 3 ms between two positions.
 fn exact(jump: Jump, from: f64, to: f64) -> Result<Curve, StudyError> {
     let solved = jump.exact()?;
     let points = (0..=2000).map(|k| {
@@ -174,7 +174,7 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
             legend: (k == 0).then_some(SeriesLabelPosition::UpperRight),
         });
     }
-    // Room for the legend below the points.
+    // The ranges leave room for the legend below the points.
     let heights = [(0.5, 200.0), (20.0, 2000.0), (20.0, 2000.0)];
     for (k, (size, height)) in [100.0, 1000.0, -1000.0].into_iter().zip(heights).enumerate() {
         let jump = Jump::of(size);

@@ -9,7 +9,7 @@ use crate::report::{Bound, Report};
 use bar::{Jump, Measured, Mesh, Method, Transfer};
 use rayon::prelude::*;
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str =
     "a jump of velocity in a bar (section 4.1): profiles, convergence, and a scheme that converges for strong jumps";
 
@@ -28,10 +28,10 @@ const GAMMAS: [f64; 4] = [0.5, 0.6, 0.7, 1.0];
 /// The recommended Courant number for jumps.
 const COURANT: f64 = 0.5;
 
-/// A front may be so many times as wide as without dissipation.
+/// The largest width of a front, over its width without dissipation.
 const WIDTH: f64 = 1.5;
 
-/// Down to this Courant number, fronts are also compared with undissipated ones at the same time step.
+/// The smallest Courant number at which fronts are also compared with undissipated ones at the same time step.
 const LEAST_COMPARED: f64 = 0.1;
 
 /// L2 errors at particles of an independent program in the paper's own case, by h and Courant number
@@ -52,13 +52,14 @@ const REFERENCE: [(Method, f64, f64, f64); 13] = [
     (LINEAR, 0.025, 1.0, 3.80),
 ];
 
-/// How many of them a short run compares.
+/// The number of references that a short run compares.
 const SHORT_REFERENCE: usize = 6;
 
-/// Its numbers have three digits; linear functions, whose errors depend on when particles cross cells, amplify the rest.
+/// The reference numbers have three digits. Linear functions amplify the rounding: their errors depend on the times at which particles
+/// cross cells.
 const AGREEMENT: f64 = 0.01;
 
-/// One run by its coordinates; what is asked for twice is run once.
+/// One run, by its parameters; equal cases run once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Case {
     Particles(Method, Jump, Mesh),
@@ -78,7 +79,7 @@ impl Case {
     }
 }
 
-/// All runs of the study, done side by side. A scheme that breaks down is a result too: the message is kept.
+/// All runs of the study, in parallel. The message of a scheme that breaks down is also a result.
 struct Runs(Vec<(Case, Result<Measured, String>)>);
 
 impl Runs {
@@ -89,7 +90,7 @@ impl Runs {
                 once.push(case);
             }
         }
-        // The long ones first, so that no core idles at the end.
+        // Long runs start first, so that no core idles at the end.
         let least_work = |case: &Case| {
             let (Case::Particles(_, jump, mesh) | Case::Elements(_, jump, mesh)) = case;
             mesh.h * mesh.h * mesh.courant / jump.young
@@ -115,7 +116,7 @@ impl Runs {
     }
 }
 
-/// The recommended scheme: which jumps, spacings and Courant numbers are judged.
+/// The judged jumps, spacings and Courant numbers of the recommended scheme.
 struct Plan {
     jumps: Vec<Jump>,
     spacings: Vec<f64>,
@@ -141,13 +142,13 @@ impl Plan {
         }
     }
 
-    /// The spacings of one jump: the finest, which takes minutes, for the paper's case alone.
+    /// The spacings of one jump. The finest takes minutes and is used for the paper's case only.
     fn spacings(&self, jump: Jump) -> &[f64] {
         let all = self.spacings.len();
         if jump == Jump::PAPER || all <= 2 { &self.spacings } else { &self.spacings[..all - 1] }
     }
 
-    /// The Courant numbers of one jump: at -100 m/s, nearly the mirror of 100, without the smallest two.
+    /// The Courant numbers of one jump. At -100 m/s, nearly the mirror of 100, the smallest two are omitted.
     fn courants(&self, jump: Jump) -> &[f64] {
         let all = self.courants.len();
         if jump == Jump::of(-100.0) { &self.courants[..all - 2] } else { &self.courants }
@@ -175,7 +176,6 @@ impl Plan {
     }
 }
 
-/// Runs the study.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let plan = Plan::new(*effort);
     let mut cases = plan.cases();
@@ -206,7 +206,7 @@ fn reference(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// What the issue asks of a scheme for jumps.
+/// The requirements of the issue for a scheme for jumps.
 fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
     let mut report = Report::new("the recommended setting", &["quantity", "jump", "h", "Courant"]);
     for &jump in &plan.jumps {
@@ -239,7 +239,7 @@ fn recommended(runs: &Runs, plan: &Plan) -> Result<Report, StudyError> {
                     least = found.particles;
                 }
             } else {
-                // Against the smallest error at any longer step.
+                // The reference is the smallest error at any longer step.
                 push("L2 / least L2 at longer steps", found.particles / least, Bound::AtMost(1.02));
                 least = least.min(found.particles);
             }

@@ -1,4 +1,4 @@
-//! The tables: Figs. 6 and 7 in numbers, strong jumps, and what makes them hard.
+//! The tables: Figs. 6 and 7 in numbers, strong jumps, and the causes of their difficulty.
 
 use super::*;
 use crate::table::Table;
@@ -6,13 +6,13 @@ use crate::table::Table;
 /// Spacings of the tables.
 const COARSE: [f64; 3] = [0.1, 0.05, 0.025];
 
-/// Spacings of the search for causes.
+/// Spacings for the search for causes.
 const COARSEST: [f64; 2] = [0.1, 0.05];
 
-/// The paper's scheme for strong jumps, and what is put in its place.
+/// The paper's scheme for strong jumps, and its replacements.
 const STRONG: [(Method, f64); 4] = [(LINEAR, 1.0), (LME, 1.0), (SMOOTH, 1.0), (Method::RECOMMENDED, COURANT)];
 
-/// Changes one by one: from the paper's scheme, then from the recommended one.
+/// Single changes: from the paper's scheme, then from the recommended one.
 fn changes() -> Vec<(&'static str, Method, f64)> {
     let paper = |change: &'static str, method: Method| (change, method, 1.0);
     let best = |change: &'static str, method: Method| (change, method, COURANT);
@@ -81,7 +81,7 @@ pub(super) const TRADE: [(&str, &[Transfer]); 3] = [
     ]),
 ];
 
-/// The spacing of the trade.
+/// The spacing of the trade-off.
 const TRADE_SPACING: f64 = 0.1;
 
 /// The run of one kind and strength of smoothing.
@@ -90,7 +90,7 @@ fn traded(transfer: Transfer, jump: Jump) -> Case {
     Case::particles(method, jump, TRADE_SPACING, COURANT)
 }
 
-/// Overshoot in parts of the jump and width over that of the undissipated scheme.
+/// Overshoot in parts of the jump, and width over that of the undissipated scheme.
 pub(super) fn trade(runs: &Runs, transfer: Transfer, jump: Jump) -> Result<(f64, f64, f64), StudyError> {
     let undissipated = runs.particles(Method::UNDISSIPATED, jump, TRADE_SPACING, COURANT)?;
     let found = runs.of(traded(transfer, jump))?;
@@ -156,7 +156,7 @@ pub(super) fn all(runs: &Runs, plan: &Plan) -> Result<Vec<Table>, StudyError> {
     Ok(tables)
 }
 
-/// A number of a run, or why there is none.
+/// A number of a run, or the reason why there is none.
 fn shown(run: Result<&Measured, StudyError>, value: impl Fn(&Measured) -> String) -> String {
     run.map_or_else(|_| "breaks down".into(), value)
 }
@@ -216,7 +216,7 @@ fn by_gamma(runs: &Runs) -> Result<Table, StudyError> {
     Ok(table)
 }
 
-/// `a, b, c` over the spacings.
+/// `a, b, c` for the spacings.
 fn over(
     runs: &Runs,
     spacings: &[f64],
@@ -317,7 +317,7 @@ fn judged(runs: &Runs, plan: &Plan) -> Result<Table, StudyError> {
     Ok(table)
 }
 
-/// Seconds of one run after the other, on one thread.
+/// Seconds of runs one after the other, on one thread.
 fn cost() -> Result<Table, StudyError> {
     let jump = Jump::of(1000.0);
     let mut table = Table::new(

@@ -1,4 +1,5 @@
-//! A path with two turning points: Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid joint.
+//! An equilibrium path with two turning points: Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid
+//! joint.
 
 use super::super::{Effort, StudyError};
 use crate::report::{Bound, Report};
@@ -11,7 +12,7 @@ const RISE: f64 = 0.5;
 const DEPTH: f64 = 0.25;
 const YOUNG: f64 = 1e6;
 
-/// Shallow bars are so to β², and the joint is a point; the load reaches over a quarter of the depth.
+/// The error of the shallow theory is β². The formula has a point joint; the load acts over a quarter of the depth.
 const SHALLOW: f64 = 0.03;
 
 /// Half of the frame, from its clamped foot to the joint, which slides down the plane of symmetry under half of the load, 100 λ.
@@ -28,7 +29,7 @@ fn toggle(cells: u32) -> Result<Simulation<2>, StudyError> {
         "tractions": [{"body": "bar", "region": joint, "traction": [0, -400.0 / DEPTH], "curve": [[-10, -10], [10, 10]]}]
     });
     let mut simulation: Simulation<2> = scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
-    // The bars rise: sheared, so that their ends stay on the walls.
+    // The bars rise. They are sheared, so that their ends stay on the walls.
     simulation.particles.position.iter_mut().for_each(|x| x[1] += RISE / LENGTH * x[0]);
     Ok(simulation)
 }
@@ -58,7 +59,7 @@ fn williams(displacement: f64) -> f64 {
     ei * (low / LENGTH).powi(2) * (slope - low / LENGTH * amplitudes(low).1) / 100.0
 }
 
-/// The path by the arc length, from the start over both turning points to where the bars are under tension.
+/// The path by arc length, from the start over both turning points until the bars are under tension.
 pub(super) fn snap_through(effort: Effort) -> Result<Report, StudyError> {
     let mut report = Report::new("snap-through of a toggle frame, by the length of its path", &["quantity", "cells in the depth"]);
     let depths: &[u32] = match effort {
@@ -68,7 +69,7 @@ pub(super) fn snap_through(effort: Effort) -> Result<Report, StudyError> {
     for &cells in depths {
         let (mut simulation, labels) = (toggle(cells)?, cells.to_string());
         let start = simulation.particles.by_id().position;
-        // The mean of the particles at the joint: its displacement, though the bars have a depth.
+        // The displacement of the joint is the mean over its particles, since the bars have a depth.
         let last = start.iter().fold(0.0_f64, |last, x| last.max(x[0]));
         let joint: Vec<usize> = (0..start.len()).filter(|&p| start[p][0] > last - 1e-6).collect();
         let (mut worst, mut loads, mut iterations, mut displacement) = (0.0_f64, Vec::new(), 0, 0.0);
@@ -82,7 +83,7 @@ pub(super) fn snap_through(effort: Effort) -> Result<Report, StudyError> {
         }
         let turns: Vec<f64> = loads.windows(3).filter(|l| (l[1] - l[0]) * (l[2] - l[1]) < 0.0).map(|l| l[1]).collect();
         report.push(&["turning points", &labels], turns.len() as f64, Bound::Between(2.0, 2.0));
-        // With four cells the bars are too soft to say so.
+        // With four cells the bars are too soft for the bound.
         let bound = if cells > 4 { Bound::AtMost(SHALLOW) } else { Bound::Reported };
         let limit = turns.first().copied().unwrap_or(f64::NAN);
         report.push(&["load against Williams', over the first limit load", &labels], worst / limit, bound);

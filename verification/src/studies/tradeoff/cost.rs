@@ -1,4 +1,4 @@
-//! A run of a simulation, and what it cost.
+//! A run of a simulation, and its cost.
 
 use super::setting::Setting;
 use crate::baseline::{Assembled, BFree, Pattern, assemble};
@@ -18,23 +18,23 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The most blocks assembled: 0.4 GB in 3D.
+/// The largest number of assembled blocks: 0.4 GB in 3D.
 const MOST_BLOCKS: usize = 5_000_000;
 
-/// An iteration keeps Newton's method quadratic if the linear solver leaves at most this part of what is left: the rest
-/// is the second order of Newton's own step.
+/// An iteration is quadratic if the linear solver leaves at most this share of the new residual: the rest is the second-order error of
+/// Newton's own step.
 const LINEAR_SHARE: f64 = 0.5;
 
-/// … and a run does, if this part of its iterations does, the last of each step left out.
+/// A run is quadratic if this share of its iterations is, without the last of each step.
 const QUADRATIC_SHARE: f64 = 0.9;
 
-/// What the round-off of a residual is, in units of eps times its magnitude.
+/// The round-off of a residual over its magnitude.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
-/// Systems may update the time that a thread has had a processor no more often.
+/// The longest interval at which systems update the processor time of a thread.
 const TICK: Duration = Duration::from_millis(10);
 
-/// What was evaluated.
+/// The counts of evaluations.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     pub steps: u64,
@@ -43,9 +43,9 @@ pub(super) struct Tally {
     pub linearizations: usize,
     pub products: usize,
     projections: usize,
-    /// Iterations but the last of each step.
+    /// Iterations without the last of each step.
     decisive: usize,
-    /// Those of them that the linear solver limits.
+    /// Decisive iterations limited by the linear solver.
     limited: usize,
 }
 
@@ -65,7 +65,7 @@ impl Tally {
         let limited = |one: &&bfree::solver::NewtonIteration| {
             one.residual > round_off && one.krylov.relative_residual > LINEAR_SHARE * one.ratio
         };
-        // The last one ends below the tolerance whatever limits it.
+        // The last iteration ends below the tolerance, whatever limits it.
         let before_last = newton.iterations.split_last().map_or(&[][..], |(_, before)| before);
         self.decisive += before_last.len();
         self.limited += before_last.iter().filter(limited).count();
@@ -77,20 +77,20 @@ impl Tally {
     }
 }
 
-/// What a run cost.
+/// The cost of a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cost {
     pub tally: Tally,
-    /// CPU seconds of its one thread, without the making of forces and the measuring of errors.
+    /// CPU seconds of its one thread, without the evaluation of forces and errors.
     pub seconds: f64,
-    /// What each evaluation takes, as first measured.
+    /// The first measured time of each evaluation.
     pub units: Units,
-    /// The most bytes at one time, by the plan.
+    /// The peak number of bytes, by the plan.
     pub bytes: u64,
 }
 
 impl Cost {
-    /// What was evaluated, each times what it takes, in seconds: untouched by what else the machine does.
+    /// The counts times the time of each evaluation, in seconds: independent of other load on the machine.
     pub fn counted(&self, units: &Units) -> f64 {
         let tally = &self.tally;
         units.shapes * tally.steps as f64
@@ -120,7 +120,7 @@ pub(super) fn drive<const D: usize>(
         let elapsed = start.elapsed();
         report.failed.iter().for_each(|attempt| tally.add_newton(&attempt.newton));
         match assembled {
-            // The run's own, but for Newton's method.
+            // The seconds of the run, with those of its Newton's method replaced by the assembled solution.
             Some((newton, by_matrix)) => {
                 let phases = report.seconds.seconds();
                 let own = phases[Phase::Newton as usize] / phases.iter().sum::<f64>().max(f64::MIN_POSITIVE);
@@ -138,7 +138,7 @@ pub(super) fn drive<const D: usize>(
     Ok(Cost { tally, seconds, units, bytes })
 }
 
-/// A force field with its values of the coming step made beforehand, so that they cost the step nothing.
+/// A force field with tabulated values for the next step, so that they cost the step nothing.
 fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) -> ForceField<D> {
     let (t, dt) = (simulation.clock.time(), simulation.clock.step());
     let particles = simulation.particles.by_id();
@@ -152,8 +152,8 @@ fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) 
     }))
 }
 
-/// The equilibrium of the coming step once more, beside the run, by a tangent that is assembled: what Newton's method
-/// does, and the seconds that it takes. Both solutions meet the same tolerance; the run goes on from its own.
+/// Solves the equilibrium of the next step once more, beside the run, with an assembled tangent. Returns the history of Newton's method and
+/// its seconds. Both solutions meet the same tolerance; the run continues from its own.
 fn assembled<const D: usize>(simulation: &Simulation<D>) -> Result<(NewtonHistory, f64), StudyError> {
     let prepared = Prepared::new(simulation)?;
     let equilibrium = prepared.equilibrium(simulation);
@@ -161,7 +161,7 @@ fn assembled<const D: usize>(simulation: &Simulation<D>) -> Result<(NewtonHistor
     let x = bytemuck::cast_slice_mut(&mut dphi);
     let settings = &simulation.settings.newton;
     let start = Thread::now();
-    // The pattern had fewer blocks at the start; a body that outgrows it goes on matrix-free.
+    // A moving body may exceed the limit of blocks that it met at the start; it then continues matrix-free.
     let (mut blocks, pool) = (BlockJacobi::<D>::default(), Pool::default());
     let report = match Pattern::new(&prepared.supports, prepared.nodes.len(), MOST_BLOCKS) {
         Ok(pattern) => {
@@ -181,12 +181,12 @@ pub(super) struct Units {
     linearization: f64,
     /// One product with the tangent.
     product: f64,
-    /// That for one particle.
+    /// One product with the tangent for one particle.
     pub product_of_one: f64,
 }
 
 impl Units {
-    /// The shorter times of both.
+    /// The shorter time of each evaluation.
     pub fn least(&self, other: &Self) -> Self {
         Self {
             shapes: self.shapes.min(other.shapes),
@@ -198,7 +198,7 @@ impl Units {
         }
     }
 
-    /// Measures them, and asks the plan for the most bytes at one time.
+    /// Measures the evaluations, and asks the plan for the peak number of bytes.
     pub fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<(Self, u64), StudyError> {
         let simulation = &arranged(simulation.clone())?;
         let prepared = Prepared::new(simulation)?;
@@ -252,7 +252,7 @@ fn best<R>(mut run: impl FnMut() -> R) -> f64 {
         let start = Thread::now();
         black_box(run());
         let wall = start.wall();
-        // What takes long is interrupted every time; what is short, the system's clock of processors does not see.
+        // Every long run is interrupted by other processes, and the processor clock is too coarse for short runs.
         best.min(if wall < TICK { wall.as_secs_f64() } else { start.elapsed() })
     })
 }

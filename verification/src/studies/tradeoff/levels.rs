@@ -1,4 +1,4 @@
-//! The key `accuracy`: whether its table is as accurate as it says, and each row dearer than the one before.
+//! The key `accuracy`: its rows must have the accuracy that they state, and each row must cost more than the one before.
 
 use super::measured::{Measured, Point};
 use super::problem::Problem;
@@ -7,15 +7,15 @@ use crate::report::{Bound, Report};
 use crate::studies::Effort;
 use bfree::scene::accuracy::{Accuracy, Level, levels};
 
-/// What an error may be over the one that was aimed for.
+/// The largest ratio of an error to the error aimed for.
 const MET: f64 = 1.1;
 
-/// In three dimensions, rows with more cells take minutes; at short effort, seconds.
+/// The most cells of a row in three dimensions: more take minutes at full effort, or seconds at short effort.
 fn most_cells_3d(effort: Effort) -> f64 {
     if effort == Effort::Full { 12.0 } else { 8.0 }
 }
 
-/// The words and the rows of the table; at full effort errors between the rows too.
+/// The settings of the words and the rows of the table; at full effort also of errors between the rows.
 pub(super) fn settings(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
     asked(effort)
         .into_iter()
@@ -29,7 +29,7 @@ pub(super) fn settings(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
         .collect()
 }
 
-/// By falling error.
+/// The requested accuracies, by falling error.
 fn asked(effort: Effort) -> Vec<Accuracy> {
     let named = |level: &Level| match level.name {
         Some("draft") => Accuracy::Draft,
@@ -50,7 +50,7 @@ fn asked(effort: Effort) -> Vec<Accuracy> {
     }
 }
 
-/// The report: order from word to word, and at full effort the errors that were aimed for, on problems without jumps.
+/// The report: the order of the words, and at full effort the errors aimed for, on problems without jumps.
 pub(super) fn report(all: &[Measured], effort: Effort) -> Report {
     let mut report = Report::new("the key `accuracy`", &["what", "accuracy", "problem"]);
     for measured in all {

@@ -1,4 +1,4 @@
-//! Settings with what came of them, and the front of those that nothing beats.
+//! Settings with their results, and the front of the settings that no other dominates.
 
 use super::cost::{Cost, Units};
 use super::problem::Problem;
@@ -6,30 +6,31 @@ use super::setting::{Origin, Setting, origin};
 use crate::report::chain;
 use crate::studies::StudyError;
 
-/// How often it is measured again what evaluations take.
+/// The number of repeated measurements of the evaluation times.
 const ROUNDS: usize = 4;
 
-/// What does better than the defaults by less than this is measured again beside them: by chance some of hundreds do.
+/// A setting that beats the defaults by less than this is measured again beside them: of hundreds, some do by chance.
 const DOUBTFUL: f64 = 0.9;
 
 /// A run that succeeded.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub setting: Setting,
-    /// Relative to the size of the answer.
+    /// The error, relative to the size of the answer.
     pub error: f64,
     pub cost: Cost,
-    /// What was counted, in products of one particle with the default functions.
+    /// The counted work, in products of one particle with the default functions.
     pub work: f64,
-    /// The least and the greatest work of all that were measured.
+    /// The least and the greatest measured work.
     pub scatter: [f64; 2],
-    /// The second least over the least.
+    /// The second least over the least work.
     pub again: f64,
 }
 
 impl Point {
-    /// How far `self` is from being dominated by `other`, below 1 if it is: the larger of the two ratios of error and work; that of work
-    /// alone where `other` errs no more. Errors are the same in every run; what of work is `scatter` is no difference.
+    /// The distance of `self` from being dominated by `other`, below 1 if it is: the larger of the two ratios of error and work, or the
+    /// ratio of work alone if `other` has no larger error. Errors are equal in every run; a difference of work within `scatter` does not
+    /// count.
     pub fn dominated(&self, other: &Self, scatter: f64) -> f64 {
         let (error, work) = (other.error / self.error, scatter * other.work / self.work);
         if error <= 1.0 { work } else { error.max(work) }
@@ -42,15 +43,15 @@ pub(super) struct Measured {
     /// Whether the answer has no jumps.
     pub smooth: bool,
     pub base: Point,
-    /// All that succeeded, the base first.
+    /// All successful runs, the base first.
     pub points: Vec<Point>,
-    /// Settings that failed, and why.
+    /// Settings that failed, with the reason.
     pub failures: Vec<(Setting, String)>,
 }
 
 impl Measured {
-    /// Runs the base and the settings, the first of which is the base; and measures what evaluations take again and again, so that a
-    /// time in which the machine is slow falls on no setting alone.
+    /// Runs the base and the settings, whose first is the base. Repeats the measurement of the evaluations in rounds, so that a slow period
+    /// of the machine affects all settings.
     pub fn of(problem: &dyn Problem, settings: &[Setting]) -> Result<Self, StudyError> {
         let (error, cost) = problem.run(&Setting::base())?;
         let (mut runs, mut failures) = (vec![(Setting::base(), error, cost)], Vec::new());
@@ -79,7 +80,7 @@ impl Measured {
         Ok(Self { failures, ..Self::from(problem, &runs, &units) })
     }
 
-    /// What came of the runs, by all that was measured of each.
+    /// The results of the runs, from all measurements of each.
     fn from(problem: &dyn Problem, runs: &[(Setting, f64, Cost)], units: &[Vec<Units>]) -> Self {
         let least = |units: &[Units]| units.iter().fold(units[0], |least, one| least.least(one));
         let unit = least(&units[0]).product_of_one;
@@ -95,7 +96,7 @@ impl Measured {
         Self { problem, smooth, base: points[0].clone(), points, failures: Vec::new() }
     }
 
-    /// Settings that seem to do a little better than what they are compared with, after that one.
+    /// The index of each setting that seems slightly better than its reference, after the index of that reference.
     fn doubtful(&self) -> impl Iterator<Item = (usize, usize)> {
         let of = |origin: Origin| self.points.iter().position(|point| point.setting.origin == origin);
         let scatter = self.scatter();
@@ -109,31 +110,31 @@ impl Measured {
         })
     }
 
-    /// How well the least work of a setting is found again: the second least over it, at worst over all settings. One setting's own is no
-    /// margin: of hundreds of pairs that differ in nothing, some always lie apart by more than that.
+    /// The reproducibility of the least work: the second least over the least, at worst over all settings. The value of one setting alone
+    /// is no margin: of hundreds of equal pairs, some always differ by more.
     pub fn scatter(&self) -> f64 {
         self.points.iter().map(|point| point.again).fold(1.0, f64::max)
     }
 
-    /// What the values of a knob are compared with: the base, or the defaults of the shape functions that have it; `None` where these
-    /// have failed.
+    /// The reference for the values of a knob: the base, or the defaults of the shape functions that have the knob; `None` if these have
+    /// failed.
     pub fn base_of(&self, knob: &str) -> Option<&Point> {
         let origin = origin(knob);
         self.points.iter().find(|point| point.setting.origin == origin)
     }
 
-    /// The points that nothing beats, from the cheapest to the most accurate.
+    /// The points that no other dominates, from the cheapest to the most accurate.
     pub fn front(&self) -> Vec<&Point> {
         front(self.points.iter().collect(), |point| point.work)
     }
 
-    /// The same by bytes in place of work.
+    /// The front by bytes in place of work.
     pub fn front_in_bytes(&self) -> Vec<&Point> {
         front(self.points.iter().collect(), |point| point.cost.bytes as f64)
     }
 }
 
-/// Those than which no other is both cheaper and more accurate, by rising price.
+/// The points for which no other is both cheaper and more accurate, by rising price.
 fn front(mut points: Vec<&Point>, price: impl Fn(&Point) -> f64) -> Vec<&Point> {
     points.sort_by(|a, b| price(a).total_cmp(&price(b)).then(a.error.total_cmp(&b.error)));
     let mut least = f64::INFINITY;
@@ -165,7 +166,7 @@ mod tests {
         assert_eq!(found, [(1.0, 0.5), (2.0, 0.2), (3.0, 0.1)]);
         let scatter = 1.2;
         assert!(points[5].dominated(&points[0], scatter) < 1.0 && points[1].dominated(&points[0], scatter) > 1.0);
-        // The same error for less work, by more than the scatter and by less; nothing dominates itself.
+        // An equal error with less work, by more than the scatter and by less; no point dominates itself.
         assert!(points[2].dominated(&points[1], scatter) < 1.0 && point(2.1, 0.5).dominated(&points[2], scatter) > 1.0);
         assert!(points.iter().all(|point| point.dominated(point, scatter) > 1.0));
     }

@@ -1,4 +1,4 @@
-//! Speed against accuracy: error, work, seconds and bytes over every knob of a scene, on four problems with known answers.
+//! Speed against accuracy: error, work, seconds and bytes for every knob of a scene, on four problems with known answers.
 
 mod cost;
 mod levels;
@@ -15,7 +15,7 @@ use measured::{Measured, Point};
 use problem::{Bar, Compaction, Manufactured, Problem};
 use setting::{BASE_LEVEL, COURANT, KNOBS, Origin, design, knobs, one_at_a_time};
 
-/// What the study shows.
+/// The summary in the list of studies.
 pub(super) const ABOUT: &str = "speed against accuracy: error, work, seconds and bytes over every knob of a scene, on four problems with known answers";
 
 fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
@@ -36,7 +36,7 @@ fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
     })
 }
 
-/// Runs the study, each problem on a thread of its own.
+/// Runs each problem on a thread of its own.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let effort = *effort;
     let problems = problems(effort)?;
@@ -58,7 +58,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     Ok(outcome)
 }
 
-/// All runs of a problem. Its sweeps take no other thread, so that seconds are those of one core.
+/// All runs of a problem. Its transfers use one thread, so that seconds are those of one core.
 fn measure(problem: &dyn Problem, effort: Effort) -> Result<Measured, String> {
     let settings =
         [one_at_a_time(problem, effort), design(problem, effort), levels::settings(problem, effort)].concat();
@@ -66,7 +66,7 @@ fn measure(problem: &dyn Problem, effort: Effort) -> Result<Measured, String> {
     one.install(|| Measured::of(problem, &settings).map_err(|error| chain(&*error)))
 }
 
-/// What the base is, in words.
+/// The base in words.
 fn base(problems: &[Box<dyn Problem>]) -> String {
     let sizes: Vec<_> = problems.iter().map(|one| format!("h = 1/{:.4} ({})", one.cells()[BASE_LEVEL], one.name())).collect();
     format!(
@@ -79,9 +79,9 @@ fn base(problems: &[Box<dyn Problem>]) -> String {
     )
 }
 
-/// Whether anything dominates the defaults: one knob at a time, and the combinations.
+/// Whether any setting dominates the defaults: one knob at a time, and the combinations.
 fn defaults(all: &[Measured], effort: Effort) -> Report {
-    // Decided by seconds: shown where there are few of them, as in every run of the short set.
+    // Seconds decide this; in the short set runs are short, so the value is only shown.
     let bound = if effort == Effort::Full { Bound::AtLeast(1.0) } else { Bound::Reported };
     let title = "the defaults are on the front: how far they are from being dominated in error and work, beyond the scatter of work, by what keeps \
                  Newton's method quadratic";
@@ -90,7 +90,7 @@ fn defaults(all: &[Measured], effort: Effort) -> Report {
         let (base, scatter) = (&measured.base, measured.scatter());
         let mut least = |what: &str, base: Option<&Point>, chosen: &dyn Fn(&Point) -> bool| {
             let others = measured.points.iter().filter(|point| point.cost.tally.quadratic() && chosen(point));
-            // Defaults that do not come to their end are dominated by all.
+            // Every setting dominates defaults that fail.
             let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other, scatter));
             let nearest = others.min_by(|a, b| dominated(a).total_cmp(&dominated(b)));
             if let Some(nearest) = nearest {
@@ -109,7 +109,7 @@ fn defaults(all: &[Measured], effort: Effort) -> Report {
     report
 }
 
-/// A setting, and its error and work over those of the defaults, the work as it scattered.
+/// A setting, with its error and work over those of the defaults, and the scatter of the work.
 fn by_how_much(base: &Point, other: &Point) -> String {
     let [least, greatest] = [other.scatter[0] / base.scatter[1], other.scatter[1] / base.scatter[0]];
     format!("{} (error ×{:.6}, work ×{least:.2} to {greatest:.2})", other.setting.name(), other.error / base.error)

@@ -5,12 +5,12 @@ use super::setting::{Origin, SHAPES};
 use crate::figure::Axis;
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 
-/// The sheets of the study.
+/// The pictures of the study.
 pub(super) fn sheets(all: &[Measured], knobs: &[(&'static str, String)]) -> Vec<Sheet> {
     vec![front(all), turned(all, knobs)]
 }
 
-/// Error against work for all problems, and against bytes for the last one; the key in a place of its own.
+/// Error against work for all problems, and against bytes for the last one; the key has its own panel.
 fn front(all: &[Measured]) -> Sheet {
     let mut panels: Vec<Panel> = all
         .iter()
@@ -58,7 +58,7 @@ fn diagram(measured: &Measured, price: &str, front: Vec<&Point>, of: impl Fn(&Po
     }
 }
 
-/// Each knob by itself: error against work, both as ratios to the defaults'.
+/// Each knob alone: error against work, both as ratios to those of the defaults.
 fn turned(all: &[Measured], knobs: &[(&'static str, String)]) -> Sheet {
     let curve = |k: usize, measured: &Measured, knob: &str| {
         let base = measured.base_of(knob);
@@ -91,7 +91,7 @@ fn turned(all: &[Measured], knobs: &[(&'static str, String)]) -> Sheet {
     }
 }
 
-/// A range that holds all points, and is wide enough for a ratio of 1.01 to look like nothing.
+/// A range that holds all points and is so wide that a ratio of 1.01 is invisible.
 fn window(curves: &[Curve], of: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
     let ratios = curves.iter().flat_map(|curve| &curve.points).map(of);
     ratios.fold((0.4, 2.5), |(low, high), ratio| (low.min(0.9 * ratio), high.max(1.1 * ratio)))

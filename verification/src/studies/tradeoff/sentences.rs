@@ -1,16 +1,16 @@
-//! What each knob costs, what it buys, where it stops paying: a sentence from the measured numbers.
+//! Sentences from the measured numbers: the cost of each knob, its gain, and the limit of that gain.
 
 use super::measured::{Measured, Point};
 use super::setting::Setting;
 use crate::table::Table;
 
-/// A smaller fall of the error does not pay.
+/// An error ratio above this does not pay.
 const PAYS: f64 = 0.95;
 
-/// Less work by a tenth.
+/// A work ratio below this is cheaper.
 const CHEAPER: f64 = 0.9;
 
-/// Less than a few ticks of the system's clock of processors says nothing.
+/// A duration of less than a few ticks of the processor clock is meaningless.
 const LEAST_SECONDS: f64 = 0.02;
 
 /// Ratios to the base over the problems: the geometric mean, the least, the greatest.
@@ -37,7 +37,7 @@ impl Ratio {
     }
 }
 
-/// One value of a knob, beside the base.
+/// One value of a knob, relative to the base.
 struct Value {
     name: String,
     error: Ratio,
@@ -46,13 +46,13 @@ struct Value {
     bytes: Ratio,
     /// Whether Newton's method stays quadratic on all problems.
     quadratic: bool,
-    /// Problems it was run on.
+    /// Number of problems in which it was run.
     problems: usize,
-    /// Where it failed.
+    /// The problems in which it failed.
     failed: Vec<&'static str>,
 }
 
-/// Everything measured of a knob, the base with it, by rising work.
+/// All measurements of a knob, including the base, by rising work.
 fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
     let mut names = vec![default];
     for measured in all {
@@ -120,7 +120,7 @@ fn shown(value: &str) -> String {
     value.replace('"', "")
 }
 
-/// Values that cost less than the default at an error that is the same within a percent, on every problem, with Newton's method quadratic.
+/// The values that cost less than the default on every problem, with an error equal within a percent and with Newton's method quadratic.
 pub(super) fn cheaper_at_equal_error(all: &[Measured], knobs: &[(&'static str, String)]) -> String {
     let mut found = Vec::new();
     for (knob, default) in knobs {
@@ -152,7 +152,7 @@ pub(super) fn sentence(all: &[Measured], knob: &str, default: &str) -> String {
         return format!("`{knob}`: at this effort only the default, {}, was run.{failures}", shown(default));
     }
     let Some(best) = values.iter().min_by(|a, b| a.error.mean.total_cmp(&b.error.mean)) else { return String::new() };
-    // The cheapest value whose error no dearer one lowers by more than PAYS.
+    // The cheapest value for which no dearer value lowers the error by more than PAYS.
     let enough = values.iter().enumerate().find(|(k, value)| {
         values[k + 1..].iter().all(|dearer| dearer.error.mean >= PAYS * value.error.mean)
     });

@@ -1,4 +1,4 @@
-//! What is varied: one knob at a time from the defaults, and a designed set of combinations.
+//! The varied settings: one knob at a time from the defaults, and a designed set of combinations.
 
 use super::problem::{LEVELS, Problem};
 use crate::studies::Effort;
@@ -7,10 +7,10 @@ use serde_json::Value;
 /// cΔt/h of the base.
 pub(super) const COURANT: f64 = 1.0;
 
-/// The level of h of the base.
+/// The level of the spacing of the base.
 pub(super) const BASE_LEVEL: usize = 2;
 
-/// Where a setting comes from.
+/// The origin of a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Origin {
     /// The defaults of the scene's types.
@@ -46,7 +46,7 @@ impl Setting {
         Self { origin: Origin::Knob(knob, value.into()), ..Self::base() }
     }
 
-    /// In a table.
+    /// The name in a table.
     pub fn name(&self) -> String {
         match &self.origin {
             Origin::Default => "defaults".into(),
@@ -59,7 +59,7 @@ impl Setting {
         }
     }
 
-    /// The value of the knob, if this is one.
+    /// The value of the knob `name`, if the setting varies that knob.
     pub fn of_knob(&self, name: &str) -> Option<&str> {
         match &self.origin {
             Origin::Knob(knob, value) if *knob == name => Some(value),
@@ -74,16 +74,16 @@ pub(super) struct Knob {
     pub key: &'static str,
     /// Its values as JSON; `$x` stands for x c/h.
     values: &'static [&'static str],
-    /// How many of them are tried at short effort.
+    /// The number of values tried at short effort.
     short: usize,
-    /// In how many dimensions it is tried.
+    /// The dimensions in which the knob is tried.
     dimensions: std::ops::RangeInclusive<usize>,
 }
 
 /// LME with its own defaults.
 const LME: &str = r#"{"lme":{}}"#;
 
-/// The knobs that are keys of a scene, but h and Δt. A value that is the default is passed over: that is the base.
+/// The knobs that are keys of a scene, without h and Δt. A default value is skipped, since it is the base.
 pub(super) const KNOBS: &[Knob] = &[
     Knob {
         key: "approximation",
@@ -141,24 +141,24 @@ pub(super) const KNOBS: &[Knob] = &[
     Knob { key: "solver.krylov.precision", values: &[r#""mixed""#, r#""double""#], short: 1, dimensions: 1..=3 },
 ];
 
-/// Names of the knobs that are no key with a default.
+/// Names of the knobs that are not keys with a default.
 pub(super) const SPACING: &str = "grid.spacing";
 pub(super) const STEP: &str = "time.step";
 pub(super) const TANGENT: &str = "tangent";
 
 const ASSEMBLED: &str = "assembled";
 
-/// The shape functions that have a knob which the base has not: its values are compared with the defaults of those.
+/// The shape functions with a knob that the base lacks. The defaults of these functions are the reference for its values.
 fn family(knob: &str) -> Option<&'static str> {
     knob.starts_with("approximation.lme.").then_some(LME)
 }
 
-/// What the values of a knob are compared with: the base, or a value of the knob `approximation`.
+/// The reference for the values of a knob: the base, or a value of the knob `approximation`.
 pub(super) fn origin(knob: &str) -> Origin {
     family(knob).map_or(Origin::Default, |shape| Origin::Knob("approximation", shown(shape)))
 }
 
-/// The setting that a knob is turned from.
+/// The setting in which a knob has its default.
 fn unturned(knob: &str) -> Setting {
     let keys = family(knob).map(|shape| format!("approximation={shape}"));
     Setting { keys: keys.into_iter().collect(), ..Setting::base() }
@@ -169,7 +169,7 @@ fn shown(value: &str) -> String {
     value.replace('"', "")
 }
 
-/// All knobs, each with the value that the base has.
+/// All knobs, each with its value in the base.
 pub(super) fn knobs(problem: &dyn Problem) -> Vec<(&'static str, String)> {
     let of_key = |knob: &Knob| {
         let default = problem.value(&unturned(knob.key), knob.key).map_or_else(String::new, |value| value.to_string());
@@ -181,7 +181,7 @@ pub(super) fn knobs(problem: &dyn Problem) -> Vec<(&'static str, String)> {
     knobs
 }
 
-/// The base, and one knob turned at a time.
+/// The base, and settings with one varied knob each.
 pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
     let full = effort == Effort::Full;
     let mut settings = vec![Setting::base()];
@@ -190,7 +190,7 @@ pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Settin
     let finest = if problem.dimension() < 3 { LEVELS } else { LEVELS - 1 };
     for level in if full { 0..finest } else { 1..2 } {
         if level != BASE_LEVEL {
-            // The time step stays.
+            // The time step stays the same.
             let courant = COURANT * cells[level] / cells[BASE_LEVEL];
             let value = format!("× {:.2}", cells[BASE_LEVEL] / cells[level]);
             let turned = Setting::turned(SPACING, value);
@@ -219,14 +219,14 @@ pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Settin
             settings.push(setting);
         }
     }
-    // In three dimensions the study `baseline` compares them: whole runs take minutes.
+    // In three dimensions whole runs take minutes, so the study `baseline` compares them.
     if problem.dimension() < 3 || !full {
         settings.push(Setting { assembled: true, ..Setting::turned(TANGENT, ASSEMBLED) });
     }
     settings
 }
 
-/// Whether a value of a scene is what stands in the JSON: 3 is 3.0.
+/// Whether a value of a scene equals the JSON: 3 is 3.0.
 fn is(value: &Value, json: &str) -> bool {
     serde_json::from_str(json).is_ok_and(|other: Value| *value == other || (value.is_f64() && value.as_f64() == other.as_f64()))
 }

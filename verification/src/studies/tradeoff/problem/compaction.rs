@@ -1,4 +1,4 @@
-//! The block that its own weight compacts (section 4.2), beside a fine run of Q8 finite elements through the same residual.
+//! The block compacted by its own weight (section 4.2), against a fine run of Q8 finite elements with the same residual.
 
 use super::{LEVELS, Problem, steps, whole_steps};
 use crate::elements::Elements;
@@ -22,7 +22,7 @@ const SAMPLES: u64 = 10;
 /// cΔt over the edge of an element.
 const FINE_COURANT: f64 = 0.5;
 
-/// The error is that of the displacement of all particles at ten times, over its size.
+/// The error is the relative error of the displacement of all particles at ten times.
 pub(in crate::studies::tradeoff) struct Compaction {
     pub end: f64,
     reference: Mutex<Reference>,
@@ -35,7 +35,7 @@ struct Reference {
 }
 
 impl Compaction {
-    /// Up to the time `end`, beside `elements`² elements.
+    /// The problem up to the time `end`, with `elements`² elements as reference.
     pub fn new(end: f64, elements: u32) -> Result<Self, StudyError> {
         let size = f64::from(elements).recip();
         let mut scene = scene();
@@ -117,7 +117,7 @@ impl Problem for Compaction {
             if !(now.clock.on_nominal() && done.is_multiple_of(every)) {
                 return Ok(());
             }
-            // A run that panicked while it held the reference would have ended the study.
+            // The lock is lost only if a run panicked while holding the reference, which would have ended the study.
             let mut reference = self.reference.lock().map_err(|_| "the reference is lost")?;
             let Reference { block, samples } = &mut *reference;
             let Some(sample) = samples.get((done / every - 1) as usize) else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Large strain along the axes of a square or a cube, under the body force that makes it a solution.
+//! Large strain along the axes of a square or a cube, under the body force of the manufactured solution.
 
 use super::{LEVELS, Problem, steps};
 use crate::manufactured::{AxisAligned, force_field, state};
@@ -14,7 +14,7 @@ use std::path::Path;
 const YOUNG: f64 = 1.0;
 const POISSON: f64 = 0.3;
 
-/// In `D` dimensions up to the time `end`; the error is the rms of the position there over the rms of the displacement.
+/// The problem in `D` dimensions up to the time `end`. The error is the rms error of the final position over the rms displacement.
 pub(in crate::studies::tradeoff) struct Manufactured<const D: usize> {
     pub name: &'static str,
     pub cells: [f64; LEVELS],

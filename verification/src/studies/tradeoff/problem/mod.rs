@@ -1,4 +1,4 @@
-//! The problems with known answers, as scenes that give no knob: what is not turned is the default of the scene's types.
+//! The problems with known answers, as scenes without knobs: every knob has the default of the scene's types.
 
 mod compaction;
 mod manufactured;
@@ -20,7 +20,7 @@ pub(super) const LEVELS: usize = 5;
 
 /// A problem with a known answer.
 pub(super) trait Problem: Sync {
-    /// What it is called.
+    /// The name in reports.
     fn name(&self) -> &'static str;
     /// 1, 2 or 3.
     fn dimension(&self) -> usize;
@@ -28,9 +28,9 @@ pub(super) trait Problem: Sync {
     fn cells(&self) -> [f64; LEVELS];
     /// The speed of pressure waves at rest.
     fn speed(&self) -> f64;
-    /// When the answer is looked at.
+    /// The time of the answer.
     fn end(&self) -> f64;
-    /// How often it is looked at: steps come in multiples of it.
+    /// The number of times at which the answer is compared; the number of steps is a multiple of it.
     fn samples(&self) -> u64 {
         1
     }
@@ -40,18 +40,18 @@ pub(super) trait Problem: Sync {
     }
     /// The scene without `grid.spacing`, `time` and any knob.
     fn scene(&self) -> Value;
-    /// The spacing that stands for so many cells, where the least extent of the body is no measure of what happens in it; else the key
-    /// `accuracy` chooses it.
+    /// The spacing for a number of cells, if the least extent of the body does not measure the motion in it. Otherwise the key `accuracy`
+    /// chooses the spacing.
     fn spacing_of(&self, _cells: f64) -> Option<f64> {
         None
     }
-    /// Runs it from a scene that is ready: the relative error, and the cost.
+    /// Runs a prepared scene. Returns the relative error and the cost.
     fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError>;
 
-    /// What evaluations take at the start of a run.
+    /// The times of the evaluations at the start of a run.
     fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError>;
 
-    /// The same of a setting.
+    /// The times of the evaluations for a setting.
     fn units(&self, setting: &Setting) -> Result<Units, StudyError> {
         self.units_of(&self.set(setting)?, setting)
     }
@@ -83,7 +83,7 @@ pub(super) trait Problem: Sync {
         Ok(scene)
     }
 
-    /// The value that a key has in the scene of a setting.
+    /// The value of a key in the scene of a setting.
     fn value(&self, setting: &Setting, key: &str) -> Option<Value> {
         let scene = self.set(setting).map_err(|error| chain(&*error)).ok()?;
         let scene = serde_json::to_value(scene).ok()?;

@@ -1,4 +1,4 @@
-//! The paper's jump of velocity in a bar (section 4.1), beside the exact solution.
+//! The paper's jump of velocity in a bar (section 4.1), against the exact solution.
 
 use super::{LEVELS, Problem, steps};
 use crate::riemann::{PSystem, State};
@@ -15,15 +15,15 @@ use std::path::Path;
 const YOUNG: f64 = 1e10;
 const POISSON: f64 = 0.3;
 const DENSITY: f64 = 2600.0;
-/// Where the jump is at the start, and the velocity to the left of it.
+/// The initial position of the jump, and the velocity to the left of it.
 const MIDDLE: f64 = 50.0;
 const JUMP: f64 = 10.0;
-/// Half of the bar, and room beyond it; its ends are not looked at, for this much.
+/// Half the length of the bar, the room beyond it, and the length at each end that the error omits.
 const HALF: f64 = 9.0;
 const ROOM: f64 = 1.2;
 const ENDS: f64 = 1.0;
 
-/// The error is ‖v − v_exact‖ over ‖v_exact‖, over the particles, when the fronts have run to 43 and 57 m.
+/// The error is ‖v − v_exact‖ over ‖v_exact‖, over the particles, when the fronts have reached 43 and 57 m.
 pub(in crate::studies::tradeoff) struct Bar {
     pub end: f64,
 }
@@ -75,7 +75,7 @@ impl Problem for Bar {
         })
     }
 
-    /// Cells between the fronts; a node in the middle, at the ends of the bar, and at those of the box.
+    /// Cells between the fronts, with nodes in the middle, at the ends of the bar, and at those of the box.
     fn spacing_of(&self, cells: f64) -> Option<f64> {
         let between_fronts = 2.0 * self.speed() * self.end;
         let common = 0.5 * ROOM;
