@@ -87,7 +87,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         let particles = self.laws.particles;
         let energies = self.supports.interpolate(dphi, |p, _, g| {
             let id = particles.id[p] as usize;
-            let at = admissible(compose(&g, &particles.displacement_gradient[p]))
+            let at = admissible(compose(&g, &particles.reference().displacement_gradient[p]))
                 .map_err(|source| Inadmissible { particle: id, source })?;
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at, &particles.start(p, self.laws.dt)))
         });
@@ -98,7 +98,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
-            let h_n = &particles.displacement_gradient[p];
+            let h_n = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
             let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: id, source })?;
             let f_n = (identity::<f64, D>() + h_n).norm();
