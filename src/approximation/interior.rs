@@ -99,6 +99,15 @@ impl Shipped<'_> {
         }
     }
 
+    /// The distance from a node of a cell to the edges of supports in the cell, in units of the spacing; 0 for functions that do not end
+    /// inside a cell, or that are cut off where they are small.
+    pub(crate) fn edge(&self) -> f64 {
+        match self {
+            Self::Gimp(_) | Self::Bspline(_) => self.radius().fract(),
+            Self::Linear | Self::Lme(_) => 0.0,
+        }
+    }
+
     /// Calls `visitor` with the concrete type of the functions, so that a loop over particles has no branch on the family.
     pub(crate) fn with(&self, visitor: impl InteriorVisitor) {
         match self {

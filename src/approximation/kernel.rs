@@ -25,7 +25,8 @@ pub(super) fn folded(
     x: f64,
     out: &mut AxisWeights,
 ) -> Result<(), ApproximationError> {
-    let (place, radius) = (Place::new(axis, x)?, kernel.radius());
+    let radius = kernel.radius();
+    let place = Place::new(axis, x)?.at_edge(radius.fract(), axis.round_off(x));
     // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
     let lower = (radius - place.below).ceil() as i64 - 1;
     let upper = (radius - place.above).ceil() as i64;

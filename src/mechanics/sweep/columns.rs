@@ -66,8 +66,8 @@ impl<'a> Family<'a> {
     /// The error of the first particle whose functions cannot be evaluated.
     pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), ApproximationError> {
         approximation::check(axis)?;
-        if let Some((_, radius)) = self.shipped {
-            f64::widest(Places { axis, radius, along });
+        if let Some((shipped, radius)) = self.shipped {
+            f64::widest(Places { axis, radius, edge: shipped.edge(), along });
         } else {
             along.spans.clear();
             for &x in &along.x {
@@ -131,13 +131,15 @@ fn span(list: &AxisWeights) -> [u32; 2] {
 struct Places<'a> {
     axis: &'a Axis,
     radius: f64,
+    /// See [`Shipped::edge`].
+    edge: f64,
     along: &'a mut Along,
 }
 
 impl WithLanes<f64> for Places<'_> {
     #[inline(always)]
     fn run<S: Lanes<X = f64>>(self, _: S) {
-        let Self { axis, radius, along } = self;
+        let Self { axis, radius, edge, along } = self;
         let count = along.x.len();
         along.cells.resize(count, 0);
         along.below.resize(count, 0.0);
@@ -147,7 +149,7 @@ impl WithLanes<f64> for Places<'_> {
         let last = f64::from(axis.cells);
         let places = along.cells.iter_mut().zip(&mut along.below).zip(&mut along.above);
         for (&x, ((cell, below), above)) in along.x.iter().zip(places) {
-            let place = Place::at(axis, axis.spacings(x).min(last));
+            let place = Place::at(axis, axis.spacings(x).min(last)).at_edge(edge, axis.round_off(x));
             (*cell, *below, *above) = (place.cell, place.below, place.above);
         }
         // Number of integers j ≥ 1 with j < R − d: nodes beyond the cell within the radius R.
