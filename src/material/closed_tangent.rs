@@ -15,7 +15,7 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
 /// let closed = law.closed(&identity(), &at, 1.0).ok_or("neo-Hooke has one")?;
-/// let with = Single::<f64>::default();
+/// let with = Single;
 /// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
 /// let (k, l, j) = (0, 1, 1);
 /// let mut unit = [[0.0; 2]; 2];
@@ -133,7 +133,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
     ///
     /// Example: [`Elastic::closed`](super::Elastic::closed).
     pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
-        tensor(&self.product(Single::<f64>::default(), &rows(l)))
+        tensor(&self.product(Single, &rows(l)))
     }
 
     /// The block of two nodes with gradients ∇_n N_I and ∇_n N_J:
