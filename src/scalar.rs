@@ -66,12 +66,11 @@ pub fn implicit<T: Real>(root: f64, slope: f64, residual: impl Fn(T) -> T) -> T 
 ///     a.iter().zip(b).fold(with.zero(), |sum, (&a, &b)| with.mul_add(a, b, sum))
 /// }
 ///
-/// let with = Single;
-/// assert_eq!(dot(with, &[1.0, 2.0], &[3.0, 4.0]), 11.0);
+/// assert_eq!(dot(Single, &[1.0, 2.0], &[3.0, 4.0]), 11.0);
 /// // (a + b)² − 2ab = a² + b², in one formula for numbers and lanes
 /// let (a, b) = (3.0, 4.0);
-/// let (sum, twice) = (with.add(a, b), with.add(a, a));
-/// assert_eq!(with.mul_sub(twice, b, with.mul(sum, sum)), dot(with, &[a, b], &[a, b]));
+/// let (sum, twice) = (Single.add(a, b), Single.add(a, a));
+/// assert_eq!(Single.mul_sub(twice, b, Single.mul(sum, sum)), dot(Single, &[a, b], &[a, b]));
 /// ```
 pub trait Arithmetic: Copy {
     /// The number, or the lanes.

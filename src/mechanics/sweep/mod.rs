@@ -53,7 +53,7 @@ type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, 
 type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync + 'a;
 
 /// `(group, u and L, rows)`: fills the rows of a group.
-pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync + 'a;
+pub(crate) type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;
 
 /// A [`Point`] function of one field.
 pub(crate) type Linear<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a;

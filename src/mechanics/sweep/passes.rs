@@ -2,7 +2,7 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Fill, Flow, Group, Linear, Number, Quadratic, Supports, Weights};
+use super::{Fill, Flow, Group, LANES, Linear, Number, Quadratic, Supports, Weights};
 use crate::parallel::First;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
@@ -38,17 +38,18 @@ impl<const D: usize> Supports<D> {
     /// [`Self::sweep`] for D plain numbers a node. It computes products with a tangent.
     pub(crate) fn product(&self, field: &[f64], flow: Flow, out: &mut [f64], point: &Linear<'_, D>) {
         self.pass();
-        let point = |group: Group<'_>, at: &[At<f64, D, D>], sums: &mut [At<f64, D, D>]| point(group, &at[0], &mut sums[0]);
+        let point =
+            |group: Group<'_>, at: &[At<f64, D, D>], sums: &mut [At<f64, D, D>]| point(group, &at[0], &mut sums[0]);
         either!(self, way => way.sweep::<D>(1, Some(field), flow, out, &point));
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(crate) fn fill_rows<Y: Send>(
+    pub(crate) fn fill_rows(
         &self,
         field: &[Vector<f64, D>],
         count: usize,
-        rows: &mut [Y],
-        fill: &Fill<'_, Y, D>,
+        rows: &mut [[f64; LANES]],
+        fill: &Fill<'_, D>,
     ) {
         self.pass();
         either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));

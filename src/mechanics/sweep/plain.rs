@@ -160,7 +160,7 @@ impl<const D: usize> Plain<D> {
         parts.into_iter().flatten().enumerate().for_each(|(p, result)| take(p, result));
     }
 
-    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), &|(b, rows)| {
             for (group, rows) in self.groups_of(b).zip(rows.chunks_mut(count)) {
                 let mut at = [At::zero()];

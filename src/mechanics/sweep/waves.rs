@@ -179,7 +179,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = rows;
         for block in &self.blocks {
@@ -187,7 +187,7 @@ impl<const D: usize> Tiled<D> {
             chunks.push(chunk);
             rest = behind;
         }
-        let one = |scratch: &mut Scratch<D, D>, (block, chunk): (&Block, &mut [Y])| {
+        let one = |scratch: &mut Scratch<D, D>, (block, chunk): (&Block, &mut [[f64; LANES]])| {
             let mut rows = chunk.chunks_mut(count);
             gathered(block, field, 1, Flow::GRADIENT, scratch, |group, at| {
                 if let Some(rows) = rows.next() {

@@ -1,8 +1,6 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed,
-};
+use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
 use crate::material::{Law, admissible};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Laws, Number, Product, Supports, add_quadratic, product};
@@ -37,7 +35,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[f64; LANES]]| {
+        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
             if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
