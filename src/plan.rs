@@ -12,7 +12,7 @@ use crate::mechanics::transfer::Projection;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::simulation::{Sharing, Simulation};
-use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
+use crate::solver::{Krylov, Preconditioning, direct_bytes, multigrid_bytes};
 use crate::tensor::{Tensor, Vector};
 use indicatif::BinaryBytes;
 use serde::Serialize;
@@ -219,10 +219,6 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     let scheme = &*settings.scheme;
     let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
-    let precision = match settings.newton.precision {
-        Precision::Double => "only with solver.krylov.precision = \"mixed\"",
-        Precision::Mixed => "of the linear systems; for shape functions that are products",
-    };
     let averages = simulation.bodies.iter().any(Body::averages);
     let mut all = Terms::<D, L>::planned(Given {
         loads,
@@ -238,7 +234,6 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
         ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
         ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
-        ("single precision", precision_used(supports) == Precision::Mixed, precision.into()),
     ]);
     all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
 }
@@ -265,11 +260,6 @@ fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, s
     }
 }
 
-/// The precision of the linear systems.
-fn precision_used<const D: usize>(supports: &Supports<D>) -> Precision {
-    supports.unit().map_or(Precision::Double, |_| Precision::Mixed)
-}
-
 fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     simulation: &Simulation<D, L, A>,
     supports: &Supports<D>,
@@ -289,9 +279,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         Krylov::Gmres { restart } => restart as usize + 5,
         Krylov::Automatic | Krylov::ConjugateGradient => 5,
     };
-    let precision = precision_used(supports);
-    let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
-    let share = if precision == Precision::Mixed { 2 } else { 1 };
+    let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports);
     let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
     let preconditioner = simulation.preconditioner().0;
     let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
@@ -300,7 +288,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     let averages = simulation.bodies.iter().any(Body::averages);
     // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
     let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
-    let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
+    let frozen_mean = supports.groups() * LANES * (frozen_rows(D) + 1) * size_of::<f64>();
     let asks = simulation.loads.field.is_some() && !moves;
     let followers = supports.extension().map_or(0, |extension| extension.bytes());
     let used: [(bool, &'static str, usize); 24] = [
@@ -330,11 +318,11 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (true, "frozen tangent", frozen),
         (averages, "particles: mean dilatation", of_mean),
         (averages, "frozen tangent: mean dilatation", frozen_mean),
-        (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
+        (!direct, "preconditioner: diagonal blocks", nodes * tensor),
         (followers > 0, "nodes that follow others, and their weights", followers),
         (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
         (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),
-        (true, "Krylov vectors", nodes * vector / share * krylov_vectors),
+        (true, "Krylov vectors", nodes * vector * krylov_vectors),
     ];
     let used = used.into_iter().filter(|(used, ..)| *used);
     used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()

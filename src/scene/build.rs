@@ -132,7 +132,6 @@ impl Scene {
                 max_iterations: newton.max_iterations as usize,
                 forcing: krylov.forcing,
                 krylov: krylov.method,
-                precision: krylov.precision,
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },

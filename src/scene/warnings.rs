@@ -70,13 +70,7 @@ impl Scene {
             .flat_map(|a| (0..a).map(move |b| (b, a)))
             .filter_map(|(a, b)| bodies.overlap(a, b))
             .collect();
-        all.extend(self.ghost_stiffness.map(|factor| {
-            format!(
-                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {} here. Remove the key; the next \
-                 release refuses it",
-                self.aggregates()
-            )
-        }));
+        all.extend(self.deprecated());
         all.extend(bodies.coincident());
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));
@@ -100,6 +94,18 @@ impl Scene {
             staircase(i, load).filter(|_| pixels)
         }));
         all
+    }
+
+    /// The deprecated keys that the scene has.
+    fn deprecated(&self) -> impl Iterator<Item = String> {
+        let ghost = self.ghost_stiffness.map(|factor| {
+            let replaced = self.aggregates();
+            format!("ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {replaced} here")
+        });
+        let precision = self.solver.krylov.precision.map(|_| {
+            "solver.krylov.precision is no longer used: all linear systems are solved in double precision".to_owned()
+        });
+        ghost.into_iter().chain(precision).map(|why| format!("{why}. Remove the key; the next release refuses it"))
     }
 
     /// Bodies whose volume may differ from that of their shape, with their numbers.
