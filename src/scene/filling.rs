@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::boundary::Face;
-use super::build::{dimension, vector};
+use super::build_error::vector;
 use super::particle_file;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
@@ -89,7 +89,7 @@ impl Scene {
         let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
-            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let shape = shape.build::<D>().ok_or_else(|| BuildError::dimension::<D>(&path))?;
             let velocity = common.unwrap_or_else(Vector::zeros);
             let seeds = fill(grid, &shape, self.filling(body))
                 .map_err(|source| BuildError::Fill { path: path.clone(), source })?;

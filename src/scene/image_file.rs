@@ -77,7 +77,7 @@ pub enum ImageFileError {
 impl ImageFile {
     /// The solid; `None` before the file has been read, and unless `min` and `max` have `D` components.
     pub(super) fn solid<const D: usize>(&self) -> Option<Pixels<D>> {
-        let [min, max] = [&self.min, &self.max].map(|x| super::shape::vector(x));
+        let [min, max] = [&self.min, &self.max].map(|x| super::vector::vector(x));
         Pixels::new(min?, max?, self.read.get()?.clone())
     }
 

@@ -7,6 +7,7 @@
 pub mod accuracy;
 pub mod body;
 pub mod boundary;
+pub mod curve;
 pub mod grid;
 pub mod image_file;
 pub mod keys;
@@ -23,12 +24,14 @@ pub mod transfer;
 mod build;
 mod build_error;
 mod filling;
+mod json;
 mod loading;
 mod overrides;
 mod place;
 mod read;
 mod scale;
 mod suggest;
+mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
