@@ -205,39 +205,9 @@ impl Scene {
         if let Some(ghost) = self.ghost_stiffness {
             problems.between("ghost_stiffness", ghost, 0.0, 1.0);
         }
-        if let Some(gravity) = &self.gravity {
-            gravity.check(&mut problems, dimension);
-        }
-        if let Some(damping) = &self.damping {
-            damping.check(&mut problems);
-        }
-        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
-            traction.check(&mut problems, &format!("tractions[{i}]"), &self.bodies, dimension);
-        }
-        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
-            pressure.check(&mut problems, &format!("pressures[{i}]"), &self.bodies, dimension);
-        }
+        self.check_loads(&mut problems, dimension);
         if let Some(initial) = &self.initial_velocity {
-            let regions = &initial.nodes;
-            problems.require(
-                !regions.is_empty(),
-                "initial_velocity.nodes",
-                "an empty list",
-                "must have at least one region",
-            );
-            for (i, body) in self.bodies.iter().enumerate().filter(|(_, body)| body.velocity.is_some()) {
-                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
-                problems.refuse(
-                    &format!("bodies[{i}].velocity"),
-                    format_args!("{:?}", body.velocity.iter().flatten().collect::<Vec<_>>()),
-                    allowed,
-                );
-            }
-            for (i, node) in problems.few("initial_velocity.nodes", regions).iter().enumerate() {
-                let path = format!("initial_velocity.nodes[{i}]");
-                node.region.check(&mut problems, &format!("{path}.region"), dimension);
-                problems.vector(&format!("{path}.velocity"), &node.velocity, dimension);
-            }
+            self.check_initial_velocity(initial, &mut problems, dimension);
         }
         self.solver.check(&mut problems, self.unsymmetric());
         self.output.check(&mut problems, &self.bodies, &self.grid);
@@ -391,6 +361,37 @@ impl Scene {
         self.aggregation = Some(self.aggregates());
         self.output.fields = Some(self.fields());
         self
+    }
+
+    fn check_loads(&self, problems: &mut Problems, dimension: usize) {
+        if let Some(gravity) = &self.gravity {
+            gravity.check(problems, dimension);
+        }
+        if let Some(damping) = &self.damping {
+            damping.check(problems);
+        }
+        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
+            traction.check(problems, &format!("tractions[{i}]"), &self.bodies, dimension);
+        }
+        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
+            pressure.check(problems, &format!("pressures[{i}]"), &self.bodies, dimension);
+        }
+    }
+
+    fn check_initial_velocity(&self, initial: &InitialVelocity, problems: &mut Problems, dimension: usize) {
+        let regions = &initial.nodes;
+        let path = "initial_velocity.nodes";
+        problems.require(!regions.is_empty(), path, "an empty list", "must have at least one region");
+        for (i, body) in self.bodies.iter().enumerate() {
+            if let Some(velocity) = &body.velocity {
+                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
+                problems.refuse(&format!("bodies[{i}].velocity"), format_args!("{velocity:?}"), allowed);
+            }
+        }
+        for (i, node) in problems.few(path, regions).iter().enumerate() {
+            node.region.check(problems, &format!("{path}[{i}].region"), dimension);
+            problems.vector(&format!("{path}[{i}].velocity"), &node.velocity, dimension);
+        }
     }
 
     fn check_bodies(&self, problems: &mut Problems) {
