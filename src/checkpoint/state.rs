@@ -11,9 +11,12 @@ use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
 
+/// The name of an array and its numbers.
+type NamedArray<'a> = (&'static str, Cow<'a, [f64]>);
+
 /// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
 /// stored. A new array is added here and in [`restore`].
-pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<(&'static str, Cow<'_, [f64]>)> {
+pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<NamedArray<'_>> {
     let Simulation {
         grid: _,
         approximation: _,
@@ -46,7 +49,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
     let held: Vec<f64> = (0..loads.prescribed.len()).map(|one| u8::from(held.contains(&one)).into()).collect();
-    let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
+    let mut arrays: Vec<NamedArray<'_>> = vec![
         ("id", id.into()),
         ("held", held.into()),
         (JOINED, joined.iter().flatten().map(|&body| f64::from(body)).collect()),
@@ -60,30 +63,30 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    if let Some(Kept {
-        position,
-        displacement_gradient,
-        dilatation,
-        motion,
-        rate,
-        velocity,
-        acceleration,
-        unbalanced,
-    }) = kept
-    {
-        let vectors =
-            [position, motion, rate, velocity, acceleration, unbalanced].map(|field| bytemuck::cast_slice(field));
-        arrays.extend(KEPT.into_iter().zip(vectors).map(|(name, numbers)| (name, numbers.into())));
-        arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
-        arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
-    }
-    // The loads of `borne` are those of the scene.
-    if let Some(Borne { loads: _, reactions, together, asked }) = borne {
-        let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
-        arrays.push((BORNE, std::iter::once(f64::from(u8::from(*together))).chain(forces).collect()));
-        arrays.push((BORNE_ASKED, bytemuck::cast_slice(asked).into()));
-    }
+    arrays.extend(kept.iter().flat_map(kept_arrays));
+    arrays.extend(borne.iter().flat_map(borne_arrays));
     arrays
+}
+
+/// The arrays of a grid that is kept.
+fn kept_arrays<const D: usize>(kept: &Kept<D>) -> Vec<NamedArray<'_>> {
+    let Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration, unbalanced } = kept;
+    let vectors = [position, motion, rate, velocity, acceleration, unbalanced];
+    let vectors = vectors.map(|field| bytemuck::cast_slice(field).into());
+    let mut arrays: Vec<NamedArray<'_>> = KEPT.into_iter().zip(vectors).collect();
+    arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
+    arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
+    arrays
+}
+
+/// The arrays of the last converged load step. Its loads are those of the scene.
+fn borne_arrays<const D: usize>(borne: &Borne<D>) -> [NamedArray<'_>; 2] {
+    let Borne { loads: _, reactions, together, asked } = borne;
+    let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
+    [
+        (BORNE, std::iter::once(f64::from(u8::from(*together))).chain(forces).collect()),
+        (BORNE_ASKED, bytemuck::cast_slice(asked).into()),
+    ]
 }
 
 /// `Simulation::joined`: pairs of bonded bodies.
