@@ -12,6 +12,7 @@ mod moments;
 mod pixels;
 mod polygon;
 mod quadrature;
+mod seeds;
 mod similar;
 mod surface;
 
@@ -24,11 +25,12 @@ pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;
 pub(crate) use fill::around;
-pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, Seed, fill};
+pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, fill};
 pub use half_space::HalfSpace;
 pub use layout::Layout;
 pub use pixels::{Mask, Pixels};
 pub use polygon::{Polygon, PolygonError};
+pub use seeds::Seed;
 pub use similar::{Similar, rotation};
 pub use surface::{Surface, SurfaceError};
 

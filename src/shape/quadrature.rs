@@ -7,7 +7,6 @@
 //! squares finds these volumes. In each box, a surface has D points with the centroid and the second moments of the surface.
 
 use super::cut::{End, Facet, Piece, around};
-use super::fill::THIN;
 use super::moments::{few, in_simplex, whole_box};
 use super::{EDGE, Layout, Seed, Shape};
 use crate::grid::indices;
@@ -22,6 +21,10 @@ const OF_SURFACES: [f64; 3] = [3e-5, 3e-5, 3e-4];
 
 /// The number of points along an axis of a piece of surface, and across the gap below the piece.
 const IN_GAP: u32 = 3;
+
+/// Parts below this fraction of a box have one particle, which is joined to a neighbour. Joining changes second moments, so the limit is
+/// smaller than that of regular particles.
+pub(super) const THIN: f64 = 1e-3;
 
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate, over the part of the solid in a box, every product of polynomials of this degree along each axis.
