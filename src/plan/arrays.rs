@@ -156,12 +156,16 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
         let asked = usize::from(self.keeps_grid) + usize::from(!self.has_inertia);
         let carries_over = !self.has_inertia && self.simulation.may_renew();
         vec![
-            particles(self.keeps_grid, "particles: x, H when the grid was new", vectors::<D>(1) + tensors::<D>(1)),
-            nodes(self.keeps_grid, "nodal fields: motion since then, its rate", motion),
+            particles(self.keeps_grid, "particles: x, H at the last grid reset", vectors::<D>(1) + tensors::<D>(1)),
+            nodes(self.keeps_grid, "nodal fields: motion since the grid reset, its rate", motion),
             // The positions on a kept grid, and in load steps the positions of the last step.
             particles(asks, "particles: x for a field of forces", vectors::<D>(asked)),
             // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
-            nodes(carries_over, "nodal fields: carried over", vectors::<D>(if self.keeps_grid { 3 } else { 2 })),
+            nodes(
+                carries_over,
+                "nodal fields: out-of-balance force",
+                vectors::<D>(if self.keeps_grid { 3 } else { 2 }),
+            ),
         ]
     }
 

@@ -148,7 +148,7 @@ impl Scene {
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
         Settings {
-            scheme: self.time.inertia.scheme(self.time.newmark()),
+            scheme: self.time.scheme().scheme(self.time.newmark()),
             lumping: self.time.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             aggregation: self.aggregates(),

@@ -80,7 +80,7 @@ impl Scene {
     ) -> Result<(), BuildError> {
         let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
             let mass = body.density * volume;
-            if self.time.inertia.has_inertia() {
+            if self.time.scheme().has_inertia() {
                 particles.push(x, velocity, volume, mass, number)
             } else {
                 particles.push_without_inertia(x, volume, mass, number)
@@ -106,8 +106,8 @@ impl Scene {
                 source: Box::new(source),
             })?;
             if read.velocities.is_some() {
-                let why = if !self.time.inertia.has_inertia() {
-                    Some("there is no inertia; remove its columns vx, … or the key time.inertia")
+                let why = if !self.time.scheme().has_inertia() {
+                    Some("there is no inertia; remove its columns vx, … or the key time.scheme")
                 } else {
                     let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
                     self.initial_velocity.as_ref().map(|_| twice)
@@ -161,7 +161,7 @@ impl Scene {
     /// bodies, and no lumped mass, not even in part.
     pub(super) fn is_integrated(&self) -> bool {
         let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
-        let lumped = self.time.inertia.has_inertia() && self.time.lumping() > 0.0;
+        let lumped = self.time.scheme().has_inertia() && self.time.lumping() > 0.0;
         !lumped && self.is_kept() && self.bodies.iter().all(gauss)
     }
 

@@ -109,7 +109,7 @@ impl Scene {
                     points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
                     // Each point lies inside the surface by a tolerance, in a cell that holds the body.
                     let x = facet.position - facet.normal * (shape::HAIR * grid.spacing);
-                    if self.time.inertia.has_inertia() {
+                    if self.time.scheme().has_inertia() {
                         particles.push(x, velocity.unwrap_or_else(Vector::zeros), 0.0, 0.0, number as u32);
                     } else {
                         particles.push_without_inertia(x, 0.0, 0.0, number as u32);

@@ -45,7 +45,7 @@ use crate::field::Field;
 use crate::material::{Law, Material, PLASTIC_STRAIN};
 use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::Loads;
-use crate::mechanics::schemes::LONG_STEPS;
+use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::mechanics::terms::Rayleigh;
 use crate::shape::Layout;
 use schemars::JsonSchema;
@@ -211,10 +211,10 @@ impl Scene {
         }
         self.solver.check(&mut problems, self.unsymmetric());
         self.output.check(&mut problems, &self.bodies, &self.grid);
-        if !self.time.inertia.has_inertia() {
+        if !self.time.scheme().has_inertia() {
             self.refuse_inertia(&mut problems);
         }
-        if self.time.inertia == time::Inertia::ArcLength {
+        if self.time.scheme() == Parameters::ArcLength {
             self.refuse_off_path(&mut problems);
         }
         problems
@@ -226,7 +226,7 @@ impl Scene {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
         let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
-        let consistent = self.time.inertia.has_inertia() && self.time.lumping() == 0.0;
+        let consistent = self.time.scheme().has_inertia() && self.time.lumping() == 0.0;
         let needed = long_steps || consistent || loads.into_iter().any(|load| load.surface.is_none());
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
@@ -235,7 +235,7 @@ impl Scene {
     /// in every step feels a wall from farther away.
     fn renewal(&self) -> Renewal {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
-        self.grid.renewed.unwrap_or(match self.time.inertia.has_inertia() {
+        self.grid.renewed.unwrap_or(match self.time.scheme().has_inertia() {
             false => Renewal::Strain(STATIC_STRAIN),
             true if flip && self.is_clamped() => Renewal::Strain(VIBRATION_STRAIN),
             true => Renewal::EveryStep,
@@ -265,7 +265,7 @@ impl Scene {
 
     /// The largest Courant number of pressure waves; infinite without inertia.
     fn courant(&self) -> f64 {
-        if !self.time.inertia.has_inertia() {
+        if !self.time.scheme().has_inertia() {
             return f64::INFINITY;
         }
         accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0)
@@ -286,8 +286,8 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn fields(&self) -> Vec<Field> {
-        let flows = self.laws().any(|law| law.memory().iter().any(|one| one.name == PLASTIC_STRAIN));
-        self.output.fields(self.time.inertia, flows)
+        let has_plastic_flow = self.laws().any(|law| law.memory().iter().any(|one| one.name == PLASTIC_STRAIN));
+        self.output.fields(self.time.scheme().has_inertia(), has_plastic_flow)
     }
 
     /// The laws of all bodies whose constants are allowed.
@@ -314,9 +314,9 @@ impl Scene {
     /// Refuses keys that have a meaning only with inertia.
     fn refuse_inertia(&self, problems: &mut Problems) {
         let mut refuse = |path: &str, value: &str| {
-            let inertia = time::word(self.time.inertia);
+            let scheme = time::word(self.time.scheme());
             let allowed =
-                format!("time.inertia is {inertia}, and without inertia it means nothing: remove one of the two");
+                format!("time.scheme is {scheme}, and without inertia it means nothing: remove one of the two");
             problems.refuse(path, value, allowed);
         };
         self.time.of_inertia().for_each(|(path, value)| refuse(path, &value));
@@ -331,7 +331,7 @@ impl Scene {
 
     /// Refuses features that the arc-length method cannot have: follower pressures, prescribed motion, and a grid reset in every step.
     fn refuse_off_path(&self, problems: &mut Problems) {
-        let allowed = "time.inertia is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
+        let allowed = "time.scheme is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
         for i in 0..self.pressures.len() {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
@@ -355,7 +355,7 @@ impl Scene {
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
         self.grid.renewed = Some(self.renewal());
-        if self.time.inertia.has_inertia() {
+        if self.time.scheme().has_inertia() {
             self.transfer.get_or_insert_default();
         }
         self.aggregation = Some(self.aggregates());

@@ -140,7 +140,7 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         }
         SceneError::Values(problems)
     };
-    let chosen = accuracy::lay_under(&mut json).map_err(placed)?;
+    let chosen = accuracy::set_keys(&mut json).map_err(placed)?;
     let scene: Scene = serde_path_to_error::deserialize(&json).map_err(|error| {
         let malformed = |steps: &[Step], message: &str| Malformed {
             path: path(steps),

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::shape::Shape as Drawn;
+use super::time::word;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
@@ -70,13 +71,7 @@ impl Scene {
             .flat_map(|a| (0..a).map(move |b| (b, a)))
             .filter_map(|(a, b)| bodies.overlap(a, b))
             .collect();
-        all.extend(self.ghost_stiffness.map(|factor| {
-            format!(
-                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {} here. Remove the key; the next \
-                 release refuses it",
-                self.aggregates()
-            )
-        }));
+        all.extend(self.deprecated_keys());
         all.extend(bodies.coincident());
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));
@@ -100,6 +95,22 @@ impl Scene {
             staircase(i, load).filter(|_| pixels)
         }));
         all
+    }
+
+    /// Notes on given keys that the next release refuses.
+    fn deprecated_keys(&self) -> Vec<String> {
+        let ghost_stiffness = self.ghost_stiffness.map(|factor| {
+            format!(
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {} here. Remove the key; the next \
+                 release refuses it",
+                self.aggregates()
+            )
+        });
+        let inertia = self.time.inertia.map(|_| {
+            let scheme = word(self.time.scheme());
+            format!("time.inertia is now called time.scheme, which is {scheme} here. Rename the key; the next release refuses it")
+        });
+        ghost_stiffness.into_iter().chain(inertia).collect()
     }
 
     /// Bodies whose volume may differ from that of their shape, with their numbers.

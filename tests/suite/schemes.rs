@@ -10,7 +10,7 @@ use std::sync::Arc;
 const FALL: &[&str] = &["gravity={\"acceleration\":[0,-0.01]}", "time.beta=null", "time.gamma=null"];
 
 fn generalized(rho: f64) -> String {
-    format!(r#"time.inertia={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
+    format!(r#"time.scheme={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
 }
 
 fn advance(simulation: &mut Simulation<2>, steps: usize) -> Result<(), Failure> {
@@ -72,7 +72,7 @@ fn a_moving_wall_arrives_and_its_work_is_counted() -> Result<(), Failure> {
         advance(&mut simulation, 30)?;
         Ok(simulation)
     };
-    let newmark = run("time.inertia=\"newmark\"")?;
+    let newmark = run("time.scheme=\"newmark\"")?;
     let top = |of: &Simulation<2>| of.particles.position.iter().map(|x| x[1]).fold(f64::MIN, f64::max);
     for rho in [0.6, 1.0] {
         let other = run(&generalized(rho))?;
@@ -143,9 +143,9 @@ fn what_is_newmarks_own_is_refused_elsewhere() {
     for (more, words) in [
         ("time.beta=0.25", "time.beta"),
         ("time.gamma=0.5", "time.gamma"),
-        ("time.inertia.generalized_alpha.spectral_radius=1.5", "time.inertia.generalized_alpha.spectral_radius"),
-        ("time.inertia.generalized_alpha.spectral_radius=-0.1", "must"),
-        ("time.inertia.generalized_alpha.radius=0.1", "radius"),
+        ("time.scheme.generalized_alpha.spectral_radius=1.5", "time.scheme.generalized_alpha.spectral_radius"),
+        ("time.scheme.generalized_alpha.spectral_radius=-0.1", "must"),
+        ("time.scheme.generalized_alpha.radius=0.1", "radius"),
     ] {
         let error = scene::<2>("rebound.json", &["time.beta=null", "time.gamma=null", &generalized(0.5), more])
             .expect_err(more)

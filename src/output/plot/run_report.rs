@@ -23,7 +23,7 @@ pub(super) fn title(report: Option<&Value>) -> String {
 
 /// Whether bodies had inertia according to the report; `true` if the report does not say.
 pub(super) fn has_inertia(report: Option<&Value>) -> bool {
-    let scheme = report.map(|report| Parameters::deserialize(&report["settings"]["time"]["inertia"]));
+    let scheme = report.map(|report| Parameters::deserialize(&report["settings"]["time"]["scheme"]));
     scheme.and_then(Result::ok).is_none_or(|scheme| scheme.has_inertia())
 }
 
