@@ -198,12 +198,12 @@ impl<const D: usize> Recorder<D> {
             [limited + one.counts.krylov_limited, stagnated + one.counts.krylov_stagnated]
         });
         let krylov_limit = simulation.settings.newton.max_krylov_iterations;
-        let moves = simulation.settings.scheme.has_inertia();
+        let has_inertia = simulation.settings.scheme.has_inertia();
         let seen = Watched {
             time,
             step: number,
             energies,
-            moves,
+            has_inertia,
             cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.renewed),
             lumped: simulation.settings.lumping >= 1.0,
             cost,
@@ -222,7 +222,8 @@ impl<const D: usize> Recorder<D> {
             found.iter().for_each(|warning| self.progress.warn(warning));
         }
         let Cost { newton, krylov, .. } = cost;
-        self.progress.show(time, Shown { step: number, newton, krylov, balance: moves.then_some(energies.balance) });
+        self.progress
+            .show(time, Shown { step: number, newton, krylov, balance: has_inertia.then_some(energies.balance) });
         Ok(())
     }
 
@@ -256,7 +257,7 @@ impl<const D: usize> Recorder<D> {
         report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         Ok(Summary {
             time,
-            moves: simulation.settings.scheme.has_inertia(),
+            has_inertia: simulation.settings.scheme.has_inertia(),
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
             krylov: simulation.krylov().0,

@@ -8,7 +8,7 @@ use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
 use crate::mechanics::kept::Renewal;
 use crate::particles::Particles;
-use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around, fill};
+use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use std::fmt::{Display, Formatter};
@@ -214,7 +214,7 @@ impl Scene {
             (0..2 * D).any(|face| {
                 let (k, upper) = (face / 2, face % 2 == 1);
                 let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
-                let there = (facet.position[k] - wall).abs() < HAIR * h && facet.normal[k] * outward > 0.5;
+                let there = (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5;
                 there && self.boundary.face(k, upper).holds_across(k)
             })
         };

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 pub const MAX_PIXELS: u64 = 1 << 27;
 
 /// Maximum number of bytes that deflate packs into one byte: a PNG file that claims more is broken.
-const DENSEST: u64 = 1032;
+const MAX_COMPRESSION: u64 = 1032;
 
 /// Pixels of a picture, or voxels of a scan, whose value lies in a range.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -183,7 +183,7 @@ fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ImageF
     }
     let pixels = product(&[width, height]).filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
     let asked = pixels.ok_or(ImageFileError::Size([width, height]))?;
-    if asked * kind.1 as u64 / 8 > DENSEST * found {
+    if asked * kind.1 as u64 / 8 > MAX_COMPRESSION * found {
         return Err(ImageFileError::Length { found, asked });
     }
     let mut bytes = vec![0; asked as usize];

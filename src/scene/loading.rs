@@ -108,7 +108,7 @@ impl Scene {
                 for facet in facets {
                     points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
                     // Each point lies inside the surface by a tolerance, in a cell that holds the body.
-                    let x = facet.position - facet.normal * (shape::HAIR * grid.spacing);
+                    let x = facet.position - facet.normal * (shape::SURFACE_DEPTH * grid.spacing);
                     if self.time.scheme().has_inertia() {
                         particles.push(x, velocity.unwrap_or_else(Vector::zeros), 0.0, 0.0, number as u32);
                     } else {

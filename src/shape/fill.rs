@@ -1,7 +1,7 @@
 //! Filling a solid with particles.
 
 use super::layout::{Points, between_middles};
-use super::quadrature::THIN;
+use super::quadrature::THIN_PART;
 use super::seeds::{Seed, Seeds};
 use super::{EDGE, Layout, Shape};
 use crate::grid::{Grid, indices};
@@ -80,7 +80,7 @@ impl Filling {
 const SLIVER: f64 = 0.1;
 
 /// Parts below this fraction of a box are round-off. A box that lacks no more than this fraction is full.
-const NOTHING: f64 = 1e-9;
+const VOLUME_ROUND_OFF: f64 = 1e-9;
 
 /// A shape that cannot be filled.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -222,7 +222,7 @@ impl<const D: usize> Parts<'_, D> {
 impl<'a, const D: usize> Content<'a, D> {
     /// The parts of a cell, or a whole cell if all its boxes are full.
     fn of(parts: Parts<'a, D>) -> Self {
-        let is_cut = parts.boxes.iter().any(|part| parts.share(part) < 1.0 - NOTHING);
+        let is_cut = parts.boxes.iter().any(|part| parts.share(part) < 1.0 - VOLUME_ROUND_OFF);
         if is_cut { Self::Parts(parts) } else { Self::Whole }
     }
 }
@@ -273,7 +273,7 @@ impl<'a, const D: usize> Filler<'a, D> {
             None => self.shape.part(&lower, &edges, self.grid.spacing).0,
         };
         let mut volumes = self.lower_corners(cell, self.how.pieces()).map(volume);
-        volumes.all(|volume| volume >= (1.0 - NOTHING) * edges.product())
+        volumes.all(|volume| volume >= (1.0 - VOLUME_ROUND_OFF) * edges.product())
     }
 
     /// The volume and the centroid of the shape in the boxes of a row of cells, if the shape computes them all at once. The boxes are in
@@ -315,7 +315,7 @@ impl<'a, const D: usize> Filler<'a, D> {
             let points: Option<Vec<_>> = corners.map(|lower| self.quadrature(&lower, self.how.degree)).collect();
             if let Some(boxes) = points {
                 let box_volume = self.edge(pieces).powi(D as i32);
-                return Parts { boxes, along: pieces, box_volume, full: &self.gauss, sliver: THIN };
+                return Parts { boxes, along: pieces, box_volume, full: &self.gauss, sliver: THIN_PART };
             }
         }
         let boxes = self.how.boxes();
@@ -328,7 +328,7 @@ impl<'a, const D: usize> Filler<'a, D> {
     /// The parts of a cell with one particle in each box, from the volume and the centroid in each box.
     fn parts_with_one_particle(&self, boxes: Vec<(f64, Vector<f64, D>)>) -> Parts<'_, D> {
         let along = self.how.boxes();
-        let one = |(volume, position)| vec![Seed { position, volume }];
+        let one = |(volume, position): (f64, Vector<f64, D>)| vec![Seed { position, volume }];
         Parts {
             boxes: boxes.into_iter().map(one).collect(),
             along,
@@ -368,9 +368,9 @@ impl<'a, const D: usize> Filler<'a, D> {
         let boxes = std::mem::take(&mut parts.boxes);
         for (i, part) in indices([u64::from(parts.along); D]).zip(boxes) {
             let share = parts.share(&part);
-            if share > 1.0 - NOTHING {
+            if share > 1.0 - VOLUME_ROUND_OFF {
                 self.fill_box(cell, i, &parts, seeds);
-            } else if share > NOTHING {
+            } else if share > VOLUME_ROUND_OFF {
                 seeds.add_part(id, part, share < parts.sliver);
             }
         }

@@ -40,7 +40,7 @@ use crate::tensor::Vector;
 pub(crate) const EDGE: f64 = 1e-9;
 
 /// The depth of surface points below the surface, relative to the spacing. So the points lie in the cell of the body in spite of round-off.
-pub(crate) const HAIR: f64 = 1e-6;
+pub(crate) const SURFACE_DEPTH: f64 = 1e-6;
 
 /// A piece of surface: its signed distance d, negative inside, and its outward unit normal n = ∇d.
 type Face<const D: usize> = (f64, Vector<f64, D>);
