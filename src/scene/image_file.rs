@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// Maximum number of pixels of a file.
-pub const MAX_PIXELS: u64 = 1 << 27;
+const MAX_PIXELS: u64 = 1 << 27;
 
 /// Maximum number of bytes that deflate packs into one byte: a PNG file that claims more is broken.
 const MAX_COMPRESSION: u64 = 1032;

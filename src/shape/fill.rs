@@ -191,6 +191,9 @@ struct Filler<'a, const D: usize> {
     gauss: Points,
 }
 
+/// The volume and the centroid of the part of a box in the shape.
+type Part<const D: usize> = (f64, Vector<f64, D>);
+
 /// The content of a cell.
 enum Content<'a, const D: usize> {
     Nothing,
@@ -278,7 +281,7 @@ impl<'a, const D: usize> Filler<'a, D> {
 
     /// The volume and the centroid of the shape in the boxes of a row of cells, if the shape computes them all at once. The boxes are in
     /// rows along the first axis.
-    fn boxes_of_row(&self, first: [u64; D]) -> Option<Vec<Vec<(f64, Vector<f64, D>)>>> {
+    fn boxes_of_row(&self, first: [u64; D]) -> Option<Vec<Vec<Part<D>>>> {
         let boxes = self.how.boxes();
         let edges = Vector::repeat(self.edge(boxes));
         let along = self.count[0] as usize * boxes as usize;
@@ -287,7 +290,7 @@ impl<'a, const D: usize> Filler<'a, D> {
     }
 
     /// The content of a cell. `row` has the boxes of its row of cells, if the shape computes them all at once.
-    fn content(&self, cell: [u64; D], row: Option<&[Vec<(f64, Vector<f64, D>)>]>) -> Content<'_, D> {
+    fn content(&self, cell: [u64; D], row: Option<&[Vec<Part<D>>]>) -> Content<'_, D> {
         if let Some(row) = row {
             let boxes = self.how.boxes() as usize;
             let of_cell = row.iter().flat_map(|row| row.iter().skip(cell[0] as usize * boxes).take(boxes));
@@ -326,9 +329,9 @@ impl<'a, const D: usize> Filler<'a, D> {
     }
 
     /// The parts of a cell with one particle in each box, from the volume and the centroid in each box.
-    fn parts_with_one_particle(&self, boxes: Vec<(f64, Vector<f64, D>)>) -> Parts<'_, D> {
+    fn parts_with_one_particle(&self, boxes: Vec<Part<D>>) -> Parts<'_, D> {
         let along = self.how.boxes();
-        let one = |(volume, position): (f64, Vector<f64, D>)| vec![Seed { position, volume }];
+        let one = |(volume, position): Part<D>| vec![Seed { position, volume }];
         Parts {
             boxes: boxes.into_iter().map(one).collect(),
             along,

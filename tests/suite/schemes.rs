@@ -2,6 +2,7 @@
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
+use bfree::scene::{Override, read_file};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use std::fmt::{Display, Formatter};
@@ -135,6 +136,24 @@ fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
     assert!((own.particles.kinetic_energy() / energy - 1.0).abs() < 1e-9);
     let (own, newmark) = (own.particles.by_id(), newmark.particles.by_id());
     assert!(own.position.iter().zip(&newmark.position).all(|(a, b)| (a - b).norm() < 1e-9));
+    Ok(())
+}
+
+/// The key `time.inertia` of an earlier version selects the scheme, with a note, unless `time.scheme` is given.
+#[test]
+fn the_old_key_of_the_scheme_is_read_with_a_note() -> Result<(), Failure> {
+    for (overrides, has_inertia) in [
+        (&[r#"time={"step":0.25,"end":1,"inertia":"none"}"#][..], false),
+        (&[r#"time={"step":0.25,"end":1,"scheme":"none","inertia":"newmark"}"#], false),
+        (&[r#"time={"step":0.25,"end":1,"inertia":"newmark"}"#], true),
+    ] {
+        let overrides: Result<Vec<Override>, _> = overrides.iter().map(|text| text.parse()).collect();
+        let scene = read_file("scenes/cook.json".as_ref(), &overrides?)?;
+        let simulation = scene.build::<2>("scenes".as_ref())?;
+        assert_eq!(simulation.settings.scheme.has_inertia(), has_inertia);
+        let warnings = scene.warnings(&simulation);
+        assert!(warnings.iter().any(|text| text.contains("time.inertia is now called time.scheme")), "{warnings:?}");
+    }
     Ok(())
 }
 
