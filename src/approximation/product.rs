@@ -1,6 +1,8 @@
 //! One-dimensional functions and their tensor product, which all separable families share.
 
-use super::{ApproximationError, Shipped, Support, Validate};
+use super::error::{ApproximationError, Validate};
+use super::shipped::Shipped;
+use super::support::Support;
 use crate::aggregation::Pieces;
 use crate::grid::{Axis, Grid, indices};
 use crate::tensor::Vector;

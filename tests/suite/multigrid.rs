@@ -19,7 +19,7 @@ pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Va
     let mut scene = json!({
         "grid": {"size": vec![2; D], "spacing": 1.0 / f64::from(cells)},
         "approximation": family,
-        "time": {"step": 0.2, "end": 1, "inertia": inertia},
+        "time": {"step": 0.2, "end": 1, "scheme": inertia},
         "bodies": [{
             "name": "block", "shape": {"box": {"min": min, "max": max}}, "density": 1,
             "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}, "particles_per_cell": 2
@@ -142,7 +142,7 @@ fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Fa
     let scene = json!({
         "grid": {"size": [2, 2], "spacing": 0.05},
         "approximation": "linear",
-        "time": {"step": 1, "end": 1, "inertia": "none"},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
         "bodies": [{"name": "ball", "shape": {"ball": {"center": [0.93, 0.93], "radius": 0.5}}, "density": 1,
                     "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}}],
         "gravity": {"acceleration": [0, -50]},

@@ -187,10 +187,10 @@ fn keys_of_inertia_are_refused() -> Result<(), Failure> {
         ("output.probes.0.field=\"acceleration\"", "output.probes[0].field"),
     ] {
         let error = scene::<2>(COLUMN, &[key]).expect_err(key).to_string();
-        let words = "time.inertia is \"none\", and without inertia it means nothing";
+        let words = "time.scheme is \"none\", and without inertia it means nothing";
         assert!(error.contains(path) && error.contains(words) && error.contains(key), "{key}: {error}");
         // With inertia these keys are allowed.
-        scene::<2>(COLUMN, &[key, "time.inertia=\"newmark\""])?;
+        scene::<2>(COLUMN, &[key, "time.scheme=\"newmark\""])?;
     }
     // Keys that are not given are absent, and the written scene can be read again.
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(COLUMN);

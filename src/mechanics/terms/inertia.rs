@@ -48,7 +48,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     fn planned(Given { scheme, lumping, .. }: Given<'_, D>) -> Vec<Reason> {
         let moves = scheme.has_inertia();
         let consistent = "only for time.lumping < 1; its projection is an iteration";
-        let why = |why: String| if moves { why } else { format!("time.inertia says none: {scheme}") };
+        let why = |why: String| if moves { why } else { format!("time.scheme says none: {scheme}") };
         vec![
             ("inertia, lumped", moves && lumping > 0.0, why(format!("time.lumping = {lumping}, {scheme}"))),
             ("inertia, consistent", moves && lumping < 1.0, why(consistent.into())),

@@ -153,10 +153,11 @@ const MULTIGRID_LEVEL: &str = "src/solver/preconditioner/multigrid/level.rs";
 const NONNEGATIVE: &str = "src/solver/nonnegative.rs";
 const CUT: &str = "src/shape/cut.rs";
 const FILL: &str = "src/shape/fill.rs";
+const SEEDS: &str = "src/shape/seeds.rs";
 const MOMENTS: &str = "src/shape/moments.rs";
 const LAYOUT: &str = "src/shape/layout.rs";
 const SURFACE: &str = "src/scene/filling.rs";
-const NOT_A_KNOT: &str = "src/approximation/not_a_knot.rs";
+const NOT_A_KNOT: &str = "src/approximation/bspline/not_a_knot.rs";
 const STATE: &str = "src/checkpoint/state.rs";
 const CLOCK: &str = "src/clock.rs";
 const LOCAL_FORM: &str = "src/solver/preconditioner/multigrid/form.rs";
@@ -735,7 +736,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "inverse(&j) / -grid.spacing",
         "inverse(&j) / grid.spacing",
         Killed(&[PATCH, SHAPES, POINTS], &[DIGITS])),
-    patch("slope of the cubic spline by 1e-6", "src/approximation/bspline.rs",
+    patch("slope of the cubic spline by 1e-6", "src/approximation/bspline/uniform.rs",
         "distance * (c(1.5) * d - c(2.0))",
         "distance * (c(1.5) * d - c(2.0)) * c(1.0 + 1e-6)",
         Killed(&[PATCH, SHAPES], &[POINTS])),
@@ -751,7 +752,7 @@ pub(super) const PATCHES: &[Patch] = &[
         "rest * rest / c(4.0 * l)",
         "rest * rest / c(2.0 * l)",
         Killed(&[PATCH, SHAPES, POINTS], &[DYNAMICS])),
-    patch("hats of the wrong node", "src/approximation/interior.rs",
+    patch("hats of the wrong node", "src/approximation/linear.rs",
         "[values[M], values[M + 1]] = [above, below];",
         "[values[M], values[M + 1]] = [below, below];",
         Killed(&[PATCH, SHAPES, POINTS], &[DIGITS])),
@@ -908,36 +909,36 @@ pub(super) const PATCHES: &[Patch] = &[
         "volume / height(plane).abs()",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("a curved surface by one plane a box", CUT,
-        "(departure > flat * spacing || blurred || distinct.len() > MANY)",
-        "(distinct.len() > MANY)",
+        "departure <= flat * spacing && !may_be_confused(&planes, departure) &&",
+        "",
         Killed(&[SOLIDS], &[PATCH])),
     patch("the two sides of a thin part taken for each other", CUT,
         "cut.distance(plane, x).abs() <= 2.0 * cut.departure",
         "cut.distance(plane, x).abs() <= f64::INFINITY",
         Killed(&[SOLIDS], &[PATCH])),
-    patch("a sliver's volume lost", FILL,
+    patch("a sliver's volume lost", SEEDS,
         "*volume + small.volume",
         "*volume",
         Killed(&[SOLIDS], &[PATCH])),
     patch("slivers left alone", FILL,
-        "share < little",
+        "share < parts.sliver",
         "share < 0.0",
         Killed(&[SOLIDS], &[PATCH])),
     patch("particles of cut boxes for their whole box", FILL,
-        "Seed { position: centroid, volume }",
-        "Seed { position: centroid, volume: volume.max(0.5 * edges.product()) }",
+        "vec![Seed { position, volume }]",
+        "vec![Seed { position, volume: volume.max(0.5 * self.edge(along).powi(D as i32)) }]",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("particles of cut boxes in their corner", FILL,
-        "Seed { position: centroid, volume }",
-        "Seed { position: centroid - edges * 0.5, volume }",
+        "vec![Seed { position, volume }]",
+        "vec![Seed { position: position.add_scalar(-0.5 * self.edge(along)), volume }]",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("points of a simplex as in a cube", MOMENTS,
         "weight * u.powi(before as i32) * (before + 1) as f64",
         "*weight",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("cut cells integrated to one degree less", FILL,
-        "integrated(lower, how.degree)",
-        "integrated(lower, how.degree.saturating_sub(1))",
+        "self.quadrature(&lower, self.how.degree)",
+        "self.quadrature(&lower, self.how.degree.saturating_sub(1))",
         Killed(&[SOLIDS, ORDER], &[PATCH])),
     patch("the gap between planes and a curved surface left out", QUADRATURE,
         "foot.volume * weight * height",
