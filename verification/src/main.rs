@@ -31,7 +31,7 @@ struct Arguments {
     /// Write every cell, table and remark as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write CSV and SVG into this directory
+    /// Write tables as CSV, and pictures as SVG and PNG, into this directory
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -229,13 +229,13 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, fo
     text + &format!("({seconds:.0} s)\n")
 }
 
-/// Writes the pictures for print, as SVG and PNG.
+/// Writes the pictures, as SVG and PNG.
 fn draw(directory: &Path, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     for sheet in &outcome.sheets {
         let place = directory.join(sheet.name);
         let failed = |error| Failure { place: place.display().to_string(), source: error };
-        let svg = sheet.svg().map_err(|error| failed(io::Error::other(error)))?;
+        let svg = sheet.svg().map_err(|error| failed(io::Error::other(error.to_string())))?;
         let png = sheet.png(&svg).map_err(|error| failed(io::Error::other(error)))?;
         fs::write(place.with_extension("svg"), svg).map_err(failed)?;
         fs::write(place.with_extension("png"), png).map_err(failed)?;
@@ -273,7 +273,7 @@ fn document(finding: &Finding, result: &Result<Outcome, StudyError>) -> Value {
     }
 }
 
-/// Writes `<study>.csv`, or `<study>-1.csv`, … if there are several, and the figures under their names.
+/// Writes `<study>.csv`, or `<study>-1.csv`, … if there are several, and the pictures under their names.
 fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     let several = outcome.reports.len() + outcome.tables.len() > 1;
@@ -291,11 +291,5 @@ fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), F
     for report in &outcome.reports {
         write(&|bytes| report.write_csv(bytes))?;
     }
-    draw(directory, outcome)?;
-    for figure in &outcome.figures {
-        let path = directory.join(format!("{}.svg", figure.name));
-        let written = figure.svg().map_err(io::Error::other).and_then(|svg| fs::write(&path, svg));
-        written.map_err(writing(path.display().to_string()))?;
-    }
-    Ok(())
+    draw(directory, outcome)
 }

@@ -2,7 +2,7 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::elements::Elements;
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::report::{Bound, Report};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
@@ -79,7 +79,7 @@ const DRAWN: [(usize, usize); 5] = [(0, 2), (1, 3), (2, 4), (PAPER, 1), (5, 5)];
 type History = Vec<(f64, f64)>;
 
 fn particles(scene: &str, overrides: &[&str]) -> Result<History, StudyError> {
-    let mut simulation: Simulation<2> = shipped::scene(scene, overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation(scene, overrides)?;
     let start = simulation.particles.position.clone();
     let probe = Vector::from(PROBE);
     let watched = start.iter().position(|x| (x - probe).norm() < 1e-9).ok_or("no particle at the probe")?;
@@ -94,7 +94,7 @@ fn particles(scene: &str, overrides: &[&str]) -> Result<History, StudyError> {
 }
 
 fn elements(scene: &str) -> Result<History, StudyError> {
-    let scene: Simulation<2> = shipped::scene(scene, &[])?.build(&shipped::folder())?;
+    let scene: Simulation<2> = shipped::simulation(scene, &[] as &[&str])?;
     let body = scene.bodies.into_iter().next().ok_or("a scene without a body")?;
     let clock = Clock::new(scene.clock.nominal(), 0);
     let mut block = Elements::new(Vector::zeros(), scene.grid.spacing, [10, 10], body, clock)?;

@@ -44,8 +44,7 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
         format!("bodies.0.volumetric=\"{volumetric}\""),
         "output={}".to_owned(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<2> = shipped::scene("cook", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("cook", &overrides)?;
     let reference = Reference::of(&simulation);
     let start = simulation.particles.clone();
     let (mut newton, mut krylov) = (0, 0);

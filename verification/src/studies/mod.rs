@@ -1,6 +1,5 @@
 //! The studies: one file each, and one list.
 
-use crate::figure::Figure;
 use crate::known;
 use crate::report::{Counts, Report};
 use crate::sheet::Sheet;
@@ -25,8 +24,6 @@ pub struct Outcome {
     /// Remarks, in sentences.
     pub remarks: Vec<String>,
     /// Pictures.
-    pub figures: Vec<Figure>,
-    /// Pictures for print.
     pub sheets: Vec<Sheet>,
 }
 
@@ -99,7 +96,6 @@ studies!(
     memory,
     extremes,
     manufactured,
-    minimiser,
     order,
     riemann,
     compaction,

@@ -167,7 +167,7 @@ fn long_steps() -> Result<Report, StudyError> {
         for steps in [1_u32, 2, 5, 10, 20, 50, 100] {
             let step = format!("time.step={}", 1.0 / f64::from(steps));
             let overrides = [&step, "tractions.0.traction=[0,-7.5]", "output.probes=[]", "output.every=null"];
-            let simulation = shipped::scene("elastica", &overrides)?.build::<2>(&shipped::folder())?;
+            let simulation = shipped::simulation::<2>("elastica", &overrides)?;
             if reaches(simulation, steps, plain)? {
                 return Ok(f64::from(steps));
             }
@@ -229,7 +229,7 @@ const BEAM: f64 = 0.01;
 fn elastica() -> Result<Report, StudyError> {
     let mut report = Report::new("the elastica in ten load steps, by default settings", &["quantity", "PL²/EI"]);
     let overrides = ["grid.spacing=0.125", "output.probes=[]"];
-    let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("elastica", &overrides)?;
     let start = simulation.particles.by_id().position;
     let length = 20.0;
     for (load, along, down) in ELASTICA {
@@ -259,7 +259,7 @@ fn any_number_of_steps() -> Result<Report, StudyError> {
         let end = |steps: u32| -> Result<Vector<f64, 2>, StudyError> {
             let (step, family) = (format!("time.step={}", 1.0 / f64::from(steps)), format!("approximation={family}"));
             let overrides = [&step, &family, "output.probes=[]", "output.every=null"];
-            let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
+            let mut simulation: Simulation<2> = shipped::simulation("elastica", &overrides)?;
             let start = simulation.particles.by_id().position;
             while simulation.clock.nominal_steps() < u64::from(steps) {
                 simulation.advance()?;

@@ -3,7 +3,7 @@
 
 use super::bodies::{self, stir};
 use super::{Effort, Outcome, Report, StudyError, rows, solvable, worse};
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::prepared::Prepared;
 use crate::report::short;
 use crate::sheet::{Curve, Mark, Panel, Sheet};

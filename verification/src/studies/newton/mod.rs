@@ -1,10 +1,9 @@
-//! The convergence of Newton's method on steps of the rebound, against the paper's Table 3.
+//! The convergence of Newton's method on steps of the rebound. The study `rebound` compares with the paper's Table 3.
 
 mod difference;
 mod mass;
 
 use super::{Effort, Outcome, StudyError};
-use crate::figure::{Axis, Figure, Line};
 use crate::prepared::Prepared;
 use crate::report::{Bound, Report, chain, short};
 use crate::shipped;
@@ -14,12 +13,12 @@ use bfree::material::Material;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, gmres, newton,
 };
 use bfree::tensor::Vector;
 use difference::Difference;
 
-pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound, beside the paper's Table 3";
+pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound";
 
 /// A step of a scene, started from the converged state before it.
 struct Case {
@@ -37,10 +36,6 @@ const CASES: [Case; 3] = [
 
 const LUMPINGS: [(f64, &str); 4] = [(1.0, "1 (lumped)"), (0.5, "0.5"), (0.01, "0.01"), (0.0, "0 (consistent)")];
 
-/// The independent program at t = 21.80, ε = 1 (shared reference), and the paper's Table 3 at "t = 22.0".
-const REFERENCE: [f64; 3] = [1.3314e2, 1.778e-2, 1.18e-8];
-const TABLE_3: [f64; 3] = [1.3336e2, 2.0710e-2, 2.4353e-8];
-
 /// The method for products with the tangent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Product {
@@ -56,6 +51,38 @@ struct Method {
     name: &'static str,
     product: Product,
     forcing: Forcing,
+}
+
+impl Method {
+    /// Newton's method from `start`: its last iterate, its history, and why it ended without a solution.
+    fn solve(
+        &self,
+        equilibrium: &Equilibrium<'_, 2, Material>,
+        simulation: &Simulation<2>,
+        start: &[f64],
+    ) -> (Vec<f64>, NewtonHistory, Option<String>) {
+        let settings = NewtonSettings {
+            // The residual goes to round-off: the floor ends the iterations.
+            relative_tolerance: 0.0,
+            forcing: self.forcing,
+            krylov: Krylov::Gmres { restart: 200 },
+            ..simulation.settings.newton
+        };
+        let mut blocks = BlockJacobi::<2>::default();
+        let mut x = start.to_vec();
+        let pool = Pool::default();
+        let solved = match self.product {
+            Product::Exact => newton(equilibrium, &mut blocks, &mut x, &settings, &pool),
+            Product::Difference(step) => {
+                let problem = Difference { problem: equilibrium, length: step * simulation.grid.spacing };
+                newton(&problem, &mut blocks, &mut x, &settings, &pool)
+            }
+        };
+        match solved {
+            Ok(report) => (x, report.history, None),
+            Err(error) => (x, *error.history, Some(error.cause.to_string())),
+        }
+    }
 }
 
 /// A tight tolerance, at the limit of Krylov methods in double precision.
@@ -82,7 +109,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
                 }
                 let mut at = simulation.clone();
                 at.settings.lumping = lumping;
-                study.case(case, lumping, label, &at, effort)?;
+                study.case(case, label, &at, effort)?;
             }
             if lumping == 0.0 && *effort == Effort::Full {
                 study.consistent_alone(scene, label)?;
@@ -106,7 +133,7 @@ impl Case {
 /// A rebound at t = 0.
 fn rebound(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyError> {
     let lumping = format!("time.lumping={lumping}");
-    Ok(shipped::scene(scene, &[&lumping, RESTART])?.build::<2>(&shipped::folder())?)
+    shipped::simulation(scene, &[lumping.as_str(), RESTART])
 }
 
 /// Runs to the start of a step.
@@ -123,8 +150,6 @@ struct Study {
     runs: Report,
     converged: Report,
     orders: Report,
-    reference: Report,
-    figures: Vec<Figure>,
 }
 
 impl Study {
@@ -153,18 +178,12 @@ impl Study {
                 "order p of one Newton step from x* + s (x0 - x*): |R after| ~ |R before|^p",
                 &["step", "eps", "product", "residuals from", "to"],
             ),
-            reference: Report::new(
-                "lumped, v = 0.5, t = 21.8 against the independent program, relative difference (the paper's Table 3 printed beside)",
-                &["iteration", "here", "program", "paper"],
-            ),
-            figures: Vec::new(),
         }
     }
 
     fn case(
         &mut self,
         case: &Case,
-        lumping: f64,
         label: &str,
         simulation: &Simulation<2, Material>,
         effort: &Effort,
@@ -175,61 +194,26 @@ impl Study {
         prepared.prescribe(&mut start);
         self.spectra(case.name, label, simulation, &prepared, &start)?;
         let start: &[f64] = bytemuck::cast_slice(&start);
-        let mut lines = Vec::new();
         let mut solution = None;
         for method in &METHODS {
-            let settings = NewtonSettings {
-                // The residual goes to round-off: the floor ends the iterations.
-                relative_tolerance: 0.0,
-                forcing: method.forcing,
-                krylov: Krylov::Gmres { restart: 200 },
-                ..simulation.settings.newton
-            };
-            let (mut x, mut blocks, pool) = (start.to_vec(), BlockJacobi::<2>::default(), Pool::default());
-            let history = match method.product {
-                Product::Exact => newton(&equilibrium, &mut blocks, &mut x, &settings, &pool).map(|r| r.history).map_err(|e| (e.cause.to_string(), e.history)),
-                Product::Difference(step) => {
-                    let length = step * simulation.grid.spacing;
-                    newton(&Difference { problem: &equilibrium, length }, &mut blocks, &mut x, &settings, &pool)
-                        .map(|r| r.history)
-                        .map_err(|e| (e.cause.to_string(), e.history))
-                }
-            };
-            let history = match history {
-                Ok(history) => history,
-                Err((cause, history)) => {
-                    self.converged.note(format!("{}, eps = {label}, {}: {cause}", case.name, method.name));
-                    *history
-                }
-            };
-            let magnitude = equilibrium.magnitude(bytemuck::cast_slice(&x))?;
+            let (x, history, cause) = method.solve(&equilibrium, simulation, start);
+            if let Some(cause) = cause {
+                self.converged.note(format!("{}, eps = {label}, {}: {cause}", case.name, method.name));
+            }
+            let magnitude = NonlinearProblem::magnitude(&equilibrium, &x)?;
             let residuals: Vec<f64> =
                 history.first_residual.into_iter().chain(history.iterations.iter().map(|i| i.residual)).collect();
-            let krylov = history.iterations.iter().map(|iteration| iteration.krylov.iterations);
-            self.list(case, label, method.name, &residuals, &krylov.collect::<Vec<_>>(), magnitude);
+            let krylov: Vec<usize> = history.iterations.iter().map(|iteration| iteration.krylov.iterations).collect();
+            self.list(case, label, method.name, &residuals, &krylov, magnitude);
             let last = residuals.last().copied().unwrap_or(f64::NAN) / (f64::EPSILON * magnitude);
             let iterations = history.iterations.len().to_string();
             // Products by differences are shown for contrast; the program does not use them.
             let bound = if method.product == Product::Exact { Bound::AtMost(ROUND_OFF) } else { Bound::Reported };
             self.converged.push(&[case.name, label, method.name, &iterations], last, bound);
-            lines.push(Line {
-                name: method.name.into(),
-                points: residuals.iter().enumerate().map(|(k, &r)| (k as f64, r)).collect(),
-            });
             if method.forcing == TIGHT {
-                if lumping == 1.0 && case.end == 21.8 {
-                    self.compare(&residuals);
-                }
                 solution = Some(x);
             }
         }
-        self.figures.push(Figure {
-            name: format!("newton-{}-t{}-eps{lumping}", case.scene, case.end),
-            title: format!("{}, eps = {label}: residual by iteration", case.name),
-            x: Axis::linear("iteration"),
-            y: Axis::logarithmic("|R|"),
-            lines,
-        });
         if let Some(solution) = solution {
             self.single_steps(case, label, simulation.grid.spacing, &equilibrium, start, &solution, effort)?;
         }
@@ -308,20 +292,6 @@ impl Study {
         }
     }
 
-    fn compare(&mut self, residuals: &[f64]) {
-        // The last residual is the square of a residual times a curvature, so it doubles any relative difference. The circle of nodes of
-        // the independent program differs from the box in the fifth digit. The program gives two to five digits.
-        for (k, (reference, tolerance)) in REFERENCE.into_iter().zip([1e-3, 1e-2, 5e-2]).enumerate() {
-            let here = residuals.get(k).copied().unwrap_or(f64::NAN);
-            let shown = [here, reference, TABLE_3[k]].map(|x| format!("{x:.4e}"));
-            self.reference.push(
-                &[&k.to_string(), &shown[0], &shown[1], &shown[2]],
-                (here / reference - 1.0).abs(),
-                Bound::AtMost(tolerance),
-            );
-        }
-    }
-
     /// One Newton step from many distances to the solution. The order shows over all decades above round-off, even if the whole solution
     /// takes few iterations.
     #[allow(clippy::too_many_arguments)] // the ingredients of one experiment
@@ -343,7 +313,6 @@ impl Study {
             ("difference 1.5e-8", Product::Difference(1.5e-8)),
             ("difference 1e-3", Product::Difference(1e-3)),
         ];
-        let mut lines = Vec::new();
         for (name, product) in sides {
             let mut pairs = Vec::new();
             for k in 0..points {
@@ -365,15 +334,7 @@ impl Study {
             let ends = |k: Option<&(f64, f64)>| k.map_or_else(|| "-".into(), |pair| format!("{:.1e}", pair.0));
             let labels = [case.name, label, name, &ends(near.first()), &ends(near.last())].map(String::from);
             self.orders.push(&labels.each_ref().map(String::as_str), order(near).unwrap_or(f64::NAN), bound);
-            lines.push(Line { name: name.into(), points: pairs });
         }
-        self.figures.push(Figure {
-            name: format!("newton-step-{}-t{}-eps{}", case.scene, case.end, equilibrium.step.lumping),
-            title: format!("{}, eps = {label}: residual after one Newton step over residual before", case.name),
-            x: Axis::logarithmic("|R| before"),
-            y: Axis::logarithmic("|R| after"),
-            lines,
-        });
         Ok(())
     }
 
@@ -389,9 +350,8 @@ impl Study {
         ];
         Outcome {
             tables: vec![self.iterations, self.masses],
-            reports: vec![self.runs, self.reference, self.converged, self.orders],
+            reports: vec![self.runs, self.converged, self.orders],
             remarks,
-            figures: self.figures,
             ..Outcome::default()
         }
     }

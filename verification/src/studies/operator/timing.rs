@@ -280,7 +280,7 @@ fn rebound() -> Result<Table, StudyError> {
     let mut linear = None;
     for (name, choice) in [("linear", "approximation=\"linear\""), ("lme 3", "approximation={\"lme\":{\"gamma\":3}}")] {
         let seconds = {
-            let mut simulation: Simulation<2> = shipped::scene("rebound", &[choice])?.build(&shipped::folder())?;
+            let mut simulation: Simulation<2> = shipped::simulation("rebound", &[choice])?;
             let start = Instant::now();
             while simulation.clock.time() < 80.0 - 1e-9 {
                 simulation.advance()?;
