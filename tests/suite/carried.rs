@@ -1,17 +1,12 @@
 //! Grid resets: the state of the particles, the out-of-balance force and the reactions that the new grid takes over from the old one.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, apart, built, scene};
 use bfree::mechanics::loads::Pressing;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
-use std::path::Path;
 
 const EVERY_STEP: &str = r#"grid.renewed="every_step""#;
-
-fn build<const D: usize>(scene: &serde_json::Value) -> Result<Simulation<D>, Failure> {
-    Ok(bfree::scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
-}
 
 /// A short beam, bent by half of its length in eight load steps; its load follows `curve`.
 fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
@@ -32,12 +27,6 @@ fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
 
 /// The load grows up to t = 0.5 and is constant from then on.
 const RESTS: &str = "[[0,0],[0.5,1]]";
-
-/// The largest distance between the positions of a particle in the two simulations.
-fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
-    let (a, b) = (a.particles.by_id(), b.particles.by_id());
-    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
-}
 
 /// On a reset grid the stresses are out of balance. This out-of-balance force is carried over, so under constant loads nothing moves.
 #[test]

@@ -28,9 +28,6 @@ mod path;
 mod plasticity;
 mod points;
 mod program;
-#[path = "../../verification/src/random.rs"]
-#[allow(dead_code, reason = "the studies need more of it")]
-mod random;
 mod rebound;
 mod restart;
 mod runs;
@@ -43,7 +40,6 @@ mod storage;
 mod support;
 mod surfaces;
 mod sweep;
-mod symmetry;
 mod transfer;
 mod tutorial;
 mod warnings;

@@ -72,6 +72,11 @@ fn short(name: &str) -> String {
     name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")
 }
 
+/// The larger number, or NaN if either is NaN.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
 /// The list of studies. One word here registers a study.
 macro_rules! studies {
     ($($study:ident),* $(,)?) => {

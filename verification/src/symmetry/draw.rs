@@ -5,17 +5,8 @@ use super::transform::{Pair, Transformation};
 use crate::random::Random;
 use serde_json::{Value, json};
 
-/// Whether scenes use the stabilisation of nodes with little mass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Devices {
-    /// The program's default, and loads on surfaces of shapes.
-    Default,
-    /// No stabilisation with inertia; loads on particles.
-    Off,
-}
-
-/// The scene of a seed and its image.
-pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pair, String) {
+/// The scene of a seed and its image. With inertia no scene stabilises nodes with little mass, and loads act on particles.
+pub fn draw(seed: u64, transformation: Transformation) -> (Pair, String) {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let random = &mut random;
     let spacing = one_of(random, &[0.25, 0.2, 0.3]);
@@ -23,17 +14,7 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
     let inertia = scheme != Scheme::LoadSteps;
     let half = transformation == Transformation::Doubled;
     let held = !inertia || one_of(random, &[true, false]);
-    let (family_name, family) = family(random, half);
-    // Gauss's rule for quadratic functions has half cells at the ends of a body. So there are more particles along a cut and across a slab.
-    let regular = family_name == "uGIMP"
-        || family_name == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
-    let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
-    // Particles of uGIMP on grid lines have nodes at the edge of their support, and round-off decides which.
-    let on_lines = devices == Devices::Default || family_name != "uGIMP";
-    let (form_name, form) = form(random, spacing, transformation, held, on_lines);
-    // Points that integrate polynomials over cut cells differ from those of the mirror image.
-    let fills: &[&str] =
-        if devices == Devices::Off && layout == "gauss" { &["particles"] } else { &["cut", "particles"] };
+    let body = body(random, transformation, spacing, held);
     let law = law(random, half);
     let averaged = law.has_volumetric_part() && one_of(random, &[true, false]);
     let renewed = match transformation {
@@ -49,11 +30,11 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         origin: [0.0; 2],
         cells: [7, 8],
         spacing,
-        family,
-        layout,
-        fill: one_of(random, fills),
+        family: body.family.1,
+        layout: body.layout,
+        fill: one_of(random, body.fills),
         renewed,
-        bodies: vec![form.clone()],
+        bodies: vec![body.form.1.clone()],
         law,
         averaged,
         velocity: [if half { 0.0 } else { random.between(-2.0, 2.0) }, random.between(-2.0, 2.0)],
@@ -74,21 +55,46 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         blend: if half { None } else { one_of(random, &[None, Some(10.0)]) },
         damping: one_of(random, &[None, Some([1.0, 1e-4])]),
         // Without inertia only aggregation stabilises nodes with little mass.
-        aggregation: (devices == Devices::Off).then_some(!inertia),
+        aggregation: !inertia,
         forcing: 1e-9,
         slab: false,
     };
-    scene.load = load(random, &scene, &form, share, devices);
+    scene.load = load(random, &scene, &body.form.1, share);
     let name = format!(
-        "{}: {family_name}, {law:?}{}, {scheme:?}, {form_name}, {layout}, {}, renewed {}, load {}",
+        "{}: {}, {law:?}{}, {scheme:?}, {}, {}, {}, renewed {}, load {}",
         transformation.name(),
+        body.family.0,
         if averaged { " averaged" } else { "" },
+        body.form.0,
+        scene.layout,
         scene.fill,
         scene.renewed,
         scene.load.as_ref().map_or("none".to_owned(), |load| format!("{:?}", load.pressing)),
     );
     let choice = random.between(0.0, 512.0) as u32;
     (transformation.of(scene, choice), name)
+}
+
+/// The body of a scene: its shape functions and its form, each with its name, and its particles.
+struct Body {
+    family: (&'static str, Value),
+    form: (&'static str, Form),
+    layout: &'static str,
+    fills: &'static [&'static str],
+}
+
+fn body(random: &mut Random, transformation: Transformation, spacing: f64, held: bool) -> Body {
+    let family = family(random, transformation == Transformation::Doubled);
+    // Gauss's rule for quadratic functions has half cells at the ends of a body. So there are more particles along a cut and across a slab.
+    let regular = family.0 == "uGIMP"
+        || family.0 == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
+    let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
+    // Particles of uGIMP on grid lines have nodes at the edge of their support, and round-off decides which.
+    let on_lines = family.0 != "uGIMP";
+    let form = form(random, spacing, transformation, held, on_lines);
+    // Points that integrate polynomials over cut cells differ from those of the mirror image.
+    let fills: &[&str] = if layout == "gauss" { &["particles"] } else { &["cut", "particles"] };
+    Body { family, form, layout, fills }
 }
 
 fn steps_of_load(steps: u32) -> f64 {
@@ -191,7 +197,7 @@ fn faces(random: &mut Random, half: bool, held: bool, inertia: bool) -> [Option<
 }
 
 /// A traction or a pressure on the upper part of the body, or none.
-fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: Devices) -> Option<Load> {
+fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64) -> Option<Load> {
     let half = scene.faces[0].is_some();
     let across = if half { 0.0 } else { random.between(-10.0, 10.0) };
     let traction = Pressing::Traction([across, random.between(-15.0, 5.0)].map(|t| share * t));
@@ -210,6 +216,5 @@ fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: De
     // The region extends beyond the body, so that no particle lies on its edge; a half begins at its plane.
     let lower = if half { 0.0 } else { ends[0] - 0.1 * h };
     let region = Form::Box { min: [lower, top - 0.53 * h], max: [ends[1] + 0.1 * h, top + 0.1 * h] };
-    let carried = (devices == Devices::Off).then_some(([0.0, 1.0], 0.5 * h));
-    Some(Load { region, pressing, carried })
+    Some(Load { region, pressing, carried: ([0.0, 1.0], 0.5 * h) })
 }

@@ -19,7 +19,7 @@ mod small;
 mod strains;
 mod units;
 
-use super::{Effort, Outcome, StudyError};
+use super::{Effort, Outcome, StudyError, worse};
 use crate::report::{Bound, Report, chain};
 
 /// The summary in the list of studies.
@@ -41,7 +41,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     small::run(&mut outcome);
     durations::run(effort, &mut outcome)?;
     flight::run(effort, &mut outcome)?;
-    sliding::run(effort, &mut outcome)?;
+    sliding::run(&mut outcome)?;
     Ok(outcome)
 }
 
@@ -105,9 +105,4 @@ fn refused<T, E: std::error::Error>(
     // Without an answer there was no refusal.
     let value = if answered > 0 { f64::from(wrong) } else { f64::NAN };
     report.push(&[what, case, &beforehand], value, Bound::AtMost(0.0));
-}
-
-/// The larger number, or NaN if either is NaN.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }

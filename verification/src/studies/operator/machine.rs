@@ -1,4 +1,4 @@
-//! The limits of the processor per second: fused multiply-adds, copied bytes and read bytes, on one core.
+//! The limits of the processor per second: fused multiply-adds and copied bytes, on one core.
 
 use pulp::{Arch, Simd, WithSimd};
 use std::hint::black_box;
@@ -40,37 +40,6 @@ pub(super) fn peak() -> f64 {
         let start = Instant::now();
         let operations = Arch::new().dispatch(Chains);
         best.max(operations / start.elapsed().as_secs_f64())
-    })
-}
-
-/// The sum of an array, in independent chains.
-struct Sum<'a>(&'a [f64]);
-
-impl WithSimd for Sum<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f64 {
-        let (vectors, rest) = S::as_simd_f64s(self.0);
-        let mut sums = [simd.splat_f64s(0.0); CHAINS];
-        for vectors in vectors.chunks(CHAINS) {
-            for (sum, &vector) in sums.iter_mut().zip(vectors) {
-                *sum = simd.add_f64s(*sum, vector);
-            }
-        }
-        sums.iter().map(|&sum| simd.reduce_sum_f64s(sum)).sum::<f64>() + rest.iter().sum::<f64>()
-    }
-}
-
-/// Bytes per second when reading an array larger than the caches. This rate limits a product with a matrix in memory, which writes almost
-/// nothing.
-pub(super) fn read_bandwidth() -> f64 {
-    const NUMBERS: usize = 1 << 26;
-    let numbers = vec![1.0_f64; NUMBERS];
-    (0..7).fold(0.0, |best: f64, _| {
-        let start = Instant::now();
-        black_box(Arch::new().dispatch(Sum(black_box(&numbers))));
-        best.max((NUMBERS * size_of::<f64>()) as f64 / start.elapsed().as_secs_f64())
     })
 }
 

@@ -23,7 +23,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     if *effort == Effort::Full {
         timing::measure(&mut outcome)?;
     } else {
-        outcome.remarks.push("Full effort measures rates, steps, memory and assembled matrices beside them.".into());
+        outcome.remarks.push("Full effort measures rates, steps and memory; the study `baseline` has assembled matrices.".into());
     }
     Ok(outcome)
 }

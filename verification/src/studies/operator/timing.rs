@@ -2,18 +2,15 @@
 
 use super::general::General;
 use crate::settling::block;
-use super::machine::{copy_bandwidth, peak, read_bandwidth};
+use super::machine::{copy_bandwidth, peak};
 use super::work::Work;
-use crate::baseline::{BFree, Pattern, assemble};
 use crate::prepared::{Prepared, arranged};
 use crate::random::Random;
-use crate::shipped;
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::material::{Law, Material};
 use bfree::mechanics::sweep::{Points, Supports};
-use bfree::mechanics::tangent::frozen_bytes;
 use bfree::particles::Body;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
@@ -22,9 +19,6 @@ use bfree::solver::Precision;
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
-
-/// The largest number of assembled blocks: 1.1 GB in 3D.
-const MOST_BLOCKS: usize = 14_000_000;
 
 fn shapes() -> [(&'static str, Approximation); 2] {
     [("linear", Linear.into()), ("lme 3", Lme::new(3.0, 1e-6).into())]
@@ -45,10 +39,10 @@ pub(super) fn measure(outcome: &mut Outcome) -> Result<(), StudyError> {
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
     let tables = one.install(|| -> Result<Vec<Table>, String> {
         let all = || -> Result<Vec<Table>, StudyError> {
-            let (peak, copy, read) = (peak(), copy_bandwidth(), read_bandwidth());
-            let mut machine = Table::new("the machine, one core", ["GFLOP/s of multiply-adds", "GB/s copied (read and written)", "GB/s read"]);
-            machine.push([peak, copy, read].map(|rate| format!("{:.1}", rate / 1e9)));
-            Ok(vec![machine, products(peak, copy, &two)?, matrices(copy, read)?, steps()?, rebound()?, growth()?])
+            let (peak, copy) = (peak(), copy_bandwidth());
+            let mut machine = Table::new("the machine, one core", ["GFLOP/s of multiply-adds", "GB/s copied (read and written)"]);
+            machine.push([peak, copy].map(|rate| format!("{:.1}", rate / 1e9)));
+            Ok(vec![machine, products(peak, copy, &two)?, steps()?, growth()?])
         };
         all().map_err(|error| error.to_string())
     })?;
@@ -134,41 +128,6 @@ fn product<const D: usize, L: Law>(
         times(shape_functions),
     ]);
     Ok(())
-}
-
-/// The same product with an assembled matrix of 3×3 blocks.
-fn matrices(copy: f64, read: f64) -> Result<Table, StudyError> {
-    let mut table = Table::new(
-        "the product by an assembled block matrix, 3D",
-        ["shape", "particles", "share of copy bandwidth", "share of read bandwidth", "matrix / free, time", "matrix / free, bytes", "assembly, in free products"],
-    );
-    for ((name, shape), cells) in shapes().into_iter().zip([32, 16]) {
-        let simulation = block::<3>(shape, None, cells, 0.1, 1.0)?;
-        let prepared = Prepared::new(&simulation)?;
-        let equilibrium = prepared.equilibrium(&simulation);
-        let count = prepared.nodes.len();
-        let u: Vec<Vector<f64, 3>> = Random::new(11).field(count).iter().map(|x: &Vector<f64, 3>| x * 0.01).collect();
-        let start = Instant::now();
-        let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
-        let matrix = assemble(&equilibrium, &u, &pattern, &BFree)?;
-        let assembly = start.elapsed().as_secs_f64();
-        let tangent = equilibrium.tangent(&u)?;
-        let mut out = vec![Vector::zeros(); count];
-        let by_matrix = best(9, || matrix.product(&u, &mut out));
-        let free = best(9, || tangent.product(&u, &mut out));
-        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
-        let bytes = prepared.supports.bytes() + frozen;
-        table.push([
-            name.into(),
-            simulation.particles.len().to_string(),
-            format!("{:.0} %", 100.0 * matrix.bytes() as f64 / by_matrix / copy),
-            format!("{:.0} %", 100.0 * matrix.bytes() as f64 / by_matrix / read),
-            format!("{:.2}", by_matrix / free),
-            format!("{:.2}", matrix.bytes() as f64 / bytes as f64),
-            format!("{:.0}", assembly / free),
-        ]);
-    }
-    Ok(table)
 }
 
 /// Whole implicit steps.
@@ -274,21 +233,3 @@ fn growth() -> Result<Table, StudyError> {
     Ok(table)
 }
 
-/// The whole rebound, without output.
-fn rebound() -> Result<Table, StudyError> {
-    let mut table = Table::new("the rebound, 1600 steps, no output", ["shape", "s", "over linear"]);
-    let mut linear = None;
-    for (name, choice) in [("linear", "approximation=\"linear\""), ("lme 3", "approximation={\"lme\":{\"gamma\":3}}")] {
-        let seconds = {
-            let mut simulation: Simulation<2> = shipped::simulation("rebound", &[choice])?;
-            let start = Instant::now();
-            while simulation.clock.time() < 80.0 - 1e-9 {
-                simulation.advance()?;
-            }
-            start.elapsed().as_secs_f64()
-        };
-        let reference = *linear.get_or_insert(seconds);
-        table.push([name.into(), format!("{seconds:.2}"), format!("{:.2}", seconds / reference)]);
-    }
-    Ok(table)
-}
