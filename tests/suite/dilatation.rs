@@ -9,7 +9,6 @@ use bfree::output::Reference;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, determinant, identity};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 const MEAN: &str = r#"bodies.0.volumetric="mean_dilatation""#;

@@ -270,37 +270,6 @@ fn a_run_that_checks_its_tangent_finds_what_single_precision_cannot_hold() -> Re
     numbers_without_room_are_found::<3>()
 }
 
-fn blocks_are_columns<const D: usize>() -> Result<(), Failure> {
-    for closed in [true, false] {
-        let mut cloud = cloud::<D>(2.0, Fault::Nothing, closed, 1.0)?;
-        cloud.loads.surface = pressures(&[3], Vector::repeat(0.5));
-        for lumping in [1.0, 0.4, 0.0] {
-            let equilibrium = cloud.equilibrium(lumping, &[]);
-            let tangent = equilibrium.tangent(&cloud.increment())?;
-            let blocks = tangent.diagonal_blocks();
-            for (node, block) in blocks.iter().enumerate() {
-                for i in 0..D {
-                    let (mut unit, mut product) =
-                        (vec![Vector::zeros(); blocks.len()], vec![Vector::zeros(); blocks.len()]);
-                    unit[node][i] = 1.0;
-                    tangent.product(&unit, &mut product);
-                    let apart = (product[node] - block.column(i)).norm() / block.norm();
-                    assert!(apart < 1e-13, "{D}D, closed: {closed}, ε = {lumping}, node {node}: {apart:e}");
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// The linearisation is computed once, and product and blocks share its numbers. So no law can make one wrong and leave the other right.
-#[test]
-fn diagonal_blocks_are_the_columns_of_products_with_unit_vectors() -> Result<(), Failure> {
-    blocks_are_columns::<1>()?;
-    blocks_are_columns::<2>()?;
-    blocks_are_columns::<3>()
-}
-
 #[test]
 fn what_is_not_a_number_is_a_mismatch_at_its_node() -> Result<(), Failure> {
     for node in [0, 5] {

@@ -1,18 +1,17 @@
 //! Laws with plastic or viscous flow: closed forms at a point, and whole bodies that yield.
 
-use crate::support::{Failure, Random, restored, scene};
+use crate::support::{Failure, Random, output, restored, scene};
 use bfree::field::Field;
 use bfree::material::{
     Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters,
     Plastic, Start, Viscoelastic, VonMises,
 };
 use bfree::output::history::Energies;
-use bfree::output::Reference;
+use bfree::output::{Recorder, Reference};
 use bfree::scene::Problems;
 use bfree::simulation::Simulation;
 use bfree::solver::Krylov;
 use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 /// A material point, deformed step by step, with its internal variables.
@@ -347,6 +346,8 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
             assert_eq!(shown, solid.iter().map(kept).collect::<Vec<_>>());
             assert_eq!(shown.iter().any(|x| *x > 0.0), place.is_some());
         }
+        let folder = tempfile::tempdir()?;
+        Recorder::start(output(folder.path()), &start, Reference::of(&start))?;
         let header = std::fs::read_to_string(folder.path().join("history.csv"))?;
         let header = header.lines().next().unwrap_or_default().to_owned();
         assert!(header.contains("dissipated"), "{header}");

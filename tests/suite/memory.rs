@@ -6,7 +6,6 @@ use bfree::particles::Particles;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, contract, scaled};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 /// Ciarlet's solid softens with the largest strain energy W so far: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ. The

@@ -3,12 +3,12 @@
 mod random;
 mod wrong;
 
+use crate::support::built;
 use bfree::material::{Lame, NeoHookean};
 use bfree::particles::Particles;
 use bfree::plan::Plan;
 use bfree::scene::{self, Override, Scene, SceneError};
 use bfree::shape::fill;
-use bfree::simulation::Simulation;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,6 @@ use bfree::tensor::Vector;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-use std::path::Path;
 
 type Point<const D: usize> = Vector<f64, D>;
 

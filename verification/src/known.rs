@@ -323,7 +323,8 @@ pub const KNOWN: &[Known] = &[
 const SCENE_0: &str = "0: half and whole: linear, VonMises averaged, GeneralizedAlpha, box on grid lines, regular, cut, renewed {\"strain\":0.02}, load Pressure(-0.9060935652165885)";
 const SCENE_4: &str = "4: half and whole: linear, Viscoelastic averaged, Newmark, polygon, regular, cut, renewed {\"strain\":0.02}, load none";
 const SCENE_21: &str = "21: slab in 3D: uGIMP, DruckerPrager, LoadSteps, box off grid lines, regular, cut, renewed {\"strain\":0.02}, load Pressure(3.281869085026783)";
-const SCENE_13: &str = "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none";
+const SCENE_13: &str =
+    "13: units × powers of 2: cubic, VonMises, LoadSteps, polygon, regular, cut, renewed \"never\", load none";
 const SCENE_28: &str = "28: units × powers of 2: LME 1.4, VonMises averaged, LoadSteps, box on grid lines, regular, cut, renewed \"every_step\", load none";
 
 const CONSISTENT: &str = "0 (consistent)";

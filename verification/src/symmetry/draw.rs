@@ -8,7 +8,25 @@ use serde_json::{Value, json};
 /// The scene of a seed and its image. With inertia no scene stabilises nodes with little mass, and loads act on particles.
 pub fn draw(seed: u64, transformation: Transformation) -> (Pair, String) {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let random = &mut random;
+    let (scene, body) = scene(&mut random, transformation);
+    let name = format!(
+        "{}: {}, {:?}{}, {:?}, {}, {}, {}, renewed {}, load {}",
+        transformation.name(),
+        body.family.0,
+        scene.law,
+        if scene.averaged { " averaged" } else { "" },
+        scene.scheme,
+        body.form.0,
+        scene.layout,
+        scene.fill,
+        scene.renewed,
+        scene.load.as_ref().map_or("none".to_owned(), |load| format!("{:?}", load.pressing)),
+    );
+    let choice = random.between(0.0, 512.0) as u32;
+    (transformation.of(scene, choice), name)
+}
+
+fn scene(random: &mut Random, transformation: Transformation) -> (Scene, Body) {
     let spacing = one_of(random, &[0.25, 0.2, 0.3]);
     let scheme = one_of(random, &[Scheme::Newmark, Scheme::GeneralizedAlpha, Scheme::LoadSteps]);
     let inertia = scheme != Scheme::LoadSteps;
@@ -30,7 +48,7 @@ pub fn draw(seed: u64, transformation: Transformation) -> (Pair, String) {
         origin: [0.0; 2],
         cells: [7, 8],
         spacing,
-        family: body.family.1,
+        family: body.family.1.clone(),
         layout: body.layout,
         fill: one_of(random, body.fills),
         renewed,
@@ -60,19 +78,7 @@ pub fn draw(seed: u64, transformation: Transformation) -> (Pair, String) {
         slab: false,
     };
     scene.load = load(random, &scene, &body.form.1, share);
-    let name = format!(
-        "{}: {}, {law:?}{}, {scheme:?}, {}, {}, {}, renewed {}, load {}",
-        transformation.name(),
-        body.family.0,
-        if averaged { " averaged" } else { "" },
-        body.form.0,
-        scene.layout,
-        scene.fill,
-        scene.renewed,
-        scene.load.as_ref().map_or("none".to_owned(), |load| format!("{:?}", load.pressing)),
-    );
-    let choice = random.between(0.0, 512.0) as u32;
-    (transformation.of(scene, choice), name)
+    (scene, body)
 }
 
 /// The body of a scene: its shape functions and its form, each with its name, and its particles.

@@ -12,7 +12,6 @@ mod double;
 mod durations;
 mod flight;
 mod impossible;
-mod places;
 mod points;
 mod sliding;
 mod small;
@@ -23,7 +22,7 @@ use super::{Effort, Outcome, StudyError, worse};
 use crate::report::{Bound, Report, chain};
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, lone particles, time steps and overlaps at their extremes";
+pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, lone particles, time steps and overlaps at their extremes";
 
 /// The entry in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
@@ -37,7 +36,6 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.reports.push(crushed::run()?);
     outcome.reports.push(contrast::run()?);
     outcome.reports.push(units::run()?);
-    outcome.reports.push(places::run());
     small::run(&mut outcome);
     durations::run(effort, &mut outcome)?;
     flight::run(effort, &mut outcome)?;
