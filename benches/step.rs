@@ -1,7 +1,6 @@
 //! The parts of a step, in particles per second: `cargo bench --bench step`, with `-- product` behind it for one part.
 //!
-//! One thread; a jittered, strained block with 2^D particles per cell. The study `operator` of the verification compares the same parts
-//! with the limits of the machine.
+//! One thread; a jittered, strained block with 2^D particles per cell.
 
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;

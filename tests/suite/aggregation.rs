@@ -1,11 +1,10 @@
 //! Aggregation: outer nodes follow inner ones. Tests of the quantities that aggregation keeps exact, and of the errors that it removes.
 
-use crate::support::{Failure, Random, moved_in_column, scene};
+use crate::support::{Failure, Random, built, moved_in_column, scene};
 use bfree::aggregation::{Extension, Occupied, Pieces};
 use bfree::mechanics::check::direction;
 use bfree::mechanics::reference::Renewal;
 use bfree::plan::Plan;
-use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
@@ -135,7 +134,7 @@ fn bar(family: Value, offset: f64, traction: f64) -> Result<Simulation<2>, Failu
         "tractions": [{ "body": "bar", "region": { "half_space": { "point": [end, 0], "normal": [-1, 0] } }, "traction": [traction, 0] }],
         "solver": { "newton": { "tolerance": 1e-14 } }
     });
-    Ok(scene::read(&scene.to_string(), &[])?.build(".".as_ref())?)
+    built(&scene)
 }
 
 /// Under the former ghost penalty, a bar that ended on a grid line was 10 % too long. Its surface points had thirty times the stress of the

@@ -1,17 +1,12 @@
 //! Grid resets: the state of the particles, the out-of-balance force and the reactions that the new grid takes over from the old one.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, apart, built, scene};
 use bfree::mechanics::loads::Pressing;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
-use std::path::Path;
 
 const EVERY_STEP: &str = r#"grid.renewed="every_step""#;
-
-fn build<const D: usize>(scene: &serde_json::Value) -> Result<Simulation<D>, Failure> {
-    Ok(bfree::scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
-}
 
 /// A short beam, bent by half of its length in eight load steps; its load follows `curve`.
 fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
@@ -32,12 +27,6 @@ fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
 
 /// The load grows up to t = 0.5 and is constant from then on.
 const RESTS: &str = "[[0,0],[0.5,1]]";
-
-/// The largest distance between the positions of a particle in the two simulations.
-fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
-    let (a, b) = (a.particles.by_id(), b.particles.by_id());
-    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
-}
 
 /// On a reset grid the stresses are out of balance. This out-of-balance force is carried over, so under constant loads nothing moves.
 #[test]
@@ -135,7 +124,7 @@ fn reactions_go_on_over_renewals() -> Result<(), Failure> {
         ],
         "solver": {"newton": {"tolerance": 1e-12}}
     });
-    let mut simulation = build::<2>(&turned)?;
+    let mut simulation = built::<2>(&turned)?;
     let mut reactions = Vec::new();
     while simulation.clock.time() < 1.0 {
         reactions.push(simulation.step()?.reactions);
@@ -154,7 +143,7 @@ fn reactions_go_on_over_renewals() -> Result<(), Failure> {
 /// A stretched block. Its prescribed displacement is removed, and the force of that condition must not remain.
 #[test]
 fn what_a_body_has_lost_does_not_hold_it() -> Result<(), Failure> {
-    let mut simulation = build::<2>(&pressed(&["left"], -0.05))?;
+    let mut simulation = built::<2>(&pressed(&["left"], -0.05))?;
     while simulation.clock.time() < 0.5 {
         simulation.step()?;
     }
@@ -170,7 +159,7 @@ fn what_a_body_has_lost_does_not_hold_it() -> Result<(), Failure> {
 /// A block pressed on by another one, which is then taken away.
 #[test]
 fn a_body_that_has_parted_does_not_hold_another() -> Result<(), Failure> {
-    let mut simulation = build::<2>(&pressed(&["left", "right"], 0.1))?;
+    let mut simulation = built::<2>(&pressed(&["left", "right"], 0.1))?;
     while simulation.clock.time() < 0.5 {
         simulation.step()?;
     }
@@ -222,7 +211,7 @@ fn a_field_acts_where_a_body_has_come_to() -> Result<(), Failure> {
             "prescribed": [{"region": {"box": {"min": [0, 0], "max": [8, 3]}}, "displacement": [[0, [0, 0]], [1, [4, 0]]]}],
             "gravity": {"acceleration": [0, -1], "curve": [[0, 1], [1, 2]], "profile": {"along": [1, 0], "factor": [[0, 0], [8, 8]]}}
         });
-        let mut simulation = build::<2>(&moved)?;
+        let mut simulation = built::<2>(&moved)?;
         for _ in 0..4 {
             let particles = &simulation.particles;
             let moment: f64 = particles.position.iter().zip(&particles.mass).map(|(x, m)| m * x[0]).sum();

@@ -1,6 +1,6 @@
 //! The distance between the surfaces of two bodies when contact begins: the table of `docs/src/limits.md`, measured.
 
-use crate::support::{Failure, restored};
+use crate::support::{Failure, built, restored};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use serde_json::json;
@@ -69,7 +69,7 @@ fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
         "boundary": { "bottom": "fixed" },
         "gravity": { "acceleration": [0, -20], "curve": [[0, 0], [1, 1]] }
     });
-    let start: Simulation<2> = scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
+    let start: Simulation<2> = built(&scene)?;
     let mut simulation = start.clone();
     simulation.advance()?;
     assert_eq!(simulation.history.bonded(), &[[0, 1]].into());

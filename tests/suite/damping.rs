@@ -4,20 +4,16 @@ use crate::support::{Failure, scene};
 use bfree::approximation::{Approximation, Bspline};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Energy, FromEnergy, Lame, Material, NeoHookean};
-use bfree::mechanics::check::direction;
+use bfree::material::{Lame, Material, NeoHookean};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, Motion, Prescribed, Selection};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::Rayleigh;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
-use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
-use bfree::tensor::{Tensor, Vector, contract, trace};
-use num_dual::Dual64;
+use bfree::tensor::{Tensor, Vector};
 use std::f64::consts::PI;
-use std::num::NonZeroU64;
 
 /// Tight tolerances, so that only round-off remains.
 fn tight() -> NewtonSettings {
@@ -173,38 +169,6 @@ fn what_damping_takes_is_counted() -> Result<(), Failure> {
     Ok(())
 }
 
-/// St. Venant–Kirchhoff's law from its energy alone, without a closed form.
-struct Quadratic;
-
-impl Energy for Quadratic {
-    fn energy<T: Real>(&self, e: &Tensor<T, 3>) -> T {
-        T::lit(75.0) * trace(e) * trace(e) + T::lit(30.0) * contract(e, e)
-    }
-}
-
-fn checked<const D: usize>(name: &str, overrides: &[&str]) -> Result<(), Failure> {
-    let damping = [(0.5, 0.0), (0.0, 0.02), (0.5, 0.02)].map(|(mass, stiffness)| Rayleigh { mass, stiffness });
-    for (damping, lumping) in damping.iter().flat_map(|damping| [(damping, 0.6), (damping, 1.0)]) {
-        let lumping = format!("time.lumping={lumping}");
-        let mut simulation = scene::<D>(name, &[overrides, &[&lumping]].concat())?;
-        simulation.loads.damping = Some(*damping);
-        simulation.settings.check_tangent = NonZeroU64::new(1);
-        let mut general = simulation.clone().with_laws(|_| FromEnergy(Quadratic));
-        for _ in 0..10 {
-            simulation.advance()?;
-            general.advance()?;
-        }
-        assert!(simulation.dissipated > 0.0 && general.dissipated > 0.0);
-    }
-    Ok(())
-}
-
-#[test]
-fn the_tangent_of_damping_is_the_derivative_of_its_force() -> Result<(), Failure> {
-    checked::<2>("rebound.json", &["bodies.0.shape.ball.center=[1.6, 2.5]", "bodies.0.velocity=[-3,1]", "output={}"])?;
-    checked::<3>("ball_drop.json", &["output={}"])
-}
-
 #[test]
 fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), Failure> {
     let mut simulation = scene::<2>("rebound.json", &[])?;
@@ -227,23 +191,5 @@ fn a_body_that_turns_as_a_whole_is_not_damped_by_its_stiffness() -> Result<(), F
     let turning = forces(&|x| Vector::from([-(x[1] - 2.5), x[0] - 2.5]))?;
     let shearing = forces(&|x| Vector::from([x[1] - 2.5, x[0] - 2.5]))?;
     assert!(shearing > 1.0 && turning < 1e-13 * shearing, "{turning:e} {shearing:e}");
-    Ok(())
-}
-
-#[test]
-fn the_force_of_damping_is_the_gradient_of_its_potential() -> Result<(), Failure> {
-    let mut simulation = scene::<2>("rebound.json", &["time.lumping=0.5"])?;
-    simulation.particles.displacement_gradient.fill(Tensor::<f64, 2>::new(0.2, 0.3, -0.1, -0.15));
-    simulation.loads.damping = Some(Rayleigh { mass: 0.7, stiffness: 0.05 });
-    let dt = simulation.clock.step();
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    let nodal = Nodal::project(&simulation.particles, &supports, 0.5)?;
-    let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    let (dphi, u) = (direction::<2>(nodes.len(), 1), direction::<2>(nodes.len(), 2));
-    let seeded: Vec<_> = dphi.iter().zip(&u).map(|(x, u)| x.zip_map(u, |x, u| Dual64::new(0.01 * x, u))).collect();
-    let dphi: Vec<_> = dphi.iter().map(|x| x * 0.01).collect();
-    let slope = equilibrium.potential(&seeded).ok_or("all terms have one")??.0.eps;
-    let work: f64 = equilibrium.residual(&dphi)?.iter().zip(&u).map(|(r, u)| r.dot(u)).sum();
-    assert!((slope - work).abs() < 1e-11 * equilibrium.magnitude(&dphi)?, "{slope} {work}");
     Ok(())
 }

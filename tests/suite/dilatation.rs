@@ -1,16 +1,14 @@
 //! The mean dilatation of cells: its value, its internal variable, and the absence of locking.
 
-use crate::support::{Failure, scene};
-use bfree::checkpoint::{Checkpoints, Identity, restore};
+use crate::support::{Failure, restored, scene};
 use bfree::field::Field;
 use bfree::mechanics::schemes::Alphas;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
-use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::output::Reference;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, determinant, identity};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 const MEAN: &str = r#"bodies.0.volumetric="mean_dilatation""#;
@@ -167,25 +165,12 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
     }
     assert_eq!(found[0], found[1]);
     for after in [1, 3] {
-        let (folder, start) = (tempfile::tempdir()?, fresh()?);
-        let identity = Identity::new(Value::Null, &start.particles);
-        let settings = OutputSettings {
-            directory: folder.path().to_owned(),
-            fields: vec![Field::Pressure],
-            snapshot_every: None,
-            probes: vec![],
-            end_time: 1.0,
-            audience: Audience::Nobody,
-        };
+        let start = fresh()?;
         let mut simulation = start.clone();
-        let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
         for _ in 0..after {
             simulation.advance()?;
         }
-        let mut checkpoints = Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None);
-        checkpoints.write(&simulation, &mut recorder)?;
-        let mut continued = start.clone();
-        restore(folder.path(), &identity, &mut continued)?;
+        let mut continued = restored(&simulation, &start)?;
         run(&mut continued)?;
         assert_eq!(bits(&continued), found[0], "after {after} steps");
     }

@@ -1,5 +1,6 @@
 //! Five steps of 36 jittered particles in a corner, against an independent program (tests/reference/dynamics.json).
 
+use crate::support::Failure;
 use bfree::approximation::{Approximation, Linear, Lme, LmeCircle};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
@@ -11,8 +12,6 @@ use bfree::solver::{Forcing, NewtonSettings};
 use bfree::tensor::Vector;
 use serde_json::Value;
 use std::num::NonZeroU64;
-
-type Failure = Box<dyn std::error::Error>;
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)

@@ -1,19 +1,17 @@
 //! Laws with plastic or viscous flow: closed forms at a point, and whole bodies that yield.
 
-use crate::support::{Failure, Random, scene};
-use bfree::checkpoint::{Checkpoints, Identity, restore};
+use crate::support::{Failure, Random, output, restored, scene};
 use bfree::field::Field;
 use bfree::material::{
     Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters,
     Plastic, Start, Viscoelastic, VonMises,
 };
 use bfree::output::history::Energies;
-use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::output::{Recorder, Reference};
 use bfree::scene::Problems;
 use bfree::simulation::Simulation;
 use bfree::solver::Krylov;
 use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 /// A material point, deformed step by step, with its internal variables.
@@ -328,25 +326,12 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
             bits.push(memory.iter().map(|x| x.to_bits()).collect());
         }
         assert_eq!(bits[0], bits[1]);
-        let (folder, start) = (tempfile::tempdir()?, membrane(material, 4, &[])?);
-        let identity = Identity::new(Value::Null, &start.particles);
-        let settings = OutputSettings {
-            directory: folder.path().to_owned(),
-            fields: vec![Field::PlasticStrain, Field::DissipatedDensity],
-            snapshot_every: None,
-            probes: vec![],
-            end_time: 1.0,
-            audience: Audience::Nobody,
-        };
+        let start = membrane(material, 4, &[])?;
         let mut simulation = start.clone();
-        let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
         for _ in 0..2 {
             simulation.advance()?;
         }
-        let mut checkpoints = Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None);
-        checkpoints.write(&simulation, &mut recorder)?;
-        let mut continued = start.clone();
-        restore(folder.path(), &identity, &mut continued)?;
+        let mut continued = restored(&simulation, &start)?;
         run(&mut continued)?;
         let memory: Vec<u64> = continued.particles.by_id().memory.iter().map(|x| x.to_bits()).collect();
         assert_eq!(memory, bits[0]);
@@ -359,6 +344,8 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
             assert_eq!(shown, solid.iter().map(kept).collect::<Vec<_>>());
             assert_eq!(shown.iter().any(|x| *x > 0.0), place.is_some());
         }
+        let folder = tempfile::tempdir()?;
+        Recorder::start(output(folder.path()), &start, Reference::of(&start))?;
         let header = std::fs::read_to_string(folder.path().join("history.csv"))?;
         let header = header.lines().next().unwrap_or_default().to_owned();
         assert!(header.contains("dissipated"), "{header}");

@@ -1,6 +1,6 @@
 //! Total Lagrangian steps on one grid: the answer does not depend on the number of steps. Tests of the conditions for a grid reset.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, apart, built, scene};
 use bfree::mechanics::reference::Renewal;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
@@ -53,12 +53,6 @@ fn run<const D: usize>(simulation: &mut Simulation<D>) -> Result<Vec<bool>, Fail
         renewed.push(simulation.advance()?.renewed);
     }
     Ok(renewed)
-}
-
-/// The largest distance between the positions of a particle in the two simulations.
-fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
-    let (a, b) = (a.particles.by_id(), b.particles.by_id());
-    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
 #[test]
@@ -395,7 +389,7 @@ fn a_wall_that_is_met_holds_nobody_from_the_start() -> Result<(), Failure> {
         "bodies": [block("resting", [0.25, 0.0], 0.0), block("falling", [2.0, 0.5], -2.0)],
         "boundary": { "bottom": "fixed" }
     });
-    let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
+    let mut simulation: Simulation<2> = built(&scene)?;
     assert!(simulation.advance()?.renewed);
     assert!(simulation.history.constrained().contains(&0));
     let mut met = false;

@@ -1,10 +1,10 @@
 //! A scene costs only what it requires. Each feature that is left out saves passes over the particles or bytes, and increases neither. The
 //! size of the box around a body costs nothing.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, output, scene};
 use bfree::field::Field;
 use bfree::material::{ClosedTangent, Elastic, Lame, Law, Material, NeoHookean, Start};
-use bfree::output::{Audience, OutputSettings, Recorder, Reference};
+use bfree::output::{OutputSettings, Recorder, Reference};
 use bfree::particles::Body;
 use bfree::phases::Phase;
 use bfree::plan::Plan;
@@ -229,14 +229,8 @@ fn fields_not_asked_for_are_not_computed() -> Result<(), Failure> {
         (Some(vec![Field::Stress]), 2 * particles),
         (Some(vec![Field::Stress, Field::Pressure]), 4 * particles),
     ] {
-        let settings = OutputSettings {
-            directory: folder.path().to_owned(),
-            snapshot_every: fields.as_ref().map(|_| 0.1),
-            fields: fields.unwrap_or_default(),
-            probes: Vec::new(),
-            end_time: 1.0,
-            audience: Audience::Nobody,
-        };
+        let snapshot_every = fields.as_ref().map(|_| 0.1);
+        let settings = OutputSettings { snapshot_every, fields: fields.unwrap_or_default(), ..output(folder.path()) };
         let reference = Reference::of(&simulation);
         energies.store(0, Ordering::Relaxed);
         stresses.store(0, Ordering::Relaxed);

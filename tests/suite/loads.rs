@@ -2,6 +2,7 @@
 
 mod rotation;
 
+use crate::support::{Failure, built};
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
 use bfree::material::{Lame, Material, NeoHookean};
@@ -12,18 +13,10 @@ use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::terms::{ForceField, Step};
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
-use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
-use std::path::Path;
 use std::sync::Arc;
-
-type Failure = Box<dyn std::error::Error>;
-
-fn build<const D: usize>(scene: &serde_json::Value) -> Result<Simulation<D>, Failure> {
-    Ok(scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
-}
 
 /// A body that fills a box whose four faces all follow `table`.
 fn carried(table: &serde_json::Value, velocity: f64, step: f64) -> serde_json::Value {
@@ -43,7 +36,7 @@ fn carried(table: &serde_json::Value, velocity: f64, step: f64) -> serde_json::V
 #[test]
 fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<(), Failure> {
     let v = 0.05;
-    let mut simulation: Simulation<2> = build(&carried(&json!([[0, [v, 0]]]), v, 0.02))?;
+    let mut simulation: Simulation<2> = built(&carried(&json!([[0, [v, 0]]]), v, 0.02))?;
     let start = simulation.particles.position.clone();
     for _ in 0..50 {
         simulation.advance()?;
@@ -64,7 +57,7 @@ fn walls_of_constant_velocity_carry_the_body_without_straining_it() -> Result<()
 #[test]
 fn accelerating_walls_take_the_body_along_and_their_work_is_its_energy() -> Result<(), Failure> {
     // V(t) = 0.1 t is slow compared with waves, which cross the box in 2/√3000 = 0.037.
-    let mut simulation: Simulation<2> = build(&carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01))?;
+    let mut simulation: Simulation<2> = built(&carried(&json!([[0, [0, 0]], [1, [0.1, 0]]]), 0.0, 0.01))?;
     let mut reactions = Vector::zeros();
     for _ in 0..100 {
         reactions = simulation.advance()?.reactions.iter().map(|one| one.force).sum();
@@ -96,7 +89,7 @@ fn falling(step: f64, lumping: f64) -> serde_json::Value {
 #[test]
 fn a_load_present_at_the_start_acts_from_the_start() -> Result<(), Failure> {
     for (step, lumping) in [(0.02, 1.0), (0.005, 1.0), (0.02, 0.5)] {
-        let mut simulation: Simulation<2> = build(&falling(step, lumping))?;
+        let mut simulation: Simulation<2> = built(&falling(step, lumping))?;
         let start = simulation.particles.position.clone();
         while simulation.clock.time() < 0.2 - 1e-9 {
             simulation.advance()?;
@@ -115,7 +108,7 @@ fn a_load_present_at_the_start_acts_from_the_start() -> Result<(), Failure> {
 fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Result<(), Failure> {
     // A body of one cell: every node is prescribed, so v_p = Σ N V(t_{n+1}) = V(t_{n+1}) exactly.
     let moving = json!({"velocity": [[0, [0, 0]], [1, [3, 1]]]});
-    let mut simulation: Simulation<2> = build(&json!({
+    let mut simulation: Simulation<2> = built(&json!({
         "grid": {"size": [1, 1], "spacing": 1}, "time": {"step": 0.01, "end": 1}, "approximation": "linear",
         "bodies": [{"name": "load", "shape": {"box": {"min": [0.25, 0.25], "max": [0.75, 0.75]}}, "density": 1,
                     "material": {"neo_hookean": {"lambda": 10, "shear": 10}}}],
@@ -140,7 +133,7 @@ fn a_body_among_accelerating_walls_has_their_velocity_after_every_step() -> Resu
 /// (momentum, ∫ reactions dt, energy, work) of a bar between two walls that start at once with the velocity 1.
 fn struck(step: f64) -> Result<[f64; 4], Failure> {
     let moving = json!({"velocity": [[0, [1]]]});
-    let mut simulation: Simulation<1> = build(&json!({
+    let mut simulation: Simulation<1> = built(&json!({
         "grid": {"size": [2], "spacing": 0.1}, "time": {"step": step, "end": 0.1}, "approximation": {"lme": {}},
         "bodies": [{"name": "bar", "shape": {"box": {"min": [0.1], "max": [1.9]}}, "density": 1,
                     "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}, "particles_per_cell": 2}],
@@ -173,7 +166,7 @@ fn inflation(cells: u32, functions: &str) -> Result<f64, Failure> {
     let pressure = 0.02;
     let disc = |radius: f64| json!({"ball": {"center": [0, 0], "radius": radius}});
     let ring = json!({"difference": {"of": disc(1.5), "minus": disc(1.0)}});
-    let mut simulation: Simulation<2> = build(&json!({
+    let mut simulation: Simulation<2> = built(&json!({
         "grid": {"size": [2, 2], "spacing": 1.0 / f64::from(cells)},
         "time": {"step": 1, "end": 1, "scheme": "none"},
         "approximation": serde_json::from_str::<serde_json::Value>(functions)?,
@@ -228,7 +221,7 @@ fn a_traction_pulls_a_bar_to_its_static_stretch() -> Result<(), Failure> {
     // Uniaxial strain, P(F) = (Λ/2 + G)(F − 1/F) = T at rest.
     // The traction is small enough for the outermost particle, which carries all of it, to stay attached.
     let traction = 25.0;
-    let mut simulation: Simulation<1> = build(&json!({
+    let mut simulation: Simulation<1> = built(&json!({
         "grid": {"size": [3], "spacing": 0.125},
         "time": {"step": 0.05, "end": 20, "beta": 0.5, "gamma": 1.0},
         "bodies": [{"name": "bar", "shape": {"box": {"min": [0], "max": [2]}}, "density": 1,
@@ -302,7 +295,7 @@ fn a_uniform_field_is_gravity() -> Result<(), Failure> {
                     "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}}],
         "boundary": {"left": "fixed", "right": "fixed", "bottom": "fixed"}, "gravity": {"acceleration": [0, -9.81]}});
     for scene in [falling(0.02, 1.0), falling(0.02, 0.5), held] {
-        let mut by_gravity: Simulation<2> = build(&scene)?;
+        let mut by_gravity: Simulation<2> = built(&scene)?;
         let mut by_field = by_gravity.clone();
         let Some(Gravity { acceleration, curve }) = by_field.loads.gravity.take() else { return Err("gravity".into()) };
         by_field.loads.field = Some(ForceField(Arc::new(move |_, _, t| acceleration * curve.value(t))));
@@ -325,7 +318,7 @@ fn a_uniform_field_is_gravity() -> Result<(), Failure> {
 
 #[test]
 fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
-    let mut simulation: Simulation<2> = build(&falling(0.02, 1.0))?;
+    let mut simulation: Simulation<2> = built(&falling(0.02, 1.0))?;
     let gravity = simulation.loads.gravity.clone().ok_or("gravity")?;
     // The field depends on particle, position and time; the test detects an exchange of any of the three.
     let b = |id: usize, x: &Vector<f64, 2>, t: f64| Vector::from([0.1 * id as f64 + t, x[0] * x[1] - 2.0 * t]);
@@ -361,7 +354,7 @@ fn a_field_acts_on_each_particle_where_it_is_and_when() -> Result<(), Failure> {
 #[test]
 fn gravity_follows_its_profile() -> Result<(), Failure> {
     let falling = |profile: serde_json::Value| {
-        build::<2>(&json!({
+        built::<2>(&json!({
             "grid": {"size": [4, 4], "spacing": 0.5},
             "time": {"step": 0.01, "end": 1},
             "bodies": [{

@@ -1,14 +1,11 @@
 //! A law with internal variables: restarts, failed steps and reordering must keep them.
 
-use crate::support::{Failure, Random, scene};
-use bfree::checkpoint::{Checkpoints, Identity, restore};
+use crate::support::{Failure, Random, restored, scene};
 use bfree::material::{Lame, Law, NeoHookean, Remembered, Start};
-use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::particles::Particles;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, contract, scaled};
-use serde_json::Value;
 use std::num::NonZeroU64;
 
 /// Ciarlet's solid softens with the largest strain energy W so far: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ. The
@@ -160,25 +157,12 @@ fn the_tangent_of_a_law_with_memory_is_the_derivative_of_its_residual() -> Resul
 
 #[test]
 fn a_restart_knows_what_particles_remember() -> Result<(), Failure> {
-    let (folder, start) = (tempfile::tempdir()?, collision(&[])?);
-    let identity = Identity::new(Value::Null, &start.particles);
-    let settings = OutputSettings {
-        directory: folder.path().to_owned(),
-        fields: vec![],
-        snapshot_every: None,
-        probes: vec![],
-        end_time: 1.0,
-        audience: Audience::Nobody,
-    };
+    let start = collision(&[])?;
     let mut simulation = start.clone();
-    let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
     for _ in 0..STEPS / 2 {
         simulation.advance()?;
     }
-    Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None)
-        .write(&simulation, &mut recorder)?;
-    let mut continued = start.clone();
-    restore(folder.path(), &identity, &mut continued)?;
+    let mut continued = restored(&simulation, &start)?;
     assert!(continued.particles.memory.iter().any(|x| *x > 0.0) && continued.particles == simulation.particles);
     for _ in 0..STEPS / 2 {
         simulation.advance()?;
@@ -186,9 +170,9 @@ fn a_restart_knows_what_particles_remember() -> Result<(), Failure> {
     }
     assert_eq!(continued.particles, simulation.particles);
     // The same scene with laws without internal variables is another run.
-    let mut forgetful = start.with_laws(|body| Softening { softens: false, ..body.law });
-    let refused = restore(folder.path(), &identity, &mut forgetful).err().ok_or("another law")?;
-    assert!(bfree::causes::on_one_line(&refused).contains("of memory instead of 0"), "{refused:?}");
+    let forgetful = start.with_laws(|body| Softening { softens: false, ..body.law });
+    let refused = restored(&simulation, &forgetful).err().ok_or("another law")?;
+    assert!(bfree::causes::on_one_line(&*refused).contains("of memory instead of 0"), "{refused:?}");
     Ok(())
 }
 

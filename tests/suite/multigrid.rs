@@ -1,11 +1,10 @@
 //! Multigrid: it must not change the results, and must save iterations.
 
-use crate::support::Failure;
+use crate::support::{Failure, built};
 use bfree::mechanics::check::direction;
 use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::solver::{LinearOperator, Multigrid, Preconditioner, Preconditioning};
 use serde_json::{Value, json};
@@ -31,7 +30,7 @@ pub fn block<const D: usize>(family: &Value, cells: u32, inertia: &str, more: Va
     for (key, value) in more.as_object().into_iter().flatten() {
         scene[key] = value.clone();
     }
-    Ok(scene::read(&scene.to_string(), &[])?.build(".".as_ref())?)
+    built(&scene)
 }
 
 /// Takes one step. Returns the Krylov iterations per Newton iteration.
@@ -149,7 +148,7 @@ fn held_nodes_that_lead_others_do_not_spoil_the_coarsest_grid() -> Result<(), Fa
         "prescribed": [{"region": {"half_space": {"point": [0, 0.601], "normal": [0, 1]}}, "displacement": [[0, [0, 0]]]}],
         "solver": {"krylov": {"preconditioner": "multigrid", "forcing": {"fixed": 1e-8}}}
     });
-    let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
+    let mut simulation: Simulation<2> = built(&scene)?;
     let history = simulation.step()?.newton.history;
     let iterations = history.counts.krylov_iterations as f64 / history.iterations.len() as f64;
     // 6 to 8 iterations if the coarsest grid is solved, 20 if its matrix is singular.

@@ -1,5 +1,6 @@
 //! The output files of a run agree with the simulation and with each other.
 
+use crate::support::Failure;
 use bfree::approximation::{Approximation, Linear};
 use bfree::clock::Clock;
 use bfree::field::Field;
@@ -14,8 +15,6 @@ use bfree::simulation::{AdvanceError, Simulation, StepError};
 use bfree::tensor::{Tensor, Vector};
 use serde_json::{Map, Value, json};
 use std::path::Path;
-
-type Failure = Box<dyn std::error::Error>;
 
 const LAMBDA: f64 = 150.0;
 const SHEAR: f64 = 30.0;

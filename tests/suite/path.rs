@@ -1,9 +1,9 @@
 //! An equilibrium path with two turning points: Williams' toggle frame (Quart. J. Mech. Appl. Math. 17, 1964), two shallow bars and a rigid
 //! joint. The study `robust` compares it with its closed form.
 
-use crate::support::{Failure, scene};
+use crate::support::{Failure, output, scene};
 use bfree::output::warnings::Kind;
-use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
+use bfree::output::{Outcome, OutputSettings, Recorder, Reference};
 use bfree::simulation::Simulation;
 
 const LENGTH: f64 = 10.0;
@@ -56,14 +56,7 @@ fn a_load_is_followed_down_and_up_again() -> Result<(), Failure> {
 fn a_load_that_turns_is_told() -> Result<(), Failure> {
     let mut simulation = toggle(&[])?;
     let directory = tempfile::tempdir()?;
-    let settings = OutputSettings {
-        directory: directory.path().to_owned(),
-        fields: Vec::new(),
-        snapshot_every: None,
-        probes: Vec::new(),
-        end_time: 0.3,
-        audience: Audience::Nobody,
-    };
+    let settings = OutputSettings { end_time: 0.3, ..output(directory.path()) };
     let reference = Reference::of(&simulation);
     let (mut recorder, mut largest) = (Recorder::start(settings, &simulation, reference)?, 0.0_f64);
     while simulation.clock.time() < 0.3 {

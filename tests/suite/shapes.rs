@@ -1,6 +1,6 @@
 //! Shapes as drawn, against slow and simple geometry; and the messages for shapes that are drawn wrong.
 
-use crate::support::{self, Failure};
+use crate::support::{self, Failure, built};
 use bfree::scene::{self, SceneError};
 use bfree::shape::{Ball, Block, Cone, Polygon, PolygonError, Shape, Similar, rotation};
 use bfree::simulation::Simulation;
@@ -8,7 +8,6 @@ use bfree::tensor::Vector;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-use std::path::Path;
 
 type Point<const D: usize> = Vector<f64, D>;
 
@@ -254,10 +253,6 @@ fn with_shape(dimension: usize, shape: &Value) -> Value {
         "time": {"step": 1, "end": 1},
         "bodies": [{"name": "body", "shape": shape, "density": 1, "material": {"neo_hookean": {"young": 1, "poisson": 0.3}}}]
     })
-}
-
-fn built<const D: usize>(scene: &Value) -> Result<Simulation<D>, Failure> {
-    Ok(scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! The order of the particles in memory is near that of the transfer, and has no influence on the results.
 
-use crate::support::{Failure, Random, scene};
-use bfree::checkpoint::{Checkpoints, Identity, restore};
+use crate::support::{Failure, Random, restored, scene};
 use bfree::mechanics::sweep::Supports;
-use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 
@@ -60,26 +58,12 @@ fn a_step_puts_the_particles_where_the_sweep_looks_for_them() -> Result<(), Fail
 
 #[test]
 fn a_checkpoint_knows_where_the_particles_lie() -> Result<(), Failure> {
-    let (folder, start) = (tempfile::tempdir()?, scene::<2>("collision.json", &LOADED)?);
-    let identity = Identity::new(serde_json::Value::Null, &start.particles);
-    let settings = OutputSettings {
-        directory: folder.path().to_owned(),
-        fields: vec![],
-        snapshot_every: None,
-        probes: vec![],
-        end_time: 1.0,
-        audience: Audience::Nobody,
-    };
+    let start = scene::<2>("collision.json", &LOADED)?;
     let mut simulation = shuffled(&start);
-    let mut recorder = Recorder::start(settings, &simulation, Reference::of(&simulation))?;
     simulation.advance()?;
     // The step has sorted the particles into the order of `continued`. A second shuffle reveals a restart that does not store the order.
     let mut simulation = shuffled(&simulation);
-    let mut checkpoints =
-        Checkpoints::new(folder.path().to_owned(), identity.clone(), serde_json::Value::Null, 1.0, None);
-    checkpoints.write(&simulation, &mut recorder)?;
-    let mut continued = start.clone();
-    restore(folder.path(), &identity, &mut continued)?;
+    let mut continued = restored(&simulation, &start)?;
     assert_eq!((&continued.particles, &continued.loads), (&simulation.particles, &simulation.loads));
     simulation.advance()?;
     continued.advance()?;

@@ -6,6 +6,7 @@ use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Deformation, Tensor, identity};
+use serde_json::Value;
 use std::path::Path;
 
 pub type Failure = Box<dyn std::error::Error>;
@@ -17,25 +18,42 @@ pub fn scene<const D: usize>(name: &str, overrides: &[&str]) -> Result<Simulatio
     Ok(scene::read_file(&folder.join(name), &overrides)?.build(&folder)?)
 }
 
-/// Continues `start` from a checkpoint of `simulation`, which began in the same way.
-pub fn restored<const D: usize>(simulation: &Simulation<D>, start: &Simulation<D>) -> Result<Simulation<D>, Failure> {
-    let folder = tempfile::tempdir()?;
-    let identity = Identity::new(serde_json::Value::Null, &start.particles);
-    let settings = OutputSettings {
-        directory: folder.path().to_owned(),
+/// The simulation of a scene in JSON.
+pub fn built<const D: usize>(scene: &Value) -> Result<Simulation<D>, Failure> {
+    Ok(scene::read(&scene.to_string(), &[])?.build(Path::new("."))?)
+}
+
+/// The output of a run that ends at t = 1 and writes no snapshots.
+pub fn output<const D: usize>(directory: &Path) -> OutputSettings<D> {
+    OutputSettings {
+        directory: directory.to_owned(),
         fields: vec![],
         snapshot_every: None,
         probes: vec![],
         end_time: 1.0,
         audience: Audience::Nobody,
-    };
-    let mut recorder = Recorder::start(settings, start, Reference::of(start))?;
-    let mut checkpoints =
-        Checkpoints::new(folder.path().to_owned(), identity.clone(), serde_json::Value::Null, 1.0, None);
-    checkpoints.write(simulation, &mut recorder)?;
+    }
+}
+
+/// Continues `start` from a checkpoint of `simulation`, which began in the same way.
+pub fn restored<const D: usize, L: Law + Clone>(
+    simulation: &Simulation<D, L>,
+    start: &Simulation<D, L>,
+) -> Result<Simulation<D, L>, Failure> {
+    let folder = tempfile::tempdir()?;
+    let identity = Identity::new(Value::Null, &start.particles);
+    let mut recorder = Recorder::start(output(folder.path()), start, Reference::of(start))?;
+    Checkpoints::new(folder.path().to_owned(), identity.clone(), Value::Null, 1.0, None)
+        .write(simulation, &mut recorder)?;
     let mut continued = start.clone();
     restore(folder.path(), &identity, &mut continued)?;
     Ok(continued)
+}
+
+/// The largest distance between the positions of a particle in the two simulations.
+pub fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
+    let (a, b) = (a.particles.by_id(), b.particles.by_id());
+    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
 /// The shipped laws whose tangent has a closed form. Vector lanes linearise only these.

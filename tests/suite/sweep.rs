@@ -2,7 +2,7 @@
 
 mod stored;
 
-use crate::support::closed_laws;
+use crate::support::{Failure, closed_laws};
 use bfree::approximation::{Approximation, Linear, Lme, ShapeFunction};
 use bfree::grid::Grid;
 use bfree::material::{ClosedTangent, Lame, Law, Material, NeoHookean, Start};
@@ -20,8 +20,6 @@ use bfree::scalar::Real;
 use bfree::tensor::{Deformation, Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
-
-type Failure = Box<dyn std::error::Error>;
 
 /// Numbers without pattern in (−1, 1): the golden-ratio sequence.
 struct Irregular(u32);

@@ -1,21 +1,18 @@
 //! Random scenes and their images, which must agree: the mirrored and rotated scenes of the study `symmetry`.
 
-use shared::{Devices, Disagreement, SymmetryError, Transformation, compare, draw};
+use shared::{Disagreement, SymmetryError, Transformation, compare, draw};
 
 #[path = "../../verification/src/symmetry/mod.rs"]
-#[allow(dead_code, unused_imports, reason = "the study judges the other transformations, and scenes with all devices")]
+#[allow(dead_code, unused_imports, reason = "the study judges the other transformations")]
 mod shared;
 
 /// Scenes per transformation.
 const SCENES: u64 = 60;
 
-/// `Devices::Default` also tests loads on surfaces of shapes, and aggregation with inertia.
-const DEVICES: Devices = Devices::Off;
-
 fn judge(transformation: Transformation) {
     let (mut wrong, mut compared) = (Vec::new(), 0);
     for seed in 0..SCENES {
-        let (pair, name) = draw(seed, transformation, DEVICES);
+        let (pair, name) = draw(seed, transformation);
         match compare(&pair) {
             Ok(found) => {
                 compared += 1;

@@ -1,4 +1,4 @@
-//! Runs studies, prints their results, and writes CSV, SVG and JSON. The exit code is the verdict.
+//! Runs studies, prints their results, and writes JSON and pictures. The exit code is the verdict.
 
 use clap::{Parser, ValueEnum};
 use serde_json::{Value, json};
@@ -31,7 +31,7 @@ struct Arguments {
     /// Write every cell, table and remark as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write CSV and SVG into this directory
+    /// Write pictures, as SVG and PNG, into this directory
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -133,7 +133,7 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
         print(&mut text, study, &result, seconds).map_err(writing("the results"))?;
         out.write_all(&text[before..]).map_err(writing("to standard output"))?;
         if let (Ok(outcome), Some(directory)) = (&result, &arguments.out) {
-            write_files(directory, study.name, outcome)?;
+            draw(directory, outcome)?;
         }
         chapters.push(chapter(study, &result, seconds, "results"));
         if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
@@ -229,13 +229,13 @@ fn chapter(study: &Study, result: &Result<Outcome, StudyError>, seconds: f64, fo
     text + &format!("({seconds:.0} s)\n")
 }
 
-/// Writes the pictures for print, as SVG and PNG.
+/// Writes the pictures, as SVG and PNG.
 fn draw(directory: &Path, outcome: &Outcome) -> Result<(), Failure> {
     fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
     for sheet in &outcome.sheets {
         let place = directory.join(sheet.name);
         let failed = |error| Failure { place: place.display().to_string(), source: error };
-        let svg = sheet.svg().map_err(|error| failed(io::Error::other(error)))?;
+        let svg = sheet.svg().map_err(|error| failed(io::Error::other(error.to_string())))?;
         let png = sheet.png(&svg).map_err(|error| failed(io::Error::other(error)))?;
         fs::write(place.with_extension("svg"), svg).map_err(failed)?;
         fs::write(place.with_extension("png"), png).map_err(failed)?;
@@ -271,31 +271,4 @@ fn document(finding: &Finding, result: &Result<Outcome, StudyError>) -> Value {
         }),
         Err(error) => json!({ "study": study, "passed": false, "seconds": seconds, "error": chain(error.as_ref()) }),
     }
-}
-
-/// Writes `<study>.csv`, or `<study>-1.csv`, … if there are several, and the figures under their names.
-fn write_files(directory: &Path, study: &str, outcome: &Outcome) -> Result<(), Failure> {
-    fs::create_dir_all(directory).map_err(writing(directory.display().to_string()))?;
-    let several = outcome.reports.len() + outcome.tables.len() > 1;
-    let mut number = 0;
-    let mut write = |content: &dyn Fn(&mut Vec<u8>) -> io::Result<()>| {
-        number += 1;
-        let name = if several { format!("{study}-{number}.csv") } else { format!("{study}.csv") };
-        let path = directory.join(name);
-        let mut bytes = Vec::new();
-        content(&mut bytes).and_then(|()| fs::write(&path, &bytes)).map_err(writing(path.display().to_string()))
-    };
-    for table in &outcome.tables {
-        write(&|bytes| table.write_csv(bytes))?;
-    }
-    for report in &outcome.reports {
-        write(&|bytes| report.write_csv(bytes))?;
-    }
-    draw(directory, outcome)?;
-    for figure in &outcome.figures {
-        let path = directory.join(format!("{}.svg", figure.name));
-        let written = figure.svg().map_err(io::Error::other).and_then(|svg| fs::write(&path, svg));
-        written.map_err(writing(path.display().to_string()))?;
-    }
-    Ok(())
 }

@@ -7,11 +7,10 @@ mod cell;
 pub(crate) use cell::worst;
 pub use cell::{Bound, Cell, Counts, Listed, Verdict, short};
 
-use crate::table::{Table, csv_field};
+use crate::table::Table;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::fmt;
-use std::io::{self, Write};
 use std::sync::{PoisonError, RwLock};
 
 /// The printed form of a report. Failing cells, known or not, are always listed one by one.
@@ -143,24 +142,6 @@ impl Report {
         let Some(cell) = self.worst() else { return format!("FAIL  {}: nothing is judged; {counts}", self.title) };
         let (word, place) = if self.passed() { ("PASS", "closest to its bound") } else { ("FAIL", "worst") };
         format!("{word}  {}: {counts}; {place}: {}: {}", self.title, cell.name(), cell.finding())
-    }
-
-    /// Every cell as comma-separated values, with a header.
-    ///
-    /// # Errors
-    /// Errors of the writer.
-    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
-        for column in &self.columns {
-            write!(out, "{},", csv_field(column))?;
-        }
-        writeln!(out, "value,bound,verdict")?;
-        for cell in &self.cells {
-            for label in &cell.labels {
-                write!(out, "{},", csv_field(label))?;
-            }
-            writeln!(out, "{:e},{},{}", cell.value, csv_field(&cell.bound.to_string()), cell.verdict())?;
-        }
-        Ok(())
     }
 
     /// Every cell in a table as Markdown, the notes, and the verdict.

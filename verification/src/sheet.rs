@@ -1,11 +1,14 @@
 //! Charts side by side in one picture, for print.
 
-use crate::figure::{Axis, COLORS, FigureError};
+use crate::axis::{Axis, range};
 use bfree::output::plot::{PlotError, png};
+use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use std::ops::Range;
+
+type PlottingError = Box<dyn std::error::Error>;
 
 /// Plotters rounds coordinates to whole units. Pictures are drawn larger by this factor and shown smaller, so that lines are smooth.
 const FINE: u32 = 4;
@@ -18,6 +21,19 @@ const MARGINS: (u32, u32) = (8, 18);
 const NUMBERS: u32 = 66;
 
 const LABEL: (&str, u32) = ("sans-serif", 14 * FINE);
+
+/// Colours that people with any colour vision distinguish (Okabe and Ito, 2008), without yellow, which is too pale for a line. Black, blue,
+/// vermillion, green, purple, orange, sky; grey for the background.
+pub(crate) const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 0, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(170, 170, 170),
+];
 
 /// The style of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,9 +105,9 @@ impl Sheet {
     ///
     /// # Errors
     /// Errors of the plotting library.
-    pub fn svg(&self) -> Result<String, FigureError> {
+    pub fn svg(&self) -> Result<String, PlottingError> {
         let mut text = String::new();
-        self.draw(&mut text).map_err(|error| FigureError::new(&*error))?;
+        self.draw(&mut text)?;
         let (width, height) = self.extent();
         let drawn = format!(r#"width="{}" height="{}" viewBox"#, width * FINE, height * FINE);
         Ok(text.replacen(&drawn, &format!(r#"width="{width}" height="{height}" viewBox"#), 1))
@@ -114,7 +130,7 @@ impl Sheet {
         (self.size.0 * self.columns as u32, self.size.1 * self.rows() as u32)
     }
 
-    fn draw(&self, text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    fn draw(&self, text: &mut String) -> Result<(), PlottingError> {
         let (width, height) = self.extent();
         let root = SVGBackend::with_string(text, (width * FINE, height * FINE)).into_drawing_area();
         root.fill(&WHITE)?;
@@ -124,11 +140,6 @@ impl Sheet {
         root.present()?;
         Ok(())
     }
-}
-
-/// Whether `value` lies in `range`, including its ends.
-fn within(range: &Range<f64>, value: f64) -> bool {
-    (range.start..=range.end).contains(&value)
 }
 
 /// An axis with labels at given values.
@@ -165,13 +176,11 @@ impl Panel {
     }
 
     /// The names, one below the other.
-    fn draw_key(
-        &self,
-        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-    ) -> Result<(), Box<dyn std::error::Error>> {
+    fn draw_key(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), PlottingError> {
         let fine = FINE as i32;
         for (k, curve) in self.curves.iter().enumerate() {
-            let (color, height) = (COLORS[curve.color % COLORS.len()], (60 + 26 * k as i32) * fine);
+            let color = curve.color();
+            let height = (60 + 26 * k as i32) * fine;
             let pieces: &[(i32, i32)] = match curve.mark {
                 Mark::Dots => &[],
                 Mark::Dashed => &[(40, 48), (52, 60), (64, 72)],
@@ -189,30 +198,16 @@ impl Panel {
         Ok(())
     }
 
-    fn draw(
-        &self,
-        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-    ) -> Result<(), Box<dyn std::error::Error>> {
+    fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), PlottingError> {
         if self.curves.iter().all(|curve| curve.points.is_empty()) {
             return self.draw_key(area);
         }
-        let placed: Vec<Vec<(f64, f64)>> = (self.curves.iter())
-            .map(|curve| {
-                let place = |&(x, y): &(f64, f64)| Some((self.x.place(x)?, self.y.place(y)?));
-                curve.points.iter().filter_map(place).collect()
-            })
-            .collect();
-        let all = || placed.iter().flatten();
-        let window = self.window.map(|ends| {
-            let [x, y] = [(&self.x, ends[0]), (&self.y, ends[1])]
-                .map(|(axis, (low, high))| axis.place(low).unwrap_or(0.0)..axis.place(high).unwrap_or(1.0));
-            (x, y)
-        });
-        let (x, y) = window
-            .unwrap_or_else(|| (crate::figure::range(all().map(|p| p.0)), crate::figure::range(all().map(|p| p.1))));
+        let placed: Vec<_> = self.curves.iter().map(|curve| self.placed(curve)).collect();
+        let [x, y] = self.ranges(&placed);
         let length = (area.dim_in_pixel().0 / FINE).saturating_sub(MARGINS.0 + MARGINS.1 + NUMBERS);
+        let ticks_x = self.x.ticks(&x, f64::from(length));
         // Labels of the vertical axis stand above each other, so they need no room along it.
-        let (ticks_x, ticks_y) = (self.x.ticks(&x, f64::from(length)), self.y.ticks(&y, f64::INFINITY));
+        let ticks_y = self.y.ticks(&y, f64::INFINITY);
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, ("sans-serif", 16 * FINE))
             .margin(MARGINS.0 * FINE)
@@ -236,43 +231,10 @@ impl Panel {
             .x_label_formatter(&|&x| self.x.tick(x))
             .y_label_formatter(&|&y| self.y.tick(y))
             .draw()?;
-        for (curve, points) in self.curves.iter().zip(placed) {
-            let color = COLORS[curve.color % COLORS.len()];
-            let inside: Vec<_> = (points.iter().copied())
-                .filter(|point| within(&x, point.0) && (within(&y, point.1) || curve.mark != Mark::Dots))
-                .collect();
-            let dots = || inside.iter().map(|&point| Circle::new(point, 3 * FINE, color.filled())).collect::<Vec<_>>();
-            let series = match curve.mark {
-                Mark::Line | Mark::Joined => {
-                    chart.draw_series(LineSeries::new(inside.clone(), color.stroke_width(3 * FINE / 2)))?
-                }
-                Mark::Dashed => chart.draw_series(DashedLineSeries::new(
-                    inside.clone(),
-                    DASH.0,
-                    DASH.1,
-                    color.stroke_width(3 * FINE / 2),
-                ))?,
-                Mark::Dots => {
-                    let dots = inside.iter().map(|&point| Circle::new(point, 5 * FINE / 2, color.filled()));
-                    chart.draw_series(dots.collect::<Vec<_>>())?
-                }
-            };
-            if !curve.name.is_empty() {
-                let length = 20 * FINE as i32;
-                let (start, width) = if curve.mark == Mark::Dots { (length / 2, 5 * FINE) } else { (0, 2 * FINE) };
-                let end = if curve.mark == Mark::Dots { start + width as i32 } else { length };
-                // The library underestimates the width of text: without the blanks it would leave the box.
-                let series = series.label(format!("{}    ", curve.name));
-                let line = move |(x, y)| [(x + start, y), (x + end, y)];
-                let style = color.stroke_width(width);
-                match curve.mark {
-                    Mark::Dashed => series.legend(move |at| DashedPathElement::new(line(at), DASH.0, DASH.1, style)),
-                    _ => series.legend(move |at| PathElement::new(line(at), style)),
-                };
-            }
-            if curve.mark == Mark::Joined {
-                chart.draw_series(dots())?;
-            }
+        let within = |range: &Range<f64>, value: f64| (range.start..=range.end).contains(&value);
+        for (curve, mut points) in self.curves.iter().zip(placed) {
+            points.retain(|point| within(&x, point.0) && (within(&y, point.1) || curve.mark != Mark::Dots));
+            curve.draw(&mut chart, points)?;
         }
         if let Some(position) = &self.legend {
             chart
@@ -284,6 +246,61 @@ impl Panel {
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.3).stroke_width(FINE))
                 .draw()?;
+        }
+        Ok(())
+    }
+
+    /// The points of a curve in the coordinates of the axes.
+    fn placed(&self, curve: &Curve) -> Vec<(f64, f64)> {
+        let place = |&(x, y): &(f64, f64)| Some((self.x.place(x)?, self.y.place(y)?));
+        curve.points.iter().filter_map(place).collect()
+    }
+
+    /// The ranges of both axes: the window, or all points.
+    fn ranges(&self, placed: &[Vec<(f64, f64)>]) -> [Range<f64>; 2] {
+        match self.window {
+            Some([x, y]) => [(&self.x, x), (&self.y, y)]
+                .map(|(axis, (low, high))| axis.place(low).unwrap_or(0.0)..axis.place(high).unwrap_or(1.0)),
+            None => [range(placed.iter().flatten().map(|p| p.0)), range(placed.iter().flatten().map(|p| p.1))],
+        }
+    }
+}
+
+impl Curve {
+    fn color(&self) -> RGBColor {
+        COLORS[self.color % COLORS.len()]
+    }
+
+    fn draw(
+        &self,
+        chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<Scale, Scale>>,
+        points: Vec<(f64, f64)>,
+    ) -> Result<(), PlottingError> {
+        let color = self.color();
+        let thin = color.stroke_width(3 * FINE / 2);
+        let dots = |radius: u32| points.iter().map(move |&point| Circle::new(point, radius, color.filled()));
+        let series = match self.mark {
+            Mark::Line | Mark::Joined => chart.draw_series(LineSeries::new(points.clone(), thin))?,
+            Mark::Dashed => chart.draw_series(DashedLineSeries::new(points.clone(), DASH.0, DASH.1, thin))?,
+            Mark::Dots => chart.draw_series(dots(5 * FINE / 2))?,
+        };
+        if !self.name.is_empty() {
+            let length = 20 * FINE as i32;
+            let (start, end, width) = match self.mark {
+                Mark::Dots => (length / 2, length / 2 + 5 * FINE as i32, 5 * FINE),
+                _ => (0, length, 2 * FINE),
+            };
+            // The library underestimates the width of text: without the blanks it would leave the box.
+            let series = series.label(format!("{}    ", self.name));
+            let line = move |(x, y)| [(x + start, y), (x + end, y)];
+            let style = color.stroke_width(width);
+            match self.mark {
+                Mark::Dashed => series.legend(move |at| DashedPathElement::new(line(at), DASH.0, DASH.1, style)),
+                _ => series.legend(move |at| PathElement::new(line(at), style)),
+            };
+        }
+        if self.mark == Mark::Joined {
+            chart.draw_series(dots(3 * FINE))?;
         }
         Ok(())
     }

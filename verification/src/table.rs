@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 use std::fmt;
-use std::io::{self, Write};
 
 /// A titled table; shorter rows end early.
 #[derive(Clone, Debug, Serialize)]
@@ -36,23 +35,6 @@ impl Table {
         let rows: String = self.rows.iter().map(|row| format!("| {} |\n", escaped(row))).collect();
         format!("**{}**\n\n| {} |\n| {rule} |\n{rows}", self.title, escaped(&self.header))
     }
-
-    /// The table as comma-separated values, with a header.
-    ///
-    /// # Errors
-    /// Errors of the writer.
-    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
-        for row in std::iter::once(&self.header).chain(&self.rows) {
-            let fields: Vec<_> = row.iter().map(|field| csv_field(field)).collect();
-            writeln!(out, "{}", fields.join(","))?;
-        }
-        Ok(())
-    }
-}
-
-/// The text, quoted if it contains a comma, a quote or a line break.
-pub(crate) fn csv_field(text: &str) -> String {
-    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// Whether the text is a number, which is aligned to the right.

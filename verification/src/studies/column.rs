@@ -67,8 +67,7 @@ fn column(shape: &str, cells: u32, steps: u32) -> Result<Errors, StudyError> {
         format!("time.step={}", 1.0 / f64::from(steps)),
         "output.probes=[]".to_owned(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<2> = shipped::scene("column_static", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("column_static", &overrides)?;
     let start = simulation.particles.position.clone();
     let (mut newton, mut krylov) = (0, 0);
     for _ in 0..steps {

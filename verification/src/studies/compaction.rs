@@ -2,7 +2,7 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::elements::Elements;
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::report::{Bound, Report};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use crate::shipped;
@@ -79,7 +79,7 @@ const DRAWN: [(usize, usize); 5] = [(0, 2), (1, 3), (2, 4), (PAPER, 1), (5, 5)];
 type History = Vec<(f64, f64)>;
 
 fn particles(scene: &str, overrides: &[&str]) -> Result<History, StudyError> {
-    let mut simulation: Simulation<2> = shipped::scene(scene, overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation(scene, overrides)?;
     let start = simulation.particles.position.clone();
     let probe = Vector::from(PROBE);
     let watched = start.iter().position(|x| (x - probe).norm() < 1e-9).ok_or("no particle at the probe")?;
@@ -94,7 +94,7 @@ fn particles(scene: &str, overrides: &[&str]) -> Result<History, StudyError> {
 }
 
 fn elements(scene: &str) -> Result<History, StudyError> {
-    let scene: Simulation<2> = shipped::scene(scene, &[])?.build(&shipped::folder())?;
+    let scene: Simulation<2> = shipped::simulation(scene, &[] as &[&str])?;
     let body = scene.bodies.into_iter().next().ok_or("a scene without a body")?;
     let clock = Clock::new(scene.clock.nominal(), 0);
     let mut block = Elements::new(Vector::zeros(), scene.grid.spacing, [10, 10], body, clock)?;
@@ -159,56 +159,20 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut report = Report::new("distance ‖u − u_Q8‖ / ‖u_Q8‖ over 5 s at (0.525, 0.975)", &["of", "sides"]);
     let mut outcome = Outcome::default();
     let mut panels = vec![load_curve()];
+    let chosen: &[usize] = match effort {
+        Effort::Short => &[PAPER, IMPROVED[0]],
+        Effort::Full => &[0, 1, 2, 3, 4, 5, 6, 7],
+    };
     for (scene, sides, independent) in SIDES {
-        let chosen: &[usize] = match effort {
-            Effort::Short => &[PAPER, IMPROVED[0]],
-            Effort::Full => &[0, 1, 2, 3, 4, 5, 6, 7],
-        };
         let q8 = elements(scene)?;
         report.push(&["Q8 elements from an independent program's", sides], distance(&q8, &rows(independent.elements)), Bound::AtMost(AGREEMENT));
         let histories: Result<Vec<(usize, History)>, String> = (chosen.par_iter())
             .map(|&k| Ok((k, particles(scene, METHODS[k].1).map_err(|error| crate::report::chain(&*error))?)))
             .collect();
         let histories = histories?;
-        let title = format!("block, {sides}: beside Q8 elements");
-        let header = ["method", "amplitude (m)", "of Q8's", "lag (ms)", "L2 distance (%)"];
-        let mut table = Table::new(title, header);
-        table.push(["Q8 elements".to_owned(), format!("{:.5}", amplitude(&q8)), "1".into(), "0".into(), "0".into()]);
-        let mut curves = vec![Curve::new("Q8 elements", 0, Mark::Dashed, q8.clone())];
-        for (k, u) in &histories {
-            let (name, far) = (METHODS[*k].0, distance(u, &q8));
-            table.push([
-                name.to_owned(),
-                format!("{:.5}", amplitude(u)),
-                format!("{:.3}", amplitude(u) / amplitude(&q8)),
-                format!("{:.0}", 1e3 * lag(u, &q8)),
-                format!("{:.2}", 100.0 * far),
-            ]);
-            // No theory bounds the distance of a method from elements; an independent program gives that of the paper's method.
-            report.push(&[name, sides], far, Bound::Reported);
-            if *k == PAPER {
-                let apart = distance(u, &rows(independent.lme_3));
-                report.push(&["LME 3 (paper) from an independent program's", sides], apart, Bound::AtMost(AGREEMENT));
-            }
-            if let Some((_, colour)) = DRAWN.iter().find(|(drawn, _)| drawn == k) {
-                curves.push(Curve::new(name, *colour, Mark::Line, u.clone()));
-            }
-        }
-        let of = |k: usize| histories.iter().find(|(at, _)| *at == k).map(|(_, u)| distance(u, &q8));
-        for k in IMPROVED {
-            if let (Some(paper), Some(improved)) = (of(PAPER), of(k)) {
-                report.push(&[&format!("{} over LME 3 (paper)", METHODS[k].0), sides], improved / paper, Bound::AtMost(1.0));
-            }
-        }
-        outcome.tables.push(table);
-        panels.push(Panel {
-            title: format!("displacement near the middle of the top, {sides}"),
-            x: Axis::linear("time (s)"),
-            y: Axis::linear("vertical displacement (m)"),
-            window: None,
-            curves,
-            legend: Some(SeriesLabelPosition::UpperRight),
-        });
+        judge(&mut report, sides, &independent, &q8, &histories);
+        outcome.tables.push(table(sides, &q8, &histories));
+        panels.push(panel(sides, &q8, &histories));
     }
     if *effort == Effort::Full {
         outcome.sheets.push(Sheet {
@@ -222,6 +186,56 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     }
     outcome.reports.push(report);
     Ok(outcome)
+}
+
+fn judge(report: &mut Report, sides: &str, independent: &Independent, q8: &History, histories: &[(usize, History)]) {
+    let mut paper = f64::NAN;
+    for (k, u) in histories {
+        // No theory bounds the distance of a method from elements; an independent program gives that of the paper's method.
+        let far = distance(u, q8);
+        report.push(&[METHODS[*k].0, sides], far, Bound::Reported);
+        if *k == PAPER {
+            paper = far;
+            let apart = distance(u, &rows(independent.lme_3));
+            report.push(&["LME 3 (paper) from an independent program's", sides], apart, Bound::AtMost(AGREEMENT));
+        }
+        if IMPROVED.contains(k) {
+            report.push(&[&format!("{} over LME 3 (paper)", METHODS[*k].0), sides], far / paper, Bound::AtMost(1.0));
+        }
+    }
+}
+
+fn table(sides: &str, q8: &History, histories: &[(usize, History)]) -> Table {
+    let header = ["method", "amplitude (m)", "of Q8's", "lag (ms)", "L2 distance (%)"];
+    let mut table = Table::new(format!("block, {sides}: beside Q8 elements"), header);
+    table.push(["Q8 elements".to_owned(), format!("{:.5}", amplitude(q8)), "1".into(), "0".into(), "0".into()]);
+    for (k, u) in histories {
+        table.push([
+            METHODS[*k].0.to_owned(),
+            format!("{:.5}", amplitude(u)),
+            format!("{:.3}", amplitude(u) / amplitude(q8)),
+            format!("{:.0}", 1e3 * lag(u, q8)),
+            format!("{:.2}", 100.0 * distance(u, q8)),
+        ]);
+    }
+    table
+}
+
+fn panel(sides: &str, q8: &History, histories: &[(usize, History)]) -> Panel {
+    let mut curves = vec![Curve::new("Q8 elements", 0, Mark::Dashed, q8.clone())];
+    for (k, u) in histories {
+        if let Some((_, colour)) = DRAWN.iter().find(|(drawn, _)| drawn == k) {
+            curves.push(Curve::new(METHODS[*k].0, *colour, Mark::Line, u.clone()));
+        }
+    }
+    Panel {
+        title: format!("displacement near the middle of the top, {sides}"),
+        x: Axis::linear("time (s)"),
+        y: Axis::linear("vertical displacement (m)"),
+        window: None,
+        curves,
+        legend: Some(SeriesLabelPosition::UpperRight),
+    }
 }
 
 fn load_curve() -> Panel {

@@ -3,7 +3,7 @@
 //! At strains of 1e-12 a law is linear to 12 digits: S = ℂ:E and W = ½ E:ℂ:E with ℂ at rest. Computed from F or J, S would have 4 correct
 //! digits and W none. The checks of derivatives see only part of such a loss: if W and S lose the same digits, they still agree.
 
-use super::{Effort, Outcome, StudyError, short};
+use super::{Effort, Outcome, StudyError, short, worse};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::material::{Lame, Law, Material, Start};
@@ -48,9 +48,4 @@ fn linear<const D: usize>(name: &str, law: &Material, report: &mut Report) {
     let dimension = D.to_string();
     report.push(&["S = C:E", name, &dimension], stress, Bound::AtMost(LINEAR));
     report.push(&["W = E:C:E / 2", name, &dimension], energy, Bound::AtMost(LINEAR));
-}
-
-/// The larger number, or NaN if either is NaN.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }

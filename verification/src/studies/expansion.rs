@@ -82,8 +82,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
         r#"solver={"newton":{"tolerance":1e-6,"max_iterations":60}}"#.to_owned(),
         "output={}".to_owned(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<2> = shipped::scene("tube", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("tube", &overrides)?;
     let side = (INNER[0] / h) as u32;
     let all = (0..=side).flat_map(|i| (0..=side).map(move |k| Vector::from([f64::from(i) * h, f64::from(k) * h])));
     // Linear functions have a support of one cell to each side.

@@ -3,7 +3,7 @@
 //! Tangents are compared with dual numbers through the local solve. The internal variables at the end of a step must reproduce its stress
 //! when no further time passes.
 
-use super::{Effort, Outcome, StudyError};
+use super::{Effort, Outcome, StudyError, worse};
 use crate::random::Random;
 use crate::report::{Bound, Report};
 use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, Start, admissible};
@@ -138,11 +138,6 @@ const QUANTITIES: [(&str, f64); 7] = [
     ("energy gained by flow", 1e-14),
     ("symmetry of the tangent", EXACT),
 ];
-
-/// The larger number, or NaN if either is NaN.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
-}
 
 /// Errors of all [`QUANTITIES`], 0 for those that the law lacks, and whether the step had plastic flow.
 fn errors<const D: usize>(

@@ -1,6 +1,5 @@
 //! The studies: one file each, and one list.
 
-use crate::figure::Figure;
 use crate::known;
 use crate::report::{Counts, Report};
 use crate::sheet::Sheet;
@@ -25,8 +24,6 @@ pub struct Outcome {
     /// Remarks, in sentences.
     pub remarks: Vec<String>,
     /// Pictures.
-    pub figures: Vec<Figure>,
-    /// Pictures for print.
     pub sheets: Vec<Sheet>,
 }
 
@@ -75,6 +72,11 @@ fn short(name: &str) -> String {
     name.trim_start_matches("neo-Hookean, ").replace("St. Venant", "St.V.")
 }
 
+/// The larger number, or NaN if either is NaN.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
 /// The list of studies. One word here registers a study.
 macro_rules! studies {
     ($($study:ident),* $(,)?) => {
@@ -99,7 +101,6 @@ studies!(
     memory,
     extremes,
     manufactured,
-    minimiser,
     order,
     riemann,
     compaction,

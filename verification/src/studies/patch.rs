@@ -1,6 +1,6 @@
 //! Properties that hold for any layout of particles: affine motion, rigid motion, momentum; and properties that do not.
 
-use super::{Effort, Outcome, StudyError};
+use super::{Effort, Outcome, StudyError, worse};
 use crate::check_approximation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
@@ -374,9 +374,4 @@ fn free_flight(
     table.push(row);
     report.push(&["angular momentum, order in dt", name, &label], order(1), Bound::Reported);
     Ok(())
-}
-
-/// The larger number, or NaN if either is NaN.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }

@@ -1,7 +1,7 @@
 //! Section 4.3: an elastic cylinder between two walls.
 
 use super::{Effort, Outcome, StudyError};
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::prepared::Prepared;
 use crate::report::{Bound, Report, chain};
 use crate::sheet::{Curve, Mark, Panel, Sheet};
@@ -45,7 +45,7 @@ const INDEPENDENT: [(f64, [f64; 3]); 2] = [(21.8, [1.3314e2, 1.778e-2, 1.18e-8])
 
 fn cylinder(shape: &str, rule: [&str; 2], more: &[&str]) -> Result<Simulation<2>, StudyError> {
     let overrides = [&[shape, rule[0], rule[1]], more].concat();
-    Ok(shipped::scene("rebound", &overrides)?.build(&shipped::folder())?)
+    shipped::simulation("rebound", &overrides)
 }
 
 /// The energy changes of a step. Together they are the change of the particles' energy.
@@ -268,8 +268,13 @@ fn residuals(report: &mut Report) -> Result<Table, StudyError> {
         let history = last.ok_or("no step was taken")?.newton.history;
         let mut found = vec![history.first_residual.unwrap_or(f64::NAN)];
         found.extend(history.iterations.iter().map(|iteration| iteration.residual));
-        let label = format!("residual {} at t = {time}, over the independent program's, minus 1", 0);
-        report.push(&[&label, "LME 3", RULES[0].0], (found[0] / expected[0] - 1.0).abs(), Bound::AtMost(2e-3));
+        // The last residual is the square of a residual times a curvature, so it doubles any relative difference. The program gives two to
+        // five digits.
+        for (k, most) in [1e-3, 1e-2, 5e-2].into_iter().enumerate() {
+            let label = format!("residual {k} at t = {time}, over the independent program's, minus 1");
+            let apart = found.get(k).map_or(f64::NAN, |found| (found / expected[k] - 1.0).abs());
+            report.push(&[&label, "LME 3", RULES[0].0], apart, Bound::AtMost(most));
+        }
         columns.push((found, expected));
     }
     for k in 0..3 {

@@ -1,5 +1,5 @@
 //! Iterations of linear solves for hard systems: statics against refinement, cut cells, near incompressibility and contrast; long time
-//! steps. The results are checked, too.
+//! steps. Then the load steps that a bending beam takes, and an equilibrium path with turning points.
 //!
 //! A body of size one stands on fixed nodes and carries its weight in one load step. Each linear system is solved to 1e-8. Iterations are
 //! counts, so they are judged. The bounds suit a method whose work grows with the unknowns, and give users numbers for planning.
@@ -20,14 +20,21 @@ use serde_json::{Value, json};
 use snap::snap_through;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and whether statics are right";
+pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; load steps of a beam, and a path that turns";
 
 /// The most linear iterations per Newton iteration in 2D and in 3D, and the largest growth by the last refinement.
 const MOST: [f64; 2] = [20.0, 30.0];
 const GROWTH: f64 = 1.3;
 
+/// The spacings in 2D and in 3D; the finest of each is for full effort.
+const PLANE: [f64; 4] = [0.1, 0.05, 0.025, 0.0125];
+const SPACE: [f64; 3] = [0.2, 0.1, 0.05];
+
 /// The most iterations for steps of 1 to 1000 Courant numbers.
 const MOST_IN_TIME: f64 = 20.0;
+
+/// The smallest spacing in 2D and in 3D at which diagonal blocks are shown beside multigrid: their iterations double at each refinement.
+const LEAST_SPACING: [f64; 2] = [0.025, 0.1];
 
 /// The largest over the smallest count, for all positions of the body in a cell.
 const BY_CUTS: f64 = 2.0;
@@ -137,14 +144,13 @@ fn push<const D: usize>(
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut refined = Report::new("iterations against refinement, statics", &["quantity", "body", "D", "shape", "h"]);
-    let (plane, space): (&[f64], &[f64]) = match effort {
-        Effort::Short => (&[0.1, 0.05, 0.025], &[0.2, 0.1]),
-        Effort::Full => (&[0.1, 0.05, 0.025, 0.0125], &[0.2, 0.1, 0.05]),
-    };
     for (name, family) in families() {
         for (shape, body) in Shape::ALL {
-            refinement::<2>((name, &family), (shape, body), plane, &mut refined)?;
-            refinement::<3>((name, &family), (shape, body), space, &mut refined)?;
+            // The other bodies differ by their cut cells, which coarse grids have too.
+            let finest = *effort == Effort::Full && shape == Shape::Block;
+            let [plane, space] = [PLANE.len(), SPACE.len()].map(|all| if finest { all } else { all - 1 });
+            refinement::<2>((name, &family), (shape, body), &PLANE[..plane], &mut refined)?;
+            refinement::<3>((name, &family), (shape, body), &SPACE[..space], &mut refined)?;
         }
     }
     let mut others = Report::new("iterations where systems are hard, block in the plane", &["quantity", "shape", "at"]);
@@ -153,7 +159,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         cuts(name, &family, *effort, &mut others)?;
         materials(name, &family, &mut others)?;
     }
-    Ok(Outcome { reports: vec![refined, others, elastica()?, any_number_of_steps()?, long_steps()?, snap_through(*effort)?], ..Outcome::default() })
+    Ok(Outcome { reports: vec![refined, others, long_steps()?, snap_through(*effort)?], ..Outcome::default() })
 }
 
 /// The least ratio of load-step lengths: the program's over plain Newton's.
@@ -167,7 +173,7 @@ fn long_steps() -> Result<Report, StudyError> {
         for steps in [1_u32, 2, 5, 10, 20, 50, 100] {
             let step = format!("time.step={}", 1.0 / f64::from(steps));
             let overrides = [&step, "tractions.0.traction=[0,-7.5]", "output.probes=[]", "output.every=null"];
-            let simulation = shipped::scene("elastica", &overrides)?.build::<2>(&shipped::folder())?;
+            let simulation = shipped::simulation::<2>("elastica", &overrides)?;
             if reaches(simulation, steps, plain)? {
                 return Ok(f64::from(steps));
             }
@@ -217,65 +223,6 @@ fn plainly<const D: usize>(simulation: &Simulation<D>) -> Result<bool, StudyErro
     Ok(false)
 }
 
-/// Tenths of the load, which equal PL²/EI, with u/L and w/L of the inextensible beam without shear (elliptic integrals; Mattiasson, Int. J.
-/// Numer. Methods Eng. 17, 1981).
-const ELASTICA: [(u64, f64, f64); 4] =
-    [(1, 0.05643, 0.30172), (2, 0.16064, 0.49346), (5, 0.38763, 0.71379), (10, 0.55500, 0.81061)];
-
-/// A beam of L/h = 20 also shears and stretches: a percent is allowed.
-const BEAM: f64 = 0.01;
-
-/// The shipped scene, 8 cells deep, with default settings.
-fn elastica() -> Result<Report, StudyError> {
-    let mut report = Report::new("the elastica in ten load steps, by default settings", &["quantity", "PL²/EI"]);
-    let overrides = ["grid.spacing=0.125", "output.probes=[]"];
-    let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
-    let start = simulation.particles.by_id().position;
-    let length = 20.0;
-    for (load, along, down) in ELASTICA {
-        while simulation.clock.nominal_steps() < load {
-            simulation.advance()?;
-        }
-        // The mean over the points of the load.
-        let now = simulation.particles.by_id();
-        let at: Vec<_> = (0..now.len()).filter(|&p| !now.is_solid(p)).collect();
-        let moved: Vector<f64, 2> = at.iter().map(|&p| now.position[p] - start[p]).sum();
-        let end = moved / (at.len() as f64 * -length);
-        for (quantity, found, exact) in [("u/L", end[0], along), ("w/L", end[1], down)] {
-            let labels = [&format!("{quantity}: error over w/L")[..], &load.to_string()];
-            report.push(&labels, (found - exact).abs() / down, Bound::AtMost(BEAM));
-        }
-        report.push(&["load steps", &load.to_string()], simulation.clock.steps() as f64, Bound::AtMost(20.0));
-    }
-    Ok(report)
-}
-
-/// The position of the beam's end under the whole load, in one load step and in more. With one reference configuration it is the same, to
-/// the tolerance of Newton's method.
-fn any_number_of_steps() -> Result<Report, StudyError> {
-    const SAME: f64 = 1e-6;
-    let mut report = Report::new("the elastica's end, PL²/EI = 10, beside that of one load step, over its way", &["shape", "steps"]);
-    for (name, family) in families() {
-        let end = |steps: u32| -> Result<Vector<f64, 2>, StudyError> {
-            let (step, family) = (format!("time.step={}", 1.0 / f64::from(steps)), format!("approximation={family}"));
-            let overrides = [&step, &family, "output.probes=[]", "output.every=null"];
-            let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
-            let start = simulation.particles.by_id().position;
-            while simulation.clock.nominal_steps() < u64::from(steps) {
-                simulation.advance()?;
-            }
-            let last = (0..start.len()).max_by(|&a, &b| start[a][0].total_cmp(&start[b][0])).unwrap_or(0);
-            Ok(simulation.particles.by_id().position[last] - start[last])
-        };
-        let one = end(1)?;
-        for steps in [4, 16] {
-            let apart = (end(steps)? - one).norm() / one.norm();
-            report.push(&[name, &steps.to_string()], apart, Bound::AtMost(SAME));
-        }
-    }
-    Ok(report)
-}
-
 fn refinement<const D: usize>(
     (name, family): (&str, &Value),
     (shape, body): (Shape, &str),
@@ -295,7 +242,7 @@ fn refinement<const D: usize>(
         {
             report.push(&with("growth"), count / before, Bound::AtMost(GROWTH));
         }
-        if shape == Shape::Block {
+        if shape == Shape::Block && h >= LEAST_SPACING[D - 2] {
             push(report, &with("with diagonal blocks"), simulation, Preconditioning::BlockJacobi, Bound::Reported);
         }
     }
@@ -319,7 +266,7 @@ fn time_steps(name: &str, family: &Value, report: &mut Report) -> Result<(), Stu
 /// The block, shifted within a cell along each axis and along both.
 fn cuts(name: &str, family: &Value, effort: Effort, report: &mut Report) -> Result<(), StudyError> {
     let h = 0.1;
-    let parts = if effort == Effort::Full { 40 } else { 8 };
+    let parts = if effort == Effort::Full { 16 } else { 8 };
     for (along, direction) in [("x", [1.0, 0.0]), ("y", [0.0, 1.0]), ("both", [1.0, 1.0])] {
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for part in 0..=parts {

@@ -2,7 +2,7 @@
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
-use crate::symmetry::{Devices, SymmetryError, TRANSFORMATIONS, Transformation, compare, draw};
+use crate::symmetry::{SymmetryError, TRANSFORMATIONS, Transformation, compare, draw};
 use rayon::prelude::*;
 
 /// The summary in the list of studies.
@@ -36,7 +36,7 @@ fn judge(transformation: Transformation, scenes: u64, report: &mut Report, left_
     let found: Vec<_> = (0..scenes)
         .into_par_iter()
         .map(|seed| {
-            let (pair, name) = draw(seed, transformation, Devices::Off);
+            let (pair, name) = draw(seed, transformation);
             (format!("{seed}: {name}"), compare(&pair))
         })
         .collect();

@@ -1,7 +1,6 @@
 //! Remainders of Taylor's expansion of Π and R along a line, on whole steps of every shipped scene.
 
 use super::{Effort, Outcome, StudyError};
-use crate::figure::{Axis, Figure, Line};
 use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
@@ -34,23 +33,20 @@ const TOLERANCE: f64 = 0.1;
 /// Π(x + s u) and R(x + s u) minus their expansions at x, for shrinking s.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let steps = if *effort == Effort::Full { 40 } else { 2 };
-    let mut study = Study {
-        report: Report::new("Taylor remainders: slope of log(remainder) over log(s)", &["scene", "remainder", "points"]),
-        figures: Vec::new(),
-    };
+    let mut report = Report::new("Taylor remainders: slope of log(remainder) over log(s)", &["scene", "remainder", "points"]);
     for name in shipped::names()? {
-        let scene = shipped::scene(&name, &[])?;
+        let scene = shipped::scene(&name, &[] as &[&str])?;
         match scene.dimension() {
-            1 => study.scene(&name, scene.build::<1>(&shipped::folder())?, steps, scene.time.end)?,
-            2 => study.scene(&name, scene.build::<2>(&shipped::folder())?, steps, scene.time.end)?,
-            _ => study.scene(&name, scene.build::<3>(&shipped::folder())?, steps, scene.time.end)?,
+            1 => judge::<1>(&mut report, &name, scene.build(&shipped::folder())?, steps, scene.time.end)?,
+            2 => judge::<2>(&mut report, &name, scene.build(&shipped::folder())?, steps, scene.time.end)?,
+            _ => judge::<3>(&mut report, &name, scene.build(&shipped::folder())?, steps, scene.time.end)?,
         }
     }
-    study.report.note(format!(
+    report.note(format!(
         "After {steps} steps of the scene, or three quarters of its time; x is the converged increment of the next one plus a random deformation. A slope is the median of the last {LOCAL_SLOPES} local ones whose remainders are {ABOVE_FLOOR} times their round-off, eps times the magnitude of the contributions; `points` are those above it.",
     ));
-    study.report.note("Slope 2 of R - R(x) - s K u and slope 3 of Pi - ... - s^2/2 u.Ku hold only for the exact K; slope 3 of R uses its second derivative by dual numbers.");
-    Ok(Outcome { reports: vec![study.report], figures: study.figures, ..Outcome::default() })
+    report.note("Slope 2 of R - R(x) - s K u and slope 3 of Pi - ... - s^2/2 u.Ku hold only for the exact K; slope 3 of R uses its second derivative by dual numbers.");
+    Ok(Outcome { reports: vec![report], ..Outcome::default() })
 }
 
 /// The four remainders.
@@ -61,82 +57,70 @@ const NAMES: [(&str, f64); 4] = [
     ("R - (R + s K u + s^2/2 R''uu)", 3.0),
 ];
 
-struct Study {
-    report: Report,
-    figures: Vec<Figure>,
-}
-
-impl Study {
-    fn scene<const D: usize>(
-        &mut self,
-        name: &str,
-        mut simulation: Simulation<D, Material>,
-        steps: usize,
-        end: f64,
-    ) -> Result<(), StudyError> {
-        // The last load of a scene may be the limit of its body, and the tested step starts on a reset grid; so the run ends earlier.
-        for _ in 0..steps {
-            if simulation.clock.time() > 0.75 * end {
-                break;
-            }
-            simulation.advance()?;
+/// Adds the slopes of one scene to the report.
+fn judge<const D: usize>(
+    report: &mut Report,
+    name: &str,
+    mut simulation: Simulation<D>,
+    steps: usize,
+    end: f64,
+) -> Result<(), StudyError> {
+    // The last load of a scene may be the limit of its body, and the tested step starts on a reset grid; so the run ends earlier.
+    for _ in 0..steps {
+        if simulation.clock.time() > 0.75 * end {
+            break;
         }
-        let prepared = Prepared::new(&simulation)?;
-        let equilibrium = prepared.equilibrium(&simulation);
-        let mut x = vec![Vector::zeros(); prepared.nodes.len()];
-        prepared.prescribe(&mut x);
-        newton(
-            &equilibrium,
-            &mut BlockJacobi::<D>::default(),
-            bytemuck::cast_slice_mut(&mut x),
-            &simulation.settings.newton,
-            &Pool::default(),
-        )?;
-        // A random deformation of some percent, so that every term contributes.
-        let mut random = Random::new(3);
-        let size = 0.02 * simulation.grid.spacing;
-        let mut shift = random.field::<D>(x.len());
-        equilibrium.clear_prescribed(&mut shift);
-        x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
-        // A direction of similar size, a skew sawtooth. Stretches and compressions of equal shape would cancel in the third derivative of Π
-        // and show the fourth.
-        let indices = prepared.nodes.positions(&simulation.grid);
-        let mut u: Vec<Vector<f64, D>> = indices
-            .map(|(index, _)| {
-                Vector::from_fn(|k, _| size * (SAWTOOTH[index[k] as usize % SAWTOOTH.len()] + 0.2 * random.signed()))
-            })
-            .collect();
-        equilibrium.clear_prescribed(&mut u);
-
-        let remainders = remainders(&equilibrium, &x, &u)?;
-        let mut lines = Vec::new();
-        for ((title, order), values) in NAMES.iter().zip(&remainders) {
-            if values.is_empty() {
-                continue;
-            }
-            let above: Vec<f64> =
-                values.iter().take_while(|point| point.remainder > ABOVE_FLOOR * point.floor).map(|p| p.remainder).collect();
-            let slope = slope(&above).unwrap_or(f64::NAN);
-            let bound = Bound::Between(order - TOLERANCE, order + TOLERANCE);
-            self.report.push(&[name, title, &above.len().to_string()], slope, bound);
-            let points = values.iter().map(|point| (point.s, point.remainder)).collect();
-            lines.push(Line { name: (*title).into(), points });
-        }
-        self.figures.push(Figure {
-            name: format!("taylor-{name}"),
-            title: format!("Taylor remainders: {name}"),
-            x: Axis::logarithmic("s"),
-            y: Axis::logarithmic("remainder"),
-            lines,
-        });
-        Ok(())
+        simulation.advance()?;
     }
+    let prepared = Prepared::new(&simulation)?;
+    let equilibrium = prepared.equilibrium(&simulation);
+    let mut random = Random::new(3);
+    let size = 0.02 * simulation.grid.spacing;
+    let x = near_solution(&simulation, &prepared, size, &mut random)?;
+    // A direction of similar size, a skew sawtooth. Stretches and compressions of equal shape would cancel in the third derivative of Π and
+    // show the fourth.
+    let sawtooth = |at: u32, random: &mut Random| SAWTOOTH[at as usize % SAWTOOTH.len()] + 0.2 * random.signed();
+    let indices = prepared.nodes.positions(&simulation.grid);
+    let mut u: Vec<Vector<f64, D>> =
+        indices.map(|(index, _)| Vector::from_fn(|k, _| size * sawtooth(index[k], &mut random))).collect();
+    equilibrium.clear_prescribed(&mut u);
+
+    for ((title, order), points) in NAMES.iter().zip(remainders(&equilibrium, &x, &u)?) {
+        if points.is_empty() {
+            continue;
+        }
+        let above: Vec<f64> = points
+            .iter()
+            .take_while(|point| point.remainder > ABOVE_FLOOR * point.floor)
+            .map(|point| point.remainder)
+            .collect();
+        let bound = Bound::Between(order - TOLERANCE, order + TOLERANCE);
+        report.push(&[name, title, &above.len().to_string()], slope(&above).unwrap_or(f64::NAN), bound);
+    }
+    Ok(())
 }
 
-/// A remainder at s, and its round-off.
+/// The increment of the next step plus a random deformation of some percent, so that every term contributes.
+fn near_solution<const D: usize>(
+    simulation: &Simulation<D>,
+    prepared: &Prepared<D>,
+    size: f64,
+    random: &mut Random,
+) -> Result<Vec<Vector<f64, D>>, StudyError> {
+    let equilibrium = prepared.equilibrium(simulation);
+    let mut x = vec![Vector::zeros(); prepared.nodes.len()];
+    prepared.prescribe(&mut x);
+    let (unknowns, settings) = (bytemuck::cast_slice_mut(&mut x), &simulation.settings.newton);
+    newton(&equilibrium, &mut BlockJacobi::<D>::default(), unknowns, settings, &Pool::default())?;
+    let mut shift = random.field::<D>(x.len());
+    equilibrium.clear_prescribed(&mut shift);
+    x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
+    Ok(x)
+}
+
+/// A remainder, and its round-off.
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    s: f64,
     remainder: f64,
     floor: f64,
 }
@@ -176,8 +160,8 @@ fn remainders<const D: usize>(
             let (at_moved, magnitude) = moved?;
             let floor = f64::EPSILON * magnitude;
             let first = at_moved - at_x - s * r_u;
-            lists[0].push(Point { s, remainder: first.abs(), floor });
-            lists[1].push(Point { s, remainder: (first - 0.5 * s * s * u_k_u).abs(), floor });
+            lists[0].push(Point { remainder: first.abs(), floor });
+            lists[1].push(Point { remainder: (first - 0.5 * s * s * u_k_u).abs(), floor });
         }
         let r_moved = free(equilibrium.residual::<f64>(&moved)?);
         let floor = f64::EPSILON * equilibrium.magnitude(&moved)?;
@@ -185,8 +169,8 @@ fn remainders<const D: usize>(
             let all = r_moved.iter().zip(&r).zip(k_u.iter().zip(&second));
             all.map(|((moved, r), (k, second))| (moved - r - k * s - second * factor).norm_squared()).sum::<f64>().sqrt()
         };
-        lists[2].push(Point { s, remainder: of(0.0), floor });
-        lists[3].push(Point { s, remainder: of(0.5 * s * s), floor });
+        lists[2].push(Point { remainder: of(0.0), floor });
+        lists[3].push(Point { remainder: of(0.5 * s * s), floor });
     }
     Ok(lists)
 }

@@ -5,37 +5,34 @@ use super::transform::{Pair, Transformation};
 use crate::random::Random;
 use serde_json::{Value, json};
 
-/// Whether scenes use the stabilisation of nodes with little mass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Devices {
-    /// The program's default, and loads on surfaces of shapes.
-    Default,
-    /// No stabilisation with inertia; loads on particles.
-    Off,
+/// The scene of a seed and its image. With inertia no scene stabilises nodes with little mass, and loads act on particles.
+pub fn draw(seed: u64, transformation: Transformation) -> (Pair, String) {
+    let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let (scene, body) = scene(&mut random, transformation);
+    let name = format!(
+        "{}: {}, {:?}{}, {:?}, {}, {}, {}, renewed {}, load {}",
+        transformation.name(),
+        body.family.0,
+        scene.law,
+        if scene.averaged { " averaged" } else { "" },
+        scene.scheme,
+        body.form.0,
+        scene.layout,
+        scene.fill,
+        scene.renewed,
+        scene.load.as_ref().map_or("none".to_owned(), |load| format!("{:?}", load.pressing)),
+    );
+    let choice = random.between(0.0, 512.0) as u32;
+    (transformation.of(scene, choice), name)
 }
 
-/// The scene of a seed and its image.
-pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pair, String) {
-    let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let random = &mut random;
+fn scene(random: &mut Random, transformation: Transformation) -> (Scene, Body) {
     let spacing = one_of(random, &[0.25, 0.2, 0.3]);
     let scheme = one_of(random, &[Scheme::Newmark, Scheme::GeneralizedAlpha, Scheme::LoadSteps]);
     let inertia = scheme != Scheme::LoadSteps;
     let half = transformation == Transformation::Doubled;
     let held = !inertia || one_of(random, &[true, false]);
-    let (family_name, family) = family(random, half);
-    // Gauss's rule for quadratic functions has half cells at the ends of a body. So there are more particles along a cut and across a slab.
-    let regular = family_name == "uGIMP"
-        || family_name == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
-    let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
-    let (form_name, form) = form(random, spacing, transformation, held);
-    // Points that integrate polynomials over cut cells differ from those of the mirror image.
-    let fills: &[&str] = match (devices, layout) {
-        (Devices::Off, "gauss") => &["particles"],
-        // Aggregation takes the domain of a particle for a cube. Cut particles have other edges in the plane and in space.
-        _ if transformation == Transformation::Slab && !inertia => &["particles"],
-        _ => &["cut", "particles"],
-    };
+    let body = body(random, transformation, spacing, held, inertia);
     let law = law(random, half);
     let renewed = match transformation {
         // Bodies in contact reset the grid in every step; without inertia they are bonded.
@@ -53,11 +50,11 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         origin: [0.0; 2],
         cells: [7, 8],
         spacing,
-        family,
-        layout,
-        fill: one_of(random, fills),
+        family: body.family.1.clone(),
+        layout: body.layout,
+        fill: one_of(random, body.fills),
         renewed,
-        bodies: vec![form.clone()],
+        bodies: vec![body.form.1.clone()],
         law,
         averaged,
         velocity: [if half { 0.0 } else { random.between(-2.0, 2.0) }, random.between(-2.0, 2.0)],
@@ -78,21 +75,34 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
         blend: if half { None } else { one_of(random, &[None, Some(10.0)]) },
         damping: one_of(random, &[None, Some([1.0, 1e-4])]),
         // Without inertia only aggregation stabilises nodes with little mass.
-        aggregation: (devices == Devices::Off).then_some(!inertia),
+        aggregation: !inertia,
         forcing: 1e-9,
         slab: false,
     };
-    scene.load = load(random, &scene, &form, share, devices);
-    let name = format!(
-        "{}: {family_name}, {law:?}{}, {scheme:?}, {form_name}, {layout}, {}, renewed {}, load {}",
-        transformation.name(),
-        if averaged { " averaged" } else { "" },
-        scene.fill,
-        scene.renewed,
-        scene.load.as_ref().map_or("none".to_owned(), |load| format!("{:?}", load.pressing)),
-    );
-    let choice = random.between(0.0, 512.0) as u32;
-    (transformation.of(scene, choice), name)
+    scene.load = load(random, &scene, &body.form.1, share);
+    (scene, body)
+}
+
+/// The body of a scene: its shape functions and its form, each with its name, and its particles.
+struct Body {
+    family: (&'static str, Value),
+    form: (&'static str, Form),
+    layout: &'static str,
+    fills: &'static [&'static str],
+}
+
+fn body(random: &mut Random, transformation: Transformation, spacing: f64, held: bool, inertia: bool) -> Body {
+    let family = family(random, transformation == Transformation::Doubled);
+    // Gauss's rule for quadratic functions has half cells at the ends of a body. So there are more particles along a cut and across a slab.
+    let regular = family.0 == "uGIMP"
+        || family.0 == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
+    let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
+    let form = form(random, spacing, transformation, held);
+    // Points that integrate polynomials over cut cells differ from those of the mirror image. Aggregation takes the domain of a particle for
+    // a cube, and cut particles have other edges in the plane and in space.
+    let whole = layout == "gauss" || transformation == Transformation::Slab && !inertia;
+    let fills: &[&str] = if whole { &["particles"] } else { &["cut", "particles"] };
+    Body { family, form, layout, fills }
 }
 
 fn steps_of_load(steps: u32) -> f64 {
@@ -194,7 +204,7 @@ fn faces(random: &mut Random, half: bool, held: bool, inertia: bool) -> [Option<
 }
 
 /// A traction or a pressure on the upper part of the body, or none.
-fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: Devices) -> Option<Load> {
+fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64) -> Option<Load> {
     let half = scene.faces[0].is_some();
     let across = if half { 0.0 } else { random.between(-10.0, 10.0) };
     let traction = Pressing::Traction([across, random.between(-15.0, 5.0)].map(|t| share * t));
@@ -214,6 +224,5 @@ fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: De
     // layer of particles. The next layer would count as loaded beside the faces of cuts and slabs, which the image does not have.
     let lower = if half { 0.0 } else { ends[0] - 0.1 * h };
     let region = Form::Box { min: [lower, top - 0.499 * h], max: [ends[1] + 0.1 * h, top + 0.1 * h] };
-    let carried = (devices == Devices::Off).then_some(([0.0, 1.0], 0.5 * h));
-    Some(Load { region, pressing, carried })
+    Some(Load { region, pressing, carried: ([0.0, 1.0], 0.5 * h) })
 }

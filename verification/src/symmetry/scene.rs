@@ -70,8 +70,8 @@ pub enum Hold {
 pub struct Load {
     pub region: Form,
     pub pressing: Pressing,
-    /// Outward normal and area of a particle, if particles carry the load.
-    pub carried: Option<([f64; 2], f64)>,
+    /// Outward normal and area of each particle that carries the load.
+    pub carried: ([f64; 2], f64),
 }
 
 /// A traction or a follower pressure.
@@ -118,8 +118,8 @@ pub struct Scene {
     pub blend: Option<f64>,
     /// Rayleigh's constants, of mass and of stiffness.
     pub damping: Option<[f64; 2]>,
-    /// Whether nodes with little mass follow others; `None` is the program's default.
-    pub aggregation: Option<bool>,
+    /// Whether nodes with little mass follow others.
+    pub aggregation: bool,
     /// The tolerance of each linear system.
     pub forcing: f64,
     /// Whether the scene is a slab of one cell between sliding faces in three dimensions.
@@ -210,7 +210,7 @@ impl Scene {
             "bodies": bodies.collect::<Vec<_>>(),
             "boundary": self.boundary(&in_space),
             "solver": { "newton": { "tolerance": 1e-14, "max_iterations": 50 }, "krylov": { "forcing": { "fixed": self.forcing } } },
-            "time": self.time(),
+            "time": self.time(), "aggregation": self.aggregation,
         });
         let duration = f64::from(self.steps) * self.step * units.time;
         let ramp = json!([[0, 0.5], [duration, 1]]);
@@ -219,9 +219,6 @@ impl Scene {
             scene["gravity"] = json!({ "acceleration": acceleration, "curve": ramp });
         }
         self.write_load(&mut scene, &ramp, thickness, &in_space);
-        if let Some(aggregation) = self.aggregation {
-            scene["aggregation"] = json!(aggregation);
-        }
         if let (Some(rate), true) = (self.blend, inertia) {
             scene["transfer"] = json!({ "blend": { "rate": rate / units.time, "order": 2 } });
         }
@@ -282,9 +279,8 @@ impl Scene {
                 Pressing::Traction(traction) => one["traction"] = in_space(traction, units.stress()),
                 Pressing::Pressure(pressure) => one["pressure"] = json!(pressure * units.stress()),
             }
-            if let Some((normal, area)) = load.carried {
-                one["surface"] = json!({ "normal": in_space(normal, 1.0), "area": area * units.length * depth });
-            }
+            let (normal, area) = load.carried;
+            one["surface"] = json!({ "normal": in_space(normal, 1.0), "area": area * units.length * depth });
             one
         });
         let key = if matches!(load.pressing, Pressing::Traction(_)) { "tractions" } else { "pressures" };

@@ -171,7 +171,7 @@ fn mapped(scene: &Scene, map: &Map, edges: [f64; 2]) -> Scene {
                 Pressing::Traction(traction) => Pressing::Traction(map.vector(traction)),
                 pressure => pressure,
             },
-            carried: load.carried.map(|(normal, area)| (map.vector(normal), area)),
+            carried: (map.vector(load.carried.0), load.carried.1),
         }),
         ..scene.clone()
     }

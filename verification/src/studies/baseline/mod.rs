@@ -3,7 +3,7 @@
 mod statics;
 
 use super::{Effort, Outcome, StudyError};
-use crate::baseline::{BFree, BlockMatrix, Pattern, Stiffness, Voigt, assemble};
+use crate::baseline::{BFree, BlockMatrix, Pattern, Voigt, assemble};
 use crate::prepared::Prepared;
 use crate::random::Random;
 use crate::report::{Bound, Report};
@@ -48,16 +48,15 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             ["case", "GMRES products", "s GMRES, matrix-free", "s GMRES, matrix"],
         ),
     };
-    let (plane, space) = match effort {
-        Effort::Short => (16, 4),
-        Effort::Full => (64, 10),
-    };
     // One law of each formula: the laws with another volumetric part cost the same.
     let mut laws = Material::examples(settling::lame()?);
     laws.retain(|(name, _)| *name != "neo-Hookean, logarithmic");
     let shapes = [("linear", Approximation::from(Linear)), ("lme 3", Lme::new(3.0, 1e-6).into())];
     for (law_name, law) in &laws {
         let law_name = law_name.trim_end_matches(", Ciarlet");
+        // The seconds depend on whether a tangent has a closed form, and on little else of the law: one law of each kind has large blocks.
+        let large = *effort == Effort::Full && matches!(law, Material::NeoHookean(_) | Material::Ogden(_));
+        let (plane, space) = if large { (64, 10) } else { (16, 4) };
         // Blocks of a law without a closed form need one product each. LME has 4·10⁵ of them in 3D, which take up to three minutes and show
         // no more than linear functions.
         let is_closed = law.closed::<3>(&identity(), &Deformation::new(Tensor::zeros()), 1.0).is_some();
@@ -107,51 +106,36 @@ impl Study {
         let mut dphi: Vec<Vector<f64, D>> = random.field(count).iter().map(|x: &Vector<f64, D>| x * 0.01).collect();
         prepared.prescribe(&mut dphi);
 
-        let start = Instant::now();
-        let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
-        let pattern_seconds = start.elapsed().as_secs_f64();
-        let (b_free, b_free_seconds) = built(&equilibrium, &dphi, &pattern, &BFree)?;
-        let voigt_seconds = {
-            let (voigt, seconds) = built(&equilibrium, &dphi, &pattern, &Voigt)?;
-            self.report.push(&["entries, B-free - Voigt", &case], b_free.difference(&voigt), Bound::AtMost(ENTRIES));
-            seconds
-        };
+        let (pattern, pattern_seconds) = timed(|| Pattern::new(&prepared.supports, count, MOST_BLOCKS))?;
+        let (b_free, b_free_seconds) = timed(|| assemble(&equilibrium, &dphi, &pattern, &BFree))?;
+        let (voigt, voigt_seconds) = timed(|| assemble(&equilibrium, &dphi, &pattern, &Voigt))?;
+        self.report.push(&["entries, B-free - Voigt", &case], b_free.difference(&voigt), Bound::AtMost(ENTRIES));
+        drop(voigt);
 
-        let start = Instant::now();
-        let tangent = equilibrium.tangent(&dphi)?;
-        let freeze_seconds = start.elapsed().as_secs_f64();
+        let (tangent, freeze_seconds) = timed(|| equilibrium.tangent(&dphi))?;
         let mut u: Vec<Vector<f64, D>> = random.field(count);
         equilibrium.clear_prescribed(&mut u);
-        let (mut by_matrix, mut free) = (vec![Vector::zeros(); count], vec![Vector::zeros(); count]);
+        let mut by_matrix = vec![Vector::zeros(); count];
+        let mut free = by_matrix.clone();
         let matrix_seconds = best(|| b_free.product(black_box(&u), &mut by_matrix));
         let free_seconds = best(|| tangent.product(black_box(&u), &mut free));
         equilibrium.clear_prescribed(&mut by_matrix);
         let difference = distance(&by_matrix, &free) / norm(&free);
         self.report.push(&["product, matrix - matrix-free", &case], difference, Bound::AtMost(ENTRIES));
 
-        let particles = simulation.particles.len();
         let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports);
-        let free_bytes = prepared.supports.bytes() + frozen;
-        let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
-        let seconds = |s: f64| format!("{s:.5}");
-        let (spent, saved) = (pattern_seconds + b_free_seconds - freeze_seconds, free_seconds - matrix_seconds);
-        self.table.push([
-            format!("{D}D {shape_name}"),
-            law_name.into(),
-            particles.to_string(),
-            (D * count).to_string(),
-            pattern.len().to_string(),
-            megabytes(free_bytes),
-            megabytes(b_free.bytes()),
-            format!("{:.1}", b_free.bytes() as f64 / free_bytes as f64),
-            seconds(pattern_seconds),
-            seconds(b_free_seconds),
-            seconds(voigt_seconds),
-            seconds(freeze_seconds),
-            seconds(free_seconds),
-            seconds(matrix_seconds),
-            if saved > 0.0 { format!("{:.0}", (spent / saved).max(0.0)) } else { "never".into() },
-        ]);
+        let bytes = [prepared.supports.bytes() + frozen, b_free.bytes()].map(|bytes| bytes as f64);
+        let spent = pattern_seconds + b_free_seconds - freeze_seconds;
+        let saved = free_seconds - matrix_seconds;
+        let counts = [simulation.particles.len(), D * count, pattern.len()].map(|count| count.to_string());
+        let megabytes = bytes.map(|bytes| format!("{:.2}", bytes / 1e6));
+        let seconds = [pattern_seconds, b_free_seconds, voigt_seconds, freeze_seconds, free_seconds, matrix_seconds];
+        let mut row = vec![format!("{D}D {shape_name}"), law_name.into()];
+        row.extend(counts.into_iter().chain(megabytes));
+        row.push(format!("{:.1}", bytes[1] / bytes[0]));
+        row.extend(seconds.map(|s| format!("{s:.5}")));
+        row.push(if saved > 0.0 { format!("{:.0}", (spent / saved).max(0.0)) } else { "never".into() });
+        self.table.push(row);
         if matches!(law, Material::NeoHookean(_)) {
             self.solve(&case, &equilibrium, &dphi, &b_free)?;
         }
@@ -173,22 +157,13 @@ impl Study {
         blocks.take(&tangent);
         let settings = GmresSettings { relative_tolerance: SOLVE, max_iterations: 4000, restart: 100 };
         let mut x = vec![0.0; right.len()];
-        let start = Instant::now();
-        let report = gmres(&tangent, &blocks, right, &mut x, &settings, &pool)?;
-        let free_seconds = start.elapsed().as_secs_f64();
+        let (report, free_seconds) = timed(|| gmres(&tangent, &blocks, right, &mut x, &settings, &pool))?;
         self.report.push(&["GMRES, relative residual", case], report.relative_residual, Bound::AtMost(SOLVE));
-
-        let mut y = vec![0.0; right.len()];
-        let start = Instant::now();
-        gmres(&Held { matrix, equilibrium }, &blocks, right, &mut y, &settings, &pool)?;
-        let matrix_seconds = start.elapsed().as_secs_f64();
-        let seconds = |s: f64| format!("{s:.4}");
-        self.solves.push([
-            case.into(),
-            report.products.to_string(),
-            seconds(free_seconds),
-            seconds(matrix_seconds),
-        ]);
+        x.fill(0.0);
+        let held = Held { matrix, equilibrium };
+        let (_, matrix_seconds) = timed(|| gmres(&held, &blocks, right, &mut x, &settings, &pool))?;
+        let seconds = [free_seconds, matrix_seconds].map(|s| format!("{s:.4}"));
+        self.solves.push([case.into(), report.products.to_string()].into_iter().chain(seconds));
         Ok(())
     }
 }
@@ -207,16 +182,10 @@ impl<const D: usize> bfree::solver::LinearOperator for Held<'_, D> {
     }
 }
 
-/// The assembled tangent, and the seconds of the assembly.
-fn built<'p, const D: usize, S: Stiffness<D>>(
-    equilibrium: &Equilibrium<'_, D, Material>,
-    dphi: &[Vector<f64, D>],
-    pattern: &'p Pattern,
-    stiffness: &S,
-) -> Result<(BlockMatrix<'p, D>, f64), StudyError> {
+/// A result and the seconds it took.
+fn timed<T, E>(run: impl FnOnce() -> Result<T, E>) -> Result<(T, f64), E> {
     let start = Instant::now();
-    let matrix = assemble(equilibrium, dphi, pattern, stiffness)?;
-    Ok((matrix, start.elapsed().as_secs_f64()))
+    Ok((run()?, start.elapsed().as_secs_f64()))
 }
 
 /// The shortest of five runs, after one warm-up run.

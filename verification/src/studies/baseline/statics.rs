@@ -71,7 +71,7 @@ fn measured(effort: Effort) -> Result<(Report, Table), StudyError> {
 
 fn block(family: &str, cells: u32) -> Result<Simulation<3>, StudyError> {
     let (spacing, family) = (format!("grid.spacing={}", 1.0 / f64::from(cells)), format!("approximation={family}"));
-    Ok(shipped::scene("block_static", &[&spacing, &family])?.build(&shipped::folder())?)
+    shipped::simulation("block_static", &[&spacing, &family])
 }
 
 struct Solved {

@@ -12,18 +12,17 @@ mod double;
 mod durations;
 mod flight;
 mod impossible;
-mod places;
 mod points;
 mod sliding;
 mod small;
 mod strains;
 mod units;
 
-use super::{Effort, Outcome, StudyError};
+use super::{Effort, Outcome, StudyError, worse};
 use crate::report::{Bound, Report, chain};
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, places, lone particles, time steps and overlaps at their extremes";
+pub(super) const ABOUT: &str = "strains, deformations, contrasts, units, lone particles, time steps and overlaps at their extremes";
 
 /// The entry in the column `beforehand` of a row that must be solved.
 const SOLVABLE: &str = "solvable";
@@ -37,11 +36,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.reports.push(crushed::run()?);
     outcome.reports.push(contrast::run()?);
     outcome.reports.push(units::run()?);
-    outcome.reports.push(places::run());
     small::run(&mut outcome);
     durations::run(effort, &mut outcome)?;
     flight::run(effort, &mut outcome)?;
-    sliding::run(effort, &mut outcome)?;
+    sliding::run(&mut outcome)?;
     Ok(outcome)
 }
 
@@ -105,9 +103,4 @@ fn refused<T, E: std::error::Error>(
     // Without an answer there was no refusal.
     let value = if answered > 0 { f64::from(wrong) } else { f64::NAN };
     report.push(&[what, case, &beforehand], value, Bound::AtMost(0.0));
-}
-
-/// The larger number, or NaN if either is NaN.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }

@@ -3,7 +3,7 @@
 use super::points::{Errors, Rounding, judge, laws, reference};
 use super::{Effort, Outcome, SOLVABLE};
 use crate::check::regime::rotation;
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::random::Random;
 use crate::report::{Bound, Report, short};
 use crate::sheet::{Curve, Mark, Panel, Sheet};

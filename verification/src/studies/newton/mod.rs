@@ -1,10 +1,9 @@
-//! The convergence of Newton's method on steps of the rebound, against the paper's Table 3.
+//! The convergence of Newton's method on steps of the rebound. The study `rebound` compares with the paper's Table 3.
 
 mod difference;
 mod mass;
 
 use super::{Effort, Outcome, StudyError};
-use crate::figure::{Axis, Figure, Line};
 use crate::prepared::Prepared;
 use crate::report::{Bound, Report, chain, short};
 use crate::shipped;
@@ -14,12 +13,12 @@ use bfree::material::Material;
 use bfree::pooled::Pool;
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::{
-    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonSettings, NonlinearProblem, gmres, newton,
+    BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, gmres, newton,
 };
 use bfree::tensor::Vector;
 use difference::Difference;
 
-pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound, beside the paper's Table 3";
+pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound";
 
 /// A step of a scene, started from the converged state before it.
 struct Case {
@@ -37,36 +36,45 @@ const CASES: [Case; 3] = [
 
 const LUMPINGS: [(f64, &str); 4] = [(1.0, "1 (lumped)"), (0.5, "0.5"), (0.01, "0.01"), (0.0, "0 (consistent)")];
 
-/// The independent program at t = 21.80, ε = 1 (shared reference), and the paper's Table 3 at "t = 22.0".
-const REFERENCE: [f64; 3] = [1.3314e2, 1.778e-2, 1.18e-8];
-const TABLE_3: [f64; 3] = [1.3336e2, 2.0710e-2, 2.4353e-8];
-
-/// The method for products with the tangent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Product {
-    Exact,
-    /// Forward differences with this step length, in units of the spacing.
-    Difference(f64),
-}
-
 /// GMRES has no restart within the number of unknowns. With ε = 0 the blocks of the tangent precondition badly, and GMRES(30) stagnates.
 const RESTART: &str = r#"solver.krylov.method={"gmres":{"restart":200}}"#;
 
+/// A name, and the tolerance of the linear systems.
 struct Method {
     name: &'static str,
-    product: Product,
     forcing: Forcing,
 }
 
 /// A tight tolerance, at the limit of Krylov methods in double precision.
 const TIGHT: Forcing = Forcing::Fixed(1e-12);
 
-const METHODS: [Method; 4] = [
-    Method { name: "exact, tight", product: Product::Exact, forcing: TIGHT },
-    Method { name: "exact, Eisenstat-Walker", product: Product::Exact, forcing: Forcing::EisenstatWalker },
-    Method { name: "difference 1.5e-8", product: Product::Difference(1.5e-8), forcing: Forcing::Fixed(1e-6) },
-    Method { name: "difference 1e-3", product: Product::Difference(1e-3), forcing: Forcing::Fixed(1e-6) },
+const METHODS: [Method; 2] = [
+    Method { name: "exact, tight", forcing: TIGHT },
+    Method { name: "exact, Eisenstat-Walker", forcing: Forcing::EisenstatWalker },
 ];
+
+impl Method {
+    /// Newton's method from `start`: its last iterate, its history, and why it ended without a solution.
+    fn solve(
+        &self,
+        equilibrium: &Equilibrium<'_, 2, Material>,
+        settings: &NewtonSettings,
+        start: &[f64],
+    ) -> (Vec<f64>, NewtonHistory, Option<String>) {
+        let settings = NewtonSettings {
+            // The residual goes to round-off: the floor ends the iterations.
+            relative_tolerance: 0.0,
+            forcing: self.forcing,
+            krylov: Krylov::Gmres { restart: 200 },
+            ..*settings
+        };
+        let mut x = start.to_vec();
+        match newton(equilibrium, &mut BlockJacobi::<2>::default(), &mut x, &settings, &Pool::default()) {
+            Ok(report) => (x, report.history, None),
+            Err(error) => (x, *error.history, Some(error.cause.to_string())),
+        }
+    }
+}
 
 /// Residuals of Newton's iterations with each method, and the order of single steps towards the solution.
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
@@ -82,7 +90,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
                 }
                 let mut at = simulation.clone();
                 at.settings.lumping = lumping;
-                study.case(case, lumping, label, &at, effort)?;
+                study.case(case, label, &at, effort)?;
             }
             if lumping == 0.0 && *effort == Effort::Full {
                 study.consistent_alone(scene, label)?;
@@ -106,7 +114,7 @@ impl Case {
 /// A rebound at t = 0.
 fn rebound(scene: &str, lumping: f64) -> Result<Simulation<2, Material>, StudyError> {
     let lumping = format!("time.lumping={lumping}");
-    Ok(shipped::scene(scene, &[&lumping, RESTART])?.build::<2>(&shipped::folder())?)
+    shipped::simulation(scene, &[lumping.as_str(), RESTART])
 }
 
 /// Runs to the start of a step.
@@ -123,8 +131,6 @@ struct Study {
     runs: Report,
     converged: Report,
     orders: Report,
-    reference: Report,
-    figures: Vec<Figure>,
 }
 
 impl Study {
@@ -153,18 +159,12 @@ impl Study {
                 "order p of one Newton step from x* + s (x0 - x*): |R after| ~ |R before|^p",
                 &["step", "eps", "product", "residuals from", "to"],
             ),
-            reference: Report::new(
-                "lumped, v = 0.5, t = 21.8 against the independent program, relative difference (the paper's Table 3 printed beside)",
-                &["iteration", "here", "program", "paper"],
-            ),
-            figures: Vec::new(),
         }
     }
 
     fn case(
         &mut self,
         case: &Case,
-        lumping: f64,
         label: &str,
         simulation: &Simulation<2, Material>,
         effort: &Effort,
@@ -175,61 +175,24 @@ impl Study {
         prepared.prescribe(&mut start);
         self.spectra(case.name, label, simulation, &prepared, &start)?;
         let start: &[f64] = bytemuck::cast_slice(&start);
-        let mut lines = Vec::new();
         let mut solution = None;
         for method in &METHODS {
-            let settings = NewtonSettings {
-                // The residual goes to round-off: the floor ends the iterations.
-                relative_tolerance: 0.0,
-                forcing: method.forcing,
-                krylov: Krylov::Gmres { restart: 200 },
-                ..simulation.settings.newton
-            };
-            let (mut x, mut blocks, pool) = (start.to_vec(), BlockJacobi::<2>::default(), Pool::default());
-            let history = match method.product {
-                Product::Exact => newton(&equilibrium, &mut blocks, &mut x, &settings, &pool).map(|r| r.history).map_err(|e| (e.cause.to_string(), e.history)),
-                Product::Difference(step) => {
-                    let length = step * simulation.grid.spacing;
-                    newton(&Difference { problem: &equilibrium, length }, &mut blocks, &mut x, &settings, &pool)
-                        .map(|r| r.history)
-                        .map_err(|e| (e.cause.to_string(), e.history))
-                }
-            };
-            let history = match history {
-                Ok(history) => history,
-                Err((cause, history)) => {
-                    self.converged.note(format!("{}, eps = {label}, {}: {cause}", case.name, method.name));
-                    *history
-                }
-            };
-            let magnitude = equilibrium.magnitude(bytemuck::cast_slice(&x))?;
+            let (x, history, cause) = method.solve(&equilibrium, &simulation.settings.newton, start);
+            if let Some(cause) = cause {
+                self.converged.note(format!("{}, eps = {label}, {}: {cause}", case.name, method.name));
+            }
+            let magnitude = NonlinearProblem::magnitude(&equilibrium, &x)?;
             let residuals: Vec<f64> =
                 history.first_residual.into_iter().chain(history.iterations.iter().map(|i| i.residual)).collect();
-            let krylov = history.iterations.iter().map(|iteration| iteration.krylov.iterations);
-            self.list(case, label, method.name, &residuals, &krylov.collect::<Vec<_>>(), magnitude);
+            let krylov: Vec<usize> = history.iterations.iter().map(|iteration| iteration.krylov.iterations).collect();
+            self.list(case, label, method.name, &residuals, &krylov, magnitude);
             let last = residuals.last().copied().unwrap_or(f64::NAN) / (f64::EPSILON * magnitude);
             let iterations = history.iterations.len().to_string();
-            // Products by differences are shown for contrast; the program does not use them.
-            let bound = if method.product == Product::Exact { Bound::AtMost(ROUND_OFF) } else { Bound::Reported };
-            self.converged.push(&[case.name, label, method.name, &iterations], last, bound);
-            lines.push(Line {
-                name: method.name.into(),
-                points: residuals.iter().enumerate().map(|(k, &r)| (k as f64, r)).collect(),
-            });
+            self.converged.push(&[case.name, label, method.name, &iterations], last, Bound::AtMost(ROUND_OFF));
             if method.forcing == TIGHT {
-                if lumping == 1.0 && case.end == 21.8 {
-                    self.compare(&residuals);
-                }
                 solution = Some(x);
             }
         }
-        self.figures.push(Figure {
-            name: format!("newton-{}-t{}-eps{lumping}", case.scene, case.end),
-            title: format!("{}, eps = {label}: residual by iteration", case.name),
-            x: Axis::linear("iteration"),
-            y: Axis::logarithmic("|R|"),
-            lines,
-        });
         if let Some(solution) = solution {
             self.single_steps(case, label, simulation.grid.spacing, &equilibrium, start, &solution, effort)?;
         }
@@ -308,20 +271,6 @@ impl Study {
         }
     }
 
-    fn compare(&mut self, residuals: &[f64]) {
-        // The last residual is the square of a residual times a curvature, so it doubles any relative difference. The circle of nodes of
-        // the independent program differs from the box in the fifth digit. The program gives two to five digits.
-        for (k, (reference, tolerance)) in REFERENCE.into_iter().zip([1e-3, 1e-2, 5e-2]).enumerate() {
-            let here = residuals.get(k).copied().unwrap_or(f64::NAN);
-            let shown = [here, reference, TABLE_3[k]].map(|x| format!("{x:.4e}"));
-            self.reference.push(
-                &[&k.to_string(), &shown[0], &shown[1], &shown[2]],
-                (here / reference - 1.0).abs(),
-                Bound::AtMost(tolerance),
-            );
-        }
-    }
-
     /// One Newton step from many distances to the solution. The order shows over all decades above round-off, even if the whole solution
     /// takes few iterations.
     #[allow(clippy::too_many_arguments)] // the ingredients of one experiment
@@ -338,60 +287,43 @@ impl Study {
         let magnitude = NonlinearProblem::magnitude(equilibrium, solution)?;
         let floor = ROUND_OFF * f64::EPSILON * magnitude;
         let points = if *effort == Effort::Full { 48 } else { 24 };
-        let sides = [
-            ("exact", Product::Exact),
-            ("difference 1.5e-8", Product::Difference(1.5e-8)),
-            ("difference 1e-3", Product::Difference(1e-3)),
-        ];
-        let mut lines = Vec::new();
-        for (name, product) in sides {
+        // Products by differences are the control: their error leaves a part of the residual, and the order falls to 1.
+        let sides = [("exact", None, Bound::Between(1.9, 2.1)), ("difference 1e-3", Some(1e-3), Bound::AtMost(1.5))];
+        for (name, difference, bound) in sides {
             let mut pairs = Vec::new();
             for k in 0..points {
                 let s = 10.0_f64.powf(-10.0 * f64::from(k) / f64::from(points));
                 let x: Vec<f64> = solution.iter().zip(start).map(|(x, x0)| x + s * (x0 - x)).collect();
-                let (before, after) = match product {
-                    Product::Exact => step(equilibrium, x)?,
-                    Product::Difference(length) => {
-                        step(&Difference { problem: equilibrium, length: length * spacing }, x)?
-                    }
+                let (before, after) = match difference {
+                    None => step(equilibrium, x)?,
+                    Some(length) => step(&Difference { problem: equilibrium, length: length * spacing }, x)?,
                 };
                 if after > floor {
                     pairs.push((before, after));
                 }
             }
-            let bound = if product == Product::Exact { Bound::Between(1.9, 2.1) } else { Bound::Reported };
             // The far end is not in the neighbourhood of the solution; only the nearer half counts.
             let near = &pairs[pairs.len() / 2..];
             let ends = |k: Option<&(f64, f64)>| k.map_or_else(|| "-".into(), |pair| format!("{:.1e}", pair.0));
             let labels = [case.name, label, name, &ends(near.first()), &ends(near.last())].map(String::from);
             self.orders.push(&labels.each_ref().map(String::as_str), order(near).unwrap_or(f64::NAN), bound);
-            lines.push(Line { name: name.into(), points: pairs });
         }
-        self.figures.push(Figure {
-            name: format!("newton-step-{}-t{}-eps{}", case.scene, case.end, equilibrium.step.lumping),
-            title: format!("{}, eps = {label}: residual after one Newton step over residual before", case.name),
-            x: Axis::logarithmic("|R| before"),
-            y: Axis::logarithmic("|R| after"),
-            lines,
-        });
         Ok(())
     }
 
     fn outcome(mut self) -> Outcome {
-        self.converged.note(format!("Bound: {ROUND_OFF} eps times the magnitude, where Newton's method itself calls a residual round-off. Differences are shown for contrast only."));
+        self.converged.note(format!("Bound: {ROUND_OFF} eps times the magnitude, where Newton's method itself calls a residual round-off."));
         self.orders.note("Least squares on the half of the points nearer to the solution, down to round-off.");
         let remarks = vec![
             "Quadratic: every step shown with the exact tangent and a tight linear solve. A single Newton step has order 2 wherever its result is above round-off, for every eps.".into(),
             "Between the iterations of one solve the order is less: from zero, most of the first residual is inertia, which is linear and vanishes at once, and the third iteration ends in round-off. |R|/|R before|^2 is the constant to look at, until round-off.".into(),
             "Not quadratic, by intention: Eisenstat-Walker. It solves each linear system only as far as it pays: more iterations, fewer products, superlinear.".into(),
-            "Not quadratic, by nature: products by differences. Their error leaves a part of the residual, so the order falls to 1: with a length of 1e-3 h a factor of 1e-5 is left at every iteration; with 1.5e-8 h so little that only the last iterations show it.".into(),
-            "The mass: a mixed mass keeps the order 2 and costs Krylov iterations. With eps = 0 the mass has null modes and the tangent nearly so (columns `null`). The exact tangent with tight solves still converges, with order 2 near the solution but more iterations from zero; loose solves (Eisenstat-Walker) and differences leave the near-null modes unsolved and do not: that is the convergence trouble the paper reports. Those steps start from the state reached with eps = 0.01; `full` runs eps = 0 from the start and says where it ends.".into(),
+            "The mass: a mixed mass keeps the order 2 and costs Krylov iterations. With eps = 0 the mass has null modes and the tangent nearly so (columns `null`). The exact tangent with tight solves still converges, with order 2 near the solution but more iterations from zero; loose solves (Eisenstat-Walker) leave the near-null modes unsolved and do not: that is the convergence trouble the paper reports. Those steps start from the state reached with eps = 0.01; `full` runs eps = 0 from the start and says where it ends.".into(),
         ];
         Outcome {
             tables: vec![self.iterations, self.masses],
-            reports: vec![self.runs, self.reference, self.converged, self.orders],
+            reports: vec![self.runs, self.converged, self.orders],
             remarks,
-            figures: self.figures,
             ..Outcome::default()
         }
     }

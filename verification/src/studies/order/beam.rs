@@ -20,8 +20,7 @@ fn error(length: f64) -> Result<f64, StudyError> {
         format!("tractions.0.traction=[0,{}]", -force),
         "output.probes=[]".into(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<2> = shipped::scene("elastica", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("elastica", &overrides)?;
     let start = simulation.particles.by_id().position;
     while simulation.clock.nominal_steps() < 10 {
         simulation.advance()?;

@@ -1,6 +1,6 @@
 //! A block with a round hole that cuts cells. The tractions P N of the known motion act on the hole.
 
-use super::{GAUSS, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined, figure, line};
+use super::{GAUSS, GAUSS_OF_MIDDLES, Held, Layout, NEAR, REGULAR, Refined};
 use crate::manufactured::Block;
 use crate::report::{Bound, Report};
 use crate::studies::Outcome;
@@ -33,21 +33,18 @@ pub(super) fn run(outcome: &mut Outcome) {
     ];
     let block = Block::curved_at_walls::<2>(CHANGE);
     let hole = Ball { center: Vector::from([0.47, 0.52]), radius: 0.23 };
-    let mut lines = Vec::new();
     for (name, shape, layout, of_stress) in cases {
         let [displacement, stress] = [2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));
         let least = [("displacement, round hole", displacement), ("stress, round hole", stress)];
         let refined = Refined { report: &mut report, table: &mut table, least };
-        let found = refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
+        refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
             let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
             let (scheme, renewal) = (Arc::new(Statics), Renewal::Never);
             let settings = Settings { scheme, renewal, aggregation: true, ..Settings::default() };
             let held = Held::new(block, grid, (&shape, layout), Some(&hole), 1.0, settings)?.after(1)?;
             Ok(([held.displacement(), held.stress()], held.work))
         });
-        lines.push(line(&format!("{name}, {}", layout.name), found.iter().map(|(cells, errors)| (*cells, errors[1]))));
     }
-    outcome.figures.push(figure("hole", "stress of a block with a hole", lines));
     outcome.reports.push(report);
     outcome.tables.push(table);
 }

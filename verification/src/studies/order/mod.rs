@@ -11,7 +11,6 @@ mod transfers;
 mod vortex;
 
 use super::{Effort, Outcome, StudyError};
-use crate::figure::{Axis, Figure, Line};
 use crate::manufactured::{Motion, State, force_field, state};
 use crate::report::{Bound, Report};
 use crate::table::Table;
@@ -241,33 +240,15 @@ impl<const N: usize> Refined<'_, N> {
     }
 }
 
-/// The line of a case in a figure, with its last slope.
-fn line(name: &str, points: impl Iterator<Item = (f64, f64)>) -> Line {
-    let points: Vec<_> = points.collect();
-    let slope = points.windows(2).last().map_or(f64::NAN, |pair| (pair[0].1 / pair[1].1).ln() / (pair[1].0 / pair[0].0).ln());
-    Line { name: format!("{name}: {slope:.1}"), points }
-}
-
-/// A figure of errors against cells.
-fn figure(name: &str, title: &str, lines: Vec<Line>) -> Figure {
-    Figure {
-        name: format!("order-{name}"),
-        title: format!("{title}; with the slope of the last piece"),
-        x: Axis::logarithmic("cells across"),
-        y: Axis::logarithmic("rms error, relative"),
-        lines,
-    }
-}
-
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome::default();
-    block::run(*effort, &mut outcome);
+    block::run(&mut outcome);
     hole::run(&mut outcome);
     ring::run(&mut outcome);
     shell::run(*effort, &mut outcome);
     beam::run(&mut outcome)?;
     vortex::run(*effort, &mut outcome)?;
-    transfers::run(*effort, &mut outcome);
+    transfers::run(&mut outcome);
     rebound::run(*effort, &mut outcome)?;
     outcome.remarks.push(
         "On a grid that is kept, functions of degree p on Gauss points of their own pieces have order p + 1 in the displacement and p in the \

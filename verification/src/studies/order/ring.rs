@@ -1,6 +1,6 @@
 //! A thick ring under inner pressure, whose hole grows by a third: the shipped scene against the solution at finite strain.
 
-use super::{NEAR, Refined, figure, line};
+use super::{NEAR, Refined};
 use crate::report::{Bound, Report};
 use crate::shipped;
 use crate::studies::{Outcome, StudyError};
@@ -77,8 +77,7 @@ fn ring(family: &str, cells: u32, hole: At) -> Result<([f64; 3], f64), StudyErro
         format!("pressures.0.pressure={PRESSURE}"),
         "output.probes=[]".into(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<2> = shipped::scene("ring", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<2> = shipped::simulation("ring", &overrides)?;
     let reference = simulation.particles.by_id().position;
     let mut products = 0;
     while simulation.clock.nominal_steps() < 4 {
@@ -127,7 +126,6 @@ pub(super) fn run(outcome: &mut Outcome) {
     let mut table = Table::new(format!("{title}: errors, relative to the solution at finite strain"), header);
     let hole = at_hole(shot(PRESSURE), PRESSURE);
     let mut of_circle = 0.0;
-    let mut lines = Vec::new();
     for (name, family, of_stress) in [
         ("linear", "\"linear\"", 1.0),
         ("quadratic", r#"{"bspline":{"degree":2}}"#, 1.5),
@@ -144,9 +142,7 @@ pub(super) fn run(outcome: &mut Outcome) {
         if name == "cubic" {
             of_circle = found.iter().map(|(_, errors)| errors[0]).fold(0.0, f64::max);
         }
-        lines.push(line(name, found.iter().map(|(cells, errors)| (*cells, errors[2]))));
     }
-    outcome.figures.push(figure("ring", "stress of a ring under pressure", lines));
     report.push(&["error of the hole, ring", "cubic"], of_circle, Bound::AtMost(CIRCLE));
     outcome.reports.push(report);
     outcome.tables.push(table);

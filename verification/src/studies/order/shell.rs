@@ -1,6 +1,6 @@
 //! An eighth of a thick sphere under inner pressure, between planes of symmetry, against Lamé's solution. Its surfaces cut cells.
 
-use super::{NEAR, Refined, figure, line};
+use super::{NEAR, Refined};
 use crate::report::{Bound, Report};
 use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
@@ -82,7 +82,6 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     let header = ["shape", "cells in 1", "displacement", "order", "stress", "order", "products x particles"];
     let mut table = Table::new(format!("{title}: errors, relative to Lamé's solution"), header);
     let few: &[u32] = if effort == Effort::Full { &[2, 4, 8] } else { &[2, 4] };
-    let mut lines = Vec::new();
     for (name, family, sizes, of_stress) in [
         ("linear", "\"linear\"", few, 1.0),
         ("quadratic", r#"{"bspline":{"degree":2}}"#, few, 1.5),
@@ -91,10 +90,8 @@ pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
     ] {
         let [displacement, stress] = [2.0, of_stress].map(|order| Bound::AtLeast(order - NEAR));
         let least = [("displacement, sphere", displacement), ("stress, sphere", stress)];
-        let found = Refined { report: &mut report, table: &mut table, least }.run(&[name], sizes, |cells| shell(family, cells));
-        lines.push(line(name, found.iter().map(|(cells, errors)| (*cells, errors[1]))));
+        Refined { report: &mut report, table: &mut table, least }.run(&[name], sizes, |cells| shell(family, cells));
     }
-    outcome.figures.push(figure("shell", "stress of a sphere under pressure", lines));
     outcome.reports.push(report);
     outcome.tables.push(table);
 }

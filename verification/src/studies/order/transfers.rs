@@ -1,10 +1,8 @@
-//! Particle-to-grid and grid-to-particle transfers compared: their errors with a grid reset in every step, and the losses of a spinning
-//! body.
+//! Particle-to-grid and grid-to-particle transfers compared: the losses of a spinning body.
 
-use super::{Layout, REGULAR, vortex};
 use crate::report::{Bound, Report};
 use crate::studies::patch::{angular_momentum, spinning};
-use crate::studies::{Effort, Outcome, StudyError};
+use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear};
 use bfree::mechanics::reference::Renewal;
@@ -46,30 +44,6 @@ impl Transfer {
 
 fn families() -> [(&'static str, Approximation); 2] {
     [("linear", Linear.into()), ("cubic", Bspline::Cubic.into())]
-}
-
-/// Errors of the vortex with a grid reset in every step.
-fn errors(effort: Effort, outcome: &mut Outcome) {
-    let title = "a vortex, the grid new in every step, dt = 2.56 h^2";
-    let header = ["shape", "transfer", "cells", "displacement", "velocity", "stress"];
-    let mut table = Table::new(format!("{title}: errors, relative, in the mean square"), header);
-    let sizes: &[u32] = if effort == Effort::Full { &[20, 40] } else { &[20] };
-    let layout: &Layout = &REGULAR;
-    for (name, shape) in families() {
-        for transfer in &TRANSFERS {
-            for &cells in sizes {
-                let settings = transfer.settings(Settings { renewal: Renewal::EveryStep, ..Settings::default() });
-                let found = vortex::spun((&shape, layout), settings, cells, cells * cells / 20);
-                let errors = match found {
-                    Ok(run) => [run.displacement(), run.velocity(), run.stress()].map(|error| format!("{error:.2e}")),
-                    Err(error) => [error.to_string(), "-".into(), "-".into()],
-                };
-                let row = [name, transfer.name, &cells.to_string()].map(String::from);
-                table.push(row.into_iter().chain(errors));
-            }
-        }
-    }
-    outcome.tables.push(table);
 }
 
 /// Number of steps, each of a fortieth of a radian.
@@ -140,8 +114,7 @@ fn losses(outcome: &mut Outcome) {
     outcome.tables.push(table);
 }
 
-pub(super) fn run(effort: Effort, outcome: &mut Outcome) {
-    errors(effort, outcome);
+pub(super) fn run(outcome: &mut Outcome) {
     losses(outcome);
     outcome.remarks.push(
         "Of a body that spins, the column \"one renewal\" is what a single renewal on the way adds to a grid that is kept; a consistent mass \

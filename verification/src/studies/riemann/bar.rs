@@ -198,8 +198,7 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
         "solver.newton.tolerance=1e-8".to_owned(),
         r#"solver.krylov.forcing="eisenstat_walker""#.to_owned(),
     ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let mut simulation: Simulation<1> = shipped::scene("riemann", &overrides)?.build(&shipped::folder())?;
+    let mut simulation: Simulation<1> = shipped::simulation("riemann", &overrides)?;
     start_with(&mut simulation, jump)?;
     let reference: Vec<f64> = simulation.particles.position.iter().map(|x| x[0]).collect();
     let before = energy(&simulation, exact.states[1].velocity);

@@ -1,7 +1,7 @@
 //! The figures: Figs. 5, 6 and 7, and strong jumps.
 
 use super::*;
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 use plotters::prelude::SeriesLabelPosition;
 

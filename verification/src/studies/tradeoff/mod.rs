@@ -5,7 +5,7 @@ mod levels;
 mod measured;
 mod pictures;
 mod problem;
-mod sentences;
+mod ratios;
 mod setting;
 
 use super::{Effort, Outcome, StudyError};
@@ -49,10 +49,8 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let mut outcome = Outcome { reports: vec![defaults(&all, effort), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
     outcome.remarks.push(base(&problems));
-    outcome.remarks.extend(defaults.iter().map(|(knob, default)| sentences::sentence(&all, knob, default)));
-    outcome.remarks.push(sentences::cheaper_at_equal_error(&all, &defaults));
     outcome.tables.extend(all.iter().map(front));
-    outcome.tables.extend(defaults.iter().map(|(knob, default)| sentences::table(&all, knob, default)));
+    outcome.tables.extend(defaults.iter().map(|(knob, default)| ratios::table(&all, knob, default)));
     outcome.tables.extend(all.iter().map(everything));
     outcome.sheets = if effort == Effort::Full { pictures::sheets(&all, &defaults) } else { Vec::new() };
     Ok(outcome)

@@ -2,7 +2,7 @@
 
 use super::measured::{Measured, Point};
 use super::setting::{Origin, SHAPES};
-use crate::figure::Axis;
+use crate::axis::Axis;
 use crate::sheet::{Curve, Mark, Panel, Sheet};
 
 /// The pictures of the study.

@@ -1,14 +1,8 @@
-//! Sentences from the measured numbers: the cost of each knob, its gain, and the limit of that gain.
+//! Error, work, seconds and bytes of each value of a knob, over those of its default.
 
 use super::measured::{Measured, Point};
 use super::setting::Setting;
 use crate::table::Table;
-
-/// An error ratio above this does not pay.
-const PAYS: f64 = 0.95;
-
-/// A work ratio below this is cheaper.
-const CHEAPER: f64 = 0.9;
 
 /// A duration of less than a few ticks of the processor clock is meaningless.
 const LEAST_SECONDS: f64 = 0.02;
@@ -118,69 +112,4 @@ pub(super) fn table(all: &[Measured], knob: &'static str, default: &str) -> Tabl
 /// A value with its rate in words.
 fn shown(value: &str) -> String {
     value.replace('"', "")
-}
-
-/// The values that cost less than the default on every problem, with an error equal within a percent and with Newton's method quadratic.
-pub(super) fn cheaper_at_equal_error(all: &[Measured], knobs: &[(&'static str, String)]) -> String {
-    let mut found = Vec::new();
-    for (knob, default) in knobs {
-        for value in values(all, knob, default) {
-            let equal = value.error.least > 0.99 && value.error.greatest < 1.01;
-            if value.name != *default && value.quadratic && value.problems == all.len() && equal && value.work.greatest < CHEAPER {
-                found.push(format!("{knob} = {} (work {})", shown(&value.name), value.work.text()));
-            }
-        }
-    }
-    match found.is_empty() {
-        true => "No value of a knob has the same error on every problem for less work than the default.".to_owned(),
-        false => format!("The same error on every problem for less work than the default: {}.", found.join("; ")),
-    }
-}
-
-/// The sentence of a knob.
-pub(super) fn sentence(all: &[Measured], knob: &str, default: &str) -> String {
-    let mut values = values(all, knob, default);
-    let mut failures = String::new();
-    for value in values.iter().filter(|value| !value.failed.is_empty()) {
-        failures += &format!(" {} fails on {}.", shown(&value.name), value.failed.join(", "));
-    }
-    values.retain(|value| value.problems > 0);
-    let (Some(cheapest), Some(default_value)) = (values.first(), values.iter().find(|value| value.name == default)) else {
-        return format!("`{knob}`: nothing was measured.{failures}");
-    };
-    if values.len() == 1 {
-        return format!("`{knob}`: at this effort only the default, {}, was run.{failures}", shown(default));
-    }
-    let Some(best) = values.iter().min_by(|a, b| a.error.mean.total_cmp(&b.error.mean)) else { return String::new() };
-    // The cheapest value for which no dearer value lowers the error by more than PAYS.
-    let enough = values.iter().enumerate().find(|(k, value)| {
-        values[k + 1..].iter().all(|dearer| dearer.error.mean >= PAYS * value.error.mean)
-    });
-    let enough = enough.map_or(best, |(_, value)| value);
-    let cost = |value: &Value| {
-        format!("work {}, CPU seconds {}, bytes ×{:.2}", value.work.text(), value.seconds.text(), value.bytes.mean)
-    };
-    let mut text = format!("`{knob}`, default {}: ", shown(default));
-    if cheapest.name == default {
-        text += "the default is the cheapest value. ";
-    } else {
-        text += &format!("the cheapest, {}, has {} and an error {} of the default's. ", shown(&cheapest.name), cost(cheapest), cheapest.error.text());
-    }
-    if best.name == default {
-        text += "The default is the most accurate. ";
-    } else if best.error.mean >= PAYS {
-        text += &format!("No value lowers the error by more than {:.0} %. ", 100.0 * (1.0 - PAYS));
-    } else {
-        text += &format!("The most accurate, {}, buys an error {} for {}. ", shown(&best.name), best.error.text(), cost(best));
-    }
-    let place = match (enough.work.mean / default_value.work.mean, enough.name == default) {
-        (_, true) => "at the default".to_owned(),
-        (ratio, _) => format!("at {}, work ×{ratio:.2}, error ×{:.2}", shown(&enough.name), enough.error.mean),
-    };
-    text += &format!("It stops paying {place}: nothing dearer lowers the error by more than {:.0} %.", 100.0 * (1.0 - PAYS));
-    let linear: Vec<_> = values.iter().filter(|value| !value.quadratic).map(|value| shown(&value.name)).collect();
-    if !linear.is_empty() {
-        text += &format!(" Newton's method is not quadratic with {}.", linear.join(", "));
-    }
-    text + &failures
 }
