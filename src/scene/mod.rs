@@ -313,7 +313,7 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn fields(&self) -> Vec<Field> {
-        let flows = self.laws().any(|law| law.memory().iter().any(|one| one.name == PLASTIC_STRAIN));
+        let flows = self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
         self.output.fields(self.time.inertia, flows)
     }
 

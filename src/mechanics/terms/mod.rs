@@ -37,7 +37,7 @@ use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Support
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
-use crate::tensor::{Deformation, Tensor, Vector};
+use crate::tensor::{Tensor, Vector};
 
 /// The data that all terms of a step are built from.
 #[derive(Debug)]
@@ -73,12 +73,11 @@ impl<const D: usize, L> Copy for Step<'_, D, L> {}
 impl<const D: usize, L: Law> Step<'_, D, L> {
     /// Λ + 2G of an undeformed body: the stiffness of its first particle in uniaxial strain; 0 if the body has no particle.
     pub fn modulus(&self, body: usize) -> f64 {
-        let at_rest = Deformation::new(Tensor::<f64, D>::zeros());
-        let along_x = Tensor::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
+        let along_x = Tensor::<f64, D>::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
         let first = self.particles.body.iter().position(|&of| of as usize == body);
         first.map_or(0.0, |p| {
-            let start = self.particles.start(p, self.dt);
-            self.bodies[body].law.elasticity(&at_rest, &start, &along_x)[(0, 0)].abs()
+            let undeformed = self.particles.state(p, self.dt).deformed(Tensor::zeros());
+            self.bodies[body].law.elasticity(&undeformed, &along_x)[(0, 0)].abs()
         })
     }
 }

@@ -3,12 +3,12 @@
 use super::{
     AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
 };
-use crate::material::{Law, admissible};
+use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
 use crate::parallel::First;
 use crate::pooled::Pooled;
-use crate::tensor::{Tensor, Vector, identity};
+use crate::tensor::{Tensor, Vector};
 
 /// Σ_p V₀ F S F_nᵀ ∇_n N_I
 pub struct Stress<'a, const D: usize, L> {
@@ -87,9 +87,10 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         let particles = self.laws.particles;
         let energies = self.supports.interpolate(dphi, |p, _, g| {
             let id = particles.id[p] as usize;
-            let at = admissible(compose(&g, &particles.displacement_gradient[p]))
-                .map_err(|source| Inadmissible { particle: id, source })?;
-            Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at, &particles.start(p, self.laws.dt)))
+            let at_n = particles.state(p, self.laws.dt);
+            let at = at_n.deformed(compose(&g, &at_n.h)).admissible();
+            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
+            Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
         });
         Some(energies.map(summed))
     }
@@ -98,13 +99,13 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
-            let h_n = &particles.displacement_gradient[p];
+            let at_n = particles.state(p, self.laws.dt);
             let id = particles.id[p] as usize;
-            let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: id, source })?;
-            let f_n = (identity::<f64, D>() + h_n).norm();
+            let at = at_n.deformed(compose(&g, &at_n.h)).admissible();
+            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
+            let f_n = at_n.f.norm();
             let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
-            let start = particles.start(p, self.laws.dt);
-            let response = self.law(p).elasticity(&at, &start, &(at.f.transpose() * at.f)).norm();
+            let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change = response * (at.h.norm() + moved * f_n) * f_n * particles.volume[p];
             Ok((Vector::zeros(), Tensor::repeat(change)))
         })

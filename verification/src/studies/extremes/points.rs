@@ -2,9 +2,9 @@
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
-use bfree::material::{Lame, Law, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff, Start};
+use bfree::material::{Lame, Law, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff, MaterialState};
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
+use bfree::tensor::{Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
 
 /// A precision under test.
@@ -95,25 +95,25 @@ impl Errors {
 pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
     let given: Tensor<T, D> = h.map(T::lit);
     let h = given.map(T::value);
-    let at = Deformation::new(given);
-    let exact_at = Deformation::new(h.map(DoubleDouble::from));
-    let (exact_w, exact_s) = (law.energy(&exact_at, &Start::NONE), law.stress(&exact_at, &Start::NONE));
+    let at = MaterialState::new(given);
+    let exact_at = MaterialState::new(h.map(DoubleDouble::from));
+    let (exact_w, exact_s) = (law.energy(&exact_at), law.stress(&exact_at));
     let error = |w: T, s: Tensor<T, D>| {
         let w = (DoubleDouble::from(w.value()) - exact_w).magnitude();
         let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s.value()) - exact).magnitude()).norm();
         (w, s)
     };
-    let (energy, stress) = error(law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
+    let (energy, stress) = error(law.energy(&at), law.stress(&at));
     let (naive_w, naive_s) = naive(law, &given);
     let (naive_energy, naive_stress) = error(naive_w, naive_s);
 
-    let near = Deformation::new(h);
+    let near = MaterialState::new(h);
     let (w, s) = (exact_w.magnitude(), exact_s.map(DoubleDouble::value));
     let piola = near.f * s;
     let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
     let response = |i: usize, k: usize| {
         let strain = near.f.transpose() * outer(&unit(i), &unit(k));
-        law.elasticity(&near, &Start::NONE, &strain).norm()
+        law.elasticity(&near, &strain).norm()
     };
     let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
     let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
@@ -122,7 +122,7 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
         Rounding::Products => {
             // δF = F δJ/(D J) is a purely volumetric change.
             let volume = permanent(&near.f.abs()) / (D as f64 * near.jacobian);
-            let response = law.elasticity(&near, &Start::NONE, &(near.f.transpose() * near.f)).norm();
+            let response = law.elasticity(&near, &(near.f.transpose() * near.f)).norm();
             let change_w = piola.norm() * h.norm() + contract(&piola, &near.f).abs() * volume;
             (change_w, stiffness * h.norm() + response * volume)
         }
@@ -145,8 +145,8 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
 /// The generic formulas against the textbook formulas, both in double-double, relative to the result.
 pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f64 {
     let h = h.map(DoubleDouble::from);
-    let at = Deformation::new(h);
-    let (w, s) = (law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
+    let at = MaterialState::new(h);
+    let (w, s) = (law.energy(&at), law.stress(&at));
     let (naive_w, naive_s) = naive(law, &h);
     let stress = s.zip_map(&naive_s, |a, b| (a - b).magnitude()).norm() / s.map(DoubleDouble::magnitude).norm();
     super::worse((w - naive_w).abs().magnitude() / w.magnitude(), stress)

@@ -5,11 +5,11 @@ use crate::prepared::Prepared;
 use crate::studies::StudyError;
 use crate::table::Table;
 use bfree::approximation::{Approximation, AxisWeights, Linear, Lme, ShapeFunction};
-use bfree::material::Law;
+use bfree::material::{Law, MaterialState};
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::solver::Precision;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::tensor::{Tensor, Vector, identity};
 
 /// The work of one product, summed over all particles.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,7 +53,7 @@ impl Work {
         const LANES: usize = 8;
         let mut work = Self::default();
         let mut axis = AxisWeights::default();
-        let rest = Deformation::<f64, D>::new(Tensor::zeros());
+        let rest = MaterialState::new(Tensor::<f64, D>::zeros());
         let closed = simulation.bodies.iter().all(|body| body.law.closed(&identity(), &rest, 1.0).is_some());
         let point = point(D, closed);
         let Some(product) = simulation.approximation.separable() else { return Ok(work) };
