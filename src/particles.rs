@@ -98,6 +98,43 @@ pub struct Particles<const D: usize> {
     pub remembered: usize,
     /// θ − 1 in bodies whose change of volume is averaged, 0 in other bodies. Empty if no body averages it.
     pub dilatation: Vec<f64>,
+    /// The configuration of the last grid reset; `None` if the coming step resets the grid.
+    pub(crate) reference: Option<Configuration<D>>,
+}
+
+/// Positions and deformations of all particles in one configuration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Configuration<const D: usize> {
+    /// x
+    pub position: Vec<Vector<f64, D>>,
+    /// H = F − I
+    pub displacement_gradient: Vec<Tensor<f64, D>>,
+    /// θ − 1; empty if no body averages its change of volume.
+    pub dilatation: Vec<f64>,
+}
+
+/// The particles in the reference configuration of the nodal motion φ, that of the last grid reset. The volumes V₀ belong to the undeformed
+/// bodies.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference<'a, const D: usize> {
+    /// x
+    pub position: &'a [Vector<f64, D>],
+    /// H = F − I
+    pub displacement_gradient: &'a [Tensor<f64, D>],
+    dilatation: &'a [f64],
+    volume: &'a [f64],
+}
+
+impl<const D: usize> Reference<'_, D> {
+    /// θ − 1 of the particle at index `p`.
+    pub(crate) fn dilatation(&self, p: usize) -> f64 {
+        self.dilatation.get(p).copied().unwrap_or(0.0)
+    }
+
+    /// V₀ J of the particle at index `p`.
+    pub(crate) fn volume(&self, p: usize) -> f64 {
+        self.volume[p] * Deformation::new(self.displacement_gradient[p]).jacobian
+    }
 }
 
 impl<const D: usize> Particles<D> {
@@ -150,6 +187,7 @@ impl<const D: usize> Particles<D> {
     /// assert!(particles.velocity.is_empty() && particles.kinetic_energy() == 0.0);
     /// ```
     pub fn push_without_inertia(&mut self, position: Vector<f64, D>, volume: f64, mass: f64, body: u32) {
+        self.reference = None;
         self.id.push(self.len() as u32);
         self.position.push(position);
         self.displacement_gradient.push(Tensor::zeros());
@@ -158,7 +196,36 @@ impl<const D: usize> Particles<D> {
         self.body.push(body);
     }
 
-    /// The state of the particle at the place `p` in memory, at the beginning of a step of length `dt`.
+    /// The reference configuration of the nodal motion φ: that of the last grid reset, or the present one if the coming step resets the
+    /// grid.
+    #[inline(always)]
+    pub fn reference(&self) -> Reference<'_, D> {
+        let volume = &self.volume;
+        match &self.reference {
+            None => {
+                let Self { position, displacement_gradient, dilatation, .. } = self;
+                Reference { position, displacement_gradient, dilatation, volume }
+            }
+            Some(Configuration { position, displacement_gradient, dilatation }) => {
+                Reference { position, displacement_gradient, dilatation, volume }
+            }
+        }
+    }
+
+    /// Stores the present configuration as the reference configuration, unless there is one.
+    pub(crate) fn store_reference(&mut self) {
+        let Self { position, displacement_gradient, dilatation, .. } = &*self;
+        let present = || Configuration {
+            position: position.clone(),
+            displacement_gradient: displacement_gradient.clone(),
+            dilatation: dilatation.clone(),
+        };
+        if self.reference.is_none() {
+            self.reference = Some(present());
+        }
+    }
+
+    /// The state at t_n of the particle at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
     pub fn state(&self, p: usize, dt: f64) -> MaterialState<'_, f64, D> {
         let internal = &self.memory[p * self.remembered..(p + 1) * self.remembered];
@@ -253,6 +320,11 @@ impl<const D: usize> Particles<D> {
         if self.remembered > 0 {
             let of = |&p: &u32| self.memory[p as usize * self.remembered..][..self.remembered].iter().copied();
             self.memory = order.iter().flat_map(of).collect();
+        }
+        if let Some(Configuration { position, displacement_gradient, dilatation }) = &mut self.reference {
+            permute(position, order, &mut moved);
+            permute(displacement_gradient, order, &mut moved);
+            permute(dilatation, order, &mut moved);
         }
     }
 

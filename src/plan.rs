@@ -3,8 +3,8 @@
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
-use crate::mechanics::kept::Renewal;
 use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
+use crate::mechanics::reference::Renewal;
 use crate::mechanics::sweep::{LANES, SupportError, Supports};
 use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::{Given, Terms, frozen_rows};
@@ -229,7 +229,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         scheme,
         lumping: settings.lumping,
         averages,
-        renews: simulation.may_renew(),
+        renews: simulation.may_reset(),
     });
     all.extend([
         ("aggregation", settings.aggregation, aggregated(supports)),
@@ -301,7 +301,7 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
     // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
     let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
     let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
-    let asks = simulation.loads.field.is_some() && (keeps || !moves);
+    let asks = simulation.loads.field.is_some() && !moves;
     let followers = supports.extension().map_or(0, |extension| extension.bytes());
     let used: [(bool, &'static str, usize); 24] = [
         (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
@@ -321,10 +321,10 @@ fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         (moves, "nodal fields: v, a", nodes * 4 * vector),
         (keeps, "particles: x, H when the grid was new", particles * (vector + tensor)),
         (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
-        // The positions on a kept grid, and in load steps the positions of the last step.
-        (asks, "particles: x for a field of forces", particles * vector * (usize::from(keeps) + usize::from(!moves))),
+        // The positions of the last load step.
+        (asks, "particles: x for a field of forces", particles * vector),
         // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
-        (!moves && simulation.may_renew(), "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
+        (!moves && simulation.may_reset(), "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
         // The loaded points, and in load steps the points of the last equilibrium.
         (faces > 0, "loaded surfaces", faces * if moves { 1 } else { 2 } * size_of::<SurfacePoint<D>>()),
         (true, "frozen tangent", frozen),

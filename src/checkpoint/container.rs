@@ -20,7 +20,7 @@ use std::io::{self, Read, Write};
 const MAGIC: &[u8; 8] = b"bfree\r\n\x1a";
 
 /// Version of the format.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// Largest size of a header, in bytes. A scene takes at most a quarter of it.
 const MAX_HEADER: u32 = 64 << 20;

@@ -2,11 +2,11 @@
 
 use super::container::Array;
 use crate::clock::Reached;
-use crate::mechanics::kept::Kept;
-use crate::mechanics::loads::Loads;
+use crate::mechanics::loads::{Loads, Reaction};
 use crate::mechanics::path::Path;
-use crate::particles::Particles;
-use crate::simulation::{Borne, Reaction, Simulation};
+use crate::mechanics::reference::{GridState, LastEquilibrium};
+use crate::particles::{Configuration, Particles};
+use crate::simulation::{History, Simulation};
 use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
@@ -25,10 +25,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         external_work,
         dissipated,
         path: Path { load, increment, speed, weight },
-        kept,
-        held,
-        joined,
-        borne,
+        history: History { grid, constrained, bonded, equilibrium },
         workspace: _,
     } = simulation;
     let Particles {
@@ -43,13 +40,15 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         memory,
         remembered: _,
         dilatation,
+        reference,
     } = particles;
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
-    let held: Vec<f64> = (0..loads.prescribed.len()).map(|one| u8::from(held.contains(&one)).into()).collect();
+    let conditions = 0..loads.prescribed.len();
+    let constrained: Vec<f64> = conditions.map(|one| u8::from(constrained.contains(&one)).into()).collect();
     let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
         ("id", id.into()),
-        ("held", held.into()),
-        (JOINED, joined.iter().flatten().map(|&body| f64::from(body)).collect()),
+        (CONSTRAINED, constrained.into()),
+        (BONDED, bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
         ("position", bytemuck::cast_slice(position).into()),
         ("velocity", bytemuck::cast_slice(velocity).into()),
         ("acceleration", bytemuck::cast_slice(acceleration).into()),
@@ -60,98 +59,107 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    if let Some(Kept {
-        position,
-        displacement_gradient,
-        dilatation,
-        motion,
-        rate,
-        velocity,
-        acceleration,
-        unbalanced,
-    }) = kept
-    {
-        let vectors =
-            [position, motion, rate, velocity, acceleration, unbalanced].map(|field| bytemuck::cast_slice(field));
-        arrays.extend(KEPT.into_iter().zip(vectors).map(|(name, numbers)| (name, numbers.into())));
-        arrays.push((KEPT_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
-        arrays.push((KEPT_DILATATION, dilatation.as_slice().into()));
+    if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
+        arrays.push((REFERENCE_POSITION, bytemuck::cast_slice(position).into()));
+        arrays.push((REFERENCE_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
+        arrays.push((REFERENCE_DILATATION, dilatation.as_slice().into()));
     }
-    // The loads of `borne` are those of the scene.
-    if let Some(Borne { loads: _, reactions, together, asked }) = borne {
+    if let Some(GridState { motion, rate, velocity, acceleration, out_of_balance }) = grid {
+        let fields = [motion, rate, velocity, acceleration, out_of_balance].map(|field| bytemuck::cast_slice(field));
+        arrays.extend(GRID.into_iter().zip(fields).map(|(name, numbers)| (name, numbers.into())));
+    }
+    // The loads of the last equilibrium are those of the scene.
+    if let Some(LastEquilibrium { loads: _, reactions, touching, field_positions }) = equilibrium {
         let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
-        arrays.push((BORNE, std::iter::once(f64::from(u8::from(*together))).chain(forces).collect()));
-        arrays.push((BORNE_ASKED, bytemuck::cast_slice(asked).into()));
+        arrays.push((EQUILIBRIUM, std::iter::once(f64::from(u8::from(*touching))).chain(forces).collect()));
+        arrays.push((FIELD_POSITIONS, bytemuck::cast_slice(field_positions).into()));
     }
     arrays
 }
 
-/// `Simulation::joined`: pairs of bonded bodies.
-const JOINED: &str = "joined";
+/// Whether each prescribed condition has held bodies since the first step.
+const CONSTRAINED: &str = "constrained";
 
-/// The last converged load step: whether bodies moved nodes together (`Borne::together`), then the reactions.
-const BORNE: &str = "borne";
+/// Pairs of bonded bodies.
+const BONDED: &str = "bonded";
 
-/// Particle positions at which the last load step evaluated a field of forces.
-const BORNE_ASKED: &str = "borne_asked";
+/// x, H and θ − 1 of the particles in the reference configuration, if the grid is not reset.
+const REFERENCE_POSITION: &str = "reference_position";
+const REFERENCE_GRADIENT: &str = "reference_displacement_gradient";
+const REFERENCE_DILATATION: &str = "reference_dilatation";
+
+/// The fields of [`GridState`].
+const GRID: [&str; 5] = ["grid_motion", "grid_rate", "grid_velocity", "grid_acceleration", "grid_out_of_balance"];
+
+/// The last load step: whether bodies touched, then the reactions.
+const EQUILIBRIUM: &str = "equilibrium";
+
+/// The positions at which the last load step evaluated a force field, by particle id.
+const FIELD_POSITIONS: &str = "equilibrium_field_positions";
 
 /// Prefixes of arrays that may be absent or vary in length.
-const VARYING: [&str; 3] = ["kept_", JOINED, BORNE];
+const VARYING: [&str; 4] = ["reference_", "grid_", BONDED, EQUILIBRIUM];
 
-/// Vectors of a grid that is not reset: x of the particles in the reference configuration, then φ, its rate, v, a and R₀ of the nodes.
-const KEPT: [&str; 6] =
-    ["kept_position", "kept_motion", "kept_rate", "kept_velocity", "kept_acceleration", "kept_unbalanced"];
-
-/// H of the particles in the reference configuration.
-const KEPT_GRADIENT: &str = "kept_displacement_gradient";
-
-/// θ − 1 of the particles in the reference configuration.
-const KEPT_DILATATION: &str = "kept_dilatation";
-
-/// The kept grid, if there is one. Its number of nodes cannot be checked here, because only a step knows it.
-///
-/// # Errors
-/// An array does not fit the number of particles, or nodal fields differ in length.
-fn kept<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Kept<D>>, String> {
-    let of = |name: &str| arrays.iter().find(|array| array.name == name).map(|array| array.values.as_slice());
-    let vectors = |name: &str| -> Vec<Vector<f64, D>> {
-        of(name).unwrap_or_default().chunks_exact(D).map(Vector::from_column_slice).collect()
-    };
-    let Some(gradient) = of(KEPT_GRADIENT) else { return Ok(None) };
-    let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
-    let dilatation = of(KEPT_DILATATION).unwrap_or_default().to_vec();
-    let [position, motion, rate, velocity, acceleration, unbalanced] = KEPT.map(vectors);
-    let fits = [position.len(), displacement_gradient.len()] == [particles; 2]
-        && (dilatation.is_empty() || dilatation.len() == particles)
-        && rate.len() == motion.len()
-        && [velocity.len(), acceleration.len(), unbalanced.len()]
-            .into_iter()
-            .all(|length| length == 0 || length == motion.len());
-    let kept = Kept { position, displacement_gradient, dilatation, motion, rate, velocity, acceleration, unbalanced };
-    if fits { Ok(Some(kept)) } else { Err("a grid that was kept, of other particles or nodes".into()) }
+/// The numbers of an array; none if there is no such array.
+fn numbers<'a>(arrays: &'a [Array], name: &str) -> &'a [f64] {
+    arrays.iter().find(|array| array.name == name).map_or(&[], |array| &array.values)
 }
 
-/// The last converged load step, without its loads.
+fn vectors<const D: usize>(numbers: &[f64]) -> Vec<Vector<f64, D>> {
+    numbers.chunks_exact(D).map(Vector::from_column_slice).collect()
+}
+
+/// The reference configuration, if there is one.
+///
+/// # Errors
+/// An array does not fit the number of particles.
+fn reference<const D: usize>(arrays: &[Array], particles: usize) -> Result<Option<Configuration<D>>, String> {
+    let gradient = numbers(arrays, REFERENCE_GRADIENT);
+    if gradient.is_empty() {
+        return Ok(None);
+    }
+    let displacement_gradient: Vec<_> = gradient.chunks_exact(D * D).map(Tensor::from_column_slice).collect();
+    let position = vectors(numbers(arrays, REFERENCE_POSITION));
+    let dilatation = numbers(arrays, REFERENCE_DILATATION).to_vec();
+    let fits =
+        [position.len(), displacement_gradient.len()] == [particles; 2] && [0, particles].contains(&dilatation.len());
+    let reference = Configuration { position, displacement_gradient, dilatation };
+    if fits { Ok(Some(reference)) } else { Err("a reference configuration of other particles".into()) }
+}
+
+/// The nodal state of a grid that is not reset, if there is one. Its number of nodes cannot be checked here, because only a step knows it.
+///
+/// # Errors
+/// The nodal fields differ in length.
+fn grid_state<const D: usize>(arrays: &[Array]) -> Result<Option<GridState<D>>, String> {
+    let [motion, rate, velocity, acceleration, out_of_balance] = GRID.map(|name| vectors(numbers(arrays, name)));
+    if motion.is_empty() {
+        return Ok(None);
+    }
+    let optional = [&velocity, &acceleration, &out_of_balance];
+    let fits = rate.len() == motion.len() && optional.iter().all(|field| [0, motion.len()].contains(&field.len()));
+    let state = GridState { motion, rate, velocity, acceleration, out_of_balance };
+    if fits { Ok(Some(state)) } else { Err("nodal fields of different lengths".into()) }
+}
+
+/// The last converged load step under the loads of the scene, if the checkpoint has it.
 ///
 /// # Errors
 /// An array does not fit the number of particles or of prescribed conditions.
-fn borne<const D: usize>(
-    numbers: &[f64],
-    asked: &[f64],
+fn equilibrium<const D: usize>(
+    arrays: &[Array],
     particles: usize,
-    conditions: usize,
-) -> Result<Option<Borne<D>>, String> {
-    let Some((together, reactions)) = numbers.split_first() else { return Ok(None) };
-    if reactions.len() != conditions * (D + 1) || ![0, particles * D].contains(&asked.len()) {
-        return Err("what the last step balanced, of other particles or conditions".into());
+    loads: &Loads<D>,
+) -> Result<Option<LastEquilibrium<D>>, String> {
+    let Some((touching, forces)) = numbers(arrays, EQUILIBRIUM).split_first() else { return Ok(None) };
+    let positions = vectors(numbers(arrays, FIELD_POSITIONS));
+    let expected = if loads.field.is_some() { particles } else { 0 };
+    if forces.len() != loads.prescribed.len() * (D + 1) || positions.len() != expected {
+        return Err("the last equilibrium of other particles or conditions".into());
     }
     let reaction = |one: &[f64]| Reaction { force: Vector::from_column_slice(&one[..D]), torque: one[D] };
-    Ok(Some(Borne {
-        loads: Loads::default(),
-        reactions: reactions.chunks_exact(D + 1).map(reaction).collect(),
-        together: *together > 0.0,
-        asked: asked.chunks_exact(D).map(Vector::from_column_slice).collect(),
-    }))
+    let reactions = forces.chunks_exact(D + 1).map(reaction).collect();
+    Ok(Some(LastEquilibrium::new(loads, reactions, *touching > 0.0, positions.into())))
 }
 
 /// The present places of the particles, in the order of `ids`. `None` if `ids` belong to other particles.
@@ -183,25 +191,28 @@ pub(super) fn restore<const D: usize, L, A>(
     let ids =
         arrays.iter().filter(|array| array.name == "id").flat_map(|array| &array.values).copied().collect::<Vec<_>>();
     let order = order(&simulation.particles.id, &ids).ok_or("ids that are not those of the particles")?;
-    let kept = kept(arrays, simulation.particles.len())?;
-    let of = |name: &str| arrays.iter().find(|array| array.name == name).map_or(&[][..], |array| &array.values);
-    let borne = borne(of(BORNE), of(BORNE_ASKED), simulation.particles.len(), simulation.loads.prescribed.len())?;
-    simulation.clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
+    let count = simulation.particles.len();
+    let (reference, grid) = (reference(arrays, count)?, grid_state(arrays)?);
+    if reference.is_some() != grid.is_some() {
+        return Err("a reference configuration without nodal fields, or the reverse".into());
+    }
     // Particle data without an array is rearranged, too.
-    simulation.kept = None;
+    let clock = simulation.clock.at(reached).ok_or("a time that the clock cannot show")?;
+    let equilibrium = equilibrium(arrays, count, &simulation.loads)?;
+    simulation.clock = clock;
+    simulation.forget();
+    simulation.history.equilibrium = equilibrium;
     simulation.rearrange(&order);
-    simulation.kept = kept;
-    simulation.borne = borne;
-    // `borne` has the order of the checkpoint, which is now the order of the particles. Its loads come from the simulation, which has just
-    // been rearranged.
-    simulation.borne.iter_mut().for_each(|borne| borne.loads.clone_from(&simulation.loads));
-    simulation.joined = of(JOINED).chunks_exact(2).map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
-    let held = arrays.iter().filter(|array| array.name == "held").flat_map(|array| &array.values);
-    simulation.held = held.enumerate().filter(|(_, held)| **held > 0.0).map(|(one, _)| one).collect();
+    simulation.particles.reference = reference;
+    simulation.history.grid = grid;
+    let pairs = numbers(arrays, BONDED).chunks_exact(2);
+    simulation.history.bonded = pairs.map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
+    let constrained = numbers(arrays, CONSTRAINED).iter().enumerate();
+    simulation.history.constrained = constrained.filter(|(_, flag)| **flag > 0.0).map(|(one, _)| one).collect();
     let path = &mut simulation.path;
-    let mut numbers = arrays.iter().filter(|array| array.name == "path").flat_map(|array| &array.values);
-    for number in [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight] {
-        numbers.next().iter().for_each(|&&value| *number = value);
+    let stored = [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight];
+    for (number, &value) in stored.into_iter().zip(numbers(arrays, "path")) {
+        *number = value;
     }
     let particles = &mut simulation.particles;
     for Array { name, values } in arrays {

@@ -28,8 +28,9 @@ pub(super) fn affine<const D: usize>(
 ) -> [Pooled<Vector<f64, D>>; 2] {
     let (grid, is_light) = (supports.grid(), is_light(particles));
     // Relative to the first particle, squares of positions keep more digits.
-    let origin = particles.position.first().copied().unwrap_or_else(Vector::zeros);
-    let x = |p: usize| particles.position[p] - origin;
+    let position = particles.reference().position;
+    let origin = position.first().copied().unwrap_or_else(Vector::zeros);
+    let x = |p: usize| position[p] - origin;
     let mean = |value: &(dyn Fn(usize) -> Vector<f64, D> + Sync)| {
         let mut mean: Pooled<Vector<f64, D>> = supports.field();
         supports.spread(&mut mean, |p| value(p) * particles.mass[p]);

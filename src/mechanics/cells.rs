@@ -26,19 +26,19 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             self.terms.iter().filter_map(|term| term.product_at_points(None)).map(|(_, add)| add).collect();
         // The form takes gradients in units of 1/h.
         let factor = (self.unit.length / grid.spacing).powi(2);
-        let mut places = HashMap::new();
+        let (mut places, reference) = (HashMap::new(), self.particles.reference());
         self.supports.each_group(|group| {
             // Surface points belong to no cell.
             let mut cells = [None; LANES];
             for (of, &p) in cells.iter_mut().zip(group.particles).filter(|(_, p)| self.particles.is_solid(**p as usize))
             {
-                let x = &self.particles.position[p as usize];
+                let x = &reference.position[p as usize];
                 let at = grid.cell(x).unwrap_or([0; D]);
                 let cell = *places.entry(at).or_insert_with(|| {
                     form.push_cell(padded(at), tiles);
                     form.cells.len() - 1
                 });
-                let share = self.particles.present_volume(p as usize) / volume;
+                let share = reference.volume(p as usize) / volume;
                 *of = Some(cell);
                 form.filled[cell] += share;
                 for k in 0..D {

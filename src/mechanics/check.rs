@@ -155,7 +155,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     fn worst_bound(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let particles = self.step.particles;
         let bounds = self.step.supports.interpolate(dphi, |p, _, g| {
-            let at = MaterialState::new(compose(&g, &particles.displacement_gradient[p]))
+            let at = MaterialState::new(compose(&g, &particles.reference().displacement_gradient[p]))
                 .admissible()
                 .map_err(|source| Inadmissible { particle: particles.id[p] as usize, source })?;
             Ok(tangent_bound(&at.f))

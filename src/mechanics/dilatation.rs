@@ -50,13 +50,14 @@ impl Cells {
         if !averages.contains(&true) {
             return None;
         }
-        let (grid, mut keyed) = (supports.grid(), Vec::new());
+        let (grid, reference) = (supports.grid(), particles.reference());
+        let mut keyed = Vec::new();
         supports.each_group(|group| {
             for (lane, &particle) in group.particles.iter().enumerate() {
                 let (p, slot) = (particle as usize, (group.number * LANES + lane) as u32);
                 let body = particles.body[p];
                 let averaged = averages[body as usize] && particles.is_solid(p);
-                if let Some(cell) = grid.cell(&particles.position[p]).filter(|_| averaged) {
+                if let Some(cell) = grid.cell(&reference.position[p]).filter(|_| averaged) {
                     keyed.push(((grid.id(cell), body), particles.id[p], Member { particle, slot }));
                 }
             }
@@ -75,13 +76,13 @@ impl Cells {
             let mut volume = 0.0;
             for (.., Member { particle, .. }) in same {
                 cells.of[*particle as usize] = cells.volumes.len() as u32;
-                volume += particles.present_volume(*particle as usize);
+                volume += reference.volume(*particle as usize);
             }
             cells.volumes.push(volume);
             cells.starts.push(cells.starts[cells.volumes.len() - 1] + same.len() as u32);
         }
         for p in (0..particles.len()).filter(|&p| !particles.is_solid(p) && averages[particles.body[p] as usize]) {
-            let (x, body) = (&particles.position[p], particles.body[p]);
+            let (x, body) = (&reference.position[p], particles.body[p]);
             let near = neighbours(grid, x).filter_map(|cell| {
                 let number = keys.binary_search(&(grid.id(cell), body)).ok()?;
                 let middle = grid.position(cell) + Vector::repeat(0.5 * grid.spacing);
@@ -112,10 +113,11 @@ impl Cells {
         supports: &Supports<D>,
         motion: &[Vector<T, D>],
     ) -> Vec<T> {
+        let reference = particles.reference();
         let mut grown = vec![T::zero(); particles.len()];
         supports.each_particle(
             motion,
-            |p, _, g| Deformation::new(g).j * T::lit(particles.present_volume(p)),
+            |p, _, g| Deformation::new(g).j * T::lit(reference.volume(p)),
             |p, more| grown[p] = more,
         );
         let mean = |(members, volume): (&[Member], f64)| {
@@ -152,8 +154,8 @@ pub(crate) fn after<const D: usize, L: Law>(
     motion: &[Vector<f64, D>],
 ) -> Vec<f64> {
     let Some(cells) = Cells::of(particles, bodies, supports) else { return Vec::new() };
-    let changes = cells.changes(particles, supports, motion);
-    let seen = |p: usize, cell: usize| total(changes[cell], particles.dilatation(p));
+    let (changes, reference) = (cells.changes(particles, supports, motion), particles.reference());
+    let seen = |p: usize, cell: usize| total(changes[cell], reference.dilatation(p));
     let of = |p: usize| cells.cell(p as u32).map_or(0.0, |cell| seen(p, cell));
     let mut all: Vec<f64> = (0..particles.len()).map(of).collect();
     // Surface points take the mean of the nearest cell, so that their stresses are those of the body.

@@ -14,24 +14,24 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Upper bound of the length of a particle's domain, in cells. Material need not fill the domain of a particle that is stretched further.
 const LONGEST: f64 = 2.0;
 
-/// The extension E of the bodies in a grid, from the present volumes of the particles. A particle fills the cells that its domain overlaps.
+/// The extension E of the bodies in a grid, from the volumes of the particles at the last grid reset. A particle fills the cells that its domain overlaps.
 /// The filled share of a cell thus changes gradually as particles move into the cell. A cell that holds no particle counts as empty.
 pub(crate) fn extension<const D: usize>(pieces: Pieces, particles: &Particles<D>, supports: &Supports<D>) -> Extension {
-    let grid = supports.grid();
+    let (grid, reference) = (supports.grid(), particles.reference());
     let solid = || (0..particles.len()).filter(|&p| particles.is_solid(p));
-    let local = |p: usize, k: usize| grid.axis(k).local(particles.position[p][k]).unwrap_or(0.0);
+    let local = |p: usize, k: usize| grid.axis(k).local(reference.position[p][k]).unwrap_or(0.0);
     let cell = |p: usize| std::array::from_fn(|k| pieces.cell(local(p, k), grid.cells[k]));
     let mut volumes: BTreeMap<[u32; D], f64> = solid().map(|p| (cell(p), 0.0)).collect();
     for p in solid() {
         // The domain is a box. At F = I the box is a cube of the particle's volume. Its edge along axis k grows with |row k of F|.
-        let f = identity::<f64, D>() + particles.displacement_gradient[p];
+        let f = identity::<f64, D>() + reference.displacement_gradient[p];
         let side = (particles.volume[p] / grid.spacing.powi(D as i32)).powf(1.0 / D as f64);
         let length = |k: usize| (side * f.row(k).norm()).min(LONGEST);
         let along: [_; D] = std::array::from_fn(|k| pieces.overlaps(local(p, k), length(k), grid.cells[k]));
         for which in indices::<D>(std::array::from_fn(|k| along[k].len() as u64)) {
             let parts: [(u32, f64); D] = std::array::from_fn(|k| along[k][which[k] as usize]);
             if let Some(volume) = volumes.get_mut(&parts.map(|(cell, _)| cell)) {
-                *volume += particles.present_volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
+                *volume += reference.volume(p) * parts.iter().map(|(_, part)| part).product::<f64>();
             }
         }
     }

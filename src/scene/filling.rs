@@ -6,7 +6,7 @@ use super::build::{dimension, vector};
 use super::particle_file;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
-use crate::mechanics::kept::Renewal;
+use crate::mechanics::reference::Renewal;
 use crate::particles::Particles;
 use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around, fill};
 use crate::simulation::Simulation;

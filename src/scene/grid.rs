@@ -1,7 +1,7 @@
 //! The box and its background grid.
 
 use crate::grid::Grid;
-use crate::mechanics::kept::Renewal;
+use crate::mechanics::reference::Renewal;
 use crate::problems::{Number, Problems, sensible};
 use crate::tensor::Vector;
 use schemars::JsonSchema;

@@ -4,7 +4,6 @@ use super::{InitialGuess, Simulation, StepError};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::check::direction;
-use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::path::OnPath;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
@@ -34,7 +33,6 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         supports: &'a Supports<D>,
         nodal: &'a Nodal<D>,
         prescribed: &'a [PrescribedDof],
-        kept: Option<&Kept<D>>,
     ) -> Result<Balance<'a, D, L>, StepError> {
         let (t, dt, scheme, settings) =
             (self.clock.time(), self.clock.step(), &*self.settings.scheme, &self.settings.newton);
@@ -46,20 +44,20 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             Equilibrium { stop: self.settings.stop.as_ref(), ..equilibrium }
         };
         let mut equilibrium = under(to);
-        let mut phi = self.initial_guess(supports, nodal, kept, theta * dt);
+        let mut phi = self.initial_guess(supports, nodal, theta * dt);
         for dof in prescribed {
             phi[dof.node][dof.component] = theta * dof.step.increment;
         }
         phi.iter_mut().zip(&nodal.motion).for_each(|(phi, before)| *phi += before);
         let (mut preconditioner, x) = (self.preconditioner().0.anew::<D>(), bytemuck::cast_slice_mut(&mut phi));
         let mut straight = None;
-        let newton = match kept.filter(|_| scheme.follows_path()) {
+        let newton = match self.history.grid.as_ref().filter(|_| scheme.follows_path()) {
             None => newton(&equilibrium, &mut *preconditioner, x, settings, supports.pool())
                 .map_err(|error| self.explained(error, &equilibrium, supports))?,
-            Some(kept) => {
+            Some(grid) => {
                 let start = under(from);
                 let force = |load| under(load).free_external_force(&nodal.motion);
-                let path = OnPath::new(self.path, &start, &force, &kept.rate, dt)?;
+                let path = OnPath::new(self.path, &start, &force, &grid.rate, dt)?;
                 let report = newton(&path, &mut *preconditioner, x, settings, supports.pool())?;
                 to = path.load(&phi);
                 straight = Some(path.straight(&phi));
@@ -75,18 +73,12 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     }
 
     /// The Δφ that Newton's method starts from.
-    fn initial_guess(
-        &self,
-        supports: &Supports<D>,
-        nodal: &Nodal<D>,
-        kept: Option<&Kept<D>>,
-        dt: f64,
-    ) -> Pooled<Vector<f64, D>> {
+    fn initial_guess(&self, supports: &Supports<D>, nodal: &Nodal<D>, dt: f64) -> Pooled<Vector<f64, D>> {
         let mut dphi: Pooled<Vector<f64, D>> = supports.field();
         let rate: &[Vector<f64, D>] = match self.settings.initial_guess {
             InitialGuess::Zero => &[],
             InitialGuess::Velocity => &nodal.velocity,
-            InitialGuess::LastStep => kept.map_or(&[], |kept| &kept.rate),
+            InitialGuess::LastStep => self.history.grid.as_ref().map_or(&[], |grid| &grid.rate),
         };
         dphi.iter_mut().zip(rate).for_each(|(dphi, rate)| *dphi = rate * dt);
         dphi

@@ -43,12 +43,10 @@ impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, 
     /// A particle without shape functions, or velocities so large that their projection overflows.
     pub fn coming(&self) -> Result<Coming<D, L, A>, StepError> {
         let mut simulation = Self { workspace: Workspace::default(), ..self.clone() };
-        let mut kept = simulation.kept.take();
-        kept.iter_mut().for_each(|kept| kept.exchange(&mut simulation.particles));
         simulation.particles.remember(&simulation.bodies);
         let supports = simulation.new_supports(None)?;
         let prescribed = self.prescribed(supports.active());
-        let nodal = simulation.nodal(&supports, &prescribed, kept.as_ref())?.with_prescribed(&prescribed);
+        let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
         let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));
         Ok(Coming { simulation, supports, nodal, prescribed })
     }

@@ -1,9 +1,8 @@
 //! A simulation: the state at the last converged step, and the step that advances this state (`step.rs`).
 
 mod balance;
-mod borne;
 mod coming;
-mod keep;
+mod history;
 mod report;
 mod settings;
 mod start;
@@ -11,9 +10,10 @@ mod step;
 mod touching;
 mod work;
 
-pub use borne::Borne;
+pub use crate::mechanics::loads::Reaction;
 pub use coming::Coming;
-pub use report::{AdvanceError, FailedAttempt, Reaction, StepError, StepReport};
+pub use history::History;
+pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
 
@@ -21,7 +21,6 @@ use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
 use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, internal_variable, p_wave_modulus};
-use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
@@ -33,7 +32,6 @@ use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::{Krylov, Preconditioned, Preconditioning};
 use crate::tensor::Vector;
-use std::collections::BTreeSet;
 
 /// An implicit material point simulation in `D` dimensions.
 ///
@@ -76,20 +74,9 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     pub dissipated: f64,
     /// The point on the equilibrium path, for a scheme that follows one.
     pub path: Path,
-    /// The reference configuration and the nodal motion since the last grid reset; `None` at the start and after a reset. The next step
-    /// starts from the reference configuration. Code that writes positions or deformations into the particles must put `None` here, or
-    /// these values are ignored.
-    pub kept: Option<Kept<D>>,
-    /// Numbers of the prescribed conditions that had active nodes in the first step. A condition leaves the set once a body comes to a new
-    /// part of it. The conditions outside the set are contacts.
-    pub held: BTreeSet<usize>,
-    /// Pairs of bodies that touched at the start of the first step, the lower number first. In load steps these pairs stay bonded; all
-    /// other pairs are contacts.
-    pub joined: BTreeSet<[u32; 2]>,
-    /// The last equilibrium of the load steps, if the grid is reset after it. The out-of-balance force of this state on the new grid is
-    /// carried over, as long as that grid lasts. Code that changes particles or laws must put `None` here, too. Otherwise the
-    /// out-of-balance force of the change is carried over as well.
-    pub borne: Option<Borne<D>>,
+    /// The state of the grid, and the contacts, of earlier steps. Code that writes particles, laws or shape functions by hand calls
+    /// [`Self::forget`].
+    pub history: History<D>,
     /// Memory that the next step reuses. Results do not depend on this memory.
     pub workspace: Workspace<D>,
 }
@@ -153,10 +140,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
             external_work: 0.0,
             dissipated: 0.0,
             path: Path::default(),
-            kept: None,
-            held: BTreeSet::new(),
-            joined: BTreeSet::new(),
-            borne: None,
+            history: History::default(),
             workspace: Workspace::default(),
         }
     }
@@ -183,10 +167,8 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
     pub fn rearrange(&mut self, order: &[u32]) {
         self.workspace.supports = None;
         self.particles.rearrange(order);
-        self.kept.iter_mut().for_each(|kept| kept.rearrange(order));
-        self.borne.iter_mut().for_each(|borne| borne.rearrange(order));
-        let borne = self.borne.iter_mut().map(|borne| &mut borne.loads);
-        let loads = std::iter::once(&mut self.loads).chain(borne);
+        let last = self.history.equilibrium.iter_mut().map(|last| &mut last.loads);
+        let loads = std::iter::once(&mut self.loads).chain(last);
         let mut points = loads.flat_map(|loads| &mut loads.surface).flat_map(|load| &mut load.points).peekable();
         if points.peek().is_some() {
             let mut places = vec![0; order.len()];
@@ -312,11 +294,8 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             external_work: self.external_work,
             dissipated: self.dissipated,
             path: self.path,
-            kept: self.kept,
-            held: self.held,
-            joined: self.joined,
-            // The last equilibrium was that of the old laws.
-            borne: None,
+            // The new laws need not balance the loads of the last equilibrium.
+            history: History { equilibrium: None, ..self.history },
             ..Simulation::new(self.grid, self.approximation, bodies, particles, self.clock)
         }
     }

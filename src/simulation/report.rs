@@ -3,21 +3,12 @@
 use super::Sharing;
 use crate::causes;
 use crate::mechanics::check::CheckError;
+use crate::mechanics::loads::Reaction;
 use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::rigid::Loose;
 use crate::mechanics::sweep::SupportError;
 use crate::phases::Stopwatch;
 use crate::solver::{LinearError, NewtonError, NewtonFailure, NewtonHistory, NewtonReport};
-use crate::tensor::Vector;
-
-/// The reaction of a condition at t_{n+1}, plus impulse / Δt. A wall gives this impulse to nodes that do not move with it yet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reaction<const D: usize> {
-    /// The force Σ r_I.
-    pub force: Vector<f64, D>,
-    /// The moment about the axis of a rotation; 0 for other conditions.
-    pub torque: f64,
-}
 
 /// The report of a step.
 #[derive(Clone, Debug)]
@@ -118,12 +109,12 @@ pub enum StepError {
     },
     /// The stored reference configuration does not belong to these particles and shape functions.
     #[error(
-        "the grid that was kept has {kept} nodes, and the particles have {nodes}: after a change by hand, put None into \
-         Simulation::kept"
+        "the grid of the last step has {stored} active nodes, and the particles now have {nodes}: after a change by hand, call \
+         Simulation::forget"
     )]
     OtherGrid {
         /// Number of nodes with a stored motion.
-        kept: usize,
+        stored: usize,
         /// Number of active nodes.
         nodes: usize,
     },

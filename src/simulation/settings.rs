@@ -1,6 +1,6 @@
 //! Numerical settings of a step.
 
-use crate::mechanics::kept::Renewal;
+use crate::mechanics::reference::Renewal;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::transfer::{Projection, WallUpdate};

@@ -3,7 +3,6 @@
 use super::{Simulation, StepError};
 use crate::approximation::{AtSurface, Separable, ShapeFunction};
 use crate::material::Law;
-use crate::mechanics::kept::Kept;
 use crate::mechanics::loads::{PrescribedDof, at_surface_points, prescribed_dofs};
 use crate::mechanics::residual::Equilibrium;
 use crate::mechanics::schemes::Alphas;
@@ -15,18 +14,19 @@ use crate::nodes::Nodes;
 use crate::solver::LinearError;
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The shape functions of a step; those of the last step if the grid was not reset.
-    pub(super) fn supports(&mut self, kept: bool) -> Result<Supports<D>, SupportError> {
+    /// The shape functions of a step; those of the last step if the grid is not reset.
+    pub(super) fn supports(&mut self) -> Result<Supports<D>, SupportError> {
+        let resets = self.history.resets_grid();
         match self.workspace.supports.take() {
-            Some(supports) if kept && self.workspace.serves => Ok(supports.again()),
+            Some(supports) if !resets && self.workspace.serves => Ok(supports.again()),
             spare => self.new_supports(spare),
         }
     }
 
-    /// The shape functions at the present positions, in the memory of `spare`, which is no longer needed.
+    /// The shape functions in the reference configuration, in the memory of `spare`, which is no longer needed.
     pub(crate) fn new_supports(&self, spare: Option<Supports<D>>) -> Result<Supports<D>, SupportError> {
         let Self { particles, loads, approximation, grid, settings, workspace, .. } = self;
-        let mut points = Points { ids: Some(&particles.id), ..Points::at(&particles.position) };
+        let mut points = Points { ids: Some(&particles.id), ..Points::at(particles.reference().position) };
         if settings.aggregation {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);
@@ -81,34 +81,20 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn prescribed(&self, nodes: &Nodes) -> Vec<PrescribedDof> {
-        self.prescribed_from(nodes, self.kept.as_ref())
-    }
-
-    pub(super) fn prescribed_from(&self, nodes: &Nodes, kept: Option<&Kept<D>>) -> Vec<PrescribedDof> {
-        let moved = kept.map_or(&[][..], |kept| &kept.motion);
+        let moved = self.history.grid.as_ref().map_or(&[][..], |grid| &grid.motion);
         prescribed_dofs(&self.loads.prescribed, &self.grid, nodes, moved, self.clock.time(), self.clock.step())
     }
 
-    /// The nodal state at t_n: projected from the particles after a grid reset, otherwise stored since the last step.
-    pub(super) fn nodal(
-        &self,
-        supports: &Supports<D>,
-        prescribed: &[PrescribedDof],
-        kept: Option<&Kept<D>>,
-    ) -> Result<Nodal<D>, StepError> {
+    /// The nodal state at t_n: projected from the particles after a grid reset, otherwise that of the last step.
+    pub(super) fn nodal(&self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> Result<Nodal<D>, StepError> {
         let nodes = supports.nodes();
-        match kept {
+        match &self.history.grid {
             None => {
                 let nodal = self.project(supports)?;
-                Ok(Nodal { unbalanced: self.unbalanced(supports, &nodal, prescribed)?, ..nodal })
+                Ok(Nodal { out_of_balance: self.out_of_balance(supports, &nodal, prescribed)?, ..nodal })
             }
-            Some(kept) if kept.motion.len() == nodes => {
-                // The particles are in the reference configuration, and `kept` stores their present positions.
-                let asked = self.loads.field.iter().flat_map(|_| kept.position.iter().copied());
-                let state = kept.state(self.masses(supports), supports.pool());
-                Ok(Nodal { asked: supports.pool().collect(asked), ..state })
-            }
-            Some(kept) => Err(StepError::OtherGrid { kept: kept.motion.len(), nodes }),
+            Some(grid) if grid.motion.len() == nodes => Ok(grid.nodal(self.masses(supports), supports.pool())),
+            Some(grid) => Err(StepError::OtherGrid { stored: grid.motion.len(), nodes }),
         }
     }
 

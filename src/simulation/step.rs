@@ -1,13 +1,13 @@
 //! The step on one page: the paper's Algorithm 1.
 
 use super::balance::Balance;
+use super::history::{Accepted, Solved};
 use super::report::Spent;
 use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::kept::{Kept, Renewal};
 use crate::mechanics::sweep::Supports;
-use crate::mechanics::transfer::{Committed, Update};
+use crate::mechanics::transfer::Update;
 use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
@@ -36,35 +36,23 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         self.attempt(&mut Spent::nothing())
     }
 
-    /// Like [`Self::step`]. A failed step leaves its time and iterations in `spent`.
+    /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
-        // Without a grid reset, a step starts from the reference configuration.
-        let mut kept = self.kept.take();
-        kept.iter_mut().for_each(|kept| kept.exchange(&mut self.particles));
-        let report = self.attempt_from(&mut kept, spent);
-        if report.is_err() {
-            kept.iter_mut().for_each(|kept| kept.exchange(&mut self.particles));
-            self.kept = kept;
-        }
-        report
-    }
-
-    fn attempt_from(&mut self, kept: &mut Option<Kept<D>>, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
         self.particles.remember(&self.bodies);
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
-        let supports = self.supports(kept.is_some())?;
+        let supports = self.supports()?;
         let nodes = supports.active().clone();
-        let prescribed = self.prescribed_from(&nodes, kept.as_ref());
+        let prescribed = self.prescribed(&nodes);
         watch.lap(Phase::ShapeFunctions, supports.passes());
 
-        let projected = self.nodal(&supports, &prescribed, kept.as_ref())?;
+        let projected = self.nodal(&supports, &prescribed)?;
         spent.projection_iterations = projected.iterations;
         let nodal = projected.with_prescribed(&prescribed).extended(&Unknowns::new(&supports, &prescribed));
         watch.lap(Phase::Projection, supports.passes());
 
         let Balance { equilibrium, phi, newton, loads: [from, to], straight } =
-            self.balance(&supports, &nodal, &prescribed, kept.as_ref())?;
+            self.balance(&supports, &nodal, &prescribed)?;
         watch.lap(Phase::Newton, supports.passes());
         self.check_tangent(&equilibrium, &phi)?;
         // Forces are in balance at t_n + θ Δt. The motion is extrapolated to t_{n+1}.
@@ -84,23 +72,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, from, dt, &dphi, &update)?;
 
         // Nothing fails from here on.
-        let asked = self.loads.field.iter().filter(|_| !scheme.has_inertia()).flat_map(|_| match &nodal.asked[..] {
-            [] => &self.particles.position,
-            asked => asked,
-        });
-        let borne = (reactions.clone(), asked.copied().collect());
-        let renewed = kept.is_none();
-        let mut next = kept.take().unwrap_or_default();
-        if self.settings.renewal != Renewal::EveryStep {
-            next.renew(&self.particles, &update.end(&projected), &dphi, dt);
-        }
-        let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, &supports, dt);
+        let solved = Solved { nodal: &projected, prescribed: &prescribed, dphi: &dphi, reactions: &reactions };
+        let Accepted { renewed, feels_wall, sharing, yielding } = self.accept(update, &solved, &supports);
         if scheme.follows_path() {
             self.path = self.path.after(to, &dphi, dt);
         }
-        let (feels_wall, sharing) = (self.feels_wall(&prescribed), self.sharing(&supports));
         let passes = supports.passes();
-        self.keep(next, supports, strain, &prescribed, borne);
+        self.store_supports(supports);
         watch.lap(Phase::Update, passes);
         self.external_work += work;
         self.dissipated += dissipated;
@@ -120,6 +98,17 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             seconds: *watch,
             failed: Vec::new(),
         })
+    }
+
+    /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Reorders the particles if passes over the
+    /// particles leap too often in memory.
+    fn store_supports(&mut self, supports: Supports<D>) {
+        let order = supports.leaping();
+        if let Some(order) = &order {
+            self.rearrange(order);
+        }
+        self.workspace.serves = !self.history.resets_grid() && order.is_none();
+        self.workspace.supports = Some(if order.is_some() { supports.rearranged() } else { supports });
     }
 
     /// Whether the next step may be twice as long.

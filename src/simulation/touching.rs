@@ -70,10 +70,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         interfaces.iter().map(of).collect()
     }
 
-    /// Whether a contact, a prescribed condition outside `held`, has active nodes in this step.
+    /// Whether a contact, a prescribed condition outside [`History::constrained`](super::History::constrained), has active nodes in this step.
     pub(super) fn feels_wall(&self, prescribed: &[PrescribedDof]) -> bool {
         let begins = self.clock.steps() == 0;
-        !begins && prescribed.iter().any(|dof| !self.held.contains(&dof.owner))
+        !begins && prescribed.iter().any(|dof| !self.history.constrained.contains(&dof.owner))
     }
 
     /// The particles that contribute to nodes of another body, by pairs of bodies.

@@ -3,7 +3,7 @@
 use crate::support::{Failure, Random, moved_in_column, scene};
 use bfree::aggregation::{Extension, Occupied, Pieces};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::plan::Plan;
 use bfree::scene;
 use bfree::simulation::Simulation;

@@ -72,9 +72,9 @@ fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
     let start: Simulation<2> = scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
     let mut simulation = start.clone();
     simulation.advance()?;
-    assert_eq!(simulation.joined, [[0, 1]].into());
+    assert_eq!(simulation.history.bonded(), &[[0, 1]].into());
     let mut continued = restored(&simulation, &start)?;
-    assert_eq!(continued.joined, simulation.joined);
+    assert_eq!(continued.history.bonded(), simulation.history.bonded());
     for _ in 0..2 {
         assert!(!simulation.advance()?.renewed && !continued.advance()?.renewed);
     }

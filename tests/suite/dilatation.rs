@@ -200,7 +200,7 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
 fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
     let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.05}"#])?;
     let mut renewed = 0;
-    while renewed < 2 || simulation.kept.is_none() {
+    while renewed < 2 || simulation.history.resets_grid() {
         renewed += u32::from(simulation.advance()?.renewed);
         assert!(simulation.clock.time() < 0.8, "no second grid that is kept");
     }

@@ -1,7 +1,7 @@
 //! Total Lagrangian steps on one grid: the answer does not depend on the number of steps. Tests of the conditions for a grid reset.
 
 use crate::support::{Failure, scene};
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
 use serde_json::json;
@@ -80,7 +80,7 @@ fn the_answer_does_not_depend_on_the_number_of_load_steps() -> Result<(), Failur
         }
         // With a grid reset in every step, the answer depends on the number of steps.
         let mut renewed = beam(7, &[&family, r#"grid.renewed="every_step""#])?;
-        assert!(run(&mut renewed)?.iter().all(|&renewed| renewed) && renewed.kept.is_none());
+        assert!(run(&mut renewed)?.iter().all(|&renewed| renewed) && renewed.history.resets_grid());
         assert!(apart(&one, &renewed) > 1e-5, "{family}: {:e}", apart(&one, &renewed));
     }
     Ok(())
@@ -197,10 +197,11 @@ fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
 fn a_step_that_fails_leaves_it_as_it_was() -> Result<(), Failure> {
     let mut simulation = beam(4, &[])?;
     simulation.step()?;
-    let (particles, kept) = (simulation.particles.clone(), simulation.kept.clone());
+    let particles = simulation.particles.clone();
     simulation.settings.newton.max_iterations = 1;
     assert!(matches!(simulation.step(), Err(StepError::Unbalanced { .. })));
-    assert_eq!((&simulation.particles, &simulation.kept), (&particles, &kept));
+    assert_eq!(simulation.particles, particles);
+    assert!(!simulation.history.resets_grid());
     // The next step gives the same bits, with stored or recomputed shape functions, and with particles in another order.
     simulation.settings.newton.max_iterations = 30;
     let mut other = simulation.clone();
@@ -233,15 +234,12 @@ fn particles_may_lie_in_any_order() -> Result<(), Failure> {
 fn what_was_changed_by_hand_is_noticed() -> Result<(), Failure> {
     let mut simulation = beam(4, &[])?;
     simulation.step()?;
-    if let Some(kept) = &mut simulation.kept {
-        *kept = Default::default();
-    }
-    simulation.kept = None;
+    simulation.forget();
     simulation.step()?;
     simulation.approximation = bfree::approximation::Approximation::from(bfree::approximation::Linear);
     let error = simulation.clone().step().expect_err("other functions, other nodes").to_string();
-    assert!(error.contains("put None into Simulation::kept"), "{error}");
-    simulation.kept = None;
+    assert!(error.contains("call Simulation::forget"), "{error}");
+    simulation.forget();
     simulation.step()?;
     Ok(())
 }
@@ -399,13 +397,13 @@ fn a_wall_that_is_met_holds_nobody_from_the_start() -> Result<(), Failure> {
     });
     let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(".".as_ref())?;
     assert!(simulation.advance()?.renewed);
-    assert!(simulation.held.contains(&0));
+    assert!(simulation.history.constrained().contains(&0));
     let mut met = false;
     while simulation.clock.time() < 0.4 {
         let renewed = simulation.advance()?.renewed;
         assert!(renewed == met, "at {}", simulation.clock.time());
-        met = simulation.kept.is_none();
+        met = simulation.history.resets_grid();
     }
-    assert!(met && simulation.held.is_empty(), "{:?}", simulation.held);
+    assert!(met && simulation.history.constrained().is_empty(), "{:?}", simulation.history);
     Ok(())
 }

@@ -21,14 +21,15 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
     grid: &Grid<D>,
     at_surface: AtSurface<'_>,
 ) -> Points<'a, D> {
+    let reference = particles.reference();
     let of_surface = loads.surface.iter().flat_map(|load| &load.points);
     let on_surface: BTreeMap<u32, Vector<f64, D>> = of_surface
         .filter(|point| !particles.is_solid(point.particle))
         .map(|point| {
-            let f = identity::<f64, D>() + particles.displacement_gradient[point.particle];
+            let f = identity::<f64, D>() + reference.displacement_gradient[point.particle];
             let normal = cofactor(&f) * point.normal;
             let outward = normal.try_normalize(0.0).unwrap_or(normal);
-            (point.particle as u32, particles.position[point.particle] + outward * (HAIR * grid.spacing))
+            (point.particle as u32, reference.position[point.particle] + outward * (HAIR * grid.spacing))
         })
         .collect();
     let below: HashMap<u32, Vector<f64, D>> = match at_surface {
@@ -49,28 +50,29 @@ fn nearest<const D: usize>(
     grid: &Grid<D>,
     points: impl Iterator<Item = u32> + Clone,
 ) -> HashMap<u32, Vector<f64, D>> {
+    let position = particles.reference().position;
     let around = |p: usize| {
-        let cell = grid.cell(&particles.position[p]).unwrap_or([0; D]);
+        let cell = grid.cell(&position[p]).unwrap_or([0; D]);
         crate::grid::indices([3; D]).map(move |by| std::array::from_fn(|k| i64::from(cell[k]) + by[k] as i64 - 1))
     };
     let mut beside: HashMap<[i64; D], Vec<u32>> = HashMap::new();
     points.clone().flat_map(|p| around(p as usize)).for_each(|cell| _ = beside.entry(cell).or_default());
     for p in (0..particles.len()).filter(|&p| particles.is_solid(p)) {
-        let cell = grid.cell(&particles.position[p]).unwrap_or([0; D]).map(i64::from);
+        let cell = grid.cell(&position[p]).unwrap_or([0; D]).map(i64::from);
         beside.entry(cell).and_modify(|list| list.push(p as u32));
     }
     let mut found = HashMap::new();
     for point in points {
-        let (own, x) = (particles.body[point as usize], particles.position[point as usize]);
+        let (own, x) = (particles.body[point as usize], position[point as usize]);
         let of_body = |q: &&u32| particles.body[**q as usize] == own;
         let near: Vec<(f64, u32)> = around(point as usize)
             .flat_map(|cell| beside.get(&cell).into_iter().flatten().filter(of_body))
-            .map(|&q| ((particles.position[q as usize] - x).norm(), q))
+            .map(|&q| ((position[q as usize] - x).norm(), q))
             .collect();
         let least = near.iter().map(|(distance, _)| *distance).fold(f64::INFINITY, f64::min);
         let same: Vec<_> = near.into_iter().filter(|(distance, _)| *distance <= least * (1.0 + SAME)).collect();
         if !same.is_empty() {
-            let sum: Vector<f64, D> = same.iter().map(|(_, q)| particles.position[*q as usize]).sum();
+            let sum: Vector<f64, D> = same.iter().map(|(_, q)| position[*q as usize]).sum();
             found.insert(point, sum / same.len() as f64);
         }
     }

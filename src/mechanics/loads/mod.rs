@@ -7,7 +7,7 @@ mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
 pub use curve::{Curve, CurveError};
-pub use prescribed::{Motion, MotionStep, Prescribed, PrescribedDof, Selection, prescribed_dofs};
+pub use prescribed::{Motion, MotionStep, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
 pub use rotation::Rotation;
 
 use crate::mechanics::terms::{ForceField, Rayleigh};

@@ -19,6 +19,21 @@ pub enum Motion<const D: usize> {
     Rotation(Rotation<D>),
 }
 
+/// The reaction of a condition at t_{n+1}, plus impulse / Δt. A wall gives this impulse to nodes that do not move with it yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reaction<const D: usize> {
+    /// The force Σ r_I.
+    pub force: Vector<f64, D>,
+    /// The moment about the axis of a rotation; 0 for other conditions.
+    pub torque: f64,
+}
+
+impl<const D: usize> Reaction<D> {
+    /// No reaction.
+    pub(crate) const NONE: Self =
+        Self { force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])), torque: 0.0 };
+}
+
 /// The motion of a prescribed component over one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionStep {

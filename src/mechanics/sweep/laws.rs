@@ -50,9 +50,10 @@ impl<'a, T: Real> States<'a, T> {
         // Empty lanes take the internal variables of the first particle.
         let internal = [particles.state(group[0] as usize, dt).internal; LANES];
         let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal };
+        let reference = particles.reference();
         for (lane, &p) in group.iter().enumerate().take(LANES) {
             states.internal[lane] = particles.state(p as usize, dt).internal;
-            let h_n = &particles.displacement_gradient[p as usize];
+            let h_n = &reference.displacement_gradient[p as usize];
             for i in 0..D {
                 for k in 0..D {
                     states.h_n[i * D + k][lane] = h_n[(i, k)];

@@ -44,9 +44,8 @@ impl<const D: usize> BodyForce<D> {
             force.iter_mut().zip(&step.nodal.mass).for_each(|(force, &m)| *force = b * m);
         }
         if let Some(ForceField(field)) = &loads.field {
-            let (time, asked) = (step.time, &step.nodal.asked);
-            let position = if asked.is_empty() { &particles.position[..] } else { &asked[..] };
-            let of_particle = |p: usize| field(particles.id[p] as usize, &position[p], time);
+            let time = step.time;
+            let of_particle = |p: usize| field(particles.id[p] as usize, &particles.position[p], time);
             step.supports.spread(&mut force, |p| of_particle(p) * particles.mass[p]);
         }
         Some(Self(force))

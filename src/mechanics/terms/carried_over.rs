@@ -11,8 +11,8 @@ pub struct CarriedOver<'a, const D: usize>(&'a [Vector<f64, D>]);
 
 impl<'a, const D: usize> CarriedOver<'a, D> {
     pub(super) fn of<L>(step: &Step<'a, D, L>) -> Option<Self> {
-        let unbalanced = &step.nodal.unbalanced;
-        (!unbalanced.is_empty()).then_some(Self(unbalanced))
+        let force = &step.nodal.out_of_balance;
+        (!force.is_empty()).then_some(Self(force))
     }
 }
 

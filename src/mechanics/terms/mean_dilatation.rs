@@ -64,12 +64,12 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
 
     /// U at θ = Θ θ_n of a particle, with Θ − 1 = `change` of its cell.
     fn at_mean<T: Real>(&self, p: usize, change: T) -> VolumeResponse<T> {
-        self.response(p, total(change, self.step.particles.dilatation(p)))
+        self.response(p, total(change, self.step.particles.reference().dilatation(p)))
     }
 
     /// U at J, which the law contains already.
     fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
-        let h_n = &self.step.particles.displacement_gradient[p];
+        let h_n = &self.step.particles.reference().displacement_gradient[p];
         let (at, _) = MaterialState::new(compose(g, h_n)).admissible_or_rest();
         let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
         let a = scaled(&(cofactor(&at.f) * f_n_t), T::lit(self.step.particles.volume[p]));

@@ -33,7 +33,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
     fn add_at_nodes<T: Number>(&self, dphi: &[Vector<T, D>], out: &mut [Vector<T, D>]) {
         for point in &self.points {
             let g = self.supports.gradient_at(point.particle, dphi);
-            let f = identity::<T, D>() + compose(&g, &self.particles.displacement_gradient[point.particle]);
+            let f = identity::<T, D>() + compose(&g, &self.particles.reference().displacement_gradient[point.particle]);
             let force = cofactor(&f) * point.force.map(T::lit);
             for (node, n, _) in self.supports.of(point.particle) {
                 out[node] += force * T::lit(n);
@@ -55,7 +55,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
         let freeze = |point: &PressurePoint<D>| {
-            let (p, h_n) = (point.particle, &self.particles.displacement_gradient[point.particle]);
+            let (p, h_n) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
             let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));
             let f_inv_t = at.inverse_transpose();
             FrozenPoint {

@@ -8,7 +8,7 @@ use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
 use crate::parallel::First;
 use crate::pooled::Pooled;
-use crate::tensor::{Tensor, Vector};
+use crate::tensor::{Tensor, Vector, identity};
 
 /// Σ_p V₀ F S F_nᵀ ∇_n N_I
 pub struct Stress<'a, const D: usize, L> {
@@ -87,8 +87,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         let particles = self.laws.particles;
         let energies = self.supports.interpolate(dphi, |p, _, g| {
             let id = particles.id[p] as usize;
-            let at_n = particles.state(p, self.laws.dt);
-            let at = at_n.deformed(compose(&g, &at_n.h)).admissible();
+            let h_n = &particles.reference().displacement_gradient[p];
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
             let at = at.map_err(|source| Inadmissible { particle: id, source })?;
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
         });
@@ -99,11 +99,11 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
-            let at_n = particles.state(p, self.laws.dt);
+            let h_n = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
-            let at = at_n.deformed(compose(&g, &at_n.h)).admissible();
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
             let at = at.map_err(|source| Inadmissible { particle: id, source })?;
-            let f_n = at_n.f.norm();
+            let f_n = (identity::<f64, D>() + h_n).norm();
             let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
             let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change = response * (at.h.norm() + moved * f_n) * f_n * particles.volume[p];

@@ -48,9 +48,7 @@ pub struct Nodal<const D: usize> {
     /// φ_n, the motion since the last grid reset; empty right after a reset.
     pub motion: Pooled<Vector<f64, D>>,
     /// R₀, the out-of-balance force carried over at the last grid reset; empty on the first grid, and with inertia.
-    pub unbalanced: Pooled<Vector<f64, D>>,
-    /// x_n of the particles, if a force field needs x_n and the particles are at the last grid reset; otherwise empty.
-    pub asked: Pooled<Vector<f64, D>>,
+    pub out_of_balance: Pooled<Vector<f64, D>>,
     /// Iterations of the projection; 0 for a lumped mass.
     pub iterations: usize,
 }

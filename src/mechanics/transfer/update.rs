@@ -208,7 +208,7 @@ impl<'a, const D: usize> Update<'a, D> {
             velocity: sum(&projected.velocity, &self.delta_velocity),
             acceleration: sum(&projected.acceleration, &self.delta_acceleration),
             motion: projected.velocity.pool().collect(self.motion().iter().copied()),
-            unbalanced: projected.unbalanced.clone(),
+            out_of_balance: projected.out_of_balance.clone(),
             ..Nodal::default()
         }
     }
@@ -221,8 +221,9 @@ impl<'a, const D: usize> Update<'a, D> {
         grid: &Grid<D>,
     ) -> Option<(usize, Vector<f64, D>)> {
         let mut first: Option<(usize, Vector<f64, D>)> = None;
+        let position = particles.reference().position;
         supports.each_value(self.motion(), |p, delta_x| {
-            let (id, x) = (particles.id[p] as usize, particles.position[p] + delta_x);
+            let (id, x) = (particles.id[p] as usize, position[p] + delta_x);
             if !grid.contains(&x) && first.is_none_or(|(one, _)| id < one) {
                 first = Some((id, x));
             }
@@ -243,14 +244,20 @@ impl<'a, const D: usize> Update<'a, D> {
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
         particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
-        let Particles { position, velocity, acceleration, displacement_gradient, volume, memory, body, .. } = particles;
+        let Particles {
+            position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
+        } = particles;
         supports.each_particle(
             self.motion(),
             |_, delta_x, g| (delta_x, g),
             |p, (delta_x, g)| {
                 largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
-                position[p] += delta_x;
-                displacement_gradient[p] = compose(&g, &displacement_gradient[p]);
+                let (x, h_n) = match reference {
+                    Some(reference) => (reference.position[p], reference.displacement_gradient[p]),
+                    None => (position[p], displacement_gradient[p]),
+                };
+                position[p] = x + delta_x;
+                displacement_gradient[p] = compose(&g, &h_n);
                 if remembered > 0 {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
                     let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();

@@ -4,7 +4,7 @@ use super::bodies::{self, PLAIN, settings, stir, sum_of_momenta};
 use super::{Effort, Outcome, Report, StudyError, rows, solvable, worse};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme};
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::mechanics::schemes::GeneralizedAlpha;
 use bfree::mechanics::transfer::Projection;
 use bfree::particles::Particles;

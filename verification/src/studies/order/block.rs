@@ -7,7 +7,7 @@ use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::mechanics::schemes::Statics;
 use bfree::simulation::Settings;
 use bfree::tensor::Vector;

@@ -7,7 +7,7 @@ use crate::studies::Outcome;
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::mechanics::schemes::Statics;
 use bfree::shape::Ball;
 use bfree::simulation::Settings;

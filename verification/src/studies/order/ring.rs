@@ -114,7 +114,7 @@ fn ring(family: &str, cells: u32, hole: At) -> Result<([f64; 3], f64), StudyErro
     Ok(([(inner[0] / inner[1] - 1.0).abs(), relative(displacement), relative(stress)], work))
 }
 
-/// The relative error of the area of the planes that approximate the hole's circle (`docs/src/limits.md`), and so of the load. A smaller
+/// The relative error of the area of the planes that approximate the hole's circle (`docs/src/accuracy.md`), and so of the load. A smaller
 /// error of the displacement shows no order.
 const CIRCLE: f64 = 1e-5;
 

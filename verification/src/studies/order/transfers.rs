@@ -7,7 +7,7 @@ use crate::studies::patch::{angular_momentum, spinning};
 use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear};
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::mechanics::schemes::GeneralizedAlpha;
 use bfree::mechanics::smoothing::Smoothing;
 use bfree::mechanics::transfer::Projection;

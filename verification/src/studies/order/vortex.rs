@@ -7,7 +7,7 @@ use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear};
 use bfree::grid::Grid;
-use bfree::mechanics::kept::Renewal;
+use bfree::mechanics::reference::Renewal;
 use bfree::mechanics::schemes::{GeneralizedAlpha, Newmark, Scheme};
 use bfree::particles::Particles;
 use bfree::simulation::Settings;

@@ -1,0 +1,122 @@
+//! Contact detection between two grid resets: particles that reach a prescribed condition or another body.
+
+use crate::grid::{Grid, indices};
+use crate::mechanics::loads::Prescribed;
+use crate::mechanics::sweep::Supports;
+use crate::nodes::Nodes;
+use crate::particles::Particles;
+use crate::tensor::Vector;
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+/// A node belongs to one body if the variance of the body index at that node, relative to its mean square, is below this tolerance.
+const ALONE: f64 = 1e-9;
+
+/// The prescribed conditions that a particle has reached. Its cell has a node of the condition that is not active yet. At the last grid
+/// reset, its cell had no node of the condition.
+pub(crate) fn reached_conditions<const D: usize>(
+    particles: &Particles<D>,
+    prescribed: &[Prescribed<D>],
+    grid: &Grid<D>,
+    nodes: &Nodes,
+) -> Vec<usize> {
+    let (present, at_reset) = (&particles.position, particles.reference().position);
+    let holders = |index: [u32; D]| {
+        let position = grid.position(index);
+        prescribed.iter().enumerate().filter(move |(_, one)| one.on.holds(grid, index, &position)).map(|(one, _)| one)
+    };
+    // Pairs (cell, condition) where the condition holds a node of the cell that is not active yet.
+    let mut new = HashSet::new();
+    for (cell, ()) in cells(present.iter().map(|x| (x, ())), grid) {
+        for index in corners(grid.index(cell)).filter(|&index| nodes.number(grid.id(index)).is_none()) {
+            new.extend(holders(index).map(|one| (cell, one)));
+        }
+    }
+    if new.is_empty() {
+        return Vec::new();
+    }
+    let was_there = |x: &Vector<f64, D>, one: usize| {
+        grid.cell(x).is_some_and(|cell| corners(cell).any(|index| holders(index).any(|holder| holder == one)))
+    };
+    let comes = |one: usize| {
+        present.iter().zip(at_reset).any(|(x, before)| {
+            grid.cell(x).is_some_and(|cell| new.contains(&(grid.id(cell), one)) && !was_there(before, one))
+        })
+    };
+    (0..prescribed.len()).filter(|&one| comes(one)).collect()
+}
+
+/// Whether a particle has reached a body to which its own body is not bonded. Its cell has a node of that body. At the last grid reset, its
+/// cell had no such node.
+pub(crate) fn reached_body<const D: usize>(
+    particles: &Particles<D>,
+    bonded: &BTreeSet<[u32; 2]>,
+    grid: &Grid<D>,
+) -> bool {
+    let body = &particles.body;
+    let at_reset = particles.reference().position;
+    let [now, before] = [&particles.position[..], at_reset].map(|position| seen(position, body, grid));
+    let beside = |x: &Vector<f64, D>, own: u32, seen: &HashMap<u64, BTreeSet<u32>>| {
+        let others = |index| seen.get(&grid.id(index)).into_iter().flatten();
+        let is_contact = |&other: &u32| other != own && !bonded.contains(&pair(own, other));
+        grid.cell(x).is_some_and(|cell| corners(cell).flat_map(others).any(is_contact))
+    };
+    let mut all = particles.position.iter().zip(at_reset).zip(body);
+    all.any(|((x, was), &own)| beside(x, own, &now) && !beside(was, own, &before))
+}
+
+fn pair(one: u32, other: u32) -> [u32; 2] {
+    [one.min(other), one.max(other)]
+}
+
+/// The bodies in the cells around each node.
+fn seen<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> HashMap<u64, BTreeSet<u32>> {
+    let mut seen: HashMap<u64, BTreeSet<u32>> = HashMap::new();
+    for (cell, body) in cells(position.iter().zip(body.iter().copied()), grid) {
+        for index in corners(grid.index(cell)) {
+            seen.entry(grid.id(index)).or_default().insert(body);
+        }
+    }
+    seen
+}
+
+/// The pairs of bodies that lie in cells with a common corner.
+pub(crate) fn pairs<const D: usize>(position: &[Vector<f64, D>], body: &[u32], grid: &Grid<D>) -> BTreeSet<[u32; 2]> {
+    let seen = seen(position, body, grid);
+    let of_node = |bodies: &BTreeSet<u32>| {
+        let bodies = bodies.clone();
+        bodies.clone().into_iter().flat_map(move |one| bodies.clone().into_iter().map(move |other| [one, other]))
+    };
+    seen.values().flat_map(of_node).filter(|[one, other]| one < other).collect()
+}
+
+/// Whether two bodies lie in cells with a common corner now, or shared a node when the shape functions were evaluated.
+pub(crate) fn touch<const D: usize>(particles: &Particles<D>, grid: &Grid<D>, supports: &Supports<D>) -> bool {
+    if !pairs(&particles.position, &particles.body, grid).is_empty() {
+        return true;
+    }
+    // The variance of the body index, weighted with N.
+    let sum = |power: i32| {
+        let mut sum: Vec<Vector<f64, 1>> = vec![Vector::zeros(); supports.active().len()];
+        supports.spread(&mut sum, |p| Vector::from([f64::from(particles.body[p]).powi(power)]));
+        sum
+    };
+    let [weights, means, squares] = [0, 1, 2].map(sum);
+    let mut of_nodes = weights.iter().zip(&means).zip(&squares).map(|((w, m), s)| (w[0], m[0], s[0]));
+    of_nodes.any(|(weight, mean, square)| weight * square - mean * mean > ALONE * weight * square)
+}
+
+/// The pairs of a cell's id and an item in that cell, sorted, each pair once.
+fn cells<'a, const D: usize, T: Ord>(
+    held: impl Iterator<Item = (&'a Vector<f64, D>, T)>,
+    grid: &Grid<D>,
+) -> Vec<(u64, T)> {
+    let mut cells: Vec<_> = held.filter_map(|(x, what)| Some((grid.id(grid.cell(x)?), what))).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+/// The nodes of a cell.
+fn corners<const D: usize>(cell: [u32; D]) -> impl Iterator<Item = [u32; D]> {
+    indices([2; D]).map(move |by| std::array::from_fn(|k| cell[k] + by[k] as u32))
+}

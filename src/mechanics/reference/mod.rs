@@ -1,0 +1,111 @@
+//! The reference configuration: where the grid was reset last. Updated and total Lagrangian steps take the same road.
+//!
+//! A *reset* of the grid takes the present configuration as the reference: shape functions are evaluated there, and velocities are projected
+//! to the nodes. Between two resets the nodal motion φ adds up (total Lagrangian), and nothing is projected: with x_k and F_k at the reset,
+//!
+//! ```text
+//! x = x_k + Σ φ N,   F = (I + Σ φ ⊗ ∇N) F_k.
+//! ```
+//!
+//! The result then does not depend on the number of steps. With a reset in every step, φ is Δφ, and the formulation is updated Lagrangian.
+//! [`Particles::reference`](crate::particles::Particles::reference) is x_k and F_k, and [`GridState`] is what the nodes keep.
+//!
+//! **Contact.** Bodies that share nodes stick, and on a grid that is not reset a body cannot leave a wall. The grid is therefore reset when
+//! a particle reaches a prescribed condition or another body ([`contact`]). Bodies that touch at the start are *bonded*: in load steps they
+//! stay together, and do not cause resets.
+//!
+//! **Out-of-balance force.** In load steps, a state in balance on the old grid is not in balance on the new one. Its residual R₀ on the new
+//! grid is carried over as a force on the nodes ([`LastEquilibrium`]), or each reset would add an error of its own to the stresses.
+
+mod contact;
+mod equilibrium;
+
+pub(crate) use contact::{pairs, reached_body, reached_conditions, touch};
+pub use equilibrium::LastEquilibrium;
+
+use crate::mechanics::transfer::Nodal;
+use crate::pooled::Pool;
+use crate::tensor::Vector;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt::{Display, Formatter};
+
+/// When the background grid is reset. Between two resets the grid is kept, and its prescribed nodes stay prescribed. The grid is always
+/// reset if a body reaches a part of a wall, or of a prescribed region, at which no body was. In load steps the grid is also reset if a
+/// body reaches another body, and the two did not touch at the start. With inertia the grid is reset in every step while a body feels the
+/// wall that it has reached, or while two bodies touch. In load steps, the out-of-balance force of the last converged state on the new grid
+/// is carried over as a force on the nodes of the new grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Renewal {
+    /// After every step, as in the paper.
+    #[default]
+    EveryStep,
+    /// Never.
+    Never,
+    /// After a step at whose end ‖½ (F_rᵀ F_r − I)‖ of a particle is larger than this value (no unit). F_r is the deformation of the
+    /// particle since the last reset.
+    Strain(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+}
+
+impl Renewal {
+    /// Whether the grid is kept after a step that ends with this strain.
+    pub fn keeps(self, strain: f64) -> bool {
+        match self {
+            Self::EveryStep => false,
+            Self::Never => true,
+            // NaN resets the grid.
+            Self::Strain(most) => strain <= most,
+        }
+    }
+}
+
+impl Display for Renewal {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::EveryStep => f.write_str("new in every step"),
+            Self::Never => f.write_str("kept"),
+            Self::Strain(most) => write!(f, "kept until a particle has strained by {most}"),
+        }
+    }
+}
+
+/// The state of the nodes at t_n on a grid that is not reset. All fields have one entry per active node, or are empty.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GridState<const D: usize> {
+    /// φ
+    pub(crate) motion: Vec<Vector<f64, D>>,
+    /// Δφ/Δt of the last step.
+    pub(crate) rate: Vec<Vector<f64, D>>,
+    /// v; empty without inertia.
+    pub(crate) velocity: Vec<Vector<f64, D>>,
+    /// a; empty without inertia.
+    pub(crate) acceleration: Vec<Vector<f64, D>>,
+    /// R₀; empty with inertia, and on the first grid.
+    pub(crate) out_of_balance: Vec<Vector<f64, D>>,
+}
+
+impl<const D: usize> GridState<D> {
+    /// The state after a step of length `dt` by Δφ, which ends with the nodal state `end`.
+    pub(crate) fn new(end: &Nodal<D>, dphi: &[Vector<f64, D>], dt: f64) -> Self {
+        Self {
+            motion: end.motion.to_vec(),
+            rate: dphi.iter().map(|dphi| dphi / dt).collect(),
+            velocity: end.velocity.to_vec(),
+            acceleration: end.acceleration.to_vec(),
+            out_of_balance: end.out_of_balance.to_vec(),
+        }
+    }
+
+    /// The nodal state at the start of a step, with the mass of `masses`.
+    pub(crate) fn nodal(&self, masses: Nodal<D>, pool: &Pool) -> Nodal<D> {
+        let pooled = |field: &[Vector<f64, D>]| pool.collect(field.iter().copied());
+        Nodal {
+            velocity: pooled(&self.velocity),
+            acceleration: pooled(&self.acceleration),
+            motion: pooled(&self.motion),
+            out_of_balance: pooled(&self.out_of_balance),
+            ..masses
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The history of a simulation: the state of a grid that is not reset, and what decides when to reset it (`mechanics::reference`).
+
+use super::{Reaction, Sharing, Simulation};
+use crate::approximation::ShapeFunction;
+use crate::material::Law;
+use crate::mechanics::loads::PrescribedDof;
+use crate::mechanics::reference::{
+    GridState, LastEquilibrium, Renewal, pairs, reached_body, reached_conditions, touch,
+};
+use crate::mechanics::residual::Inadmissible;
+use crate::mechanics::schemes::Alphas;
+use crate::mechanics::sweep::Supports;
+use crate::mechanics::transfer::{Committed, Nodal, Update};
+use crate::pooled::Pooled;
+use crate::tensor::Vector;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// What the next step takes from earlier steps, beside the particles. A simulation writes it; see [`Simulation::forget`].
+#[derive(Clone, Debug, Default)]
+pub struct History<const D: usize> {
+    /// The nodal state; `None` if the next step resets the grid.
+    pub(crate) grid: Option<GridState<D>>,
+    /// The prescribed conditions that held bodies in the first step, without those that a body has reached since. All other conditions are
+    /// contacts.
+    pub(crate) constrained: BTreeSet<usize>,
+    /// Pairs of bodies that touched at the start.
+    pub(crate) bonded: BTreeSet<[u32; 2]>,
+    /// The last load step, if the next one resets the grid.
+    pub(crate) equilibrium: Option<LastEquilibrium<D>>,
+}
+
+impl<const D: usize> History<D> {
+    /// Whether the next step resets the grid.
+    pub fn resets_grid(&self) -> bool {
+        self.grid.is_none()
+    }
+
+    /// The prescribed conditions, by index, that have held bodies since the first step. All other conditions are contacts.
+    pub fn constrained(&self) -> &BTreeSet<usize> {
+        &self.constrained
+    }
+
+    /// Pairs of bodies, by index, that touched at the start. In load steps they stay bonded.
+    pub fn bonded(&self) -> &BTreeSet<[u32; 2]> {
+        &self.bonded
+    }
+}
+
+/// A converged step, before the particles take it.
+pub(super) struct Solved<'a, const D: usize> {
+    /// The nodal state at t_n, projected or that of the last step.
+    pub nodal: &'a Nodal<D>,
+    pub prescribed: &'a [PrescribedDof],
+    pub dphi: &'a [Vector<f64, D>],
+    pub reactions: &'a [Reaction<D>],
+}
+
+/// The part of a step's report that is known once the particles have taken the step.
+pub(super) struct Accepted {
+    pub renewed: bool,
+    pub feels_wall: bool,
+    pub sharing: Vec<Sharing>,
+    pub yielding: f64,
+}
+
+impl<const D: usize, L, A> Simulation<D, L, A> {
+    /// Clears the history. Call this after a change of particle positions, deformations, laws or shape functions by hand: otherwise the
+    /// next step starts from the grid of the last one, and ignores or carries over the change.
+    pub fn forget(&mut self) {
+        self.particles.reference = None;
+        self.history = History::default();
+    }
+
+    /// Whether a strain, a wall or another body may cause a grid reset.
+    pub(crate) fn may_reset(&self) -> bool {
+        self.settings.renewal != Renewal::Never || !self.loads.prescribed.is_empty() || self.bodies.len() > 1
+    }
+
+    /// The positions at which the coming load step evaluates a force field, by particle id; empty if no step will ask for them.
+    pub(super) fn field_positions(&self) -> Arc<[Vector<f64, D>]> {
+        if self.loads.field.is_none() || self.settings.scheme.has_inertia() {
+            return Arc::default();
+        }
+        self.particles.places().iter().map(|&p| self.particles.position[p as usize]).collect()
+    }
+}
+
+impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
+    /// Writes a step to the particles, and decides whether the next step resets the grid.
+    pub(super) fn accept(&mut self, update: Update<'_, D>, step: &Solved<'_, D>, supports: &Supports<D>) -> Accepted {
+        let (renewed, dt) = (self.history.resets_grid(), self.clock.step());
+        let field_positions = self.field_positions();
+        let mut grid = None;
+        if self.settings.renewal != Renewal::EveryStep {
+            self.particles.store_reference();
+            grid = Some(GridState::new(&update.end(step.nodal), step.dphi, dt));
+        }
+        let Committed { strain, yielding } = update.commit(&mut self.particles, &self.bodies, supports, dt);
+        let (feels_wall, sharing) = (self.feels_wall(step.prescribed), self.sharing(supports));
+        if self.clock.steps() == 0 {
+            self.record_first_contacts(step.prescribed);
+        }
+        // Contact detection also updates the constrained conditions.
+        let contact = grid.is_some() && self.in_contact(supports, step.prescribed);
+        self.history.grid = grid.filter(|_| !contact && self.settings.renewal.keeps(strain));
+        self.history.equilibrium = None;
+        if self.history.resets_grid() {
+            self.particles.reference = None;
+            if !self.settings.scheme.has_inertia() {
+                let touching = self.bodies_touch(supports);
+                let last = LastEquilibrium::new(&self.loads, step.reactions.to_vec(), touching, field_positions);
+                self.history.equilibrium = Some(last);
+            }
+        }
+        Accepted { renewed, feels_wall, sharing, yielding }
+    }
+
+    /// Records the prescribed conditions that hold bodies from the start, and the bodies that touch.
+    fn record_first_contacts(&mut self, prescribed: &[PrescribedDof]) {
+        self.history.constrained = prescribed.iter().map(|dof| dof.owner).collect();
+        if self.settings.renewal != Renewal::EveryStep && self.bodies.len() > 1 {
+            let at_start = self.particles.reference().position;
+            self.history.bonded = pairs(at_start, &self.particles.body, &self.grid);
+        }
+    }
+
+    fn bodies_touch(&self, supports: &Supports<D>) -> bool {
+        self.bodies.len() > 1 && touch(&self.particles, &self.grid, supports)
+    }
+
+    /// Whether a body has reached a wall, or in load steps another body. With inertia, also whether a body still feels a wall or touches
+    /// another body: without a grid reset, it would never leave.
+    fn in_contact(&mut self, supports: &Supports<D>, prescribed: &[PrescribedDof]) -> bool {
+        let reached = reached_conditions(&self.particles, &self.loads.prescribed, &self.grid, supports.active());
+        self.history.constrained.retain(|one| !reached.contains(one));
+        if !reached.is_empty() {
+            return true;
+        }
+        if self.settings.scheme.has_inertia() {
+            return prescribed.iter().any(|dof| !self.history.constrained.contains(&dof.owner))
+                || self.bodies_touch(supports);
+        }
+        self.bodies.len() > 1 && reached_body(&self.particles, &self.history.bonded, &self.grid)
+    }
+
+    /// The out-of-balance force R₀ on a new grid; empty with inertia and on the first grid. Also empty where a body has lost a condition or
+    /// another body that held it: the reaction of a lost support must not act any longer.
+    pub(super) fn out_of_balance(
+        &self,
+        supports: &Supports<D>,
+        nodal: &Nodal<D>,
+        prescribed: &[PrescribedDof],
+    ) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {
+        let Some(last) = self.history.equilibrium.as_ref().filter(|_| nodal.is_static()) else {
+            return Ok(Pooled::default());
+        };
+        if last.lost_support(prescribed) || last.touching && !self.bodies_touch(supports) {
+            return Ok(Pooled::default());
+        }
+        let t = if self.settings.scheme.follows_path() { self.path.load } else { self.clock.time() };
+        last.out_of_balance(self.equilibrium(supports, nodal, prescribed, Alphas::START, t).step, prescribed)
+    }
+}
