@@ -1,6 +1,6 @@
 //! One family of fibres in an elastic matrix.
 
-use super::{Lame, Law, Listed, MaterialState, VolumeResponse};
+use super::{Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
@@ -107,11 +107,7 @@ impl<B: Law> Law for FibreReinforced<B> {
     }
 
     /// The blocks of the base, plus 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let mut blocks = self.base.tangent_blocks(f_n, at);
         if let (_, Some(x)) = self.stretched(at) {
             let a = Vector::<f64, D>::from_fn(|i, _| self.direction[i]);

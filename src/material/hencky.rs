@@ -4,8 +4,8 @@
 //! configuration, so rotations of the body do not change it. A step that flows by Δε multiplies b by e^{−2Δε}, in the same axes: the
 //! exponential map (Weber and Anand, 1990; Simo, 1992). All tensors are in three dimensions, and the missing stretches of F are 1.
 
-use super::Lame;
 use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
+use super::{Lame, TangentBlocks};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, embed, identity, outer, scaled, symmetric, trace};
 
@@ -213,7 +213,7 @@ impl Moduli {
     }
 
     /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
-    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut [[Tensor<f64, D>; D]; D]) {
+    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
         let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
         let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();
         for j in 0..D {

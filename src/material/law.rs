@@ -27,6 +27,9 @@ pub const PLASTIC_STRAIN: &str = "plastic_strain";
 /// The name of the dissipated energy per reference volume, a term of the energy balance.
 pub const DISSIPATED: &str = "dissipated";
 
+/// A D×D block for each pair of unit gradients: row k and column l belong to e_k and e_l.
+pub type TangentBlocks<const D: usize> = [[Tensor<f64, D>; D]; D];
+
 /// A pointwise law in `D` = 1 (uniaxial strain), 2 (plane strain) or 3 dimensions.
 ///
 /// An elastic law needs two methods, [`energy`](Self::energy) and [`stress`](Self::stress). A law with internal variables also names them
@@ -140,11 +143,7 @@ pub trait Law: Send + Sync {
 
     /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ in row
     /// k and column l. A law that solves equations at each state overrides the default, to solve them once for all pairs.
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let unit = |k: usize| f_n.row(k).transpose();
         let block = |k, l| at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose();
         std::array::from_fn(|k| std::array::from_fn(|l| block(k, l)))

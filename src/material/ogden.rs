@@ -2,7 +2,7 @@
 
 use super::hencky::{Moduli, Principal, Strained};
 use super::spectral::{Function, Power, primitive_trace};
-use super::{Ciarlet, Lame, Law, Listed, MaterialState, VolumeResponse, Volumetric};
+use super::{Ciarlet, Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, identity, scaled};
@@ -90,11 +90,7 @@ impl Law for Ogden {
         Some(Ciarlet::response(self.lambda, at))
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let mut blocks = [[Tensor::zeros(); D]; D];
         self.moduli(at).add_blocks(f_n, &mut blocks);
         blocks

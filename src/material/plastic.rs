@@ -2,8 +2,8 @@
 
 use super::hencky::{Principal, Radial, Strained};
 use super::{
-    DISSIPATED, InternalVariable, Lame, Law, Listed, Logarithmic, MaterialState, PLASTIC_STRAIN, VolumeResponse,
-    Volumetric,
+    DISSIPATED, InternalVariable, Lame, Law, Listed, Logarithmic, MaterialState, PLASTIC_STRAIN, TangentBlocks,
+    VolumeResponse, Volumetric,
 };
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -153,11 +153,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
         principal.radial_moduli(&radial).elasticity(x)
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let (principal, Returned { radial, .. }) = self.principal(at);
         let mut blocks = [[Tensor::zeros(); D]; D];
         principal.radial_moduli(&radial).add_blocks(f_n, &mut blocks);

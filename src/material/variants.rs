@@ -53,7 +53,7 @@ macro_rules! law_of_variants {
             &self,
             f_n: &$crate::tensor::Tensor<f64, D>,
             at: &$crate::material::MaterialState<f64, D>,
-        ) -> [[$crate::tensor::Tensor<f64, D>; D]; D] {
+        ) -> $crate::material::TangentBlocks<D> {
             match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_n, at)),+ }
         }
         fn closed<const D: usize>(

@@ -1,7 +1,7 @@
 //! Finite viscoelasticity: Maxwell branches parallel to an elastic law.
 
 use super::hencky::{Principal, Radial, Strained};
-use super::{DISSIPATED, InternalVariable, Lame, Law, Listed, MaterialState, VolumeResponse};
+use super::{DISSIPATED, InternalVariable, Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
@@ -142,11 +142,7 @@ impl<B: Law> Law for Viscoelastic<B> {
         self.base.volumetric(at)
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &MaterialState<f64, D>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let mut blocks = self.base.tangent_blocks(f_n, at);
         for (branch, flowed, decay) in self.branches(at) {
             Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).add_blocks(f_n, &mut blocks);
