@@ -7,7 +7,6 @@ use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
-use bfree::solver::Precision;
 use bfree::tensor::Vector;
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -59,8 +58,7 @@ fn at_a_step<const D: usize>(
     let simulation = block::<D>(shape, cells);
     let (positions, dt) = (&simulation.particles.position, simulation.clock.step());
     let (supports, nodes) =
-        Supports::with_precision(&simulation.approximation, &simulation.grid, positions, Precision::Mixed)
-            .expect("inside the grid");
+        Supports::new(&simulation.approximation, &simulation.grid, positions).expect("inside the grid");
     let nodal = Nodal::project(&simulation.particles, &supports, 1.0).expect("finite velocities");
     let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
     let u: Vec<Vector<f64, D>> =
@@ -85,21 +83,6 @@ macro_rules! in_dimension {
                         let tangent = at.tangent(u).expect("admissible");
                         let mut out = vec![Vector::zeros(); u.len()];
                         bencher.bench_local(|| tangent.product(black_box(u), &mut out));
-                    },
-                );
-            }
-
-            #[divan::bench(args = SHAPES)]
-            fn product_in_single_precision(bencher: Bencher<'_, '_>, shape: &str) {
-                at_a_step::<$dimension>(
-                    bencher.counter(ItemsCount::new(PARTICLES)),
-                    shape,
-                    $cells,
-                    |bencher, at, u| {
-                        let tangent = at.single_tangent(None, u).expect("admissible").expect("prepared");
-                        let u: Vec<Vector<f32, $dimension>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-                        let mut out = vec![Vector::zeros(); u.len()];
-                        bencher.bench_local(|| tangent.product(black_box(&u), &mut out));
                     },
                 );
             }

@@ -9,7 +9,7 @@ pub const MAX_HALVINGS: u32 = 20;
 const TICKS: u64 = 1 << MAX_HALVINGS;
 
 /// The tolerance for round-off in an end time, in steps.
-const HAIR: f64 = 1e-6;
+const TIME_TOLERANCE: f64 = 1e-6;
 
 /// The part of a clock that changes in a run. Checkpoints store it.
 ///
@@ -136,7 +136,7 @@ impl Clock {
     /// assert_eq!((Clock::new(0.1, 0).whole_steps(0.3), Clock::new(0.1, 0).whole_steps(0.39)), (3, 3));
     /// ```
     pub fn whole_steps(&self, end: f64) -> u64 {
-        (end / self.nominal + HAIR).floor().max(0.0) as u64
+        (end / self.nominal + TIME_TOLERANCE).floor().max(0.0) as u64
     }
 
     /// The time left to `end` after [`Self::whole_steps`], if `end` lies between steps.
@@ -148,7 +148,7 @@ impl Clock {
     /// ```
     pub fn rest(&self, end: f64) -> Option<f64> {
         let rest = end - self.whole_steps(end) as f64 * self.nominal;
-        (rest > HAIR * self.nominal).then_some(rest)
+        (rest > TIME_TOLERANCE * self.nominal).then_some(rest)
     }
 
     /// Whether `end` is reached, to within a millionth of a step.
@@ -161,7 +161,7 @@ impl Clock {
     /// assert!(clock.has_reached(0.3) && !clock.has_reached(0.31));
     /// ```
     pub fn has_reached(&self, end: f64) -> bool {
-        end - self.time() <= HAIR * self.nominal
+        end - self.time() <= TIME_TOLERANCE * self.nominal
     }
 
     /// A clock whose nominal step is the time left to `end`. This step is halved until it is no longer than the coming step. `None` if
@@ -181,7 +181,7 @@ impl Clock {
     /// ```
     pub fn to(&self, end: f64) -> Option<Self> {
         let rest = end - self.time();
-        let between = rest > HAIR * self.nominal && rest < self.nominal;
+        let between = rest > TIME_TOLERANCE * self.nominal && rest < self.nominal;
         let level = (0..self.max_halvings).find(|&level| rest <= self.step() * (1_u64 << level) as f64);
         let level = level.unwrap_or(self.max_halvings);
         between.then_some(Self { nominal: rest, end: Some(end), ticks: 0, level, ..*self })

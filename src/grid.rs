@@ -68,8 +68,13 @@ impl Axis {
     pub(crate) fn spacings(&self, x: f64) -> f64 {
         let s = (x - self.origin) / self.spacing;
         let node = f64::from((s + 0.5) as u32);
-        let rounded = ON_NODE * (x.abs() + self.origin.abs());
-        if (s - node).abs() * self.spacing <= rounded { node } else { s }
+        if (s - node).abs() <= self.round_off(x) { node } else { s }
+    }
+
+    /// A bound of the round-off of [`Self::spacings`].
+    #[inline(always)]
+    pub(crate) fn round_off(&self, x: f64) -> f64 {
+        ON_NODE * (x.abs() + self.origin.abs()) / self.spacing
     }
 
     /// Last node of the axis.

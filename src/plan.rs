@@ -1,23 +1,23 @@
 //! The requirements of a scene: the terms in use and why, the number of unknowns, and the memory of each array.
 
+mod arrays;
+
+pub use arrays::ArrayUse;
+
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
-use crate::mechanics::dilatation::Cells;
-use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
+use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad};
 use crate::mechanics::reference::Renewal;
-use crate::mechanics::sweep::{LANES, SupportError, Supports};
-use crate::mechanics::tangent::frozen_bytes;
-use crate::mechanics::terms::{Given, Terms, frozen_rows};
-use crate::mechanics::transfer::Projection;
+use crate::mechanics::sweep::{SupportError, Supports};
+use crate::mechanics::terms::{Given, Terms};
 use crate::mechanics::unknowns::Unknowns;
-use crate::particles::{Body, Particles};
+use crate::particles::Body;
 use crate::simulation::{Sharing, Simulation};
-use crate::solver::{Krylov, Precision, Preconditioning, direct_bytes, multigrid_bytes};
-use crate::tensor::{Tensor, Vector};
+use crate::solver::{Krylov, Preconditioning};
+use arrays::arrays;
 use indicatif::BinaryBytes;
 use serde::Serialize;
 use std::fmt::{Display, Formatter};
-use std::mem::size_of;
 
 /// A term of the residual, or a part of the step, and whether this scene has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,15 +28,6 @@ pub struct TermUse {
     pub used: bool,
     /// The reason.
     pub why: String,
-}
-
-/// An array and its bytes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ArrayUse {
-    /// The contents of the array.
-    pub name: &'static str,
-    /// Bytes.
-    pub bytes: u64,
 }
 
 /// The points of a loaded surface.
@@ -160,7 +151,7 @@ impl Plan {
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports),
-            arrays: arrays(simulation, &supports, nodes.len()),
+            arrays: arrays(simulation, &supports),
             surfaces: SurfaceUse::of(simulation),
             sharing: sharing(simulation, &supports),
         })
@@ -215,14 +206,11 @@ fn sharing<const D: usize, L: Law, A: ShapeFunction>(
 }
 
 fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> Vec<TermUse> {
-    let (loads, settings) = (&simulation.loads, &simulation.settings);
+    let loads = &simulation.loads;
+    let settings = &simulation.settings;
     let scheme = &*settings.scheme;
     let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
-    let precision = match settings.newton.precision {
-        Precision::Double => "only with solver.krylov.precision = \"mixed\"",
-        Precision::Mixed => "of the linear systems; for shape functions that are products",
-    };
     let averages = simulation.bodies.iter().any(Body::averages);
     let mut all = Terms::<D, L>::planned(Given {
         loads,
@@ -238,7 +226,6 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
         ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
         ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
-        ("single precision", precision_used(supports) == Precision::Mixed, precision.into()),
     ]);
     all.into_iter().map(|(name, used, why)| TermUse { name, used, why }).collect()
 }
@@ -263,81 +250,6 @@ fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, s
         1 => format!("only with several bodies; the law of the only one is looked up {often}"),
         count => format!("the law of each of {count} bodies is looked up {often}"),
     }
-}
-
-/// The precision of the linear systems.
-fn precision_used<const D: usize>(supports: &Supports<D>) -> Precision {
-    supports.unit().map_or(Precision::Double, |_| Precision::Mixed)
-}
-
-fn arrays<const D: usize, L: Law, A: ShapeFunction>(
-    simulation: &Simulation<D, L, A>,
-    supports: &Supports<D>,
-    nodes: usize,
-) -> Vec<ArrayUse> {
-    let (vector, tensor) = (size_of::<Vector<f64, D>>(), size_of::<Tensor<f64, D>>());
-    let (particles, remembered) = (simulation.particles.len(), simulation.particles.remembered);
-    let moves = simulation.settings.scheme.has_inertia();
-    let weighs = moves || simulation.loads.gravity.is_some();
-    let lumping = if moves { simulation.settings.lumping } else { 1.0 };
-    let consistent = moves && lumping < 1.0;
-    let smooths = moves && simulation.settings.smoothing.is_some();
-    let fits = moves && simulation.settings.projection == Projection::Affine;
-    let tiled = supports.is_tiled();
-    let krylov_vectors = match simulation.krylov().0 {
-        // The basis; residual, correction, trial and product.
-        Krylov::Gmres { restart } => restart as usize + 5,
-        Krylov::Automatic | Krylov::ConjugateGradient => 5,
-    };
-    let precision = precision_used(supports);
-    let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, supports, precision);
-    let share = if precision == Precision::Mixed { 2 } else { 1 };
-    let faces: usize = simulation.loads.surface.iter().map(|load| load.points.len()).sum();
-    let preconditioner = simulation.preconditioner().0;
-    let (multigrid, direct) = (preconditioner == Preconditioning::Multigrid, preconditioner == Preconditioning::Direct);
-    // Arrays that the run does not have are not listed.
-    let keeps = simulation.settings.renewal != Renewal::EveryStep;
-    let averages = simulation.bodies.iter().any(Body::averages);
-    // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
-    let of_mean = particles * (Cells::BYTES + size_of::<f64>() * if keeps { 4 } else { 3 });
-    let frozen_mean = supports.groups() * LANES * (frozen_rows(D) * size_of::<f64>() / share + size_of::<f64>());
-    let asks = simulation.loads.field.is_some() && !moves;
-    let followers = supports.extension().map_or(0, |extension| extension.bytes());
-    let used: [(bool, &'static str, usize); 24] = [
-        (true, "particles: x, H, volume, mass, body, id", particles * Particles::<D>::BYTES),
-        (moves, "particles: v, a", particles * 2 * vector),
-        (remembered > 0, "particles: memory of laws", particles * remembered * size_of::<f64>()),
-        // The prediction at the start and at the end of the step.
-        (consistent, "particles: prediction for the consistent inertia", particles * 2 * vector),
-        // The part of the field that nodes cannot represent, its change, and the change of the other field.
-        (smooths, "particles: smoothing", particles * 3 * vector),
-        (fits, "affine fits of v, a", particles * tensor + nodes * 4 * (tensor + vector)),
-        (true, "shape functions: N, dN/dx by axis", supports.bytes()),
-        (tiled, "particles: the order of the sweep", particles * 2 * size_of::<u64>()),
-        // The load; Δφ, residual and trial of Newton's method, right-hand side, update and product of the linear solver.
-        (true, "nodal fields: loads, Δφ, residuals", nodes * 8 * vector),
-        // v and a, as projected and with prescribed values in place.
-        (weighs, "nodal mass", nodes * 2 * size_of::<f64>()),
-        (moves, "nodal fields: v, a", nodes * 4 * vector),
-        (keeps, "particles: x, H when the grid was new", particles * (vector + tensor)),
-        (keeps, "nodal fields: motion since then, its rate", nodes * (if moves { 4 } else { 2 }) * vector),
-        // The positions of the last load step.
-        (asks, "particles: x for a field of forces", particles * vector),
-        // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
-        (!moves && simulation.may_reset(), "nodal fields: carried over", nodes * if keeps { 3 } else { 2 } * vector),
-        // The loaded points, and in load steps the points of the last equilibrium.
-        (faces > 0, "loaded surfaces", faces * if moves { 1 } else { 2 } * size_of::<SurfacePoint<D>>()),
-        (true, "frozen tangent", frozen),
-        (averages, "particles: mean dilatation", of_mean),
-        (averages, "frozen tangent: mean dilatation", frozen_mean),
-        (!direct, "preconditioner: diagonal blocks", nodes * (tensor / share + if share > 1 { tensor } else { 0 })),
-        (followers > 0, "nodes that follow others, and their weights", followers),
-        (multigrid, "preconditioner: multigrid levels", multigrid_bytes(nodes, D)),
-        (direct, "preconditioner: assembled tangent and its factor", direct_bytes(nodes, D, supports.reach() as usize)),
-        (true, "Krylov vectors", nodes * vector / share * krylov_vectors),
-    ];
-    let used = used.into_iter().filter(|(used, ..)| *used);
-    used.map(|(_, name, bytes)| ArrayUse { name, bytes: bytes as u64 }).collect()
 }
 
 impl Display for Plan {

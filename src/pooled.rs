@@ -36,57 +36,16 @@ const MULTIPLE: usize = 144;
 /// assert_eq!((next.len(), next[7], next.as_ptr()), (99_990, 7.0, at));
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct Pool(Arc<Mutex<Spare>>);
-
-/// Vectors that are not on loan.
-#[derive(Debug, Default)]
-pub struct Spare {
-    double: Vec<Vec<f64>>,
-    single: Vec<Vec<f32>>,
-}
-
-/// The number type of pooled memory.
-pub trait Number: Pod + Send {
-    /// The spare vectors of this type.
-    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>>;
-}
-
-impl Number for f64 {
-    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>> {
-        &mut spare.double
-    }
-}
-
-impl Number for f32 {
-    fn of(spare: &mut Spare) -> &mut Vec<Vec<Self>> {
-        &mut spare.single
-    }
-}
+pub struct Pool(Arc<Mutex<Vec<Vec<f64>>>>);
 
 /// An element of a pooled vector: a number, or several numbers side by side. Vectors of different elements can reuse the same memory.
-pub trait Element: Pod + Send {
-    /// The type of the numbers.
-    type Number: Number;
-}
+pub trait Element: Pod + Send {}
 
-impl Element for f64 {
-    type Number = Self;
-}
+impl Element for f64 {}
 
-impl Element for f32 {
-    type Number = Self;
-}
+impl<const R: usize, const C: usize> Element for SMatrix<f64, R, C> where Self: Pod {}
 
-impl<X: Number, const R: usize, const C: usize> Element for SMatrix<X, R, C>
-where
-    Self: Pod,
-{
-    type Number = X;
-}
-
-impl<X: Number, const N: usize> Element for [X; N] {
-    type Number = X;
-}
+impl<const N: usize> Element for [f64; N] {}
 
 impl Pool {
     /// A vector of `count` times `value`.
@@ -119,12 +78,11 @@ impl Pool {
         if count * size_of::<T>() < SMALL {
             return Vec::with_capacity(count);
         }
-        let numbers = size_of::<T>() / size_of::<T::Number>();
+        let numbers = size_of::<T>() / size_of::<f64>();
         let length = count * numbers;
-        let fits = |one: &Vec<T::Number>| (length..=TOO_LARGE * length).contains(&one.capacity());
+        let fits = |one: &Vec<f64>| (length..=TOO_LARGE * length).contains(&one.capacity());
         let kept = {
-            let mut spare = held(&self.0);
-            let list = T::Number::of(&mut spare);
+            let mut list = held(&self.0);
             let smallest = list.iter().enumerate().filter(|(_, one)| fits(one)).min_by_key(|(_, one)| one.capacity());
             let small = || list.iter().position(|one| one.capacity() < length && length <= TOO_LARGE * one.capacity());
             smallest.map(|(at, _)| at).or_else(small).map(|at| list.swap_remove(at))
@@ -151,10 +109,7 @@ impl<T: Element> Pooled<T> {
     }
 
     /// The vector as plain numbers, in the same memory.
-    pub fn into_numbers(mut self) -> Pooled<T::Number>
-    where
-        T::Number: Element,
-    {
+    pub fn into_numbers(mut self) -> Pooled<f64> {
         let vector = try_cast_vec(std::mem::take(&mut self.vector)).unwrap_or_default();
         Pooled { vector, pool: self.pool.clone() }
     }
@@ -167,7 +122,7 @@ impl<T: Element> Drop for Pooled<T> {
             return;
         }
         if let Ok(kept) = try_cast_vec(vector) {
-            T::Number::of(&mut held(&self.pool.0)).push(kept);
+            held(&self.pool.0).push(kept);
         }
     }
 }

@@ -1,13 +1,12 @@
-//! The number type of the kernels: one trait for `f64`, `f32` and the (nested) dual numbers of `num-dual`.
+//! The number type of the kernels: one trait for `f64` and the (nested) dual numbers of `num-dual`.
 
 use num_dual::{DualNumCopy, DualStruct};
 use num_traits::{NumCast, ToPrimitive};
 
 /// A number the residual can be evaluated with.
 ///
-/// `f64` and `f32` for computing, `Dual64`, `HyperDual64`, `Dual<Dual64>`, … for derivatives. Dual numbers compare by
-/// their real part, so a branch takes the path `f64` would take; both sides of a branch must therefore be the same
-/// analytic function.
+/// `f64` for computing, `Dual64`, `HyperDual64`, `Dual<Dual64>`, … for derivatives. Dual numbers compare by their real part, so a branch
+/// takes the path `f64` would take; both sides of a branch must therefore be the same analytic function.
 ///
 /// ```
 /// use bfree::scalar::Real;
@@ -27,7 +26,7 @@ pub trait Real: DualNumCopy {
 impl<T: DualNumCopy> Real for T {
     #[inline(always)]
     fn lit(x: f64) -> Self {
-        // A cast between floats always succeeds (f32 rounds); the fallback is never taken.
+        // A cast from f64 always succeeds; the fallback is never taken.
         <T::Primitive as NumCast>::from(x).map_or_else(T::zero, T::from)
     }
 
@@ -67,12 +66,11 @@ pub fn implicit<T: Real>(root: f64, slope: f64, residual: impl Fn(T) -> T) -> T 
 ///     a.iter().zip(b).fold(with.zero(), |sum, (&a, &b)| with.mul_add(a, b, sum))
 /// }
 ///
-/// let with = Single::<f64>::default();
-/// assert_eq!(dot(with, &[1.0, 2.0], &[3.0, 4.0]), 11.0);
+/// assert_eq!(dot(Single, &[1.0, 2.0], &[3.0, 4.0]), 11.0);
 /// // (a + b)² − 2ab = a² + b², in one formula for numbers and lanes
 /// let (a, b) = (3.0, 4.0);
-/// let (sum, twice) = (with.add(a, b), with.add(a, a));
-/// assert_eq!(with.mul_sub(twice, b, with.mul(sum, sum)), dot(with, &[a, b], &[a, b]));
+/// let (sum, twice) = (Single.add(a, b), Single.add(a, a));
+/// assert_eq!(Single.mul_sub(twice, b, Single.mul(sum, sum)), dot(Single, &[a, b], &[a, b]));
 /// ```
 pub trait Arithmetic: Copy {
     /// The number, or the lanes.
@@ -91,34 +89,28 @@ pub trait Arithmetic: Copy {
 
 /// The arithmetic of single numbers, every operation rounded.
 #[derive(Clone, Copy, Debug)]
-pub struct Single<T>(std::marker::PhantomData<T>);
+pub struct Single;
 
-impl<T> Default for Single<T> {
-    fn default() -> Self {
-        Self(std::marker::PhantomData)
-    }
-}
-
-impl<T: Real> Arithmetic for Single<T> {
-    type N = T;
+impl Arithmetic for Single {
+    type N = f64;
     #[inline(always)]
-    fn zero(self) -> T {
-        T::zero()
+    fn zero(self) -> f64 {
+        0.0
     }
     #[inline(always)]
-    fn add(self, a: T, b: T) -> T {
+    fn add(self, a: f64, b: f64) -> f64 {
         a + b
     }
     #[inline(always)]
-    fn mul(self, a: T, b: T) -> T {
+    fn mul(self, a: f64, b: f64) -> f64 {
         a * b
     }
     #[inline(always)]
-    fn mul_add(self, a: T, b: T, c: T) -> T {
+    fn mul_add(self, a: f64, b: f64, c: f64) -> f64 {
         a * b + c
     }
     #[inline(always)]
-    fn mul_sub(self, a: T, b: T, c: T) -> T {
+    fn mul_sub(self, a: f64, b: f64, c: f64) -> f64 {
         c - a * b
     }
 }

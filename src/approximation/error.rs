@@ -67,3 +67,23 @@ pub enum ApproximationError {
         residual: f64,
     },
 }
+
+/// Validation of a family's parameters before any particle exists.
+///
+/// ```
+/// use bfree::approximation::{Gimp, Lme, Validate};
+///
+/// assert_eq!(Lme::new(3.0, 1e-6).validate(3), Ok(()));
+/// // A particle wider than its cell.
+/// let refused = Gimp { half_width: 0.6 }.validate(2).unwrap_err();
+/// assert!(refused.to_string().contains("0.6"), "{refused}");
+/// ```
+pub trait Validate {
+    /// Checks the parameters of the family in `dimension` = 1, 2 or 3 dimensions.
+    ///
+    /// # Errors
+    /// A parameter is out of range. The error names the parameter and its range.
+    fn validate(&self, _dimension: usize) -> Result<(), ApproximationError> {
+        Ok(())
+    }
+}

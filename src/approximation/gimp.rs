@@ -1,7 +1,7 @@
 //! Uniform generalized interpolation (uGIMP).
 
-use super::interior::Lane;
 use super::kernel::{Kernel, folded};
+use super::lane::Lane;
 use super::{
     Approximation, ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Shipped, Validate,
 };

@@ -1,7 +1,9 @@
 //! Kernels centred on the nodes. Ghost nodes beyond a wall are folded back to nodes of the grid.
 
-use super::interior::Lane;
-use super::{ApproximationError, AxisWeights, product::Place};
+use super::error::ApproximationError;
+use super::interior::{Column, Interior, NODES, distance};
+use super::lane::Lane;
+use super::product::{AxisWeights, Place};
 use crate::grid::Axis;
 
 /// A kernel D ↦ (φ, φ'), with lengths in units of the spacing.
@@ -25,7 +27,8 @@ pub(super) fn folded(
     x: f64,
     out: &mut AxisWeights,
 ) -> Result<(), ApproximationError> {
-    let (place, radius) = (Place::new(axis, x)?, kernel.radius());
+    let radius = kernel.radius();
+    let place = Place::new(axis, x)?.at_edge(radius.fract(), axis.round_off(x));
     // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
     let lower = (radius - place.below).ceil() as i64 - 1;
     let upper = (radius - place.above).ceil() as i64;
@@ -55,4 +58,17 @@ pub(super) fn folded(
         }
     }
     Ok(())
+}
+
+impl<K: Kernel> Interior for K {
+    #[inline(always)]
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, _: T, spacing: f64) -> Column<T> {
+        let zero = below.constant(0.0);
+        let (mut values, mut derivatives) = ([zero; NODES], [zero; NODES]);
+        for i in 0..2 * M + 2 {
+            let (value, slope) = self.at(distance::<T, M>(i, below, above));
+            (values[i], derivatives[i]) = (value, slope / below.constant(spacing));
+        }
+        Column { values, derivatives, correction: zero }
+    }
 }

@@ -1,9 +1,9 @@
 //! Linear functions (Q4 in the plane).
 
-use super::interior::{Column, Interior};
-use super::{
-    Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate, product::Place,
-};
+use super::interior::{Column, Interior, NODES};
+use super::lane::Lane;
+use super::product::Place;
+use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::problems::Problems;
@@ -46,5 +46,16 @@ impl Separable for Linear {
 
     fn width(&self) -> usize {
         2
+    }
+}
+
+impl Interior for Linear {
+    #[inline(always)]
+    fn column<T: Lane, const M: usize>(&self, below: T, above: T, _: T, spacing: f64) -> Column<T> {
+        let zero = below.constant(0.0);
+        let (mut values, mut derivatives) = ([zero; NODES], [zero; NODES]);
+        [values[M], values[M + 1]] = [above, below];
+        [derivatives[M], derivatives[M + 1]] = [below.constant(-1.0 / spacing), below.constant(1.0 / spacing)];
+        Column { values, derivatives, correction: zero }
     }
 }

@@ -1,6 +1,8 @@
 //! One-dimensional functions and their tensor product, which all separable families share.
 
-use super::{ApproximationError, Shipped, Support, Validate};
+use super::error::{ApproximationError, Validate};
+use super::shipped::Shipped;
+use super::support::Support;
 use crate::aggregation::Pieces;
 use crate::grid::{Axis, Grid, indices};
 use crate::tensor::Vector;
@@ -158,6 +160,20 @@ impl Place {
         // This difference is exact: s and the cell number agree in their leading digits.
         let below = s - f64::from(cell);
         Self { cell, below, above: 1.0 - below }
+    }
+
+    /// The place, moved onto the edge of a support if only round-off separates them. Otherwise round-off would decide whether a node is
+    /// active whose N and h|∇N| are round-off themselves, and nothing would hold such a node. `edge` is the distance from a node of the
+    /// cell to the edges of supports in the cell, in spacings.
+    #[inline(always)]
+    pub fn at_edge(self, edge: f64, round_off: f64) -> Self {
+        if (self.below - edge).abs() <= round_off {
+            Self { below: edge, above: 1.0 - edge, ..self }
+        } else if (self.above - edge).abs() <= round_off {
+            Self { below: 1.0 - edge, above: edge, ..self }
+        } else {
+            self
+        }
     }
 }
 

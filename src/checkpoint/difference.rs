@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 /// Keys that change no step of a run: the schema, the title, the end and the time between checkpoints.
-const FREE: [&str; 4] = ["$schema", "title", "time.end", "output.checkpoint"];
+const KEYS_WITHOUT_EFFECT: [&str; 4] = ["$schema", "title", "time.end", "output.checkpoint"];
 
 /// A key with different values. `None` is an absent value.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ fn within(key: &str, then: Option<&Value>, now: Option<&Value>) -> Option<Differ
     // In a scene, an absent key and null mean the same.
     let present = |value: Option<&Value>| value.is_some_and(|value| !value.is_null());
     match (then, now) {
-        _ if then == now || (!present(then) && !present(now)) || FREE.contains(&key) => None,
+        _ if then == now || (!present(then) && !present(now)) || KEYS_WITHOUT_EFFECT.contains(&key) => None,
         (Some(Value::Object(then)), Some(Value::Object(now))) => {
             let keys = then.keys().chain(now.keys().filter(|key| !then.contains_key(*key)));
             let path = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };

@@ -11,9 +11,12 @@ use crate::tensor::{Tensor, Vector};
 use crc32fast::hash;
 use std::borrow::Cow;
 
+/// The name of an array and its numbers.
+type NamedArray<'a> = (&'static str, Cow<'a, [f64]>);
+
 /// The arrays of the state at tₙ, by name. The patterns name every field: a new field does not compile until somebody decides whether it is
 /// stored. A new array is added here and in [`restore`].
-pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<(&'static str, Cow<'_, [f64]>)> {
+pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) -> Vec<NamedArray<'_>> {
     let Simulation {
         grid: _,
         approximation: _,
@@ -45,7 +48,7 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
     let id: Vec<f64> = id.iter().map(|&id| f64::from(id)).collect();
     let conditions = 0..loads.prescribed.len();
     let constrained: Vec<f64> = conditions.map(|one| u8::from(constrained.contains(&one)).into()).collect();
-    let mut arrays: Vec<(_, Cow<'_, [f64]>)> = vec![
+    let mut arrays: Vec<NamedArray<'_>> = vec![
         ("id", id.into()),
         (CONSTRAINED, constrained.into()),
         (BONDED, bonded.iter().flatten().map(|&body| f64::from(body)).collect()),
@@ -59,22 +62,37 @@ pub(super) fn inherited<const D: usize, L, A>(simulation: &Simulation<D, L, A>) 
         ("dissipated", std::slice::from_ref(dissipated).into()),
         ("path", vec![*load, *increment, *speed, *weight].into()),
     ];
-    if let Some(Configuration { position, displacement_gradient, dilatation }) = reference {
-        arrays.push((REFERENCE_POSITION, bytemuck::cast_slice(position).into()));
-        arrays.push((REFERENCE_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()));
-        arrays.push((REFERENCE_DILATATION, dilatation.as_slice().into()));
-    }
-    if let Some(GridState { motion, rate, velocity, acceleration, out_of_balance }) = grid {
-        let fields = [motion, rate, velocity, acceleration, out_of_balance].map(|field| bytemuck::cast_slice(field));
-        arrays.extend(GRID.into_iter().zip(fields).map(|(name, numbers)| (name, numbers.into())));
-    }
-    // The loads of the last equilibrium are those of the scene.
-    if let Some(LastEquilibrium { loads: _, reactions, touching, field_positions }) = equilibrium {
-        let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
-        arrays.push((EQUILIBRIUM, std::iter::once(f64::from(u8::from(*touching))).chain(forces).collect()));
-        arrays.push((FIELD_POSITIONS, bytemuck::cast_slice(field_positions).into()));
-    }
+    arrays.extend(reference.iter().flat_map(reference_arrays));
+    arrays.extend(grid.iter().flat_map(grid_arrays));
+    arrays.extend(equilibrium.iter().flat_map(equilibrium_arrays));
     arrays
+}
+
+/// The arrays of the reference configuration.
+fn reference_arrays<const D: usize>(reference: &Configuration<D>) -> [NamedArray<'_>; 3] {
+    let Configuration { position, displacement_gradient, dilatation } = reference;
+    [
+        (REFERENCE_POSITION, bytemuck::cast_slice(position).into()),
+        (REFERENCE_GRADIENT, bytemuck::cast_slice(displacement_gradient).into()),
+        (REFERENCE_DILATATION, dilatation.as_slice().into()),
+    ]
+}
+
+/// The arrays of a grid that is not reset.
+fn grid_arrays<const D: usize>(grid: &GridState<D>) -> impl Iterator<Item = NamedArray<'_>> {
+    let GridState { motion, rate, velocity, acceleration, out_of_balance } = grid;
+    let fields = [motion, rate, velocity, acceleration, out_of_balance];
+    GRID.into_iter().zip(fields.map(|field| bytemuck::cast_slice(field).into()))
+}
+
+/// The arrays of the last converged load step. Its loads are those of the scene.
+fn equilibrium_arrays<const D: usize>(equilibrium: &LastEquilibrium<D>) -> [NamedArray<'_>; 2] {
+    let LastEquilibrium { loads: _, reactions, touching, field_positions } = equilibrium;
+    let forces = reactions.iter().flat_map(|one| one.force.iter().copied().chain([one.torque]));
+    [
+        (EQUILIBRIUM, std::iter::once(f64::from(u8::from(*touching))).chain(forces).collect()),
+        (FIELD_POSITIONS, bytemuck::cast_slice(field_positions).into()),
+    ]
 }
 
 /// Whether each prescribed condition has held bodies since the first step.

@@ -1,6 +1,6 @@
 //! The linearised tangent in closed form, from a handful of numbers, for isotropic laws without internal variables.
 
-use crate::scalar::{Arithmetic, Real, Single};
+use crate::scalar::{Arithmetic, Single};
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
 /// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N. B, b and c are symmetric.
@@ -15,12 +15,11 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let at = MaterialState::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
 /// let closed = law.closed(&identity(), &at, 1.0).ok_or("neo-Hooke has one")?;
-/// let with = Single::<f64>::default();
 /// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
 /// let (k, l, j) = (0, 1, 1);
 /// let mut unit = [[0.0; 2]; 2];
 /// unit[j][l] = 1.0;
-/// let (product, block) = (closed.product(with, &unit), closed.unit_block(with, k, l));
+/// let (product, block) = (closed.product(Single, &unit), closed.unit_block(Single, k, l));
 /// for i in 0..2 {
 ///     assert!((product[i][k] - block[i][j]).abs() < 1e-15);
 /// }
@@ -88,9 +87,7 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
         }
         out
     }
-}
 
-impl<N: Copy, const D: usize> ClosedTangent<N, D> {
     /// The block of the unit gradients e_k and e_l: κ A e_k ⊗ A e_l − q A e_l ⊗ A e_k + B_kl I + c_kl b.
     #[inline(always)]
     pub fn unit_block<A: Arithmetic<N = N>>(&self, with: A, k: usize, l: usize) -> [[N; D]; D] {
@@ -112,8 +109,8 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
 
 /// A tensor by rows.
 #[inline(always)]
-pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
-    let mut rows = [[T::zero(); D]; D];
+pub(super) fn rows<const D: usize>(a: &Tensor<f64, D>) -> [[f64; D]; D] {
+    let mut rows = [[0.0; D]; D];
     for i in 0..D {
         for k in 0..D {
             rows[i][k] = a[(i, k)];
@@ -124,7 +121,7 @@ pub(super) fn rows<T: Real, const D: usize>(a: &Tensor<T, D>) -> [[T; D]; D] {
 
 /// A tensor from its rows.
 #[inline(always)]
-fn tensor<T: Real, const D: usize>(a: &[[T; D]; D]) -> Tensor<T, D> {
+fn tensor<const D: usize>(a: &[[f64; D]; D]) -> Tensor<f64, D> {
     Tensor::from_fn(|i, k| a[i][k])
 }
 
@@ -133,7 +130,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
     ///
     /// Example: [`Law::closed`](super::Law::closed).
     pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
-        tensor(&self.product(Single::<f64>::default(), &rows(l)))
+        tensor(&self.product(Single, &rows(l)))
     }
 
     /// The block of two nodes with gradients ∇_n N_I and ∇_n N_J:

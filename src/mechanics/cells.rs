@@ -1,13 +1,13 @@
 //! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids; and its sparsity pattern.
 
-use crate::mechanics::sweep::{At, LANES, Laned};
+use crate::mechanics::sweep::{At, LANES};
 use crate::mechanics::tangent::Tangent;
 use crate::mechanics::unknowns::padded;
 use crate::solver::{LocalForm, Neighbours};
 use crate::tensor::{Tensor, Vector};
 use std::collections::HashMap;
 
-impl<X: Laned, const D: usize> Tangent<'_, D, X> {
+impl<const D: usize> Tangent<'_, D> {
     /// The tangent as a form on cells: tangent moduli and masses, summed over the particles of each cell. Terms at nodes add a block for
     /// each node, the force under uniform motions.
     pub(super) fn on_cells(&self) -> LocalForm {
@@ -25,7 +25,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         let terms: Vec<_> =
             self.terms.iter().filter_map(|term| term.product_at_points(None)).map(|(_, add)| add).collect();
         // The form takes gradients in units of 1/h.
-        let factor = (self.unit.length / grid.spacing).powi(2);
+        let factor = grid.spacing.recip().powi(2);
         let (mut places, reference) = (HashMap::new(), self.particles.reference());
         self.supports.each_group(|group| {
             // Surface points belong to no cell.
@@ -46,25 +46,25 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
                     form.centres[cell][k] += share * local;
                 }
             }
-            let probe = |at: &At<X, D, D>| {
-                let mut sums = At::<X, D, D>::zero();
+            let probe = |at: &At<f64, D, D>| {
+                let mut sums = At::<f64, D, D>::zero();
                 terms.iter().for_each(|add| add(group, at, &mut sums));
                 sums
             };
-            let mut at = At::<X, D, D>::zero();
-            at.value[0] = [X::one(); LANES];
+            let mut at = At::<f64, D, D>::zero();
+            at.value[0] = [1.0; LANES];
             let sums = probe(&at);
             for (lane, cell) in cells.iter().enumerate().filter_map(|(lane, cell)| Some((lane, (*cell)?))) {
-                form.masses[cell] += sums.value[0][lane].value();
+                form.masses[cell] += sums.value[0][lane];
             }
             for (j, l) in (0..D).flat_map(|j| (0..D).map(move |l| (j, l))) {
-                let mut at = At::<X, D, D>::zero();
-                at.gradient[j][l] = [X::one(); LANES];
+                let mut at = At::<f64, D, D>::zero();
+                at.gradient[j][l] = [1.0; LANES];
                 let sums = probe(&at);
                 for (lane, cell) in cells.iter().enumerate().filter_map(|(lane, cell)| Some((lane, (*cell)?))) {
                     for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
                         form.tangents[cell * tiles + ((i * D + k) * D + j) * D + l] +=
-                            factor * sums.gradient[i][k][lane].value();
+                            factor * sums.gradient[i][k][lane];
                     }
                 }
             }
@@ -72,10 +72,10 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         form.finish_centres();
         let mut blocks = vec![Tensor::<f64, D>::zeros(); active.len()];
         for k in 0..D {
-            let uniform = vec![Vector::<X, D>::from_fn(|i, _| if i == k { X::one() } else { X::zero() }); active.len()];
-            let mut out = vec![Vector::<X, D>::zeros(); active.len()];
+            let uniform = vec![Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 }); active.len()];
+            let mut out = vec![Vector::<f64, D>::zeros(); active.len()];
             self.terms.iter().for_each(|term| term.add_product_at_nodes(&uniform, &mut out));
-            blocks.iter_mut().zip(&out).for_each(|(block, out)| (0..D).for_each(|i| block[(i, k)] = out[i].value()));
+            blocks.iter_mut().zip(&out).for_each(|(block, out)| block.set_column(k, out));
         }
         form.blocks = bytemuck::cast_slice(&blocks).to_vec();
         form

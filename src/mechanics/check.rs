@@ -32,7 +32,7 @@ pub fn tangent_bound<const D: usize>(f: &Tensor<f64, D>) -> f64 {
      numbers; allowed is a difference of {bound:e} relative to {scale:e}"
 )]
 pub struct TangentMismatch {
-    /// The compared quantity: a term, a part of a term, the whole product, the product in single precision, or the diagonal blocks.
+    /// The compared quantity: a term, a part of a term, the whole product, or the diagonal blocks.
     pub compared: &'static str,
     /// Number of the active node with the largest difference.
     pub node: usize,
@@ -84,13 +84,10 @@ pub fn direction<const D: usize>(nodes: usize, seed: u64) -> Vec<Vector<f64, D>>
     (0..nodes).map(|node| Vector::from_fn(|i, _| entry(node * D + i))).collect()
 }
 
-/// Relative difference allowed in single precision, for the rounding of the tangent's numbers and of sums over a few hundred numbers.
-const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
-
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// Compares the tangent at Δφ in the direction `u`, each piece and the whole, with dual numbers through the same transfer loop. The
     /// tangent acts through the products that the solver applies. Then the diagonal blocks of the preconditioner are compared with the
-    /// product, and single precision is checked where it is used.
+    /// product.
     ///
     /// ```
     /// use bfree::mechanics::{check::{CheckError, direction}, sweep::Supports, transfer::Nodal};
@@ -141,14 +138,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
         }
         let tangent = self.tangent(dphi)?;
         compare("whole product", &product(&tangent), &whole, bound, norm(&whole))?;
-        self.check_blocks(&tangent, bound)?;
-        if let Some(single) = self.single_tangent(None, dphi)? {
-            let mut out = vec![Vector::zeros(); u.len()];
-            single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut out);
-            let product: Vec<_> = out.iter().map(|x| x.map(f64::from) * single.scale()).collect();
-            compare("single precision", &product, &whole, SINGLE, norm(&whole))?;
-        }
-        Ok(())
+        self.check_blocks(&tangent, bound)
     }
 
     /// The largest [`tangent_bound`] of all particles.

@@ -7,7 +7,7 @@
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::pooled::Pooled;
-use crate::solver::{DiagonalBlocks, LinearOperator, Linearization, LocalForm, NonlinearProblem, vector};
+use crate::solver::{LinearOperator, Linearization, LocalForm, NonlinearProblem, vector};
 use crate::tensor::Vector;
 
 /// Upper bound of the loads' share in the arc length. With a small share, the plane meets the path even where loads fall steeply.
@@ -40,7 +40,7 @@ impl Path {
     /// The path after a step of length `dt` with the motion Δφ to the load λ.
     pub(crate) fn after<const D: usize>(self, load: f64, dphi: &[Vector<f64, D>], dt: f64) -> Self {
         let increment = load - self.load;
-        let length = vector::norm::<f64>(bytemuck::cast_slice(dphi));
+        let length = vector::norm(bytemuck::cast_slice(dphi));
         let weight = SHARE * length / increment.abs();
         let first = self.speed == 0.0;
         Self {
@@ -80,7 +80,7 @@ impl<'a, const D: usize, L: Law> OnPath<'a, D, L> {
         rate: &[Vector<f64, D>],
         dt: f64,
     ) -> Result<Self, Inadmissible> {
-        let size = vector::norm::<f64>(bytemuck::cast_slice(rate));
+        let size = vector::norm(bytemuck::cast_slice(rate));
         let before = start.step.supports.pool().collect(start.step.nodal.moved(rate.len()));
         let direction = rate.iter().map(|rate| rate / size).collect();
         Ok(Self { path, start, force, at_start: force(path.load)?, before, direction, length: path.speed * dt })
@@ -171,7 +171,7 @@ impl<const D: usize> LinearOperator for Bordered<'_, D> {
 }
 
 /// The diagonal blocks and the local form are those of K.
-impl<const D: usize> DiagonalBlocks for Bordered<'_, D> {
+impl<const D: usize> Linearization for Bordered<'_, D> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         self.tangent.diagonal_blocks()
     }

@@ -2,18 +2,16 @@
 
 use crate::material::Law;
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{At, Flow, Form, Group, LANES, Laned, Laws, Quadratic, Supports};
-use crate::mechanics::terms::{Frozen, Piece, Unit};
+use crate::mechanics::sweep::{At, Flow, Form, Group, LANES, Laws, Quadratic, Supports};
+use crate::mechanics::terms::{Frozen, Piece};
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
-use crate::solver::{
-    DiagonalBlocks, LinearOperator, Linearization, LocalForm, Neighbours, NonlinearProblem, Precision,
-};
+use crate::solver::{LinearOperator, Linearization, LocalForm, Neighbours, NonlinearProblem};
 use crate::tensor::{Tensor, Vector};
 use num_dual::Dual64;
 
-/// The linearisation K(Δφ): an operator in double precision or, divided by a power of two, in single precision.
+/// The linearisation K(Δφ) as an operator.
 ///
 /// ```
 /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
@@ -44,17 +42,16 @@ use num_dual::Dual64;
 /// assert!((times(&unit)[30] - column).norm() < 1e-13 * column.norm());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Tangent<'a, const D: usize, X = f64> {
+pub struct Tangent<'a, const D: usize> {
     pub(super) supports: &'a Supports<D>,
     pub(super) unknowns: Unknowns<'a, D>,
     pub(super) particles: &'a Particles<D>,
-    pub(super) terms: Vec<Box<dyn Frozen<X, D> + 'a>>,
-    pub(super) unit: Unit,
+    pub(super) terms: Vec<Box<dyn Frozen<D> + 'a>>,
 }
 
-impl<X: Laned, const D: usize> Tangent<'_, D, X> {
-    /// K u over the scale, on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
-    pub fn product(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+impl<const D: usize> Tangent<'_, D> {
+    /// K u on the free degrees of freedom. `u` must be zero on prescribed degrees of freedom.
+    pub fn product(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         out.fill(Vector::zeros());
         let extended = self.unknowns.extended_in(self.supports, u);
         let u = extended.as_deref().unwrap_or(u);
@@ -63,7 +60,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
         if let Some(flow) = flows.into_iter().reduce(Flow::and) {
             let (field, sums) = (bytemuck::cast_slice(u), bytemuck::cast_slice_mut(out));
-            self.supports.product(field, flow, sums, &|group, at: &At<X, D, D>, sums: &mut At<X, D, D>| {
+            self.supports.product(field, flow, sums, &|group, at: &At<f64, D, D>, sums: &mut At<f64, D, D>| {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }
@@ -71,7 +68,7 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
         self.unknowns.clear_prescribed(out);
     }
 
-    /// K_II over the scale, of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
+    /// K_II of every active node. Values that are prescribed or follow inner nodes have the row and column of the identity.
     pub fn diagonal_blocks(&self) -> Pooled<Tensor<f64, D>> {
         let mut blocks: Pooled<Tensor<f64, D>> = self.supports.field();
         self.terms.iter().for_each(|term| term.add_blocks_at_nodes(&mut blocks));
@@ -104,11 +101,6 @@ impl<X: Laned, const D: usize> Tangent<'_, D, X> {
             }
         });
     }
-
-    /// The power of two that K is divided by; 1 in double precision.
-    pub fn scale(&self) -> f64 {
-        self.unit.scale
-    }
 }
 
 impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
@@ -119,7 +111,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.frozen(None, dphi, Unit::ONE)
+        self.frozen(None, dphi)
     }
 
     /// Linearises one piece of the residual at Δφ.
@@ -127,65 +119,13 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// See [`Self::tangent`].
     pub fn tangent_of(&self, piece: Piece, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.frozen(Some(piece), dphi, Unit::ONE)
+        self.frozen(Some(piece), dphi)
     }
 
-    /// Linearises the residual, or one piece, at Δφ in single precision; `None` if `Supports` is not prepared for single precision.
-    ///
-    /// ```
-    /// use bfree::mechanics::{check::direction, sweep::Supports, transfer::Nodal};
-    /// use bfree::solver::Precision;
-    /// use bfree::tensor::Vector;
-    ///
-    /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
-    /// let simulation = scene.build::<2>("scenes".as_ref())?;
-    /// let (particles, grid, dt) = (&simulation.particles, &simulation.grid, simulation.clock.step());
-    /// let (approximation, positions) = (&simulation.approximation, &particles.position);
-    /// let (supports, nodes) = Supports::with_precision(approximation, grid, positions, Precision::Mixed)?;
-    /// let nodal = Nodal::project(particles, &supports, 1.0)?;
-    /// let equilibrium = simulation.equilibrium(&supports, &nodal, &[], simulation.settings.scheme.end(dt), dt);
-    /// let (dphi, u) = (vec![Vector::zeros(); nodes.len()], direction::<2>(nodes.len(), 2));
-    /// // s (K/s) u in single precision is K u to about 1e-6.
-    /// let single = equilibrium.single_tangent(None, &dphi)?.ok_or("prepared for it")?;
-    /// let (mut rough, mut exact) = (vec![Vector::zeros(); nodes.len()], vec![Vector::zeros(); nodes.len()]);
-    /// single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut rough);
-    /// equilibrium.tangent(&dphi)?.product(&u, &mut exact);
-    /// let error = |(a, b): (&Vector<f32, 2>, &Vector<f64, 2>)| (a.map(f64::from) * single.scale() - b).norm_squared();
-    /// let size: f64 = exact.iter().map(|x| x.norm_squared()).sum();
-    /// assert!((rough.iter().zip(&exact).map(error).sum::<f64>() / size).sqrt() < 1e-6);
-    /// assert_eq!(single.scale().log2().fract(), 0.0); // a power of two
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// See [`Self::tangent`].
-    pub fn single_tangent(
-        &self,
-        piece: Option<Piece>,
-        dphi: &[Vector<f64, D>],
-    ) -> Result<Option<Tangent<'_, D, f32>>, Inadmissible> {
-        let Some(length) = self.step.supports.unit() else { return Ok(None) };
-        self.frozen(piece, dphi, Unit { scale: self.size(length), length }).map(Some)
-    }
-
-    fn frozen<X: Laned>(
-        &self,
-        piece: Option<Piece>,
-        dphi: &[Vector<f64, D>],
-        unit: Unit,
-    ) -> Result<Tangent<'_, D, X>, Inadmissible> {
-        let terms = self.terms.freeze(piece, &self.unknowns.extended(dphi), unit)?;
+    fn frozen(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
+        let terms = self.terms.freeze(piece, &self.unknowns.extended(dphi))?;
         let (supports, particles) = (self.step.supports, self.step.particles);
-        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms, unit })
-    }
-
-    /// A power of two near the largest entries of K, estimated from the stiffness of the undeformed bodies and the inertia.
-    fn size(&self, h: f64) -> f64 {
-        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |largest: f64, x| largest.max(*x));
-        let moduli: Vec<f64> = (0..self.step.bodies.len()).map(|body| self.step.modulus(body)).collect();
-        let stiffness = largest(&moduli) * largest(&self.step.particles.volume) / (h * h);
-        let size = stiffness + self.step.alphas.a1 * largest(&self.step.nodal.mass);
-        if size > 0.0 && size.is_finite() { size.log2().round().exp2() } else { 1.0 }
+        Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms })
     }
 
     /// A piece of K u by dual numbers: the derivative of the same piece of the residual, through the same transfer loop.
@@ -228,37 +168,31 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 ///
 /// ```
 /// use bfree::mechanics::{sweep::Supports, tangent::frozen_bytes};
-/// use bfree::solver::Precision;
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
 /// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
-/// let (shape, grid, positions) = (&simulation.approximation, &simulation.grid, &particles.position);
-/// let (supports, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
-/// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers; in single precision they take half.
-/// let bytes = |precision| frozen_bytes(particles, bodies, &supports, precision);
-/// assert!(bytes(Precision::Double) >= 9 * size_of::<f64>() * particles.len());
-/// assert_eq!(2 * bytes(Precision::Mixed), bytes(Precision::Double));
+/// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
+/// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers.
+/// assert!(frozen_bytes(particles, bodies, &supports) >= 9 * size_of::<f64>() * particles.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn frozen_bytes<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
     supports: &Supports<D>,
-    precision: Precision,
 ) -> usize {
     let form: Form = Laws { particles, bodies, dt: 0.0 }.form();
-    let number = if precision == Precision::Mixed { size_of::<f32>() } else { size_of::<f64>() };
-    supports.groups() * form.rows(D) * LANES * number
+    supports.groups() * form.rows(D) * LANES * size_of::<f64>()
 }
 
-impl<X: Laned, const D: usize> LinearOperator<X> for Tangent<'_, D, X> {
-    fn apply(&self, x: &[X], y: &mut [X]) {
+impl<const D: usize> LinearOperator for Tangent<'_, D> {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
         self.product(bytemuck::cast_slice(x), bytemuck::cast_slice_mut(y));
     }
 }
 
-impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
+impl<const D: usize> Linearization for Tangent<'_, D> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         Self::diagonal_blocks(self).into_numbers()
     }
@@ -269,12 +203,6 @@ impl<X: Laned, const D: usize> DiagonalBlocks for Tangent<'_, D, X> {
 
     fn neighbours(&self) -> Option<Neighbours> {
         Some(self.joined())
-    }
-}
-
-impl<const D: usize> Linearization<f32> for Tangent<'_, D, f32> {
-    fn scale(&self) -> f64 {
-        self.unit.scale
     }
 }
 
@@ -309,10 +237,5 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
 
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Inadmissible> {
         Ok(Box::new(self.tangent(bytemuck::cast_slice(x))?))
-    }
-
-    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Inadmissible> {
-        let single = self.single_tangent(None, bytemuck::cast_slice(x))?;
-        Ok(single.map(|single| Box::new(single) as Box<dyn Linearization<f32>>))
     }
 }

@@ -5,7 +5,7 @@ use crate::grid::indices;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::{Quadratic, Supports};
 use crate::particles::Particles;
-use crate::pooled::{Element, Pooled};
+use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, identity};
 use std::borrow::Cow;
@@ -90,10 +90,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// E û in pooled memory; `None` if no node follows others.
-    pub fn extended_in<T: Real>(&self, supports: &Supports<D>, field: &[Vector<T, D>]) -> Option<Pooled<Vector<T, D>>>
-    where
-        Vector<T, D>: Element,
-    {
+    pub fn extended_in(&self, supports: &Supports<D>, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
         (!self.followers.is_empty()).then(|| {
             let mut field = supports.pool().collect(field.iter().copied());
             self.followers.extend(&mut field);

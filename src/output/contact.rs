@@ -4,7 +4,7 @@ use crate::simulation::Sharing;
 use serde::{Deserialize, Serialize};
 
 /// Growth of the gap (in grid spacings) beyond which bodies that met during the run are pulled apart.
-const OPENED: f64 = 0.1;
+const MIN_OPENING: f64 = 0.1;
 
 /// Two bodies that share nodes, or have shared nodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,9 +68,9 @@ impl Contacts {
 
 impl Contact {
     /// Whether a step pulls the bodies apart. Bodies that share nodes since the start are pulled apart by a tension. Bodies that met later
-    /// are pulled apart if the gap exceeds the gap at their meeting by [`OPENED`].
+    /// are pulled apart if the gap exceeds the gap at their meeting by [`MIN_OPENING`].
     fn is_pulled(&self, now: &Sharing) -> bool {
-        let opened = self.gap[0].zip(now.gap).is_some_and(|(met, gap)| gap > met + OPENED);
+        let opened = self.gap[0].zip(now.gap).is_some_and(|(met, gap)| gap > met + MIN_OPENING);
         if self.from_start { now.tension.is_some() } else { opened }
     }
 

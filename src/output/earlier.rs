@@ -1,9 +1,10 @@
 //! Files of an earlier run, or of somebody else, in the directory of a run.
 
+use super::OutputError;
 use super::files::TEMPORARY;
+use super::mark::Mark;
 use super::plot::is_picture;
 use super::snapshots::{SERIES, SnapshotMark};
-use super::{Mark, OutputError};
 use serde_json::Value;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

@@ -100,7 +100,7 @@ pub struct Cost {
 pub struct History {
     pub(crate) table: Table,
     /// Whether there is inertia. In load steps, loads act at once, and an energy balance says nothing of their work.
-    moves: bool,
+    has_inertia: bool,
     dissipates: bool,
     follows_path: bool,
     yields: bool,
@@ -116,7 +116,7 @@ impl History {
         simulation: &Simulation<D, L, A>,
         kept: Option<Written>,
     ) -> Result<Self, OutputError> {
-        let moves = simulation.settings.scheme.has_inertia();
+        let has_inertia = simulation.settings.scheme.has_inertia();
         let dissipates = simulation.loads.damping.is_some() || simulation.remembers(DISSIPATED);
         let (follows_path, yields) = (simulation.settings.scheme.follows_path(), simulation.remembers(PLASTIC_STRAIN));
         let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
@@ -124,11 +124,11 @@ impl History {
         columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));
         columns.extend(dissipates.then(|| "dissipated".into()));
         columns.push("total".into());
-        columns.extend(moves.then(|| "balance".into()));
+        columns.extend(has_inertia.then(|| "balance".into()));
         columns.extend(AXES.iter().take(D).map(|axis| format!("momentum_{axis}")));
         columns.extend(["newton", "krylov"].map(str::to_owned));
         columns.extend(yields.then(|| "yielding".into()));
-        Ok(Self { table: Table::open(path, &columns, kept)?, moves, dissipates, follows_path, yields })
+        Ok(Self { table: Table::open(path, &columns, kept)?, has_inertia, dissipates, follows_path, yields })
     }
 
     /// Appends the present state and returns its energies.
@@ -150,7 +150,7 @@ impl History {
         row.extend([energies.kinetic, energies.strain, energies.external]);
         row.extend(self.dissipates.then_some(energies.dissipated));
         row.push(energies.total);
-        row.extend(self.moves.then_some(energies.balance));
+        row.extend(self.has_inertia.then_some(energies.balance));
         row.extend(simulation.particles.momentum().iter().copied());
         row.push(cost.newton);
         row.push(cost.krylov);

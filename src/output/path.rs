@@ -5,14 +5,14 @@ use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
 
 /// Smallest cosine of the angle between two successive steps without a sharp bend.
-const BENT: f64 = 0.5;
+const SHARP_BEND_COSINE: f64 = 0.5;
 
 /// Distance from the turning point, relative to the size of the path, beyond which the path is compared with its earlier points.
-const AWAY: f64 = 0.05;
+const MIN_DISTANCE_FROM_TURN: f64 = 0.05;
 
 /// Largest distance of a returning path from its earlier points, relative to the distance from the turning point. Beyond a limit point, the
 /// other side at the same load is twice as far away as the turning point.
-const SAME: f64 = 0.2;
+const RETURN_DISTANCE: f64 = 0.2;
 
 /// A point of the path: the load, and moments of the displacement that distinguish states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,7 +84,7 @@ impl Followed {
 
     fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
         let mut events = Vec::new();
-        if let Some(cosine) = straight.filter(|&cosine| cosine < BENT) {
+        if let Some(cosine) = straight.filter(|&cosine| cosine < SHARP_BEND_COSINE) {
             events.push(Event::Bent(cosine.clamp(-1.0, 1.0).acos().to_degrees()));
         }
         if let [.., before, last] = &self.points[..]
@@ -109,9 +109,9 @@ impl Followed {
             let [from, to] = ends else { return false };
             let part = (point.load - from.load) / (to.load - from.load);
             let between: Vec<f64> = from.moments.iter().zip(&to.moments).map(|(a, b)| a + part * (b - a)).collect();
-            (0.0..=1.0).contains(&part) && point.distance(&between) < SAME * away
+            (0.0..=1.0).contains(&part) && point.distance(&between) < RETURN_DISTANCE * away
         };
-        away > AWAY * scale && self.points[..=turn].windows(2).any(near)
+        away > MIN_DISTANCE_FROM_TURN * scale && self.points[..=turn].windows(2).any(near)
     }
 }
 

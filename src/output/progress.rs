@@ -22,21 +22,8 @@ const BAR_LENGTH: f64 = 1000.0;
 
 /// Predicts the time left from the simulated time per wall-clock second of the recent past. Impacts and halved steps slow a run down. An
 /// average since the start would hide the slower pace.
-///
-/// ```
-/// use bfree::output::progress::Pace;
-///
-/// let mut pace = Pace::default();
-/// pace.mark(0.0, 0.0);
-/// assert_eq!(pace.left(10.0), None);
-/// pace.mark(100.0, 5.0);
-/// assert_eq!(pace.left(10.0), Some(100.0));
-/// // An impact: the last 40 s were four times as slow, and the rest is predicted at this pace.
-/// pace.mark(140.0, 5.5);
-/// assert_eq!(pace.left(10.0), Some(4.5 / 0.5 * 40.0));
-/// ```
 #[derive(Clone, Debug, Default)]
-pub struct Pace {
+pub(crate) struct Pace {
     /// (wall-clock seconds, simulated time), oldest first.
     marks: VecDeque<(f64, f64)>,
 }
@@ -61,7 +48,7 @@ impl Pace {
 
 /// Numbers shown besides the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Shown {
+pub(crate) struct Shown {
     /// Steps taken.
     pub step: u64,
     /// Newton iterations of the last step.
@@ -100,26 +87,8 @@ enum Display {
 }
 
 /// Shows the progress of a run.
-///
-/// ```
-/// use bfree::output::progress::{Audience, Progress, Shown};
-/// use bfree::output::warnings::{Kind, Warning};
-///
-/// // From t = 0 to 1, for nobody: warnings are still written.
-/// let mut progress = Progress::new(0.0, 1.0, Audience::Nobody);
-/// let mut energy = 1.0;
-/// for step in 1..=10 {
-///     energy *= 1.01;
-///     let balance = energy - 1.0;
-///     progress.show(0.1 * step as f64, Shown { step, newton: 2, krylov: 12, balance: Some(balance) });
-/// }
-/// assert!(energy > 1.1);
-/// let message = format!("{energy} of 1");
-/// progress.warn(&Warning { kind: Kind::EnergyCreated, time: 1.0, step: 10, message });
-/// progress.finish();
-/// ```
 #[derive(Debug)]
-pub struct Progress {
+pub(crate) struct Progress {
     display: Display,
     pace: Pace,
     since: Instant,

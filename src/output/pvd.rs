@@ -11,25 +11,8 @@ const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" versio
 const TAIL: &str = "</Collection>\n</VTKFile>\n";
 
 /// A growing series. The file is whole after every snapshot, so the series of a killed run still opens.
-///
-/// ```
-/// use bfree::output::pvd::Series;
-///
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("particles.pvd");
-/// let mut series = Series::new(path.clone());
-/// series.push(0.0, "particles_0.vtu")?;
-/// series.push(0.1 + 0.2, "particles_1.vtu")?;
-/// let whole = std::fs::read_to_string(&path)?;
-/// assert!(whole.contains(&format!("timestep=\"{}\"", 0.1 + 0.2)));
-/// // Killed, and continued from the first snapshot on: the same file.
-/// let mut again = Series::resume(path.clone(), 1)?;
-/// again.push(0.1 + 0.2, "particles_1.vtu")?;
-/// assert_eq!(std::fs::read_to_string(&path)?, whole);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Debug)]
-pub struct Series {
+pub(crate) struct Series {
     path: PathBuf,
     entries: String,
 }

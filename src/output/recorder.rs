@@ -1,24 +1,23 @@
 //! The recorder, which writes all files of a run.
 
 use super::earlier::remove_later_files;
-use super::files::{Stream, Written};
+use super::files::Stream;
 use super::history::{Cost, Energies, History};
 use super::losses::Cause;
+use super::mark::Mark;
 use super::probes::{Probe, Probes};
 use super::progress::{Audience, Progress, Shown};
 use super::reactions::Reactions;
 use super::report::{Counts, NewtonLog, Outcome, Report, Seconds};
-use super::snapshots::{SnapshotMark, Snapshots};
+use super::snapshots::Snapshots;
 use super::warnings::{Watch, Watched};
 use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
 use crate::simulation::{Simulation, StepReport};
-use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Contents and directory of the output.
@@ -71,65 +70,6 @@ pub struct Recorder<const D: usize> {
     since: Instant,
     /// Whether a run may resume from a mark.
     marked: bool,
-}
-
-/// Ends of the files of a run at one moment, and the counts until then. [`Recorder::resume`] needs nothing else to continue the files.
-///
-/// ```
-/// use bfree::output::{Audience, OutputSettings, Recorder, Reference};
-///
-/// let (folder, scene) = (tempfile::tempdir()?, bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?);
-/// let (mut simulation, directory) = (scene.build::<2>("scenes".as_ref())?, folder.path().to_owned());
-/// let settings = OutputSettings {
-///     directory, fields: vec![], snapshot_every: None, probes: vec![], end_time: 1.0, audience: Audience::Nobody,
-/// };
-/// let reference = Reference::of(&simulation);
-/// let mut recorder = Recorder::start(settings.clone(), &simulation, reference.clone())?;
-/// let (mark, marked, history) = (recorder.mark()?, simulation.clone(), folder.path().join("history.csv"));
-/// let length = std::fs::metadata(&history)?.len();
-/// let step = simulation.advance()?;
-/// recorder.record(&simulation, &step)?;
-/// drop(recorder);
-/// // Rows written after the mark are cut off.
-/// mark.check(folder.path())?;
-/// assert!(std::fs::metadata(&history)?.len() > length);
-/// drop(Recorder::resume(settings, &marked, reference, &mark)?);
-/// assert_eq!(std::fs::metadata(&history)?.len(), length);
-/// // A file that has become shorter cannot be continued.
-/// std::fs::write(&history, "step\n")?;
-/// assert!(mark.check(folder.path()).is_err());
-/// // A file with a changed digit cannot be continued either.
-/// let mut text = std::fs::read(&history)?;
-/// text.resize(length as usize, b'7');
-/// std::fs::write(&history, text)?;
-/// assert!(mark.check(folder.path()).unwrap_err().to_string().contains("not what it was"));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Mark {
-    /// Content of every growing file at the mark.
-    pub(super) files: BTreeMap<String, Written>,
-    pub(super) snapshots: Option<SnapshotMark>,
-    watch: Watch,
-    counts: Counts,
-    seconds: Seconds,
-}
-
-impl Mark {
-    /// Checks that the growing files in `directory` still hold their content at the mark.
-    ///
-    /// # Errors
-    /// A file is missing, shorter, or has other content.
-    pub fn check(&self, directory: &Path) -> Result<(), OutputError> {
-        self.files.iter().try_for_each(|(name, written)| written.check(&directory.join(name)))?;
-        self.snapshots.map_or(Ok(()), |snapshots| snapshots.check(directory))
-    }
-
-    /// Snapshots that were written before the mark and are missing in `directory` now. A continued run does not need them.
-    pub fn missing(&self, directory: &Path) -> Vec<PathBuf> {
-        self.snapshots.map_or_else(Vec::new, |snapshots| snapshots.missing(directory))
-    }
 }
 
 impl<const D: usize> Recorder<D> {
@@ -258,12 +198,12 @@ impl<const D: usize> Recorder<D> {
             [limited + one.counts.krylov_limited, stagnated + one.counts.krylov_stagnated]
         });
         let krylov_limit = simulation.settings.newton.max_krylov_iterations;
-        let moves = simulation.settings.scheme.has_inertia();
+        let has_inertia = simulation.settings.scheme.has_inertia();
         let seen = Watched {
             time,
             step: number,
             energies,
-            moves,
+            has_inertia,
             cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.renewed),
             lumped: simulation.settings.lumping >= 1.0,
             cost,
@@ -282,7 +222,8 @@ impl<const D: usize> Recorder<D> {
             found.iter().for_each(|warning| self.progress.warn(warning));
         }
         let Cost { newton, krylov, .. } = cost;
-        self.progress.show(time, Shown { step: number, newton, krylov, balance: moves.then_some(energies.balance) });
+        self.progress
+            .show(time, Shown { step: number, newton, krylov, balance: has_inertia.then_some(energies.balance) });
         Ok(())
     }
 
@@ -316,7 +257,7 @@ impl<const D: usize> Recorder<D> {
         report.write(&self.directory.join("report.json"), self.newton, self.marked)?;
         Ok(Summary {
             time,
-            moves: simulation.settings.scheme.has_inertia(),
+            has_inertia: simulation.settings.scheme.has_inertia(),
             energies,
             momentum_change: (particles.momentum() - self.reference.momentum).norm(),
             krylov: simulation.krylov().0,

@@ -14,7 +14,7 @@ pub struct Summary {
     pub time: f64,
     /// Whether there is inertia. Without inertia, kinetic energy and momentum are zero. Loads then act at once and lose the excess of work
     /// over energy.
-    pub moves: bool,
+    pub has_inertia: bool,
     /// Energies at the end.
     pub energies: Energies,
     /// |p − p₀|, the change of momentum.
@@ -42,7 +42,7 @@ impl Display for Summary {
             "{} steps to t = {time} in {:.1} s: {} particles, up to {} active nodes, {} failed attempts",
             counts.steps, seconds.total, counts.particles, counts.max_active_nodes, counts.failed_attempts
         )?;
-        if self.moves {
+        if self.has_inertia {
             let Energies { kinetic, strain, total, external, dissipated, by_laws, initial, balance } = energies;
             writeln!(f, "energy    kinetic {kinetic:.6e}, strain {strain:.6e}, total {total:.6e}")?;
             let (error, size) = if *balance > 0.0 { ("+ created", *balance) } else { ("- lost", -balance) };

@@ -20,8 +20,11 @@ const MEMORY: u64 = 50;
 /// Steps before iterations are compared with their mean. A loss of energy is reported if it lasts for as many steps.
 const USUAL_AFTER: u64 = 10;
 
-/// Thresholds of the warning on Krylov iterations: a multiple of their usual number, and a number of iterations.
-const CLIMB: (f64, f64) = (5.0, 100.0);
+/// The multiple of their usual number beyond which Krylov iterations get a warning.
+const KRYLOV_GROWTH: f64 = 5.0;
+
+/// The number of Krylov iterations up to which there is no warning.
+const FEW_KRYLOV_ITERATIONS: f64 = 100.0;
 
 /// Subject of a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,7 +95,7 @@ pub(crate) struct Watched {
     pub step: u64,
     pub energies: Energies,
     /// Whether there is inertia. In load steps, loads act at once and lose work.
-    pub moves: bool,
+    pub has_inertia: bool,
     /// The event in the step that may lose energy.
     pub cause: Cause,
     /// Whether the mass matrix is lumped in full.
@@ -132,7 +135,7 @@ impl Watch {
         self.losses.add(&step.energies, step.cause);
         self.lumped = step.lumped;
         let (part, balance) = (-self.losses.part(), step.energies.balance);
-        if step.moves && part > CREATED {
+        if step.has_inertia && part > CREATED {
             self.warn(step, Kind::EnergyCreated, |_| {
                 let part = 100.0 * part;
                 format!(
@@ -140,7 +143,7 @@ impl Watch {
                 )
             });
         }
-        self.losing = if step.moves && -part > LOST { self.losing + 1 } else { 0 };
+        self.losing = if step.has_inertia && -part > LOST { self.losing + 1 } else { 0 };
         // In the first steps from rest there is next to no energy.
         if self.losing >= USUAL_AFTER {
             self.warn(step, Kind::EnergyLost, |watch| watch.losses.says(step.lumped));
@@ -177,7 +180,7 @@ impl Watch {
             });
         }
         let (krylov, usual) = (cost.krylov as f64, self.usual_krylov);
-        if self.seen >= USUAL_AFTER && krylov > CLIMB.0 * usual && krylov > CLIMB.1 {
+        if self.seen >= USUAL_AFTER && krylov > KRYLOV_GROWTH * usual && krylov > FEW_KRYLOV_ITERATIONS {
             self.warn(step, Kind::KrylovClimbs, |_| {
                 format!(
                     "the linear solver took {krylov} iterations in a step; {usual:.0} had been usual: cut cells are cured by \
@@ -299,7 +302,7 @@ mod tests {
             time: 0.1 * number as f64,
             step: number,
             energies,
-            moves: true,
+            has_inertia: true,
             cause: Cause::Wall,
             lumped: true,
             cost,
@@ -325,7 +328,7 @@ mod tests {
         assert!(warning.message.contains("+8.000e-2, 2.0 %"), "{}", warning.message);
         assert!(watch.see(&balance(3.0)).is_empty(), "once");
         assert!(watch.see(&balance(-0.079)).is_empty(), "2 % of 4 are not reached: work does not count");
-        assert!(watch.see(&Watched { moves: false, ..balance(-0.1) }).is_empty(), "without inertia");
+        assert!(watch.see(&Watched { has_inertia: false, ..balance(-0.1) }).is_empty(), "without inertia");
         let words = [
             "1.000e-1, 2.5 % of the largest total energy 4.000e0",
             "a body meets a wall (impact)",

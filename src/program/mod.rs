@@ -1,9 +1,11 @@
 //! Shared by all commands: exit codes, standard output and standard error.
 
+mod directory;
 mod new;
 mod probes;
 mod run;
 mod scene_arguments;
+mod steps;
 
 pub use new::New;
 pub use run::Run;

@@ -34,8 +34,11 @@ const PROBLEMS: [(&str, &str); 15] = [
 /// File name of the schema beside the scene.
 const SCHEMA: &str = "scene.schema.json";
 
-/// Width of a line, and width of the column of keys. The sentence of a longer key begins on the next line.
-const WIDTH: (usize, usize) = (110, 34);
+/// Width of a line.
+const LINE_WIDTH: usize = 110;
+
+/// Width of the column of keys. The sentence of a longer key begins on the next line.
+const KEY_WIDTH: usize = 34;
 
 /// `bfree new`.
 #[derive(Args)]
@@ -91,19 +94,18 @@ fn list() -> String {
 /// Every key of the scene with its sentence, in columns.
 fn explained(text: &str) -> Result<String, Failure> {
     let scene = serde_json::from_str(text).map_err(Failure::run)?;
-    let (width, column) = WIDTH;
     let mut out = String::new();
     for key in keys::documented(&scene) {
-        let mut line = format!("{:<column$}", key.path);
-        let mut room = width - column;
-        if line.chars().count() > column {
-            let _ = write!(line, "\n{:column$}", "");
+        let mut line = format!("{:<KEY_WIDTH$}", key.path);
+        let mut room = LINE_WIDTH - KEY_WIDTH;
+        if line.chars().count() > KEY_WIDTH {
+            let _ = write!(line, "\n{:KEY_WIDTH$}", "");
         }
         for word in key.about.split(' ') {
             let length = word.chars().count() + 1;
             if length > room {
-                let _ = write!(line, "\n{:column$}", "");
-                room = width - column;
+                let _ = write!(line, "\n{:KEY_WIDTH$}", "");
+                room = LINE_WIDTH - KEY_WIDTH;
             }
             let _ = write!(line, " {word}");
             room = room.saturating_sub(length);

@@ -2,22 +2,20 @@
 
 use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
-use super::{Failure, INTERRUPTED, print, tell};
-use bfree::checkpoint::{self, Checkpoints, Identity, Restored, Unfinished};
+use super::steps::{Schedule, Steps, Unwritten};
+use super::{Failure, INTERRUPTED, directory, print, tell};
+use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
 use bfree::output::plot::{Look, plot_run};
-use bfree::output::{Audience, Held, Outcome, OutputSettings, Recorder, Reference, foreign, held};
+use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
 use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
-use bfree::simulation::Simulation;
+use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::Stop;
 use clap::{Args, ValueEnum};
 use serde_json::{Map, Value, json};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
-use std::ffi::OsStr;
-use std::fs::{File, TryLockError, create_dir_all};
-use std::io::ErrorKind;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -84,49 +82,6 @@ enum Form {
     Json,
 }
 
-/// The directory holds something that the run would replace.
-#[derive(Debug, thiserror::Error)]
-#[error("{} holds {why}write elsewhere by --out {}", directory.display(), free(directory).display())]
-struct WouldBeLost {
-    directory: PathBuf,
-    why: Lost,
-}
-
-#[derive(Debug, thiserror::Error)]
-enum Lost {
-    #[error(
-        "a run that did not end, with a checkpoint after step {} ({}): continue it by --restart, give it up by --discard, or ",
-        .0.steps, .0.path.display()
-    )]
-    Unfinished(Unfinished),
-    #[error("the results of a run that {}, {} steps until t = {}: give them up by --discard, or ", ended(.0), .0.steps, .0.time)]
-    Results(Held),
-    #[error("a run that another program is just writing: ")]
-    Alive,
-    #[error("{}, which no run wrote and a run would replace: move it, or ", .0.display())]
-    Foreign(PathBuf),
-}
-
-/// Outcome of an earlier run, in words.
-fn ended(held: &Held) -> String {
-    held.outcome.clone().unwrap_or_else(|| "did not end and left no checkpoint that can be read".to_owned())
-}
-
-/// The first numbered path beside `directory` that does not exist.
-fn free(directory: &Path) -> PathBuf {
-    let numbered = |number: u32| {
-        let mut name = directory.file_name().unwrap_or(OsStr::new("results")).to_owned();
-        name.push(format!("-{number}"));
-        directory.with_file_name(name)
-    };
-    (2..u32::MAX).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| numbered(u32::MAX))
-}
-
-/// The name of the scene file gives no name for the directory of results.
-#[derive(Debug, thiserror::Error)]
-#[error("the name of the scene file {} gives no name for the directory of results: rename the file, or give --out DIR", .0.display())]
-struct Nameless(PathBuf);
-
 /// The checkpoint is later than the end of the run.
 #[derive(Debug, thiserror::Error)]
 #[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
@@ -134,14 +89,6 @@ struct Past {
     path: PathBuf,
     time: f64,
     end: f64,
-}
-
-/// The directory of the results cannot be created.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot create the directory {}", directory.display())]
-struct Unmade {
-    directory: PathBuf,
-    source: std::io::Error,
 }
 
 impl Run {
@@ -173,177 +120,141 @@ impl Run {
         let mut simulation = self.scene.build::<D>(scene)?;
         self.scene.plan(&simulation)?;
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
-        let end = scene.time.end;
-        let until = simulation.clock.whole_steps(end);
-        let mut last = self.steps.map_or(until, |steps| steps.min(until));
-        // The shortened step counts as one more step than the whole steps `until`.
-        let mut shortens = self.steps.is_none_or(|steps| steps > until);
-        let directory = self.directory()?;
-        if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
-            self.say("accuracy", &format!("accuracy {set}"));
-        }
+        let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
-        probes.iter().filter_map(Bound::warning).for_each(|text| self.say("warning", &text));
-        let warnings = scene.warnings(&simulation);
-        warnings.iter().for_each(|text| self.say("warning", text));
+        let warnings = self.tell_before_the_run(scene, &simulation, &probes);
+        let inputs = self.inputs(scene, &simulation, &probes, &warnings, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
-        let identity = Identity::new(settings.clone(), &simulation.particles);
-        let mut asked = Map::new();
-        asked.insert("command".to_owned(), self.options(&directory));
-        asked.insert("settings".to_owned(), settings);
-        if let Some(accuracy) = scene.accuracy {
-            let sets = serde_json::to_value(&scene.chosen).map_err(Failure::run)?;
-            asked.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
-        }
-        let (method, why) = simulation.krylov();
-        asked.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
-        let (preconditioner, why) = simulation.preconditioner();
-        asked.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
-        asked.insert("scene_warnings".to_owned(), json!(warnings));
-        asked.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
-        asked.insert("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(&simulation)).map_err(Failure::run)?);
+        let identity = Identity::new(settings, &simulation.particles);
+        let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
         let output = OutputSettings {
             directory: directory.clone(),
             fields: scene.fields(),
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
-            end_time: if shortens { end } else { last as f64 * simulation.clock.nominal() },
+            end_time: schedule.end_time(&simulation.clock),
             audience: self.audience(),
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
         let asked_to_stop = interrupted.clone();
         simulation.settings.stop = Some(Stop(Arc::new(move || asked_to_stop.load(Ordering::Relaxed))));
         let reference = Reference::of(&simulation);
-        let _claim = self.claim(&directory)?;
-        let restored = match self.restart {
-            true => Some(self.restore(&directory, &identity, &mut simulation, end)?),
-            false => self.begin(&directory).map(|()| None)?,
+        let _lock = directory::lock(&directory, !self.restart)?;
+        let restored = if self.restart {
+            Some(self.restore(&directory, &identity, &mut simulation, scene.time.end)?)
+        } else {
+            directory::clear(&directory, self.discard)?;
+            None
         };
         let set_up = start.elapsed().as_secs_f64();
         let mut recorder = match &restored {
-            // Files that cannot be continued are left as they are.
+            // Files that cannot be continued are left unchanged.
             Some(restored) => {
                 Recorder::resume(output, &simulation, reference, &restored.mark).map_err(Failure::scene)?
             }
             None => Recorder::start(output, &simulation, reference).map_err(Failure::run)?,
         };
         recorder.count_set_up(set_up);
-        let mut checkpoints = scene.output.checkpoint.map(|every| {
+        let checkpoints = scene.output.checkpoint.map(|every| {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
-        let mut failure = None;
-        let unwritten = |time: f64| {
-            let place = directory.display();
-            let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
-            self.say("stopped", &text);
-        };
-        loop {
-            let time = simulation.clock.time();
-            if let Some(checkpoints) = &mut checkpoints {
-                let due = checkpoints.write_if_due(&simulation, &mut recorder);
-                due.inspect_err(|_| unwritten(time)).map_err(Failure::run)?;
-            }
-            let interrupted = interrupted.load(Ordering::Relaxed);
-            if simulation.clock.nominal_steps() >= last || interrupted {
-                // This checkpoint precedes the last snapshot and a shortened step: a longer run has neither of them here.
-                if let Some(mut checkpoints) = checkpoints.take() {
-                    let written = checkpoints.write(&simulation, &mut recorder);
-                    written.inspect_err(|_| unwritten(time)).map_err(Failure::run)?;
-                }
-                let rest = simulation.clock.to(end).filter(|_| shortens && !interrupted);
-                let Some(rest) = rest else { break };
-                (simulation.clock, last, shortens) = (rest, 1, false);
-            }
-            match simulation.advance() {
-                Ok(step) => {
-                    let recorded = recorder.record(&simulation, &step);
-                    recorded.inspect_err(|_| unwritten(simulation.clock.time())).map_err(Failure::run)?;
-                }
-                // The next round of the loop handles the interruption.
-                Err(error) if error.cause.is_stopped() => {}
-                Err(error) => {
-                    failure = Some(error);
-                    break;
-                }
-            }
+        let mut steps = Steps { simulation, recorder, checkpoints, schedule, interrupted };
+        let failure = steps.take().map_err(|unwritten| self.stopped_by(unwritten, &directory))?;
+        self.report(steps, failure, &inputs, &warnings, &directory)
+    }
+
+    /// Tells what the scene leads to before the first step, and returns the warnings about the scene.
+    fn tell_before_the_run<const D: usize>(
+        &self,
+        scene: &Scene,
+        simulation: &Simulation<D>,
+        probes: &[Bound<D>],
+    ) -> Vec<String> {
+        if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
+            self.say("accuracy", &format!("accuracy {set}"));
         }
-        let stopped = simulation.clock.nominal_steps() < last || shortens && simulation.clock.to(end).is_some();
+        let warnings = scene.warnings(simulation);
+        for text in probes.iter().filter_map(Bound::warning).chain(warnings.iter().cloned()) {
+            self.say("warning", &text);
+        }
+        warnings
+    }
+
+    /// The entries of the report that are known before the first step.
+    fn inputs<const D: usize>(
+        &self,
+        scene: &Scene,
+        simulation: &Simulation<D>,
+        probes: &[Bound<D>],
+        warnings: &[String],
+        directory: &Path,
+    ) -> Result<Map<String, Value>, Failure> {
+        let json = |value: Result<Value, serde_json::Error>| value.map_err(Failure::run);
+        let mut inputs = Map::new();
+        inputs.insert("command".to_owned(), self.options(directory));
+        inputs.insert("settings".to_owned(), json(serde_json::to_value(scene))?);
+        if let Some(accuracy) = scene.accuracy {
+            let sets = json(serde_json::to_value(&scene.chosen))?;
+            inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
+        }
+        let (method, why) = simulation.krylov();
+        inputs.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
+        let (preconditioner, why) = simulation.preconditioner();
+        inputs.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
+        inputs.insert("scene_warnings".to_owned(), json!(warnings));
+        inputs.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
+        inputs.insert("surfaces".to_owned(), json(serde_json::to_value(SurfaceUse::of(simulation)))?);
+        Ok(inputs)
+    }
+
+    /// Says that the results of a step could not be written.
+    fn stopped_by(&self, unwritten: Unwritten, directory: &Path) -> Failure {
+        let Unwritten { time, error } = unwritten;
+        let place = directory.display();
+        let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
+        self.say("stopped", &text);
+        Failure::Run(error)
+    }
+
+    /// Writes the report, the summary and the pictures of a run, and says how the run ended.
+    fn report<const D: usize>(
+        &self,
+        steps: Steps<D>,
+        failure: Option<AdvanceError>,
+        inputs: &Map<String, Value>,
+        warnings: &[String],
+        directory: &Path,
+    ) -> Result<(), Failure> {
+        let is_interrupted = failure.is_none() && steps.schedule.is_left(&steps.simulation.clock);
         let outcome = match &failure {
             Some(error) => Outcome::Failed(error),
-            None if stopped => Outcome::Interrupted,
+            None if is_interrupted => Outcome::Interrupted,
             None => Outcome::Finished,
         };
-        let summary = recorder.finish(&simulation, &asked, outcome).map_err(Failure::run)?;
+        let summary = steps.recorder.finish(&steps.simulation, inputs, outcome).map_err(Failure::run)?;
+        let place = directory.display();
         if !self.quiet {
             let again: String = warnings.iter().map(|text| format!("\nwarned    {text}")).collect();
-            print(format_args!("{summary}{again}\nresults   {}", directory.display()))?;
+            print(format_args!("{summary}{again}\nresults   {place}"))?;
         }
         if self.plot {
-            let drawn = plot_run(&directory, &Look::default()).map_err(Failure::run)?;
+            let drawn = plot_run(directory, &Look::default()).map_err(Failure::run)?;
             if let (false, Some(page)) = (self.quiet, drawn.last()) {
                 print(format_args!("pictures  {}", page.display()))?;
             }
         }
-        let (time, place) = (simulation.clock.time(), directory.display());
-        match failure {
-            Some(error) => {
-                self.say(
-                    "stopped",
-                    &format!("stopped at t = {time} after the last good step; its state is in {place}"),
-                );
-                Err(Failure::run(error))
-            }
-            None if stopped => {
-                let text = format!("interrupted at t = {time} after a whole step; everything up to it is in {place}");
-                self.say("stopped", &text);
-                Err(Failure::Interrupted)
-            }
-            None => Ok(()),
+        let time = steps.simulation.clock.time();
+        if let Some(error) = failure {
+            let text = format!("stopped at t = {time} after the last good step; its state is in {place}");
+            self.say("stopped", &text);
+            return Err(Failure::run(error));
         }
-    }
-
-    /// The directory of the results.
-    fn directory(&self) -> Result<PathBuf, Failure> {
-        let scene = &self.scene.scene;
-        let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
-        // The stem `..` would give `out/..`, the working directory.
-        let nameless = stem.chars().all(|letter| letter == '.') || stem == ".json";
-        match &self.out {
-            Some(out) => Ok(out.clone()),
-            None if nameless => Err(Failure::scene(Nameless(scene.clone()))),
-            None => Ok(Path::new("out").join(scene.file_stem().unwrap_or_default())),
+        if is_interrupted {
+            let text = format!("interrupted at t = {time} after a whole step; everything up to it is in {place}");
+            self.say("stopped", &text);
+            return Err(Failure::Interrupted);
         }
-    }
-
-    /// Prepares the directory for a new run. Results of an earlier run are discarded only with `--discard`.
-    fn begin(&self, directory: &Path) -> Result<(), Failure> {
-        let lost = |why| Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why }));
-        if let Some(path) = foreign(directory) {
-            return lost(Lost::Foreign(path));
-        }
-        match checkpoint::unfinished(directory) {
-            Some(found) if !self.discard => lost(Lost::Unfinished(found)),
-            _ => match held(directory) {
-                Some(found) if !self.discard => lost(Lost::Results(found)),
-                _ => checkpoint::forget(directory).map_err(Failure::run),
-            },
-        }
-    }
-
-    /// Locks the directory against other runs until the returned handle is dropped. A file system without locks locks nothing.
-    fn claim(&self, directory: &Path) -> Result<Option<File>, Failure> {
-        if !self.restart {
-            let not_there = directory.exists() && !directory.is_dir();
-            let made = if not_there { Err(ErrorKind::NotADirectory.into()) } else { create_dir_all(directory) };
-            made.map_err(|source| Failure::run(Unmade { directory: directory.to_owned(), source }))?;
-        }
-        let Ok(handle) = File::open(directory) else { return Ok(None) };
-        match handle.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                Err(Failure::scene(WouldBeLost { directory: directory.to_owned(), why: Lost::Alive }))
-            }
-            _ => Ok(Some(handle)),
-        }
+        Ok(())
     }
 
     /// Restores the simulation from the last good checkpoint, and reports the checkpoint.

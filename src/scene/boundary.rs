@@ -1,6 +1,6 @@
 //! Boundary conditions at the faces of the box, and prescribed motion inside the box.
 
-use super::load::Curve;
+use super::curve::{Curve, check_times};
 use super::shape::Shape;
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
@@ -269,19 +269,4 @@ impl Table {
             problems.refuse(&format!("{path}[0][1][{k}]"), Number(start), allowed);
         }
     }
-}
-
-/// Checks the times of a table or curve: at least one, finite and increasing.
-pub(super) fn check_times(problems: &mut Problems, path: &str, times: impl Iterator<Item = f64>) {
-    let mut last: Option<f64> = None;
-    for (i, t) in times.enumerate() {
-        let path = format!("{path}[{i}][0]");
-        problems.number(&path, t);
-        if let Some(last) = last.filter(|last| t <= *last) {
-            let allowed = format!("must be greater than in the row before, {}", Number(last));
-            problems.refuse(&path, Number(t), allowed);
-        }
-        last = Some(t);
-    }
-    problems.require(last.is_some(), path, "an empty list", "must have at least one row");
 }

@@ -1,8 +1,10 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
+use super::build_error::vector;
 use super::filling::Means;
+use super::shape_file::ShapeFile;
 use super::transfer::Transfer;
-use super::{BuildError, Problems, Scene, scale};
+use super::{BuildError, Problems, Scene, scale, shape};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -111,10 +113,42 @@ impl Scene {
         self.approximation.functions(cells, problems, "approximation")
     }
 
+    /// Reads the files of all shapes, then returns the problems of the scene with these shapes.
+    fn read_shapes(&self, folder: &Path) -> Result<Problems, BuildError> {
+        let mut any = false;
+        let mut read = |path: &str, shape: ShapeFile<'_>| {
+            any = true;
+            shape.read(folder).map_err(|source| BuildError::ShapeFile {
+                path: path.to_owned(),
+                file: folder.join(shape.file()).display().to_string(),
+                source: Box::new(source),
+            })
+        };
+        for (path, shape) in self.shapes() {
+            shape.each_file(&path, &mut read)?;
+        }
+        Ok(if any { self.check() } else { Problems::default() })
+    }
+
+    /// All shapes, with their paths.
+    fn shapes(&self) -> Vec<(String, &shape::Shape)> {
+        let bodies = self.bodies.iter().enumerate();
+        let bodies = bodies.filter_map(|(i, body)| Some((format!("bodies[{i}].shape"), body.shape.as_ref()?)));
+        let prescribed = self.prescribed.iter().enumerate();
+        let prescribed = prescribed.map(|(i, one)| (format!("prescribed[{i}].region"), &one.region));
+        let tractions = self.tractions.iter().map(|one| one.region.as_ref()).enumerate();
+        let tractions = tractions.filter_map(|(i, region)| Some((format!("tractions[{i}].region"), region?)));
+        let pressures = self.pressures.iter().map(|one| one.region.as_ref()).enumerate();
+        let pressures = pressures.filter_map(|(i, region)| Some((format!("pressures[{i}].region"), region?)));
+        let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes).enumerate();
+        let initial = initial.map(|(i, one)| (format!("initial_velocity.nodes[{i}].region"), &one.region));
+        bodies.chain(prescribed).chain(tractions).chain(pressures).chain(initial).collect()
+    }
+
     fn settings(&self) -> Settings {
         let (newton, krylov) = (&self.solver.newton, &self.solver.krylov);
         Settings {
-            scheme: self.time.inertia.scheme(self.time.newmark()),
+            scheme: self.time.scheme().scheme(self.time.newmark()),
             lumping: self.time.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             aggregation: self.aggregates(),
@@ -132,7 +166,6 @@ impl Scene {
                 max_iterations: newton.max_iterations as usize,
                 forcing: krylov.forcing,
                 krylov: krylov.method,
-                precision: krylov.precision,
                 max_krylov_iterations: krylov.max_iterations as usize,
                 ..NewtonSettings::default()
             },
@@ -148,7 +181,7 @@ impl Scene {
         let mut regions: Vec<(Shape<D>, Vector<f64, D>)> = Vec::new();
         for (i, node) in initial.nodes.iter().enumerate() {
             let path = format!("initial_velocity.nodes[{i}]");
-            let region = node.region.build().ok_or_else(|| dimension::<D>(&path))?;
+            let region = node.region.build().ok_or_else(|| BuildError::dimension::<D>(&path))?;
             regions.push((region, vector(&format!("{path}.velocity"), &node.velocity)?));
         }
         let spacing = simulation.grid.spacing;
@@ -159,14 +192,4 @@ impl Scene {
             })
             .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })
     }
-}
-
-/// A vector of the scene; an error unless it has `D` components.
-pub(super) fn vector<const D: usize>(path: &str, components: &[f64]) -> Result<Vector<f64, D>, BuildError> {
-    super::shape::vector(components).ok_or_else(|| dimension::<D>(path))
-}
-
-/// The error for a value at `path` that has another dimension.
-pub(super) fn dimension<const D: usize>(path: &str) -> BuildError {
-    BuildError::Dimension { path: path.into(), dimension: D }
 }

@@ -6,6 +6,7 @@ use super::shape_file::ShapeFileError;
 use crate::mechanics::loads::CurveError;
 use crate::shape::FillError;
 use crate::simulation::StepError;
+use crate::tensor::Vector;
 use indicatif::BinaryBytes;
 
 /// Errors of building a simulation from a checked scene.
@@ -130,4 +131,16 @@ pub enum BuildError {
         /// The cause.
         source: Box<StepError>,
     },
+}
+
+impl BuildError {
+    /// The error for a value at `path` that does not have the dimension `D`.
+    pub(super) fn dimension<const D: usize>(path: &str) -> Self {
+        Self::Dimension { path: path.into(), dimension: D }
+    }
+}
+
+/// A vector of the scene; an error unless it has `D` components.
+pub(super) fn vector<const D: usize>(path: &str, components: &[f64]) -> Result<Vector<f64, D>, BuildError> {
+    super::vector::vector(components).ok_or_else(|| BuildError::dimension::<D>(path))
 }

@@ -2,13 +2,13 @@
 
 use super::body::Body;
 use super::boundary::Face;
-use super::build::{dimension, vector};
+use super::build_error::vector;
 use super::particle_file;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
 use crate::mechanics::reference::Renewal;
 use crate::particles::Particles;
-use crate::shape::{Facet, Filling, HAIR, Layout, Shape, around, fill};
+use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 use std::fmt::{Display, Formatter};
@@ -80,7 +80,7 @@ impl Scene {
     ) -> Result<(), BuildError> {
         let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
             let mass = body.density * volume;
-            if self.time.inertia.has_inertia() {
+            if self.time.scheme().has_inertia() {
                 particles.push(x, velocity, volume, mass, number)
             } else {
                 particles.push_without_inertia(x, volume, mass, number)
@@ -89,7 +89,7 @@ impl Scene {
         let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
-            let shape = shape.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let shape = shape.build::<D>().ok_or_else(|| BuildError::dimension::<D>(&path))?;
             let velocity = common.unwrap_or_else(Vector::zeros);
             let seeds = fill(grid, &shape, self.filling(body))
                 .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
@@ -106,8 +106,8 @@ impl Scene {
                 source: Box::new(source),
             })?;
             if read.velocities.is_some() {
-                let why = if !self.time.inertia.has_inertia() {
-                    Some("there is no inertia; remove its columns vx, … or the key time.inertia")
+                let why = if !self.time.scheme().has_inertia() {
+                    Some("there is no inertia; remove its columns vx, … or the key time.scheme")
                 } else {
                     let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
                     self.initial_velocity.as_ref().map(|_| twice)
@@ -161,7 +161,7 @@ impl Scene {
     /// bodies, and no lumped mass, not even in part.
     pub(super) fn is_integrated(&self) -> bool {
         let gauss = |body: &Body| body.shape.is_some() && self.filling(body).layout == Layout::Gauss;
-        let lumped = self.time.inertia.has_inertia() && self.time.lumping() > 0.0;
+        let lumped = self.time.scheme().has_inertia() && self.time.lumping() > 0.0;
         !lumped && self.is_kept() && self.bodies.iter().all(gauss)
     }
 
@@ -214,7 +214,7 @@ impl Scene {
             (0..2 * D).any(|face| {
                 let (k, upper) = (face / 2, face % 2 == 1);
                 let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
-                let there = (facet.position[k] - wall).abs() < HAIR * h && facet.normal[k] * outward > 0.5;
+                let there = (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5;
                 there && self.boundary.face(k, upper).holds_across(k)
             })
         };

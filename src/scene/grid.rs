@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 const MAX_CELLS: f64 = 1e6;
 
 /// Relative tolerance of the number of cells along an axis, which must be a whole number.
-const WHOLE: f64 = 1e-9;
+const WHOLE_CELLS_TOLERANCE: f64 = 1e-9;
 
 /// Largest round-off of node positions, relative to the spacing.
-const DISTINCT: f64 = 1e-6;
+const NODE_ROUND_OFF: f64 = 1e-6;
 
 /// The box that holds the whole simulation, and the spacing of its background nodes. Nothing exists outside the box.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -93,14 +93,16 @@ impl GridBox {
 
     /// Largest distance from zero at which nodes can be distinguished: numbers near x are |x| ε apart.
     fn farthest(&self) -> f64 {
-        DISTINCT * self.spacing / f64::EPSILON
+        NODE_ROUND_OFF * self.spacing / f64::EPSILON
     }
 
     /// The number of cells along an edge, if the spacing divides the edge.
     fn cells_along(&self, size: f64) -> Option<u32> {
         let cells = size / self.spacing;
         let whole = cells.round();
-        (self.spacing > 0.0 && (1.0..=MAX_CELLS).contains(&whole) && (cells - whole).abs() <= WHOLE * whole)
+        (self.spacing > 0.0
+            && (1.0..=MAX_CELLS).contains(&whole)
+            && (cells - whole).abs() <= WHOLE_CELLS_TOLERANCE * whole)
             .then_some(whole as u32)
     }
 

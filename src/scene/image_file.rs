@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// Maximum number of pixels of a file.
-pub const MAX_PIXELS: u64 = 1 << 27;
+const MAX_PIXELS: u64 = 1 << 27;
 
 /// Maximum number of bytes that deflate packs into one byte: a PNG file that claims more is broken.
-const DENSEST: u64 = 1032;
+const MAX_COMPRESSION: u64 = 1032;
 
 /// Pixels of a picture, or voxels of a scan, whose value lies in a range.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -77,7 +77,7 @@ pub enum ImageFileError {
 impl ImageFile {
     /// The solid; `None` before the file has been read, and unless `min` and `max` have `D` components.
     pub(super) fn solid<const D: usize>(&self) -> Option<Pixels<D>> {
-        let [min, max] = [&self.min, &self.max].map(|x| super::shape::vector(x));
+        let [min, max] = [&self.min, &self.max].map(|x| super::vector::vector(x));
         Pixels::new(min?, max?, self.read.get()?.clone())
     }
 
@@ -183,7 +183,7 @@ fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ImageF
     }
     let pixels = product(&[width, height]).filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
     let asked = pixels.ok_or(ImageFileError::Size([width, height]))?;
-    if asked * kind.1 as u64 / 8 > DENSEST * found {
+    if asked * kind.1 as u64 / 8 > MAX_COMPRESSION * found {
         return Err(ImageFileError::Length { found, asked });
     }
     let mut bytes = vec![0; asked as usize];

@@ -1,17 +1,13 @@
 //! Gravity, tractions and pressures.
 
 use super::body::Body;
-use super::boundary::check_times;
-use super::shape::{Shape, check_normal};
+use super::curve::Curve;
+use super::shape::Shape;
 use super::suggest::nearest;
+use super::vector::check_normal;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// A factor in time: rows `[t, factor]`, linear in between and constant outside.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(transparent)]
-pub struct Curve(pub Vec<[f64; 2]>);
 
 /// Gravity: one acceleration for all bodies.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -85,15 +81,6 @@ pub struct Surface {
     /// The reference area per particle (a length in 2D, 1 in 1D), > 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub area: f64,
-}
-
-impl Curve {
-    pub(super) fn check(&self, problems: &mut Problems, path: &str) {
-        check_times(problems, path, self.0.iter().map(|row| row[0]));
-        for (i, row) in self.0.iter().enumerate() {
-            problems.number(&format!("{path}[{i}][1]"), row[1]);
-        }
-    }
 }
 
 impl Gravity {

@@ -1,9 +1,9 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
 use super::boundary::{Driving, Face, Rotation, Table};
-use super::build::{dimension, vector};
+use super::build_error::vector;
 use super::filling::Means;
-use super::load::{self, Loaded};
+use super::load::Loaded;
 use super::{BuildError, Scene};
 use crate::grid::Grid;
 use crate::mechanics::loads::{
@@ -47,7 +47,7 @@ impl Scene {
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
             let path = format!("prescribed[{i}]");
-            let region = prescribed.region.build::<D>().ok_or_else(|| dimension::<D>(&path))?;
+            let region = prescribed.region.build::<D>().ok_or_else(|| BuildError::dimension::<D>(&path))?;
             let mut motion = std::array::from_fn(|_| None);
             if let Some(driving) = prescribed.given().next() {
                 motion = driving.motion(&path)?;
@@ -79,10 +79,10 @@ impl Scene {
         particles: &mut Particles<D>,
     ) -> Result<SurfaceLoad<D>, BuildError> {
         let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
-        let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| dimension::<D>(path));
+        let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| BuildError::dimension::<D>(path));
         let region = on.region.as_ref().map(built).transpose()?;
         let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
-            return Err(dimension::<D>(path));
+            return Err(BuildError::dimension::<D>(path));
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
         let points = match (&on.surface, &shape) {
@@ -108,8 +108,8 @@ impl Scene {
                 for facet in facets {
                     points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
                     // Each point lies inside the surface by a tolerance, in a cell that holds the body.
-                    let x = facet.position - facet.normal * (shape::HAIR * grid.spacing);
-                    if self.time.inertia.has_inertia() {
+                    let x = facet.position - facet.normal * (shape::SURFACE_DEPTH * grid.spacing);
+                    if self.time.scheme().has_inertia() {
                         particles.push(x, velocity.unwrap_or_else(Vector::zeros), 0.0, 0.0, number as u32);
                     } else {
                         particles.push_without_inertia(x, 0.0, 0.0, number as u32);
@@ -187,7 +187,7 @@ impl Table {
 }
 
 /// The factor of a load in time; 1 without a curve.
-fn curve(path: &str, given: Option<&load::Curve>) -> Result<Curve, BuildError> {
+fn curve(path: &str, given: Option<&super::curve::Curve>) -> Result<Curve, BuildError> {
     match given {
         Some(curve) => Curve::new(curve.0.clone()).map_err(|source| BuildError::Curve { path: path.into(), source }),
         None => Ok(Curve::constant(1.0)),

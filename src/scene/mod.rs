@@ -7,6 +7,7 @@
 pub mod accuracy;
 pub mod body;
 pub mod boundary;
+pub mod curve;
 pub mod grid;
 pub mod image_file;
 pub mod keys;
@@ -23,12 +24,14 @@ pub mod transfer;
 mod build;
 mod build_error;
 mod filling;
+mod json;
 mod loading;
 mod overrides;
 mod place;
 mod read;
 mod scale;
 mod suggest;
+mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
@@ -42,7 +45,7 @@ use crate::field::Field;
 use crate::material::{Law, Material, PLASTIC_STRAIN};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::reference::Renewal;
-use crate::mechanics::schemes::LONG_STEPS;
+use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::mechanics::terms::Rayleigh;
 use crate::shape::Layout;
 use schemars::JsonSchema;
@@ -202,46 +205,16 @@ impl Scene {
         if let Some(ghost) = self.ghost_stiffness {
             problems.between("ghost_stiffness", ghost, 0.0, 1.0);
         }
-        if let Some(gravity) = &self.gravity {
-            gravity.check(&mut problems, dimension);
-        }
-        if let Some(damping) = &self.damping {
-            damping.check(&mut problems);
-        }
-        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
-            traction.check(&mut problems, &format!("tractions[{i}]"), &self.bodies, dimension);
-        }
-        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
-            pressure.check(&mut problems, &format!("pressures[{i}]"), &self.bodies, dimension);
-        }
+        self.check_loads(&mut problems, dimension);
         if let Some(initial) = &self.initial_velocity {
-            let regions = &initial.nodes;
-            problems.require(
-                !regions.is_empty(),
-                "initial_velocity.nodes",
-                "an empty list",
-                "must have at least one region",
-            );
-            for (i, body) in self.bodies.iter().enumerate().filter(|(_, body)| body.velocity.is_some()) {
-                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
-                problems.refuse(
-                    &format!("bodies[{i}].velocity"),
-                    format_args!("{:?}", body.velocity.iter().flatten().collect::<Vec<_>>()),
-                    allowed,
-                );
-            }
-            for (i, node) in problems.few("initial_velocity.nodes", regions).iter().enumerate() {
-                let path = format!("initial_velocity.nodes[{i}]");
-                node.region.check(&mut problems, &format!("{path}.region"), dimension);
-                problems.vector(&format!("{path}.velocity"), &node.velocity, dimension);
-            }
+            self.check_initial_velocity(initial, &mut problems, dimension);
         }
         self.solver.check(&mut problems, self.unsymmetric());
         self.output.check(&mut problems, &self.bodies, &self.grid);
-        if !self.time.inertia.has_inertia() {
+        if !self.time.scheme().has_inertia() {
             self.refuse_inertia(&mut problems);
         }
-        if self.time.inertia == time::Inertia::ArcLength {
+        if self.time.scheme() == Parameters::ArcLength {
             self.refuse_off_path(&mut problems);
         }
         problems
@@ -253,7 +226,7 @@ impl Scene {
         let loads =
             self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
         let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
-        let consistent = self.time.inertia.has_inertia() && self.time.lumping() == 0.0;
+        let consistent = self.time.scheme().has_inertia() && self.time.lumping() == 0.0;
         let needed = long_steps || consistent || loads.into_iter().any(|load| load.surface.is_none());
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
@@ -262,7 +235,7 @@ impl Scene {
     /// in every step feels a wall from farther away.
     fn renewal(&self) -> Renewal {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
-        self.grid.renewed.unwrap_or(match self.time.inertia.has_inertia() {
+        self.grid.renewed.unwrap_or(match self.time.scheme().has_inertia() {
             false => Renewal::Strain(STATIC_STRAIN),
             true if flip && self.is_clamped() => Renewal::Strain(VIBRATION_STRAIN),
             true => Renewal::EveryStep,
@@ -292,7 +265,7 @@ impl Scene {
 
     /// The largest Courant number of pressure waves; infinite without inertia.
     fn courant(&self) -> f64 {
-        if !self.time.inertia.has_inertia() {
+        if !self.time.scheme().has_inertia() {
             return f64::INFINITY;
         }
         accuracy::courant(&self.bodies, self.grid.spacing, self.time.step).unwrap_or(0.0)
@@ -313,8 +286,9 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn fields(&self) -> Vec<Field> {
-        let flows = self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
-        self.output.fields(self.time.inertia, flows)
+        let has_plastic_flow =
+            self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
+        self.output.fields(self.time.scheme().has_inertia(), has_plastic_flow)
     }
 
     /// The laws of all bodies whose constants are allowed.
@@ -341,9 +315,9 @@ impl Scene {
     /// Refuses keys that have a meaning only with inertia.
     fn refuse_inertia(&self, problems: &mut Problems) {
         let mut refuse = |path: &str, value: &str| {
-            let inertia = time::word(self.time.inertia);
+            let scheme = time::word(self.time.scheme());
             let allowed =
-                format!("time.inertia is {inertia}, and without inertia it means nothing: remove one of the two");
+                format!("time.scheme is {scheme}, and without inertia it means nothing: remove one of the two");
             problems.refuse(path, value, allowed);
         };
         self.time.of_inertia().for_each(|(path, value)| refuse(path, &value));
@@ -358,7 +332,7 @@ impl Scene {
 
     /// Refuses features that the arc-length method cannot have: follower pressures, prescribed motion, and a grid reset in every step.
     fn refuse_off_path(&self, problems: &mut Problems) {
-        let allowed = "time.inertia is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
+        let allowed = "time.scheme is \"arc_length\", for dead loads, walls at rest and a grid that is kept: remove one of the two";
         for i in 0..self.pressures.len() {
             problems.refuse(&format!("pressures[{i}]"), "a follower pressure", allowed);
         }
@@ -382,12 +356,43 @@ impl Scene {
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
         self.grid.renewed = Some(self.renewal());
-        if self.time.inertia.has_inertia() {
+        if self.time.scheme().has_inertia() {
             self.transfer.get_or_insert_default();
         }
         self.aggregation = Some(self.aggregates());
         self.output.fields = Some(self.fields());
         self
+    }
+
+    fn check_loads(&self, problems: &mut Problems, dimension: usize) {
+        if let Some(gravity) = &self.gravity {
+            gravity.check(problems, dimension);
+        }
+        if let Some(damping) = &self.damping {
+            damping.check(problems);
+        }
+        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
+            traction.check(problems, &format!("tractions[{i}]"), &self.bodies, dimension);
+        }
+        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
+            pressure.check(problems, &format!("pressures[{i}]"), &self.bodies, dimension);
+        }
+    }
+
+    fn check_initial_velocity(&self, initial: &InitialVelocity, problems: &mut Problems, dimension: usize) {
+        let regions = &initial.nodes;
+        let path = "initial_velocity.nodes";
+        problems.require(!regions.is_empty(), path, "an empty list", "must have at least one region");
+        for (i, body) in self.bodies.iter().enumerate() {
+            if let Some(velocity) = &body.velocity {
+                let allowed = "initial_velocity gives the velocity of all particles: remove one of the two";
+                problems.refuse(&format!("bodies[{i}].velocity"), format_args!("{velocity:?}"), allowed);
+            }
+        }
+        for (i, node) in problems.few(path, regions).iter().enumerate() {
+            node.region.check(problems, &format!("{path}[{i}].region"), dimension);
+            problems.vector(&format!("{path}[{i}].velocity"), &node.velocity, dimension);
+        }
     }
 
     fn check_bodies(&self, problems: &mut Problems) {

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::grid::GridBox;
 use super::load::check_body;
-use super::time::{Inertia, word};
+use super::time::word;
 use crate::field::Field;
 use crate::problems::Problems;
 use schemars::JsonSchema;
@@ -59,12 +59,12 @@ pub enum At {
 }
 
 impl Output {
-    /// The fields of a snapshot. The default depends on inertia, and on whether a body may flow plastically (`flows`).
-    pub(super) fn fields(&self, inertia: Inertia, flows: bool) -> Vec<Field> {
+    /// The fields of a snapshot. The default depends on inertia and plastic flow.
+    pub(super) fn fields(&self, has_inertia: bool, has_plastic_flow: bool) -> Vec<Field> {
         self.fields.clone().unwrap_or_else(|| {
             let mut fields = vec![Field::Displacement, Field::Velocity, Field::Stress, Field::Jacobian];
-            fields.retain(|field| inertia.has_inertia() || !field.needs_inertia());
-            fields.splice(..0, flows.then_some(Field::PlasticStrain));
+            fields.retain(|field| has_inertia || !field.needs_inertia());
+            fields.splice(..0, has_plastic_flow.then_some(Field::PlasticStrain));
             fields
         })
     }

@@ -1,7 +1,7 @@
 //! Values replaced from the command line: `KEY.PATH=JSON`.
 
+use super::json::parse;
 use super::place::{Step, path, steps};
-use super::read::parse;
 use serde_json::Value;
 use std::str::FromStr;
 

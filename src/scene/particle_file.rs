@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 /// Maximum number of particles in one file.
-pub const MAX_PARTICLES: usize = 100_000_000;
+const MAX_PARTICLES: usize = 100_000_000;
 
 /// Maximum length of a line in bytes.
 const MAX_LINE: u64 = 4096;

@@ -3,83 +3,134 @@
 use super::BuildError;
 use super::Scene;
 use super::boundary::{Driving, Face};
-use super::load::Curve;
+use super::curve::Curve;
+use super::load::Gravity;
 use crate::material::p_wave_modulus;
 use crate::mechanics::loads::Pressing;
+use crate::mechanics::schemes::Alphas;
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
 
 /// The largest allowed force: norms sum its square over all nodes.
-const MOST: f64 = 1e120;
+const LARGEST_FORCE: f64 = 1e120;
 
 /// The smallest allowed value of the largest force that resists a motion. Newton's method reduces forces by a further factor of 1e-15, and
 /// squares them.
-const LEAST: f64 = 1e-120;
-
-/// A quantity: name, value, smallest and largest allowed value.
-type Quantity = (&'static str, f64, f64, f64);
+const SMALLEST_RESISTANCE: f64 = 1e-120;
 
 /// Refuses a simulation whose masses, volumes, forces or energies are not representable.
 pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Result<(), BuildError> {
-    let alphas = simulation.settings.scheme.end(simulation.clock.nominal());
-    let (particles, h) = (&simulation.particles, simulation.grid.spacing);
-    let mut heaviest: f64 = 0.0;
-    for (i, body) in simulation.bodies.iter().enumerate() {
-        let mut extremes = Extremes::default();
-        for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == i && particles.is_solid(p)) {
-            let speed = particles.velocity.get(p).map_or(0.0, Vector::amax);
-            extremes.add(particles.volume[p], particles.mass[p], speed);
-        }
-        let Extremes { volume, mass, speed } = extremes;
-        heaviest = heaviest.max(mass.1);
-        let modulus = p_wave_modulus(&body.law);
-        let normal = (f64::MIN_POSITIVE, f64::MAX);
-        let resistance = (alphas.a1 * mass.0 * h).max(modulus * volume.0 / h);
-        let quantities: [Quantity; 8] = [
-            ("the smallest particle volume", volume.0, normal.0, normal.1),
-            ("the smallest particle mass", mass.0, normal.0, normal.1),
-            (
-                "the force that moves a particle by a cell in one step, mass spacing / (beta step²),",
-                alphas.a1 * mass.1 * h,
-                0.0,
-                MOST,
-            ),
-            ("the stiffness force of a particle, modulus volume / spacing,", modulus * volume.1 / h, 0.0, MOST),
-            ("the energy of a particle, modulus volume,", modulus * volume.1, 0.0, MOST),
-            (
-                "the force that stops a particle in one step, mass speed / (beta step),",
-                alphas.a2 * mass.1 * speed,
-                0.0,
-                MOST,
-            ),
-            ("the kinetic energy of a particle, mass speed²,", mass.1 * speed * speed, 0.0, MOST),
-            ("the smallest force that resists a motion by a cell (inertia or stiffness)", resistance, LEAST, MOST),
-        ];
-        require(&format!("bodies[{i}]"), &quantities)?;
+    let scales = Scales::of(simulation);
+    for body in 0..simulation.bodies.len() {
+        require(&format!("bodies[{body}]"), &scales.of_body(body))?;
     }
     if let Some(gravity) = &scene.gravity {
-        let largest = gravity.acceleration.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let profile = gravity.profile.as_ref().map(|profile| &profile.factor);
-        let weight = heaviest * largest * factor(gravity.curve.as_ref()) * factor(profile);
-        require("gravity", &[("the weight of a particle", weight, 0.0, MOST)])?;
+        require("gravity", &[Quantity::force("the weight of a particle", scales.weight(gravity))])?;
     }
-    let across = simulation.grid.spacing * simulation.grid.cells.iter().map(|&n| f64::from(n)).sum::<f64>();
-    let driven = |path: &str, driving: Driving<'_>| {
-        let motion = match driving {
-            Driving::Displacement(table) => alphas.a1 * table.largest(),
-            Driving::Velocity(table) => alphas.a2 * table.largest(),
-            Driving::Rotation(rotation) => alphas.a2 * rotation.fastest() * across,
-        };
-        require(path, &[("the force that moves a particle so in one step", heaviest * motion, 0.0, MOST)])
-    };
     for (name, face) in scene.boundary.faces().into_iter().take(2 * D) {
-        if let Some(driving) = face.and_then(Face::driving) {
-            driven(&format!("boundary.{name}"), driving)?;
+        if let Some(motion) = face.and_then(Face::driving) {
+            scales.check_motion(&format!("boundary.{name}"), motion)?;
         }
     }
-    for (i, motion) in scene.prescribed.iter().enumerate() {
-        motion.given().try_for_each(|driving| driven(&format!("prescribed[{i}]"), driving))?;
+    for (i, prescribed) in scene.prescribed.iter().enumerate() {
+        prescribed.given().try_for_each(|motion| scales.check_motion(&format!("prescribed[{i}]"), motion))?;
     }
+    check_surface_loads(scene, simulation)
+}
+
+/// The quantities from which the forces and energies of a step follow.
+struct Scales<'a, const D: usize> {
+    simulation: &'a Simulation<D>,
+    /// Acceleration and velocity at the end of the step as functions of the motion.
+    alphas: Alphas,
+    /// The particles of each body.
+    bodies: Vec<Extremes>,
+}
+
+impl<'a, const D: usize> Scales<'a, D> {
+    fn of(simulation: &'a Simulation<D>) -> Self {
+        let particles = &simulation.particles;
+        let extremes = |body: usize| {
+            let mut extremes = Extremes::default();
+            for p in (0..particles.len()).filter(|&p| particles.body[p] as usize == body && particles.is_solid(p)) {
+                let speed = particles.velocity.get(p).map_or(0.0, Vector::amax);
+                extremes.add(particles.volume[p], particles.mass[p], speed);
+            }
+            extremes
+        };
+        Self {
+            simulation,
+            alphas: simulation.settings.scheme.end(simulation.clock.nominal()),
+            bodies: (0..simulation.bodies.len()).map(extremes).collect(),
+        }
+    }
+
+    fn of_body(&self, body: usize) -> [Quantity; 8] {
+        let Extremes { smallest_volume, largest_volume, smallest_mass, largest_mass, largest_speed } =
+            self.bodies[body];
+        let h = self.simulation.grid.spacing;
+        let modulus = p_wave_modulus(&self.simulation.bodies[body].law);
+        let resistance = (self.alphas.a1 * smallest_mass * h).max(modulus * smallest_volume / h);
+        [
+            Quantity::normal("the smallest particle volume", smallest_volume),
+            Quantity::normal("the smallest particle mass", smallest_mass),
+            Quantity::force(
+                "the force that moves a particle by a cell in one step, mass spacing / (beta step²),",
+                self.alphas.a1 * largest_mass * h,
+            ),
+            Quantity::force(
+                "the stiffness force of a particle, modulus volume / spacing,",
+                modulus * largest_volume / h,
+            ),
+            Quantity::force("the energy of a particle, modulus volume,", modulus * largest_volume),
+            Quantity::force(
+                "the force that stops a particle in one step, mass speed / (beta step),",
+                self.alphas.a2 * largest_mass * largest_speed,
+            ),
+            Quantity::force(
+                "the kinetic energy of a particle, mass speed²,",
+                largest_mass * largest_speed * largest_speed,
+            ),
+            Quantity {
+                least: SMALLEST_RESISTANCE,
+                ..Quantity::force(
+                    "the smallest force that resists a motion by a cell (inertia or stiffness)",
+                    resistance,
+                )
+            },
+        ]
+    }
+
+    /// The mass of the heaviest particle.
+    fn heaviest(&self) -> f64 {
+        self.bodies.iter().fold(0.0, |heaviest: f64, body| heaviest.max(body.largest_mass))
+    }
+
+    /// The largest weight of a particle.
+    fn weight(&self, gravity: &Gravity) -> f64 {
+        let largest = gravity.acceleration.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let profile = gravity.profile.as_ref().map(|profile| &profile.factor);
+        self.heaviest() * largest * largest_factor(gravity.curve.as_ref()) * largest_factor(profile)
+    }
+
+    /// Refuses a motion for which a particle needs too large a force.
+    fn check_motion(&self, path: &str, motion: Driving<'_>) -> Result<(), BuildError> {
+        let grid = &self.simulation.grid;
+        let acceleration = match motion {
+            Driving::Displacement(table) => self.alphas.a1 * table.largest(),
+            Driving::Velocity(table) => self.alphas.a2 * table.largest(),
+            Driving::Rotation(rotation) => {
+                let across = grid.spacing * grid.cells.iter().map(|&n| f64::from(n)).sum::<f64>();
+                self.alphas.a2 * rotation.fastest() * across
+            }
+        };
+        let force = Quantity::force("the force that moves a particle so in one step", self.heaviest() * acceleration);
+        require(path, &[force])
+    }
+}
+
+/// Refuses a surface load with too large a force on a point.
+fn check_surface_loads<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Result<(), BuildError> {
     let curves = scene.tractions.iter().map(|load| &load.curve).chain(scene.pressures.iter().map(|load| &load.curve));
     for ((k, load), curve) in simulation.loads.surface.iter().enumerate().zip(curves) {
         let (path, stress) = match load.pressing {
@@ -87,41 +138,73 @@ pub(super) fn check<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -
             Pressing::Pressure(pressure) => (format!("pressures[{}]", k - scene.tractions.len()), pressure.abs()),
         };
         let area = load.points.iter().fold(0.0, |most: f64, point| most.max(point.area));
-        require(&path, &[("the force on a particle", stress * area * factor(curve.as_ref()), 0.0, MOST)])?;
+        let force = stress * area * largest_factor(curve.as_ref());
+        require(&path, &[Quantity::force("the force on a particle", force)])?;
     }
     Ok(())
 }
 
-/// The smallest and largest particle volume and mass, and the largest speed.
+/// The extreme values of the particles of a body.
+#[derive(Clone, Copy)]
 struct Extremes {
-    volume: (f64, f64),
-    mass: (f64, f64),
-    speed: f64,
+    smallest_volume: f64,
+    largest_volume: f64,
+    smallest_mass: f64,
+    largest_mass: f64,
+    largest_speed: f64,
 }
 
 impl Default for Extremes {
     fn default() -> Self {
-        Self { volume: (f64::INFINITY, 0.0), mass: (f64::INFINITY, 0.0), speed: 0.0 }
+        Self {
+            smallest_volume: f64::INFINITY,
+            largest_volume: 0.0,
+            smallest_mass: f64::INFINITY,
+            largest_mass: 0.0,
+            largest_speed: 0.0,
+        }
     }
 }
 
 impl Extremes {
     fn add(&mut self, volume: f64, mass: f64, speed: f64) {
-        let widened = |(least, most): (f64, f64), x: f64| (least.min(x), most.max(x));
-        (self.volume, self.mass, self.speed) =
-            (widened(self.volume, volume), widened(self.mass, mass), self.speed.max(speed));
+        self.smallest_volume = self.smallest_volume.min(volume);
+        self.largest_volume = self.largest_volume.max(volume);
+        self.smallest_mass = self.smallest_mass.min(mass);
+        self.largest_mass = self.largest_mass.max(mass);
+        self.largest_speed = self.largest_speed.max(speed);
     }
 }
 
 /// The largest magnitude of the factors of a curve; 1 without a curve.
-fn factor(curve: Option<&Curve>) -> f64 {
+fn largest_factor(curve: Option<&Curve>) -> f64 {
     curve.map_or(1.0, |curve| curve.0.iter().fold(0.0, |most: f64, row| most.max(row[1].abs())))
 }
 
+/// A quantity and its allowed range.
+struct Quantity {
+    name: &'static str,
+    value: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Quantity {
+    /// A force or an energy.
+    fn force(name: &'static str, value: f64) -> Self {
+        Self { name, value, least: 0.0, most: LARGEST_FORCE }
+    }
+
+    /// A positive number with all its digits.
+    fn normal(name: &'static str, value: f64) -> Self {
+        Self { name, value, least: f64::MIN_POSITIVE, most: f64::MAX }
+    }
+}
+
 fn require(path: &str, quantities: &[Quantity]) -> Result<(), BuildError> {
-    for &(what, value, least, most) in quantities {
+    for &Quantity { name, value, least, most } in quantities {
         if !(least..=most).contains(&value) {
-            return Err(BuildError::Scale { path: path.to_owned(), what, value, least, most });
+            return Err(BuildError::Scale { path: path.to_owned(), what: name, value, least, most });
         }
     }
     Ok(())

@@ -3,6 +3,7 @@
 use super::image_file::ImageFile;
 use super::shape_file::ShapeFile;
 use super::surface_file::SurfaceFile;
+use super::vector::{check_normal, vector};
 use crate::problems::{LARGEST, MOST, Number, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
 use crate::tensor::{Tensor, Vector, identity};
@@ -142,16 +143,7 @@ impl Shape {
     /// Checks the shape, and returns whether it is allowed.
     pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
         match self {
-            Self::Box { min, max } => {
-                let path = format!("{path}.box");
-                let mut ok = problems.vector(&format!("{path}.min"), min, dimension);
-                ok &= problems.vector(&format!("{path}.max"), max, dimension);
-                for (k, (&min, &max)) in min.iter().zip(max).enumerate().filter(|_| ok) {
-                    let allowed = format!("must be greater than min[{k}] = {}", Number(min));
-                    problems.require(max > min, &format!("{path}.max[{k}]"), Number(max), allowed);
-                }
-                ok && min.iter().zip(max).all(|(min, max)| max > min)
-            }
+            Self::Box { min, max } => check_box(min, max, problems, &format!("{path}.box"), dimension),
             Self::Ball { center, radius } => {
                 let ok = problems.vector(&format!("{path}.ball.center"), center, dimension);
                 problems.positive(&format!("{path}.ball.radius"), *radius) && ok
@@ -159,12 +151,6 @@ impl Shape {
             Self::HalfSpace { point, normal } => {
                 let ok = problems.vector(&format!("{path}.half_space.point"), point, dimension);
                 check_normal(problems, &format!("{path}.half_space.normal"), normal, dimension) && ok
-            }
-            Self::Union(parts) => check_parts(parts, problems, &format!("{path}.union"), dimension),
-            Self::Intersection(parts) => check_parts(parts, problems, &format!("{path}.intersection"), dimension),
-            Self::Difference { of, minus } => {
-                let ok = of.check(problems, &format!("{path}.difference.of"), dimension);
-                minus.check(problems, &format!("{path}.difference.minus"), dimension) && ok
             }
             Self::Polygon(vertices) => check_polygon(vertices, problems, &format!("{path}.polygon"), dimension),
             Self::Cylinder { from, to, radius } => {
@@ -174,35 +160,21 @@ impl Shape {
             }
             Self::Cone { from, to, radii } => {
                 let path = format!("{path}.cone");
-                let mut ok = true;
-                for (i, &radius) in radii.iter().enumerate() {
-                    ok &= problems.between(&format!("{path}.radii[{i}]"), radius, 0.0, LARGEST);
-                }
-                let largest = radii[0].max(radii[1]);
-                if ok && largest == 0.0 {
-                    ok = refused(problems, &format!("{path}.radii"), "[0, 0]", "one of the two must be > 0");
-                }
-                check_axis(from, to, largest, problems, &path, dimension) && ok
+                let ok = check_radii(*radii, problems, &format!("{path}.radii"));
+                check_axis(from, to, radii[0].max(radii[1]), problems, &path, dimension) && ok
             }
+            Self::Union(parts) => check_parts(parts, problems, &format!("{path}.union"), dimension),
+            Self::Difference { of, minus } => {
+                let ok = of.check(problems, &format!("{path}.difference.of"), dimension);
+                minus.check(problems, &format!("{path}.difference.minus"), dimension) && ok
+            }
+            Self::Intersection(parts) => check_parts(parts, problems, &format!("{path}.intersection"), dimension),
             Self::Rotated { of, about, angle, axis } => {
                 let path = format!("{path}.rotated");
                 let mut ok = of.check(problems, &format!("{path}.of"), dimension);
                 ok &= problems.vector(&format!("{path}.about"), about, dimension);
                 ok &= problems.number(&format!("{path}.angle"), *angle);
-                ok && match (axis, dimension) {
-                    (Some(axis), 3) => check_normal(problems, &format!("{path}.axis"), axis, dimension),
-                    (None, 2) => true,
-                    (None, 3) => {
-                        refused(problems, &path, "a rotation without an axis", "give its \"axis\", a direction")
-                    }
-                    (Some(_), 2) => refused(
-                        problems,
-                        &format!("{path}.axis"),
-                        "an axis",
-                        "in 2 dimensions it is the third: remove it",
-                    ),
-                    _ => refused(problems, &path, "a rotation", "a line has no directions to turn in"),
-                }
+                ok && check_rotation_axis(axis.as_deref(), problems, &path, dimension)
             }
             Self::Scaled { of, about, factor } => {
                 let path = format!("{path}.scaled");
@@ -210,17 +182,7 @@ impl Shape {
                 ok &= problems.vector(&format!("{path}.about"), about, dimension);
                 problems.positive(&format!("{path}.factor"), *factor) && ok
             }
-            Self::Surface(_) if dimension != 3 => {
-                let allowed = format!("it needs a grid of 3 dimensions, and this one has {dimension}");
-                refused(problems, &format!("{path}.surface"), "a surface", &allowed)
-            }
-            Self::Surface(file) if !file.has_format() => refused(
-                problems,
-                &format!("{path}.surface.file"),
-                &format!("{:?}", file.file),
-                "must end in .stl or .ply",
-            ),
-            Self::Surface(_) => true,
+            Self::Surface(file) => check_surface(file, problems, &format!("{path}.surface"), dimension),
             Self::Image(file) => file.check(problems, &format!("{path}.image"), dimension),
         }
     }
@@ -290,6 +252,56 @@ fn cone<const D: usize>(from: &[f64], to: &[f64], radii: [f64; 2]) -> Option<sha
     shape::Cone::new([vector(from)?, vector(to)?], radii)
 }
 
+fn check_box(min: &[f64], max: &[f64], problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    let mut ok = problems.vector(&format!("{path}.min"), min, dimension);
+    ok &= problems.vector(&format!("{path}.max"), max, dimension);
+    if !ok {
+        return false;
+    }
+    for (k, (&min, &max)) in min.iter().zip(max).enumerate() {
+        let allowed = format!("must be greater than min[{k}] = {}", Number(min));
+        problems.require(max > min, &format!("{path}.max[{k}]"), Number(max), allowed);
+        ok &= max > min;
+    }
+    ok
+}
+
+/// Checks the radii of a cone. One of them may be 0.
+fn check_radii(radii: [f64; 2], problems: &mut Problems, path: &str) -> bool {
+    let mut ok = true;
+    for (i, radius) in radii.into_iter().enumerate() {
+        ok &= problems.between(&format!("{path}[{i}]"), radius, 0.0, LARGEST);
+    }
+    if ok && radii == [0.0, 0.0] {
+        return refused(problems, path, "[0, 0]", "one of the two must be > 0");
+    }
+    ok
+}
+
+/// Checks the axis of a rotated shape: needed in 3D, and not allowed in 2D.
+fn check_rotation_axis(axis: Option<&[f64]>, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    let axis_path = format!("{path}.axis");
+    match (axis, dimension) {
+        (Some(axis), 3) => check_normal(problems, &axis_path, axis, dimension),
+        (None, 2) => true,
+        (None, 3) => refused(problems, path, "a rotation without an axis", "give its \"axis\", a direction"),
+        (Some(_), 2) => refused(problems, &axis_path, "an axis", "in 2 dimensions it is the third: remove it"),
+        _ => refused(problems, path, "a rotation", "a line has no directions to turn in"),
+    }
+}
+
+fn check_surface(surface: &SurfaceFile, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    if dimension != 3 {
+        let allowed = format!("it needs a grid of 3 dimensions, and this one has {dimension}");
+        return refused(problems, path, "a surface", &allowed);
+    }
+    if !surface.has_format() {
+        let value = format!("{:?}", surface.file);
+        return refused(problems, &format!("{path}.file"), &value, "must end in .stl or .ply");
+    }
+    true
+}
+
 fn check_polygon(vertices: &[Vec<f64>], problems: &mut Problems, path: &str, dimension: usize) -> bool {
     if dimension != 2 {
         let allowed = format!("it needs a grid of 2 dimensions, and this one has {dimension}");
@@ -331,20 +343,4 @@ fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: 
         ok &= part.check(problems, &format!("{path}[{i}]"), dimension);
     }
     ok
-}
-
-/// Checks a direction. The largest component must lie between 1e-100 and 1e100 in size, so that the length is finite and not zero.
-pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], dimension: usize) -> bool {
-    if !problems.vector(path, normal, dimension) {
-        return false;
-    }
-    let largest = normal.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-    let ok = largest >= 1e-100;
-    problems.require(ok, path, "the zero vector", "must have a direction");
-    ok
-}
-
-/// The components as a vector; `None` unless there are `D`.
-pub(super) fn vector<const D: usize>(components: &[f64]) -> Option<Vector<f64, D>> {
-    (components.len() == D).then(|| Vector::from_column_slice(components))
 }

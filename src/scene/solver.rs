@@ -1,7 +1,7 @@
 //! Settings of Newton's method and of the linear solver.
 
 use crate::problems::Problems;
-use crate::solver::{Forcing, Krylov as Method, NewtonSettings, Precision, Preconditioning};
+use crate::solver::{Forcing, Krylov as Method, NewtonSettings, Preconditioning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -45,21 +45,31 @@ pub struct Krylov {
     pub preconditioner: Preconditioning,
     /// The tolerance of each linear solve.
     pub forcing: Forcing,
-    /// The floating-point precision of Krylov vectors and tangent products. Default "double".
-    pub precision: Precision,
+    /// Deprecated, and read for one release: it has no effect. All numbers are in double precision.
+    pub precision: Option<Precision>,
     /// Maximum number of iterations of one linear solve, 1 to 1000000. Default 2000.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub max_iterations: u32,
 }
 
+/// The values of the deprecated key `precision`. Neither has an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// Double precision.
+    Double,
+    /// Linear systems in single precision, in earlier releases.
+    Mixed,
+}
+
 impl Default for Krylov {
     fn default() -> Self {
-        let NewtonSettings { krylov, forcing, precision, max_krylov_iterations, .. } = NewtonSettings::default();
+        let NewtonSettings { krylov, forcing, max_krylov_iterations, .. } = NewtonSettings::default();
         Self {
             method: krylov,
             preconditioner: Preconditioning::default(),
             forcing,
-            precision,
+            precision: None,
             max_iterations: max_krylov_iterations as u32,
         }
     }

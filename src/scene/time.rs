@@ -1,9 +1,7 @@
 //! Time stepping.
 
 use crate::clock::MAX_HALVINGS;
-pub use crate::mechanics::schemes::Parameters as Inertia;
-
-use crate::mechanics::schemes::Newmark;
+use crate::mechanics::schemes::{self, Newmark};
 use crate::mechanics::transfer::{Projection, WallUpdate};
 use crate::problems::{Number, Problems};
 use crate::simulation::InitialGuess;
@@ -25,8 +23,9 @@ pub struct Time {
     pub end: f64,
     /// The time integration scheme: dynamics or statics. Without inertia there are load steps: each ends in static equilibrium under the
     /// loads at its end. Keys of velocities or the mass matrix are then refused. Default: `"newmark"`.
-    #[serde(default)]
-    pub inertia: Inertia,
+    pub scheme: Option<schemes::Parameters>,
+    /// Deprecated, and read for one release: the key is now `scheme`. If `scheme` is given, this key has no effect.
+    pub inertia: Option<schemes::Parameters>,
     /// Newmark's β (no unit), > 0, with 2β ≥ γ; for `"newmark"` only. Default 0.25, the trapezoidal rule.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub beta: Option<f64>,
@@ -68,6 +67,23 @@ impl Time {
         10
     }
 
+    /// The time integration scheme.
+    ///
+    /// ```
+    /// use bfree::mechanics::schemes::Parameters;
+    /// use bfree::scene::time::Time;
+    ///
+    /// // The old key `inertia` is read, unless the new key `scheme` is given.
+    /// let scheme = |text: &str| serde_json::from_str(text).map(|time: Time| time.scheme());
+    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1}"#)?, Parameters::Newmark);
+    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "inertia": "none"}"#)?, Parameters::None);
+    /// assert_eq!(scheme(r#"{"step": 0.1, "end": 1, "scheme": "arc_length", "inertia": "none"}"#)?, Parameters::ArcLength);
+    /// # Ok::<(), serde_json::Error>(())
+    /// ```
+    pub fn scheme(&self) -> schemes::Parameters {
+        self.scheme.or(self.inertia).unwrap_or_default()
+    }
+
     /// Newmark's β and γ.
     ///
     /// ```
@@ -95,18 +111,19 @@ impl Time {
 
     /// The starting point of Newton's method.
     pub(super) fn initial_guess(&self) -> InitialGuess {
-        let by_itself = if self.inertia.has_inertia() { InitialGuess::Zero } else { InitialGuess::LastStep };
+        let by_itself = if self.scheme().has_inertia() { InitialGuess::Zero } else { InitialGuess::LastStep };
         self.initial_guess.unwrap_or(by_itself)
     }
 
     /// Fills in the defaults of all keys that have a meaning for the scheme.
     pub(super) fn complete(&mut self) {
+        self.scheme = Some(self.scheme());
         self.initial_guess = Some(self.initial_guess());
-        if self.inertia == Inertia::Newmark {
+        if self.scheme() == schemes::Parameters::Newmark {
             let Newmark { beta, gamma } = self.newmark();
             (self.beta, self.gamma) = (Some(beta), Some(gamma));
         }
-        if self.inertia.has_inertia() {
+        if self.scheme().has_inertia() {
             self.lumping = Some(self.lumping());
             self.projection.get_or_insert_default();
             self.wall_update.get_or_insert_default();
@@ -173,10 +190,10 @@ impl Time {
                 format_args!("reaching the end at {end} takes {steps:e} steps; at most {MAX_STEPS:e} are allowed"),
             );
         }
-        self.inertia.check(problems, "time.inertia");
+        self.scheme().check(problems, "time.scheme");
         for (key, given) in [("time.beta", self.beta), ("time.gamma", self.gamma)] {
-            if let (Inertia::GeneralizedAlpha(_), Some(given)) = (self.inertia, given) {
-                problems.refuse(key, Number(given), "belongs to time.inertia \"newmark\": remove one of the two");
+            if let (schemes::Parameters::GeneralizedAlpha(_), Some(given)) = (self.scheme(), given) {
+                problems.refuse(key, Number(given), "belongs to time.scheme \"newmark\": remove one of the two");
             }
         }
         // 2β ≥ γ ≥ ½, up to round-off in values such as β = (γ + ½)²/4.

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::shape::Shape as Drawn;
+use super::time::word;
 use super::{BodyUse, Scene};
 use crate::grid::{Grid, indices};
 use crate::material::{Law, Material, poissons_ratio};
@@ -16,24 +17,24 @@ use std::collections::BTreeSet;
 const COINCIDENT: f64 = 1e-6;
 
 /// Maximum number of coincident positions in the message.
-const NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 /// Volume difference between a body and its shape, relative to the shape, above which a warning is given. Weight, momentum and energies
 /// have the same relative error. The limit is twice the error of the accuracy `"standard"`; with `fill: "cut"` the difference is 1e-4.
-const MISSED: f64 = 0.01;
+const MAX_VOLUME_ERROR: f64 = 0.01;
 
 /// Uncertainty of the volume in a cell with curved surfaces, relative to the cell.
-const UNSURE: f64 = 1e-3;
+const VOLUME_UNCERTAINTY: f64 = 1e-3;
 
 /// Minimum number of cells across a body for correct bending and compression.
-const CELLS: f64 = 2.0;
+const MIN_CELLS_ACROSS: f64 = 2.0;
 
 /// Tolerance of the estimated thickness, which is twice a depth of particles that need not lie in the middle. With this tolerance, a body
 /// of two cells gets no warning.
-const ABOUT: f64 = 0.95;
+const THICKNESS_TOLERANCE: f64 = 0.95;
 
 /// Poisson's ratio from which on a body with pointwise dilatation is said to lock.
-const LOCKS: f64 = 0.45;
+const LOCKING_POISSON: f64 = 0.45;
 
 /// The built bodies of a scene.
 struct Bodies<'a, const D: usize> {
@@ -70,18 +71,12 @@ impl Scene {
             .flat_map(|a| (0..a).map(move |b| (b, a)))
             .filter_map(|(a, b)| bodies.overlap(a, b))
             .collect();
-        all.extend(self.ghost_stiffness.map(|factor| {
-            format!(
-                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {} here. Remove the key; the next \
-                 release refuses it",
-                self.aggregates()
-            )
-        }));
+        all.extend(self.deprecated_keys());
         all.extend(bodies.coincident());
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.thin(body)));
         all.extend((0..self.bodies.len()).filter_map(|body| bodies.locks(body)));
         let filled = self.filled_otherwise(simulation);
-        all.extend(filled.into_iter().filter_map(|(number, body)| missed(number, &body)));
+        all.extend(filled.into_iter().filter_map(|(number, body)| volume_differs(number, &body)));
         let prescribed = simulation.loads.prescribed.iter().filter_map(|prescribed| match &prescribed.on {
             Selection::Region(region) => Some(region.clone()),
             Selection::Face { .. } => None,
@@ -102,6 +97,27 @@ impl Scene {
         all
     }
 
+    /// Notes on given keys that the next release refuses.
+    fn deprecated_keys(&self) -> Vec<String> {
+        let ghost_stiffness = self.ghost_stiffness.map(|factor| {
+            let replaced = self.aggregates();
+            format!(
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {replaced} here. Remove the key; the \
+                 next release refuses it"
+            )
+        });
+        let precision = self.solver.krylov.precision.map(|_| {
+            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove the key; the next \
+             release refuses it"
+                .to_owned()
+        });
+        let inertia = self.time.inertia.map(|_| {
+            let scheme = word(self.time.scheme());
+            format!("time.inertia is now called time.scheme, which is {scheme} here. Rename the key; the next release refuses it")
+        });
+        ghost_stiffness.into_iter().chain(precision).chain(inertia).collect()
+    }
+
     /// Bodies whose volume may differ from that of their shape, with their numbers.
     fn filled_otherwise<const D: usize>(&self, simulation: &Simulation<D>) -> Vec<(usize, BodyUse)> {
         if self.bodies.iter().all(|body| body.fill == Fill::Cut) {
@@ -120,14 +136,15 @@ impl<const D: usize> Bodies<'_, D> {
     /// Particles of `body` that lie in the shape of `other`.
     fn inside(&self, body: usize, other: usize) -> Vec<usize> {
         let Some(shape) = &self.shapes[other] else { return Vec::new() };
-        let ((min, max), hair) = (shape.bounding_box(), EDGE * self.spacing());
+        let (min, max) = shape.bounding_box();
+        let round_off = EDGE * self.spacing();
         let own = self.shapes[body].as_ref().map(Shape::bounding_box);
         if own.is_some_and(|(own_min, own_max)| (0..D).any(|k| own_max[k] <= min[k] || own_min[k] >= max[k])) {
             return Vec::new();
         }
         let position = &self.simulation.particles.position;
         let near = |p: &&usize| (0..D).all(|k| position[**p][k] > min[k] && position[**p][k] < max[k]);
-        let inside = |p: &&usize| shape.signed_distance(&position[**p]) < -hair;
+        let inside = |p: &&usize| shape.signed_distance(&position[**p]) < -round_off;
         self.particles[body].iter().filter(near).filter(inside).copied().collect()
     }
 
@@ -146,7 +163,7 @@ impl<const D: usize> Bodies<'_, D> {
             _ => found.iter().map(|&p| particles.volume[p]).sum(),
         };
         let [a, b] = [a, b].map(|body| &self.scene[body].name);
-        (volume > UNSURE * cells.len() as f64 * grid.spacing.powi(D as i32)).then(|| {
+        (volume > VOLUME_UNCERTAINTY * cells.len() as f64 * grid.spacing.powi(D as i32)).then(|| {
             format!(
                 "bodies {a:?} and {b:?} overlap: {} particles of one lie in the other, in a volume of {volume:.4e}; there they move as \
                  one, with the mass and the stiffness of both",
@@ -167,13 +184,13 @@ impl<const D: usize> Bodies<'_, D> {
         let mut keys: Vec<([i64; D], usize)> = self.particles.iter().flatten().map(|&p| (key(p), p)).collect();
         keys.sort_unstable();
         let same: Vec<usize> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
-        let places = same.iter().take(NAMED).map(|&p| {
+        let places = same.iter().take(MAX_NAMED).map(|&p| {
             let place: Vec<String> = position[p].iter().map(ToString::to_string).collect();
             format!("({})", place.join(", "))
         });
         (!same.is_empty()).then(|| {
             let places = places.collect::<Vec<_>>().join(", ");
-            let more = if same.len() > NAMED { ", …" } else { "" };
+            let more = if same.len() > MAX_NAMED { ", …" } else { "" };
             format!("{} particles lie at the place of another one: at {places}{more}; they move as one", same.len())
         })
     }
@@ -183,7 +200,7 @@ impl<const D: usize> Bodies<'_, D> {
     fn thin(&self, body: usize) -> Option<String> {
         let (own, particles, h) = (&self.particles[body], &self.simulation.particles, self.spacing());
         let width = |p: usize| particles.volume[p].powf(1.0 / D as f64);
-        let enough = CELLS * h * ABOUT;
+        let enough = MIN_CELLS_ACROSS * h * THICKNESS_TOLERANCE;
         let across = match &self.shapes[body] {
             Some(shape) => {
                 let mut most: f64 = 0.0;
@@ -204,7 +221,7 @@ impl<const D: usize> Bodies<'_, D> {
         (across < enough).then(|| {
             let name = &self.scene[body].name;
             format!(
-                "body {name:?} is about {across:.3e} thick where it is thickest, {:.2} cells; from {CELLS} on it bends and presses as it \
+                "body {name:?} is about {across:.3e} thick where it is thickest, {:.2} cells; from {MIN_CELLS_ACROSS} on it bends and presses as it \
                  should: lower grid.spacing",
                 across / h
             )
@@ -217,7 +234,7 @@ impl<const D: usize> Bodies<'_, D> {
         let body = self.simulation.bodies.get(number).filter(|body| D > 1 && !body.averages())?;
         // The tolerance covers the round-off of a given ν = 0.45.
         let (poisson, flows) = (poissons_ratio(&body.law), matches!(body.law, Material::VonMises(_)));
-        if poisson < LOCKS - 1e-9 && !flows {
+        if poisson < LOCKING_POISSON - 1e-9 && !flows {
             return None;
         }
         let why = if flows { "flows without a change of volume" } else { "hardly changes its volume" };
@@ -242,9 +259,9 @@ impl<const D: usize> Bodies<'_, D> {
 }
 
 /// Warns of a body whose volume, and thus mass, differs from that of its shape.
-fn missed(number: usize, body: &BodyUse) -> Option<String> {
+fn volume_differs(number: usize, body: &BodyUse) -> Option<String> {
     let BodyUse { name, volume, drawn, .. } = body;
-    let drawn = drawn.filter(|drawn| (volume / drawn - 1.0).abs() > MISSED)?;
+    let drawn = drawn.filter(|drawn| (volume / drawn - 1.0).abs() > MAX_VOLUME_ERROR)?;
     Some(format!(
         "body {name:?} has the volume {volume:.6}, and its shape {drawn:.6}: its mass is {:+.1} % off; bodies[{number}].fill \"cut\" \
          makes them equal",

@@ -9,13 +9,13 @@ use crate::tensor::{Tensor, Vector, determinant};
 const FLAT: f64 = 1e-3;
 
 /// Largest number of planes in one box: each plane may double the number of simplices.
-const MANY: usize = 6;
+const MAX_PLANES: usize = 6;
 
 /// Two pieces of surface in a box count as one side if the cosine of the angle between their normals exceeds this.
-const ALIKE: f64 = 0.9;
+const SAME_SIDE: f64 = 0.9;
 
 /// The smallest distance between two sides of a thin part, relative to the departure of the surface from its planes.
-const APART: f64 = 8.0;
+const SIDES_APART: f64 = 8.0;
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +96,19 @@ impl<const D: usize> Cut<D> {
     /// The signed distance of a point from one of the planes.
     fn distance(&self, plane: &Face<D>, x: &Vector<f64, D>) -> f64 {
         plane.0 + plane.1.dot(&(x - self.center))
+    }
+
+    /// The simplices of a box, cut by all planes.
+    fn simplices(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, round_off: f64) -> Vec<Simplex<D>> {
+        let mut simplices = simplices_of_box(lower, edges);
+        for plane in &self.planes {
+            let mut parts = Vec::new();
+            for simplex in simplices {
+                split(simplex, &|x| self.distance(plane, x), round_off, &mut parts);
+            }
+            simplices = parts;
+        }
+        simplices
     }
 }
 
@@ -191,7 +204,7 @@ impl<const D: usize> Shape<D> {
             if region.is_some_and(|region| region.signed_distance(&facet.position) > slack) {
                 return;
             }
-            let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > ALIKE * side.normal.norm();
+            let side = |side: &&mut Facet<D>| side.normal.dot(&facet.normal) > SAME_SIDE * side.normal.norm();
             let Some(side) = sides.iter_mut().find(side) else {
                 sides.push(facet);
                 return;
@@ -220,12 +233,12 @@ impl<const D: usize> Shape<D> {
 
     /// The side of a simplex opposite the corner `apex`, if this side lies on the surface of the solid.
     fn end(&self, simplex: &Simplex<D>, apex: usize, volume: f64, cut: &Cut<D>, spacing: f64) -> Option<End<D>> {
-        let hair = EDGE * spacing;
+        let round_off = EDGE * spacing;
         let mut corners = simplex[..=D].to_vec();
         corners.swap_remove(apex);
         let height = |plane: &Face<D>| cut.distance(plane, &simplex[apex]);
         let lies_in = |plane: &&Face<D>| {
-            height(plane).abs() > hair && corners.iter().all(|x| cut.distance(plane, x).abs() <= hair)
+            height(plane).abs() > round_off && corners.iter().all(|x| cut.distance(plane, x).abs() <= round_off)
         };
         let plane = cut.planes.iter().find(lies_in)?;
         let outward = plane.1 * -height(plane).signum();
@@ -233,7 +246,7 @@ impl<const D: usize> Shape<D> {
         let area = D as f64 * volume / height(plane).abs();
         let middle = corners.iter().sum::<Vector<f64, D>>() / D as f64;
         // A point past the plane, and past planes that count as equal to it, but not past the next plane.
-        let beyond = middle + outward * (2.0 * cut.departure + 8.0 * hair);
+        let beyond = middle + outward * (2.0 * cut.departure + 8.0 * round_off);
         (!self.contains(&beyond)).then_some(End { corners, outward, area, departure: cut.departure })
     }
 
@@ -270,48 +283,22 @@ impl<const D: usize> Shape<D> {
             visit(Piece { volume: edges.product().abs(), centroid: center, extent: Extent::Box(*edges) }, None);
             return;
         }
-        let (mut planes, mut departure) = (Vec::new(), 0.0_f64);
+        let mut planes = Vec::new();
+        let mut departure: f64 = 0.0;
         for shape in std::iter::once(self).chain(region) {
             departure = departure.max(shape.solid().add_planes(&center, radius, &mut planes));
         }
-        let hair = EDGE * spacing;
-        // Two planes are equal if their distance is at most `hair` everywhere in the box.
-        let same = |a: &Face<D>, b: &Face<D>| {
-            let along = a.1.dot(&b.1).signum();
-            (a.1 - b.1 * along).norm() * radius + (a.0 - b.0 * along).abs() <= hair
-        };
-        let mut distinct: Vec<Face<D>> = Vec::new();
-        for plane in planes {
-            if !distinct.iter().any(|other| same(other, &plane)) {
-                distinct.push(plane);
+        let round_off = EDGE * spacing;
+        let planes = distinct(planes, radius, round_off);
+        let is_flat = departure <= flat * spacing && !may_be_confused(&planes, departure) && planes.len() <= MAX_PLANES;
+        if !is_flat && radius > flat * spacing {
+            for (lower, edges) in halves(lower, edges) {
+                self.pieces(region, &lower, &edges, spacing, flat, visit);
             }
-        }
-        // The two sides of a thin part must not be mistaken for each other.
-        let close = |a: &Face<D>, b: &Face<D>| {
-            let along = a.1.dot(&b.1);
-            along.abs() > ALIKE && (a.0 - b.0 * along.signum()).abs() < APART * departure
-        };
-        let blurred = distinct.iter().enumerate().any(|(i, a)| distinct[..i].iter().any(|b| close(a, b)));
-        if (departure > flat * spacing || blurred || distinct.len() > MANY) && radius > flat * spacing {
-            let k = edges.iamax();
-            let mut half = *edges;
-            half[k] *= 0.5;
-            let mut upper = *lower;
-            upper[k] += half[k];
-            self.pieces(region, lower, &half, spacing, flat, visit);
-            self.pieces(region, &upper, &half, spacing, flat, visit);
             return;
         }
-        let cut = Cut { center, planes: distinct, departure: departure.min(2.0 * radius) };
-        let mut simplices = halved_box(lower, edges);
-        for plane in &cut.planes {
-            let mut parts = Vec::new();
-            for simplex in simplices {
-                split(simplex, &|x| cut.distance(plane, x), hair, &mut parts);
-            }
-            simplices = parts;
-        }
-        for simplex in simplices {
+        let cut = Cut { center, planes, departure: departure.min(2.0 * radius) };
+        for simplex in cut.simplices(lower, edges, round_off) {
             let volume = volume(&simplex);
             let centroid = simplex[..=D].iter().sum::<Vector<f64, D>>() / (D + 1) as f64;
             if volume > 0.0 && self.holds_by(&cut, &centroid) {
@@ -321,13 +308,48 @@ impl<const D: usize> Shape<D> {
     }
 }
 
+/// The planes without repetitions. Two planes are equal if their distance is at most `round_off` everywhere within `radius`.
+fn distinct<const D: usize>(planes: Vec<Face<D>>, radius: f64, round_off: f64) -> Vec<Face<D>> {
+    let equal = |a: &Face<D>, b: &Face<D>| {
+        let along = a.1.dot(&b.1).signum();
+        (a.1 - b.1 * along).norm() * radius + (a.0 - b.0 * along).abs() <= round_off
+    };
+    let mut distinct: Vec<Face<D>> = Vec::new();
+    for plane in planes {
+        if !distinct.iter().any(|other| equal(other, &plane)) {
+            distinct.push(plane);
+        }
+    }
+    distinct
+}
+
+/// Whether two planes may be mistaken for each other: the two sides of a thin part, whose distance is not much larger than the departure of
+/// the surface.
+fn may_be_confused<const D: usize>(planes: &[Face<D>], departure: f64) -> bool {
+    let close = |a: &Face<D>, b: &Face<D>| {
+        let along = a.1.dot(&b.1);
+        along.abs() > SAME_SIDE && (a.0 - b.0 * along.signum()).abs() < SIDES_APART * departure
+    };
+    planes.iter().enumerate().any(|(i, a)| planes[..i].iter().any(|b| close(a, b)))
+}
+
+/// The two halves of a box across its longest edge: the lower corner and the edges of each.
+fn halves<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> [(Vector<f64, D>, Vector<f64, D>); 2] {
+    let k = edges.iamax();
+    let mut half = *edges;
+    half[k] *= 0.5;
+    let mut middle = *lower;
+    middle[k] += half[k];
+    [(*lower, half), (middle, half)]
+}
+
 /// The centre of a box, and the distance of its corners from the centre. A small margin includes faces that the box only touches.
 pub(super) fn around<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> (Vector<f64, D>, f64) {
     (lower + edges * 0.5, (0.5 + EDGE) * edges.norm())
 }
 
 /// The D! simplices of a box (Kuhn). Each simplex leads from the lower corner to the upper corner, one axis at a time.
-fn halved_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> Vec<Simplex<D>> {
+fn simplices_of_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) -> Vec<Simplex<D>> {
     let orders: &[[usize; 3]] = match D {
         1 => &[[0, 0, 0]],
         2 => &[[0, 1, 0], [1, 0, 0]],
@@ -348,12 +370,12 @@ fn halved_box<const D: usize>(lower: &Vector<f64, D>, edges: &Vector<f64, D>) ->
 fn split<const D: usize>(
     simplex: Simplex<D>,
     f: &impl Fn(&Vector<f64, D>) -> f64,
-    hair: f64,
+    round_off: f64,
     parts: &mut Vec<Simplex<D>>,
 ) {
     let corners = &simplex[..=D];
     let values: Vec<f64> = corners.iter().map(f).collect();
-    let of_sign = |sign: f64| values.iter().position(|value| value * sign > hair);
+    let of_sign = |sign: f64| values.iter().position(|value| value * sign > round_off);
     let (Some(i), Some(k)) = (of_sign(-1.0), of_sign(1.0)) else {
         parts.push(simplex);
         return;
@@ -362,7 +384,7 @@ fn split<const D: usize>(
     for replaced in [i, k] {
         let mut part = simplex;
         part[replaced] = zero;
-        split(part, f, hair, parts);
+        split(part, f, round_off, parts);
     }
 }
 

@@ -1,6 +1,8 @@
 //! Filling a solid with particles.
 
-use super::layout::between_middles;
+use super::layout::{Points, between_middles};
+use super::quadrature::THIN_PART;
+use super::seeds::{Seed, Seeds};
 use super::{EDGE, Layout, Shape};
 use crate::grid::{Grid, indices};
 use crate::tensor::Vector;
@@ -74,23 +76,11 @@ impl Filling {
     }
 }
 
-/// A new particle: its position and its volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seed<const D: usize> {
-    /// The position x.
-    pub position: Vector<f64, D>,
-    /// The initial volume V₀.
-    pub volume: f64,
-}
-
 /// Parts of a box smaller than this share of it are joined to their neighbour.
 const SLIVER: f64 = 0.1;
 
-/// The limit in place of [`SLIVER`] for pieces with quadrature points. Joining changes second moments, so this limit is smaller.
-pub(super) const THIN: f64 = 1e-3;
-
 /// Parts below this fraction of a box are round-off. A box that lacks no more than this fraction is full.
-const NOTHING: f64 = 1e-9;
+const VOLUME_ROUND_OFF: f64 = 1e-9;
 
 /// A shape that cannot be filled.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -141,124 +131,29 @@ pub enum FillError {
 /// # Errors
 /// The shape needs more than [`MAX_CANDIDATES`] positions (found before anything is allocated), or no particle lies in the shape.
 pub fn fill<const D: usize>(grid: &Grid<D>, shape: &Shape<D>, how: Filling) -> Result<Vec<Seed<D>>, FillError> {
-    let h = grid.spacing;
     let (first, count) = around(grid, shape);
     let candidates = count.iter().map(|&n| n as f64 * f64::from(how.per_axis)).product::<f64>();
     if candidates > MAX_CANDIDATES {
         return Err(FillError::TooMany { candidates });
     }
-    // The points along an axis, indexed by whether the cell below is full and whether the cell above is full.
-    let between = how.pieces() > 1;
-    let points = [[false, false], [true, false], [false, true], [true, true]]
-        .map(|goes_on| if between { between_middles(how.per_axis, goes_on) } else { how.layout.points(how.per_axis) });
-    // Each piece is measured as in the loop below: neighbouring cells must agree on which of them is full.
-    let size: Vector<f64, D> = Vector::repeat(h / f64::from(how.pieces()));
-    let integrated = |lower: Vector<f64, D>, degree: u32| shape.quadrature(&lower, &size, h, degree, how.per_axis);
-    let is_full = |cell: [u64; D]| {
-        let lowers = indices([u64::from(how.pieces()); D]).map(|i| {
-            let within = |k: usize| i[k] as f64 / f64::from(how.pieces());
-            Vector::from_fn(|k, _| grid.origin[k] + ((first[k] + cell[k]) as f64 + within(k)) * h)
-        });
-        let volume = |lower: Vector<f64, D>| match integrated(lower, 0) {
-            Some(points) => points.iter().map(|point| point.volume).sum(),
-            None => shape.part(&lower, &size, h).0,
-        };
-        lowers.map(volume).all(|volume| volume >= (1.0 - NOTHING) * size.product())
-    };
-    let full: Vec<bool> = if between { indices(count).map(is_full).collect() } else { Vec::new() };
-    // The points of a full box in a cut cell: one particle, or the Gauss points.
-    let (middle, gauss) = (Layout::Regular.points(1), how.layout.points(how.per_axis));
-    let edges: Vector<f64, D> = Vector::repeat(h / f64::from(how.boxes()));
-    let mut filling = Seeds { seeds: Vec::new(), cells: Vec::new(), slivers: Vec::new(), count };
-    let mut rows = None;
+    let filler = Filler::new(grid, shape, how, first, count);
+    let mut seeds = Seeds::new(count);
+    let mut row = None;
     for (id, cell) in (0..).zip(indices(count)) {
-        let corner: [f64; D] = std::array::from_fn(|k| (first[k] + cell[k]) as f64);
-        let position = |within: Vector<f64, D>| Vector::from_fn(|k, _| grid.origin[k] + (corner[k] + within[k]) * h);
-        let lowers = |n: u32| {
-            indices([u64::from(n); D]).map(move |i| position(Vector::from_fn(|k, _| i[k] as f64 / f64::from(n))))
-        };
-        let one = |(volume, centroid): (f64, Vector<f64, D>)| vec![Seed { position: centroid, volume }];
         if how.rule == Fill::Cut && cell[0] == 0 {
-            // The boxes of a row of cells, if the shape computes them all at once.
-            let along = count[0] as usize * how.boxes() as usize;
-            rows = lowers(how.boxes())
-                .step_by(how.boxes() as usize)
-                .map(|lower| shape.row(&lower, &edges, along))
-                .collect::<Option<Vec<_>>>();
+            row = filler.boxes_of_row(cell);
         }
-        let mut parts = None;
-        if let Some(rows) = &rows {
-            let from = cell[0] as usize * how.boxes() as usize;
-            let of_cell = rows.iter().flat_map(|row| row.iter().skip(from).take(how.boxes() as usize).copied());
-            let of_cell: Vec<_> = of_cell.collect();
-            if of_cell.iter().all(|part| part.0 <= 0.0) {
-                continue;
-            }
-            let boxes = of_cell.into_iter().map(one).collect();
-            parts = Some(Parts { boxes, along: how.boxes(), full: &middle, sliver: SLIVER });
-        } else {
-            let distance = shape.signed_distance(&position(Vector::repeat(0.5)));
-            let across = 0.5 * h * (D as f64).sqrt();
-            let all = match how.rule {
-                Fill::Cells => distance <= EDGE * h,
-                Fill::Particles => true,
-                Fill::Cut => distance < across,
-            };
-            if !all {
-                continue;
-            }
-            if how.rule == Fill::Cut && distance > -across {
-                let all = (how.layout == Layout::Gauss)
-                    .then(|| lowers(how.pieces()).map(|lower| integrated(lower, how.degree)).collect());
-                parts = Some(match all.flatten() {
-                    Some(boxes) => Parts { boxes, along: how.pieces(), full: &gauss, sliver: THIN },
-                    None => {
-                        let boxes = lowers(how.boxes()).map(|lower| one(shape.part(&lower, &edges, h)));
-                        Parts { boxes: boxes.collect(), along: how.boxes(), full: &middle, sliver: SLIVER }
-                    }
-                });
-            }
+        let content = filler.content(cell, row.as_deref());
+        if how.rule == Fill::Cut && !matches!(content, Content::Nothing) {
+            seeds.begin_cell(id);
         }
-        if how.rule == Fill::Cut {
-            filling.cells.push((id, filling.seeds.len()));
-        }
-        if let Some(Parts { boxes: parts, along: n, full: in_full, sliver: little }) = parts {
-            let size = h / f64::from(n);
-            let share = |part: &[Seed<D>]| part.iter().map(|seed| seed.volume).sum::<f64>() / size.powi(D as i32);
-            if parts.iter().any(|part| share(part) < 1.0 - NOTHING) {
-                for (i, part) in indices([u64::from(n); D]).zip(parts) {
-                    let share = share(&part);
-                    if share > 1.0 - NOTHING {
-                        for j in indices([in_full.len() as u64; D]) {
-                            let along: [(f64, f64); D] = std::array::from_fn(|k| in_full[j[k] as usize]);
-                            let within = Vector::from_fn(|k, _| (i[k] as f64 + along[k].0) / f64::from(n));
-                            let volume = along.iter().map(|(_, weight)| weight * size).product();
-                            filling.seeds.push(Seed { position: position(within), volume });
-                        }
-                    } else if share > NOTHING {
-                        filling.add_part(id, part, share < little);
-                    }
-                }
-                continue;
-            }
-        }
-        let goes_on = |beside: Option<u64>| beside.and_then(|id| full.get(id as usize)).is_some_and(|&full| full);
-        let mut stride = 1;
-        let along: [&[(f64, f64)]; D] = std::array::from_fn(|k| {
-            let below = (cell[k] > 0).then(|| id - stride);
-            let above = (cell[k] + 1 < count[k]).then(|| id + stride);
-            stride *= count[k];
-            points[usize::from(goes_on(below)) + 2 * usize::from(goes_on(above))].as_slice()
-        });
-        for i in indices(along.map(|points| points.len() as u64)) {
-            let x = position(Vector::from_fn(|k, _| along[k][i[k] as usize].0));
-            if how.rule != Fill::Particles || shape.holds(&x, h) {
-                let volume = (0..D).map(|k| along[k][i[k] as usize].1 * h).product();
-                filling.seeds.push(Seed { position: x, volume });
-            }
+        match content {
+            Content::Nothing => {}
+            Content::Whole => filler.fill_whole(id, cell, &mut seeds),
+            Content::Parts(parts) => filler.fill_parts(id, cell, parts, &mut seeds),
         }
     }
-    let seeds = filling.joined();
+    let seeds = seeds.joined();
     if seeds.is_empty() { Err(FillError::Empty { candidates: candidates as u64 }) } else { Ok(seeds) }
 }
 
@@ -277,83 +172,221 @@ pub(crate) fn around<const D: usize>(grid: &Grid<D>, shape: &Shape<D>) -> ([u64;
     (first, count)
 }
 
-/// The parts of a cell that may be cut.
+/// The cells around a shape, and the rules by which they are filled.
+struct Filler<'a, const D: usize> {
+    grid: &'a Grid<D>,
+    shape: &'a Shape<D>,
+    how: Filling,
+    /// The first cell.
+    first: [u64; D],
+    /// Cells along each axis.
+    count: [u64; D],
+    /// The points along an axis of a whole cell. The index is 1 if the cell below is full, plus 2 if the cell above is full.
+    points: [Points; 4],
+    /// Whether each cell is full; empty if the points of a cell do not depend on its neighbours.
+    full: Vec<bool>,
+    /// The point along an axis of a box with one particle.
+    middle: Points,
+    /// The points along an axis of a box with Gauss points.
+    gauss: Points,
+}
+
+/// The volume and the centroid of the part of a box in the shape.
+type Part<const D: usize> = (f64, Vector<f64, D>);
+
+/// The content of a cell.
+enum Content<'a, const D: usize> {
+    Nothing,
+    Whole,
+    Parts(Parts<'a, D>),
+}
+
+/// The parts of a cut cell.
 struct Parts<'a, const D: usize> {
     /// The particles in each box of the cell.
     boxes: Vec<Vec<Seed<D>>>,
     /// The number of boxes along an axis.
     along: u32,
+    /// The volume of a box.
+    box_volume: f64,
     /// Positions and weights along an axis of a full box.
     full: &'a [(f64, f64)],
     /// A part below this fraction of a box is a sliver.
     sliver: f64,
 }
 
-/// The new particles, cell by cell.
-struct Seeds<const D: usize> {
-    seeds: Vec<Seed<D>>,
-    /// The cells that have seeds, in order, and the first seed of each cell.
-    cells: Vec<(u64, usize)>,
-    /// The slivers: the cell and the number of each seed.
-    slivers: Vec<(u64, usize)>,
-    /// Cells along each axis.
-    count: [u64; D],
+impl<const D: usize> Parts<'_, D> {
+    /// The fraction of a box that its particles fill.
+    fn share(&self, part: &[Seed<D>]) -> f64 {
+        part.iter().map(|seed| seed.volume).sum::<f64>() / self.box_volume
+    }
 }
 
-impl<const D: usize> Seeds<D> {
-    /// Adds the seeds of a part of a cell. A sliver becomes a single seed.
-    fn add_part(&mut self, cell: u64, part: Vec<Seed<D>>, sliver: bool) {
-        if !sliver {
-            self.seeds.extend(part);
-            return;
+impl<'a, const D: usize> Content<'a, D> {
+    /// The parts of a cell, or a whole cell if all its boxes are full.
+    fn of(parts: Parts<'a, D>) -> Self {
+        let is_cut = parts.boxes.iter().any(|part| parts.share(part) < 1.0 - VOLUME_ROUND_OFF);
+        if is_cut { Self::Parts(parts) } else { Self::Whole }
+    }
+}
+
+impl<'a, const D: usize> Filler<'a, D> {
+    fn new(grid: &'a Grid<D>, shape: &'a Shape<D>, how: Filling, first: [u64; D], count: [u64; D]) -> Self {
+        let between = how.pieces() > 1;
+        let points = [[false, false], [true, false], [false, true], [true, true]].map(|is_full| {
+            if between { between_middles(how.per_axis, is_full) } else { how.layout.points(how.per_axis) }
+        });
+        let middle = Layout::Regular.points(1);
+        let gauss = how.layout.points(how.per_axis);
+        let mut filler = Self { grid, shape, how, first, count, points, full: Vec::new(), middle, gauss };
+        if between {
+            filler.full = indices(count).map(|cell| filler.is_full(cell)).collect();
         }
-        let volume = part.iter().map(|seed| seed.volume).sum();
-        let moment: Vector<f64, D> = part.iter().map(|seed| seed.position * seed.volume).sum();
-        self.slivers.push((cell, self.seeds.len()));
-        self.seeds.push(Seed { position: moment / volume, volume });
+        filler
     }
 
-    /// Joins each sliver to the nearest seed that is not a sliver, in its cell or in a neighbouring cell. Volume and first moments are
-    /// kept. The positions before any joining decide which seed is nearest, so the order of cells has no influence.
-    fn joined(mut self) -> Vec<Seed<D>> {
-        let mut gone = vec![false; if self.slivers.is_empty() { 0 } else { self.seeds.len() }];
-        self.slivers.iter().for_each(|&(_, sliver)| gone[sliver] = true);
-        let nearest = |&(cell, sliver): &(u64, usize)| {
-            let far = |i: usize| (self.seeds[i].position - self.seeds[sliver].position).norm_squared();
-            let near = self.beside(cell).filter(|&i| !gone[i]).min_by(|&a, &b| far(a).total_cmp(&far(b)));
-            (sliver, near)
+    /// A position in a cell, given in units of the spacing from the lower corner.
+    fn position(&self, cell: [u64; D], within: Vector<f64, D>) -> Vector<f64, D> {
+        let corner: [f64; D] = std::array::from_fn(|k| (self.first[k] + cell[k]) as f64);
+        Vector::from_fn(|k, _| self.grid.origin[k] + (corner[k] + within[k]) * self.grid.spacing)
+    }
+
+    /// The lower corners of `n` boxes along each axis of a cell.
+    fn lower_corners(&self, cell: [u64; D], n: u32) -> impl Iterator<Item = Vector<f64, D>> {
+        indices([u64::from(n); D]).map(move |i| self.position(cell, Vector::from_fn(|k, _| i[k] as f64 / f64::from(n))))
+    }
+
+    /// The edge of a box, with `n` boxes along each axis of a cell.
+    fn edge(&self, n: u32) -> f64 {
+        self.grid.spacing / f64::from(n)
+    }
+
+    /// The quadrature points of a piece of a cell, if there are any.
+    fn quadrature(&self, lower: &Vector<f64, D>, degree: u32) -> Option<Vec<Seed<D>>> {
+        let edges = Vector::repeat(self.edge(self.how.pieces()));
+        self.shape.quadrature(lower, &edges, self.grid.spacing, degree, self.how.per_axis)
+    }
+
+    /// Whether the shape contains a cell. Each piece is measured as in [`Self::parts`]: neighbouring cells must agree on which of them is
+    /// full.
+    fn is_full(&self, cell: [u64; D]) -> bool {
+        let edges: Vector<f64, D> = Vector::repeat(self.edge(self.how.pieces()));
+        let volume = |lower: Vector<f64, D>| match self.quadrature(&lower, 0) {
+            Some(points) => points.iter().map(|point| point.volume).sum(),
+            None => self.shape.part(&lower, &edges, self.grid.spacing).0,
         };
-        let joins: Vec<(usize, Option<usize>)> = self.slivers.iter().map(nearest).collect();
-        for (sliver, near) in joins {
-            let Some(near) = near else {
-                gone[sliver] = false;
-                continue;
-            };
-            let small = self.seeds[sliver];
-            let Seed { position, volume } = &mut self.seeds[near];
-            let sum = *volume + small.volume;
-            *position = (*position * *volume + small.position * small.volume) / sum;
-            *volume = sum;
-        }
-        let mut gone = gone.into_iter();
-        self.seeds.retain(|_| !gone.next().unwrap_or(false));
-        self.seeds
+        let mut volumes = self.lower_corners(cell, self.how.pieces()).map(volume);
+        volumes.all(|volume| volume >= (1.0 - VOLUME_ROUND_OFF) * edges.product())
     }
 
-    /// The seeds of a cell and of the cells that share a face with it.
-    fn beside(&self, cell: u64) -> impl Iterator<Item = usize> {
-        let (mut near, mut stride) = (vec![cell], 1);
-        for &n in &self.count {
-            let index = cell / stride % n;
-            near.extend((index > 0).then(|| cell - stride));
-            near.extend((index + 1 < n).then(|| cell + stride));
-            stride *= n;
+    /// The volume and the centroid of the shape in the boxes of a row of cells, if the shape computes them all at once. The boxes are in
+    /// rows along the first axis.
+    fn boxes_of_row(&self, first: [u64; D]) -> Option<Vec<Vec<Part<D>>>> {
+        let boxes = self.how.boxes();
+        let edges = Vector::repeat(self.edge(boxes));
+        let along = self.count[0] as usize * boxes as usize;
+        let starts = self.lower_corners(first, boxes).step_by(boxes as usize);
+        starts.map(|lower| self.shape.row(&lower, &edges, along)).collect()
+    }
+
+    /// The content of a cell. `row` has the boxes of its row of cells, if the shape computes them all at once.
+    fn content(&self, cell: [u64; D], row: Option<&[Vec<Part<D>>]>) -> Content<'_, D> {
+        if let Some(row) = row {
+            let boxes = self.how.boxes() as usize;
+            let of_cell = row.iter().flat_map(|row| row.iter().skip(cell[0] as usize * boxes).take(boxes));
+            let of_cell: Vec<_> = of_cell.copied().collect();
+            let is_empty = of_cell.iter().all(|(volume, _)| *volume <= 0.0);
+            return if is_empty { Content::Nothing } else { Content::of(self.parts_with_one_particle(of_cell)) };
         }
-        near.into_iter().flat_map(|cell| {
-            let after = self.cells.partition_point(|one| one.0 < cell);
-            let start = self.cells.get(after).filter(|one| one.0 == cell).map(|one| one.1);
-            let end = self.cells.get(after + 1).map_or(self.seeds.len(), |one| one.1);
-            start.into_iter().flat_map(move |start| start..end)
+        let h = self.grid.spacing;
+        let distance = self.shape.signed_distance(&self.position(cell, Vector::repeat(0.5)));
+        let half_diagonal = 0.5 * h * (D as f64).sqrt();
+        match self.how.rule {
+            Fill::Particles => Content::Whole,
+            Fill::Cells if distance <= EDGE * h => Content::Whole,
+            Fill::Cut if distance <= -half_diagonal => Content::Whole,
+            Fill::Cut if distance < half_diagonal => Content::of(self.parts(cell)),
+            Fill::Cells | Fill::Cut => Content::Nothing,
+        }
+    }
+
+    /// The parts of a cell at the surface: quadrature points in Gauss layout, if there are any, or one particle in each box.
+    fn parts(&self, cell: [u64; D]) -> Parts<'_, D> {
+        if self.how.layout == Layout::Gauss {
+            let pieces = self.how.pieces();
+            let corners = self.lower_corners(cell, pieces);
+            let points: Option<Vec<_>> = corners.map(|lower| self.quadrature(&lower, self.how.degree)).collect();
+            if let Some(boxes) = points {
+                let box_volume = self.edge(pieces).powi(D as i32);
+                return Parts { boxes, along: pieces, box_volume, full: &self.gauss, sliver: THIN_PART };
+            }
+        }
+        let boxes = self.how.boxes();
+        let edges = Vector::repeat(self.edge(boxes));
+        let corners = self.lower_corners(cell, boxes);
+        let parts = corners.map(|lower| self.shape.part(&lower, &edges, self.grid.spacing));
+        self.parts_with_one_particle(parts.collect())
+    }
+
+    /// The parts of a cell with one particle in each box, from the volume and the centroid in each box.
+    fn parts_with_one_particle(&self, boxes: Vec<Part<D>>) -> Parts<'_, D> {
+        let along = self.how.boxes();
+        let one = |(volume, position): Part<D>| vec![Seed { position, volume }];
+        Parts {
+            boxes: boxes.into_iter().map(one).collect(),
+            along,
+            box_volume: self.edge(along).powi(D as i32),
+            full: &self.middle,
+            sliver: SLIVER,
+        }
+    }
+
+    /// Adds the particles of a whole cell.
+    fn fill_whole(&self, id: u64, cell: [u64; D], seeds: &mut Seeds<D>) {
+        let h = self.grid.spacing;
+        let along = self.points_of_cell(id, cell);
+        for i in indices(along.map(|points| points.len() as u64)) {
+            let position = self.position(cell, Vector::from_fn(|k, _| along[k][i[k] as usize].0));
+            if self.how.rule != Fill::Particles || self.shape.holds(&position, h) {
+                let volume = (0..D).map(|k| along[k][i[k] as usize].1 * h).product();
+                seeds.add(Seed { position, volume });
+            }
+        }
+    }
+
+    /// The points along each axis of a whole cell.
+    fn points_of_cell(&self, id: u64, cell: [u64; D]) -> [&[(f64, f64)]; D] {
+        let is_full = |beside: Option<u64>| beside.and_then(|id| self.full.get(id as usize)).is_some_and(|&full| full);
+        let mut stride = 1;
+        std::array::from_fn(|k| {
+            let below = (cell[k] > 0).then(|| id - stride);
+            let above = (cell[k] + 1 < self.count[k]).then(|| id + stride);
+            stride *= self.count[k];
+            self.points[usize::from(is_full(below)) + 2 * usize::from(is_full(above))].as_slice()
         })
+    }
+
+    /// Adds the particles of a cut cell.
+    fn fill_parts(&self, id: u64, cell: [u64; D], mut parts: Parts<'_, D>, seeds: &mut Seeds<D>) {
+        let boxes = std::mem::take(&mut parts.boxes);
+        for (i, part) in indices([u64::from(parts.along); D]).zip(boxes) {
+            let share = parts.share(&part);
+            if share > 1.0 - VOLUME_ROUND_OFF {
+                self.fill_box(cell, i, &parts, seeds);
+            } else if share > VOLUME_ROUND_OFF {
+                seeds.add_part(id, part, share < parts.sliver);
+            }
+        }
+    }
+
+    /// Adds the particles of a full box of a cut cell.
+    fn fill_box(&self, cell: [u64; D], i: [u64; D], parts: &Parts<'_, D>, seeds: &mut Seeds<D>) {
+        let edge = self.edge(parts.along);
+        for j in indices([parts.full.len() as u64; D]) {
+            let along: [(f64, f64); D] = std::array::from_fn(|k| parts.full[j[k] as usize]);
+            let within = Vector::from_fn(|k, _| (i[k] as f64 + along[k].0) / f64::from(parts.along));
+            let volume = along.iter().map(|(_, weight)| weight * edge).product();
+            seeds.add(Seed { position: self.position(cell, within), volume });
+        }
     }
 }

@@ -12,6 +12,7 @@ mod moments;
 mod pixels;
 mod polygon;
 mod quadrature;
+mod seeds;
 mod similar;
 mod surface;
 
@@ -24,11 +25,12 @@ pub use combined::{Difference, Intersection, Union};
 pub use cone::Cone;
 pub use cut::Facet;
 pub(crate) use fill::around;
-pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, Seed, fill};
+pub use fill::{Fill, FillError, Filling, MAX_CANDIDATES, fill};
 pub use half_space::HalfSpace;
 pub use layout::Layout;
 pub use pixels::{Mask, Pixels};
 pub use polygon::{Polygon, PolygonError};
+pub use seeds::Seed;
 pub use similar::{Similar, rotation};
 pub use surface::{Surface, SurfaceError};
 
@@ -38,7 +40,7 @@ use crate::tensor::Vector;
 pub(crate) const EDGE: f64 = 1e-9;
 
 /// The depth of surface points below the surface, relative to the spacing. So the points lie in the cell of the body in spite of round-off.
-pub(crate) const HAIR: f64 = 1e-6;
+pub(crate) const SURFACE_DEPTH: f64 = 1e-6;
 
 /// A piece of surface: its signed distance d, negative inside, and its outward unit normal n = ∇d.
 type Face<const D: usize> = (f64, Vector<f64, D>);

@@ -13,10 +13,10 @@ use nalgebra::DVector;
 const ROUND_OFF: f64 = 1e-14;
 
 /// The largest error allowed in moments, relative to the volume.
-const MET: f64 = 1e-10;
+const MOMENT_TOLERANCE: f64 = 1e-10;
 
 /// Candidate points per polynomial, tried in turn: more candidates where fewer cannot match the moments.
-const TRIED: [usize; 4] = [4, 16, 64, 256];
+const CANDIDATES_PER_POLYNOMIAL: [usize; 4] = [4, 16, 64, 256];
 
 impl<const D: usize> Piece<D> {
     /// The Gauss points in the piece.
@@ -73,7 +73,7 @@ fn bounds<const D: usize>(pieces: &[Piece<D>]) -> [Vector<f64, D>; 2] {
 pub(super) fn whole_box<const D: usize>(pieces: &[Piece<D>]) -> Option<Piece<D>> {
     let [low, high] = bounds(pieces);
     let (edges, volume) = (high - low, pieces.iter().map(|piece| piece.volume).sum::<f64>());
-    let fills = (edges.product() - volume).abs() <= MET * volume;
+    let fills = (edges.product() - volume).abs() <= MOMENT_TOLERANCE * volume;
     fills.then(|| Piece { volume: edges.product(), centroid: (low + high) * 0.5, extent: Extent::Box(edges) })
 }
 
@@ -190,19 +190,19 @@ pub(super) fn few<const D: usize>(pieces: &[Piece<D>], gaps: &[Seed<D>], degree:
         let piece = pieces.get(up_to.partition_point(|&sum| sum <= within)).or(pieces.last())?;
         Some(piece.place(std::array::from_fn(|k| u([3.0, 5.0, 7.0][k]))))
     };
-    let (mut values, mut points, mut missed) = (DVector::zeros(legendre.count()), Vec::new(), f64::INFINITY);
-    for tries in TRIED {
-        for k in points.len()..tries * legendre.count() {
+    let (mut values, mut points, mut residual) = (DVector::zeros(legendre.count()), Vec::new(), f64::INFINITY);
+    for candidates in CANDIDATES_PER_POLYNOMIAL {
+        for k in points.len()..candidates * legendre.count() {
             let point = place(k)?;
             legendre.at(&point, &mut values);
             problem.offer(values.clone());
             points.push(point);
         }
-        missed = problem.solve(ROUND_OFF * volume);
-        if missed <= ROUND_OFF * volume {
+        residual = problem.solve(ROUND_OFF * volume);
+        if residual <= ROUND_OFF * volume {
             break;
         }
     }
     let found = || problem.solution().map(|(k, volume)| Seed { position: points[k], volume }).collect();
-    (missed <= MET * volume).then(found)
+    (residual <= MOMENT_TOLERANCE * volume).then(found)
 }

@@ -4,7 +4,7 @@ use super::{Face, Solid};
 use crate::tensor::Vector;
 
 /// Vertices and edges nearer to each other, relative to the size of the polygon, are taken to meet.
-const MEET: f64 = 1e-9;
+const MEETING_DISTANCE: f64 = 1e-9;
 
 /// The inside of a closed outline of straight edges in 2D. The outline must not meet itself; it need not be convex.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,18 +82,18 @@ impl<const D: usize> Polygon<D> {
                     if x.norm_squared() > far.norm_squared() { x } else { far }
                 },
             );
-        let hair = MEET * diameter.norm();
+        let tolerance = MEETING_DISTANCE * diameter.norm();
         for i in 0..n {
-            if let Some(k) = (0..i).find(|&k| (vertices[i] - vertices[k]).norm() <= hair) {
+            if let Some(k) = (0..i).find(|&k| (vertices[i] - vertices[k]).norm() <= tolerance) {
                 return Err(PolygonError::Repeated(i, k));
             }
         }
-        if !from_first.clone().any(|x| cross(&diameter, &x).abs() > hair * diameter.norm()) {
+        if !from_first.clone().any(|x| cross(&diameter, &x).abs() > tolerance * diameter.norm()) {
             return Err(PolygonError::Flat);
         }
         let edge = |i: usize| [i, (i + 1) % n];
         for i in 0..n {
-            if let Some(k) = (0..i).find(|&k| meet(&vertices, edge(i), edge(k), hair)) {
+            if let Some(k) = (0..i).find(|&k| meet(&vertices, edge(i), edge(k), tolerance)) {
                 return Err(PolygonError::Meeting(edge(i), edge(k)));
             }
         }
@@ -186,13 +186,13 @@ fn foot<const D: usize>(x: &Vector<f64, D>, [a, b]: [&Vector<f64, D>; 2]) -> (f6
     }
 }
 
-/// Whether two edges cross, or come within `hair` of each other away from a shared vertex. Edges are given by the numbers of their
+/// Whether two edges cross, or come within `tolerance` of each other away from a shared vertex. Edges are given by the numbers of their
 /// vertices.
-fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [usize; 2], hair: f64) -> bool {
+fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [usize; 2], tolerance: f64) -> bool {
     let ends = |edge: [usize; 2]| edge.map(|i| &vertices[i]);
     let ([a, b], [c, d]) = (ends(one), ends(other));
     // Most edges are far apart.
-    if (0..D).any(|k| a[k].min(b[k]) > c[k].max(d[k]) + hair || c[k].min(d[k]) > a[k].max(b[k]) + hair) {
+    if (0..D).any(|k| a[k].min(b[k]) > c[k].max(d[k]) + tolerance || c[k].min(d[k]) > a[k].max(b[k]) + tolerance) {
         return false;
     }
     let apart = |a: &Vector<f64, D>, b: &Vector<f64, D>, c: &Vector<f64, D>, d: &Vector<f64, D>| {
@@ -200,7 +200,7 @@ fn meet<const D: usize>(vertices: &[Vector<f64, D>], one: [usize; 2], other: [us
         (left < 0.0 && right > 0.0) || (left > 0.0 && right < 0.0)
     };
     let touches = |end: usize, edge: [usize; 2]| {
-        !edge.contains(&end) && (vertices[end] - foot(&vertices[end], ends(edge)).1).norm() <= hair
+        !edge.contains(&end) && (vertices[end] - foot(&vertices[end], ends(edge)).1).norm() <= tolerance
     };
     (apart(a, b, c, d) && apart(c, d, a, b))
         || one.into_iter().any(|end| touches(end, other))

@@ -7,7 +7,6 @@
 //! squares finds these volumes. In each box, a surface has D points with the centroid and the second moments of the surface.
 
 use super::cut::{End, Facet, Piece, around};
-use super::fill::THIN;
 use super::moments::{few, in_simplex, whole_box};
 use super::{EDGE, Layout, Seed, Shape};
 use crate::grid::indices;
@@ -15,13 +14,17 @@ use crate::tensor::{Tensor, Vector};
 
 /// The largest distance between a surface and its planes, relative to the spacing, where particles are quadrature points. The gap between
 /// surface and planes is integrated, too. Planes of neighbouring boxes do not quite meet, by the square of this number.
-const FINE: f64 = 1e-2;
+const FLAT_FOR_PARTICLES: f64 = 1e-2;
 
 /// The largest distance between a loaded surface and its planes, relative to the spacing, in 1D, 2D and 3D. Loads act on the planes.
-const OF_SURFACES: [f64; 3] = [3e-5, 3e-5, 3e-4];
+const FLAT_FOR_LOADS: [f64; 3] = [3e-5, 3e-5, 3e-4];
 
 /// The number of points along an axis of a piece of surface, and across the gap below the piece.
-const IN_GAP: u32 = 3;
+const GAP_POINTS: u32 = 3;
+
+/// Parts below this fraction of a box have one particle, which is joined to a neighbour. Joining changes second moments, so the limit is
+/// smaller than that of regular particles.
+pub(super) const THIN_PART: f64 = 1e-3;
 
 impl<const D: usize> Shape<D> {
     /// Points and volumes that integrate, over the part of the solid in a box, every product of polynomials of this degree along each axis.
@@ -42,7 +45,7 @@ impl<const D: usize> Shape<D> {
         let (pieces, gaps) = self.pieces_and_gaps(lower, edges, spacing);
         let sum = |volume: f64, piece: &Piece<D>| volume + piece.volume;
         let (flat, gap) = (pieces.iter().fold(0.0, sum), gaps.iter().map(|gap| gap.volume).sum::<f64>());
-        if flat + gap >= THIN * edges.product() {
+        if flat + gap >= THIN_PART * edges.product() {
             return match whole_box(&pieces).filter(|_| gaps.is_empty()) {
                 Some(part) => Some(part.in_box(&Layout::Gauss.points(per_axis.max(degree / 2 + 1)))),
                 None => few(&pieces, &gaps, degree),
@@ -76,9 +79,9 @@ impl<const D: usize> Shape<D> {
             corner[k] += edges[k];
             edges[k] = -edges[k];
         }
-        let rule = Layout::Gauss.points(IN_GAP);
+        let rule = Layout::Gauss.points(GAP_POINTS);
         let (mut pieces, mut gaps) = (Vec::new(), Vec::new());
-        self.pieces(None, &corner, &edges, spacing, FINE, &mut |piece, cut| {
+        self.pieces(None, &corner, &edges, spacing, FLAT_FOR_PARTICLES, &mut |piece, cut| {
             self.ends(&piece, cut, spacing).iter().for_each(|end| self.add_gap(end, &rule, spacing, &mut gaps));
             pieces.push(piece);
         });
@@ -136,7 +139,7 @@ impl<const D: usize> Shape<D> {
         edges: &Vector<f64, D>,
         spacing: f64,
     ) -> Vec<Facet<D>> {
-        let sides = self.sides(region, lower, edges, spacing, OF_SURFACES[D.min(3) - 1]);
+        let sides = self.sides(region, lower, edges, spacing, FLAT_FOR_LOADS[D.min(3) - 1]);
         sides.iter().flat_map(Facet::points).collect()
     }
 
@@ -204,7 +207,7 @@ mod tests {
             let (all, gaps) = shape.pieces_and_gaps(&lower, &edges, edges[0]);
             let few = shape.quadrature(&lower, &edges, edges[0], degree, 1).unwrap();
             let volume: f64 = few.iter().map(|point| point.volume).sum();
-            if volume < THIN * edges.product() {
+            if volume < THIN_PART * edges.product() {
                 continue;
             }
             let legendre = Legendre::new(&all, degree);

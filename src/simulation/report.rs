@@ -101,7 +101,7 @@ pub enum StepError {
     /// Without inertia, Newton's method found no equilibrium.
     #[error(
         "no equilibrium was found; without inertia there may be none, where a load is larger than the bodies bear: prescribe the \
-         motion there, follow the path (time.inertia = \"arc_length\"), or give the scene inertia"
+         motion there, follow the path (time.scheme = \"arc_length\"), or give the scene inertia"
     )]
     Unbalanced {
         /// The error of Newton's method.

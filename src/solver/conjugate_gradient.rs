@@ -1,6 +1,6 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
-use super::vector::{Entry, axpy, dot, norm, xpby};
+use super::vector::{axpy, dot, norm, xpby};
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
@@ -64,11 +64,11 @@ impl Default for ConjugateGradientSettings {
 ///
 /// # Errors
 /// A setting is out of range, the lengths differ, or a number is NaN or infinite.
-pub fn conjugate_gradient<S: Entry>(
-    operator: &dyn LinearOperator<S>,
-    preconditioner: &dyn LinearOperator<S>,
-    rhs: &[S],
-    solution: &mut [S],
+pub fn conjugate_gradient(
+    operator: &dyn LinearOperator,
+    preconditioner: &dyn LinearOperator,
+    rhs: &[f64],
+    solution: &mut [f64],
     settings: &ConjugateGradientSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
@@ -113,18 +113,18 @@ struct Run {
 }
 
 /// Steps 1 to 4 from the residual `r` of norm `r_norm`; leaves the best iterate in `solution`.
-fn descend<S: Entry>(
-    operator: &dyn LinearOperator<S>,
-    preconditioner: &dyn LinearOperator<S>,
-    r: &mut Pooled<S>,
+fn descend(
+    operator: &dyn LinearOperator,
+    preconditioner: &dyn LinearOperator,
+    r: &mut Pooled<f64>,
     r_norm: f64,
     target: f64,
-    solution: &mut [S],
+    solution: &mut [f64],
     allowed: usize,
 ) -> Result<Run, LinearError> {
     let n = r.len();
     let mut x = r.pool().collect(solution.iter().copied());
-    let (mut z, mut q) = (r.pool().filled(n, S::zero()), r.pool().filled(n, S::zero()));
+    let (mut z, mut q) = (r.pool().filled(n, 0.0), r.pool().filled(n, 0.0));
     preconditioner.apply(r, &mut z);
     let mut p = z.clone();
     let mut rz = dot(r, &z);
@@ -150,9 +150,9 @@ fn descend<S: Entry>(
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
         let curvature = p_a_p / p_m_p;
         largest = largest.max(curvature);
-        let unresolved = UNRESOLVED * S::EPSILON * largest;
+        let unresolved = UNRESOLVED * f64::EPSILON * largest;
         if curvature < -unresolved {
-            if x.iter().all(|x| *x == S::zero()) {
+            if x.iter().all(|x| *x == 0.0) {
                 // The step length for a curvature of the opposite sign.
                 axpy(-rz / p_a_p, &p, &mut x);
             }

@@ -17,21 +17,20 @@ pub use forcing::Forcing;
 pub use gmres::{GmresSettings, gmres};
 pub use newton::{
     Convergence, Krylov, LinearSolverFailure, Merit, NewtonCounts, NewtonError, NewtonFailure, NewtonHistory,
-    NewtonIteration, NewtonReport, NewtonSettings, Precision, newton,
+    NewtonIteration, NewtonReport, NewtonSettings, newton,
 };
 pub(crate) use nonnegative::NonnegativeLeastSquares;
 #[cfg(feature = "direct")]
 pub use preconditioner::Direct;
 pub use preconditioner::{
-    BlockJacobi, DiagonalBlocks, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner,
-    Preconditioning,
+    BlockJacobi, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner, Preconditioning,
 };
 pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
 pub use stop::Stop;
 
-use vector::Entry;
+use crate::pooled::Pooled;
 
-/// A square matrix that is known by its product with a vector, in double or single precision.
+/// A square matrix that is known by its product with a vector.
 ///
 /// ```
 /// use bfree::solver::LinearOperator;
@@ -55,57 +54,33 @@ use vector::Entry;
 /// Laplacian.apply(&x, &mut y);
 /// assert!(x.iter().zip(&y).all(|(x, y)| (y - (2.0 - 2.0 * step.cos()) * x).abs() < 1e-15));
 /// ```
-pub trait LinearOperator<S = f64> {
+pub trait LinearOperator {
     /// `y = A x`; `x` and `y` have the order of the operator, and `y` is overwritten.
-    fn apply(&self, x: &[S], y: &mut [S]);
+    fn apply(&self, x: &[f64], y: &mut [f64]);
 }
 
-impl<S, T: LinearOperator<S> + ?Sized> LinearOperator<S> for &T {
-    fn apply(&self, x: &[S], y: &mut [S]) {
+impl<T: LinearOperator + ?Sized> LinearOperator for &T {
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
         (**self).apply(x, y);
     }
 }
 
-/// The linearisation of a residual at one x, divided by a power of two: its product with a vector, and the data for preconditioners.
+/// The linearisation of a residual at one x: its product with a vector, and the data for preconditioners.
 ///
-/// ```
-/// use bfree::pooled::Pooled;
-/// use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization};
-///
-/// /// A stiffness that single precision does not hold: k = 3e40, over 2¹³⁵.
-/// struct Stiff;
-///
-/// impl DiagonalBlocks for Stiff {
-///     fn diagonal_blocks(&self) -> Pooled<f64> {
-///         vec![3e40 / self.scale()].into()
-///     }
-/// }
-///
-/// impl LinearOperator<f32> for Stiff {
-///     fn apply(&self, x: &[f32], y: &mut [f32]) {
-///         y[0] = self.diagonal_blocks()[0] as f32 * x[0];
-///     }
-/// }
-///
-/// impl Linearization<f32> for Stiff {
-///     fn scale(&self) -> f64 {
-///         2_f64.powi(135)
-///     }
-/// }
-///
-/// let mut y = [0.0];
-/// Stiff.apply(&[2.0], &mut y);
-/// assert!((f64::from(y[0]) * Stiff.scale() / 6e40 - 1.0).abs() < 1e-7);
-/// ```
-pub trait Linearization<S = f64>: LinearOperator<S> + DiagonalBlocks {
-    /// The factor by which entries are divided. In single precision it is a power of two that keeps entries near 1 in any units.
-    fn scale(&self) -> f64;
-}
+/// Example: [`Preconditioner`].
+pub trait Linearization: LinearOperator {
+    /// The square blocks on the diagonal, one after the other, each column by column. Prescribed degrees of freedom have the row and column
+    /// of the identity. A common positive factor does not matter.
+    fn diagonal_blocks(&self) -> Pooled<f64>;
 
-/// In double precision entries are not scaled.
-impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
-    fn scale(&self) -> f64 {
-        1.0
+    /// The operator as a form on the cells of a grid, from which multigrid makes coarser levels; `None` if it has no such form.
+    fn local_form(&self) -> Option<LocalForm> {
+        None
+    }
+
+    /// The sparsity pattern; `None` if it is unknown.
+    fn neighbours(&self) -> Option<Neighbours> {
+        None
     }
 }
 
@@ -113,7 +88,7 @@ impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
-/// use bfree::solver::{BlockJacobi, DiagonalBlocks, LinearOperator, Linearization, NewtonSettings, NonlinearProblem, newton};
+/// use bfree::solver::{BlockJacobi, LinearOperator, Linearization, NewtonSettings, NonlinearProblem, newton};
 ///
 /// /// A charge on a spring: Π = ½ x² − ln x for x > 0, so that R = x − 1/x and K = 1 + 1/x².
 /// struct Charge;
@@ -130,7 +105,7 @@ impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
 ///     }
 /// }
 ///
-/// impl DiagonalBlocks for Stiffness {
+/// impl Linearization for Stiffness {
 ///     fn diagonal_blocks(&self) -> Pooled<f64> {
 ///         vec![self.0].into()
 ///     }
@@ -162,7 +137,6 @@ impl<T: LinearOperator + DiagonalBlocks> Linearization for T {
 /// }
 ///
 /// let problem = Charge;
-/// assert!(problem.linearize_single(&[1.0])?.is_none());
 /// // From far away Newton's full step would lead to x < 0; the line search does not.
 /// let mut x = [0.01];
 /// newton(&problem, &mut BlockJacobi::<1>::default(), &mut x, &NewtonSettings::default(), &Pool::default())?;
@@ -213,14 +187,6 @@ pub trait NonlinearProblem {
     /// # Errors
     /// x is not admissible.
     fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Self::Inadmissible>;
-
-    /// The tangent at x in single precision; `None` if there is none.
-    ///
-    /// # Errors
-    /// x is not admissible.
-    fn linearize_single(&self, _x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Self::Inadmissible> {
-        Ok(None)
-    }
 }
 
 /// The outcome and the counts of a Krylov solve.
@@ -342,12 +308,12 @@ impl InvalidSetting {
 ///
 /// # Errors
 /// The lengths differ, or the right-hand side is not finite.
-fn begin<S: Entry>(rhs: &[S], solution: &mut [S]) -> Result<(LinearReport, f64), LinearError> {
+fn begin(rhs: &[f64], solution: &mut [f64]) -> Result<(LinearReport, f64), LinearError> {
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
     }
     let b_norm = finite(vector::norm(rhs), "the norm of the right-hand side", 0)?;
-    solution.fill(S::zero());
+    solution.fill(0.0);
     Ok((LinearReport { outcome: LinearOutcome::Converged, iterations: 0, products: 0, relative_residual: 0.0 }, b_norm))
 }
 
@@ -357,7 +323,7 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
 }
 
 /// `r = b − A x`, and its norm.
-fn true_residual<S: Entry>(operator: &dyn LinearOperator<S>, rhs: &[S], x: &[S], r: &mut [S]) -> f64 {
+fn true_residual(operator: &dyn LinearOperator, rhs: &[f64], x: &[f64], r: &mut [f64]) -> f64 {
     operator.apply(x, r);
     vector::xpby(rhs, -1.0, r);
     vector::norm(r)
@@ -367,7 +333,7 @@ fn true_residual<S: Entry>(operator: &dyn LinearOperator<S>, rhs: &[S], x: &[S],
 mod testing {
     //! Dense matrices for the tests of this folder.
 
-    use super::{BlockJacobi, DiagonalBlocks, LinearOperator};
+    use super::{BlockJacobi, LinearOperator, Linearization};
     use crate::pooled::Pooled;
 
     /// A dense matrix by rows.
@@ -396,7 +362,7 @@ mod testing {
         }
     }
 
-    impl DiagonalBlocks for Dense {
+    impl Linearization for Dense {
         fn diagonal_blocks(&self) -> Pooled<f64> {
             (0..self.0.len()).map(|i| self.0[i][i]).collect::<Vec<_>>().into()
         }

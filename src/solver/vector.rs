@@ -21,22 +21,6 @@
 //! ```
 
 use crate::parallel;
-use crate::pooled::Element;
-use crate::scalar::Real;
-
-/// An entry of a vector: `f64` or `f32`. Reductions of both are added up in double precision.
-pub trait Entry: Real + Element + Sync {
-    /// The unit of round-off.
-    const EPSILON: f64;
-}
-
-impl Entry for f64 {
-    const EPSILON: f64 = Self::EPSILON;
-}
-
-impl Entry for f32 {
-    const EPSILON: f64 = Self::EPSILON as f64;
-}
 
 /// Entries per partial sum.
 const CHUNK: usize = 4096;
@@ -48,7 +32,7 @@ const PARALLEL: usize = 8 * CHUNK;
 const LANES: usize = 8;
 
 /// `Σ xᵢ yᵢ`
-pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
+pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     if x.len() < PARALLEL {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
@@ -57,11 +41,11 @@ pub fn dot<S: Entry>(x: &[S], y: &[S]) -> f64 {
     }
 }
 
-fn dot_chunk<S: Entry>(x: &[S], y: &[S]) -> f64 {
+fn dot_chunk(x: &[f64], y: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     for (x, y) in x.chunks(LANES).zip(y.chunks(LANES)) {
         for ((sum, x), y) in lanes.iter_mut().zip(x).zip(y) {
-            *sum += x.value() * y.value();
+            *sum += x * y;
         }
     }
     lanes.iter().sum()
@@ -71,43 +55,40 @@ fn dot_chunk<S: Entry>(x: &[S], y: &[S]) -> f64 {
 const SAFE_SQUARE: f64 = 1e-280;
 
 /// `√(Σ xᵢ²)`; not finite if any entry is not.
-pub fn norm<S: Entry>(x: &[S]) -> f64 {
+pub fn norm(x: &[f64]) -> f64 {
     let square = dot(x, x);
     if (SAFE_SQUARE..=f64::MAX).contains(&square) {
         return square.sqrt();
     }
     // Squares underflow or overflow, all entries are zero, or one entry is not finite.
-    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.value().abs()));
+    let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
     if largest == 0.0 || !largest.is_finite() || square.is_nan() {
         return square.sqrt();
     }
     // ‖x‖ = 2ᵏ ‖x/2ᵏ‖ with 2ᵏ near the largest entry is exact. Two factors make up 2ᵏ, so that neither overflows or underflows.
     let k = largest.log2() as i32;
     let (half, rest) = (2.0_f64.powi(-(k / 2)), 2.0_f64.powi(-(k - k / 2)));
-    let scaled: Vec<f64> = x.iter().map(|x| x.value() * half * rest).collect();
+    let scaled: Vec<f64> = x.iter().map(|x| x * half * rest).collect();
     dot(&scaled, &scaled).sqrt() / half / rest
 }
 
 /// `y ← a x + y`
-pub fn axpy<S: Entry>(a: f64, x: &[S], y: &mut [S]) {
-    let a = S::lit(a);
+pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     update(x, y, |x, y| a * x + y);
 }
 
 /// `y ← x + b y`
-pub fn xpby<S: Entry>(x: &[S], b: f64, y: &mut [S]) {
-    let b = S::lit(b);
+pub fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
     update(x, y, |x, y| x + b * y);
 }
 
 /// `y ← a x`
-pub fn scaled<S: Entry>(a: f64, x: &[S], y: &mut [S]) {
-    let a = S::lit(a);
+pub fn scaled(a: f64, x: &[f64], y: &mut [f64]) {
     update(x, y, |x, _| a * x);
 }
 
-fn update<S: Entry>(x: &[S], y: &mut [S], f: impl Fn(S, S) -> S + Sync) {
-    let chunk = |(x, y): (&[S], &mut [S])| {
+fn update(x: &[f64], y: &mut [f64], f: impl Fn(f64, f64) -> f64 + Sync) {
+    let chunk = |(x, y): (&[f64], &mut [f64])| {
         for (x, y) in x.iter().zip(y) {
             *y = f(*x, *y);
         }

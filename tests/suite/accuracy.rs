@@ -152,10 +152,10 @@ fn what_it_cannot_choose_is_told() -> Result<(), Failure> {
 #[test]
 fn without_inertia_it_sets_nothing_that_needs_it() -> Result<(), Failure> {
     let of_steps = |time: Value| with(&[("/accuracy", "standard".into()), ("/time", time)]);
-    let scene = read(&of_steps(json!({ "end": 1, "step": 0.5, "inertia": "none" })))?;
+    let scene = read(&of_steps(json!({ "end": 1, "step": 0.5, "scheme": "none" })))?;
     let keys: Vec<_> = scene.chosen.iter().map(|chosen| chosen.key.as_str()).collect();
     assert_eq!(keys, ["solver.newton.tolerance", "bodies.0.particles_per_cell", "grid.spacing"]);
-    let error = read(&of_steps(json!({ "end": 1, "inertia": "none" }))).map(|_| ()).unwrap_err().to_string();
+    let error = read(&of_steps(json!({ "end": 1, "scheme": "none" }))).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("load steps") && error.contains("give time.step"), "{error}");
     Ok(())
 }

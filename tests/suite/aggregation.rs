@@ -128,7 +128,7 @@ fn bar(family: Value, offset: f64, traction: f64) -> Result<Simulation<2>, Failu
     let (h, end) = (0.125, 1.0 + 0.125 * offset);
     let scene = json!({
         "grid": { "size": [1.5, 1.0], "spacing": h }, "approximation": family, "aggregation": true,
-        "time": { "step": 1, "end": 1, "inertia": "none" },
+        "time": { "step": 1, "end": 1, "scheme": "none" },
         "bodies": [{ "name": "bar", "shape": { "box": { "min": [0, 0], "max": [end, 0.5 + 0.3 * h] } }, "density": 1,
             "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } }],
         "boundary": { "left": "sliding", "bottom": "sliding" },

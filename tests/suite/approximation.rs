@@ -211,6 +211,33 @@ fn a_node_without_value_but_with_gradient_is_kept() {
     assert_eq!(on_node.nodes, [[1, 1], [2, 1], [1, 2]]);
 }
 
+/// A support that ends on a node up to round-off ends there. Such a node would have N ~ ε² and h|∇N| ~ ε, and nothing to hold it.
+#[test]
+fn round_off_does_not_decide_which_nodes_are_active() -> Result<(), Box<dyn std::error::Error>> {
+    let families: [(Approximation, f64); 3] = [
+        (Gimp::particles_per_axis(2).into(), 0.25),
+        (Gimp::particles_per_axis(3).into(), 1.0 / 6.0),
+        (Bspline::Quadratic.into(), 0.5),
+    ];
+    for (family, edge) in families {
+        for origin in [0.0, -7.0 * 0.3, 1000.1] {
+            let grid = Grid { origin: Vector::from([origin]), spacing: 0.3, cells: [9] };
+            for place in [edge, 1.0 - edge] {
+                let x = origin + (4.0 + place) * grid.spacing;
+                let count = |by: f64| -> Result<usize, Box<dyn std::error::Error>> {
+                    let positions = [Vector::from([x + by * x.abs().max(1.0) * f64::EPSILON])];
+                    let (supports, nodes) = Supports::new(&family, &grid, &positions)?;
+                    assert!(supports.of(0).all(|(_, n, _)| n.abs() > 1e-3), "{family:?}, {origin}, {place}, {by}");
+                    assert_eq!(support(&family, &grid, &positions[0])?.nodes.len(), nodes.len());
+                    Ok(nodes.len())
+                };
+                assert_eq!([-4.0, -1.0, 0.0, 1.0, 4.0].map(count).into_iter().collect::<Result<Vec<_>, _>>()?, [2; 5]);
+            }
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn scaling_lengths_by_a_power_of_two_keeps_the_bits() {
     let x = Vector::from([0.813, 1.377]);

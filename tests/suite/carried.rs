@@ -126,7 +126,7 @@ fn reactions_balance_loads_after_renewals() -> Result<(), Failure> {
 fn reactions_go_on_over_renewals() -> Result<(), Failure> {
     let turned = json!({
         "grid": {"size": [8, 8], "spacing": 0.5, "renewed": "every_step"},
-        "time": {"step": 0.125, "end": 1, "inertia": "none"},
+        "time": {"step": 0.125, "end": 1, "scheme": "none"},
         "bodies": [{"name": "bar", "shape": {"box": {"min": [1, 3.1], "max": [7, 4.9]}}, "density": 1,
                     "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}],
         "prescribed": [
@@ -199,7 +199,7 @@ fn pressed(names: &[&str], by: f64) -> serde_json::Value {
     };
     json!({
         "grid": {"size": [6, 3], "spacing": 0.5, "renewed": "every_step"},
-        "time": {"step": 0.25, "end": 1, "inertia": "none"},
+        "time": {"step": 0.25, "end": 1, "scheme": "none"},
         "approximation": "linear",
         "bodies": names.iter().enumerate().map(block).collect::<Vec<_>>(),
         "boundary": {"left": "fixed"},
@@ -216,7 +216,7 @@ fn a_field_acts_where_a_body_has_come_to() -> Result<(), Failure> {
     for renewed in [json!("never"), json!("every_step"), json!({"strain": 0.1})] {
         let moved = json!({
             "grid": {"size": [8, 3], "spacing": 0.5, "renewed": renewed},
-            "time": {"step": 0.25, "end": 1, "inertia": "none"},
+            "time": {"step": 0.25, "end": 1, "scheme": "none"},
             "bodies": [{"name": "block", "shape": {"box": {"min": [1, 1], "max": [2, 2]}}, "density": 2,
                         "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}}],
             "prescribed": [{"region": {"box": {"min": [0, 0], "max": [8, 3]}}, "displacement": [[0, [0, 0]], [1, [4, 0]]]}],

@@ -64,7 +64,7 @@ fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
     let scene = json!({
         "grid": { "size": [2, 1.5], "spacing": 0.25 },
         "approximation": "linear",
-        "time": { "step": 0.25, "end": 1, "inertia": "none" },
+        "time": { "step": 0.25, "end": 1, "scheme": "none" },
         "bodies": [block("lower", 0.0), block("upper", 0.5)],
         "boundary": { "bottom": "fixed" },
         "gravity": { "acceleration": [0, -20], "curve": [[0, 0], [1, 1]] }

@@ -24,7 +24,7 @@ fn a_clamped_body_keeps_its_grid_by_default() -> Result<(), Failure> {
         (&[r#"boundary={"right":"fixed"}"#], new),
         (&[r#"transfer={"pic":{}}"#], new),
         (&[r#"grid.renewed="every_step""#], new),
-        (&[r#"time.inertia="none""#, NO_BETA, NO_GAMMA], Renewal::Strain(1.0)),
+        (&[r#"time.scheme="none""#, NO_BETA, NO_GAMMA], Renewal::Strain(1.0)),
     ] {
         assert_eq!(asked("cantilever.json", overrides)?, renewal, "{overrides:?}");
     }
@@ -249,7 +249,7 @@ fn what_was_changed_by_hand_is_noticed() -> Result<(), Failure> {
 #[test]
 fn the_tangent_is_the_derivative_on_a_grid_that_is_kept() -> Result<(), Failure> {
     for scheme in [r#""newmark""#, r#"{"generalized_alpha": {"spectral_radius": 0.6}}"#] {
-        let (inertia, more) = (format!("time.inertia={scheme}"), r#"damping={"mass": 0.1, "stiffness": 0.01}"#);
+        let (inertia, more) = (format!("time.scheme={scheme}"), r#"damping={"mass": 0.1, "stiffness": 0.01}"#);
         let kept = r#"grid.renewed="never""#;
         let overrides = [&inertia, more, kept, "time.lumping=0.4", "aggregation=true", NO_BETA, NO_GAMMA];
         let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
@@ -273,7 +273,7 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
     ] {
         let flown = |renewed: &str| -> Result<Simulation<2>, Failure> {
             let overrides = [
-                &format!("time.inertia={scheme}"),
+                &format!("time.scheme={scheme}"),
                 &format!("grid.renewed=\"{renewed}\""),
                 r#"bodies[0].layout="regular""#,
                 "time.step=0.01",
@@ -358,7 +358,7 @@ fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
     };
     let overrides = [
         r#"bodies.0.shape={"box":{"min":[1.5,1.5],"max":[3.5,3.5]}}"#,
-        r#"time.inertia={"generalized_alpha":{"spectral_radius":1}}"#,
+        r#"time.scheme={"generalized_alpha":{"spectral_radius":1}}"#,
         r#"grid.renewed="never""#,
         r#"approximation="linear""#,
         "time.lumping=0",

@@ -12,7 +12,6 @@ use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
-use bfree::solver::Precision;
 use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
 use num_dual::Dual64;
 
@@ -110,8 +109,6 @@ struct Results<const D: usize> {
     residual: Vec<Vector<f64, D>>,
     product: Vec<Vector<f64, D>>,
     blocks: Vec<Tensor<f64, D>>,
-    /// The product in single precision and its scale, if the shape-function values have that precision.
-    single: Option<(Vec<Vector<f32, D>>, f64)>,
 }
 
 /// Computes the results as a step does, and checks that the tangent is the derivative of the residual.
@@ -137,12 +134,7 @@ fn results<const D: usize, L: Law>(
     let tangent = equilibrium.tangent(dphi)?;
     let mut product = vec![Vector::zeros(); u.len()];
     tangent.product(u, &mut product);
-    let single = equilibrium.single_tangent(None, dphi)?.map(|single| {
-        let mut product = vec![Vector::zeros(); u.len()];
-        single.product(&u.iter().map(|u| u.map(|x| x as f32)).collect::<Vec<_>>(), &mut product);
-        (product, single.scale())
-    });
-    Ok(Results { residual, product, blocks: tangent.diagonal_blocks().to_vec(), single })
+    Ok(Results { residual, product, blocks: tangent.diagonal_blocks().to_vec() })
 }
 
 /// The results by the formulas of one particle, with loops over the connectivity of every particle.
@@ -224,7 +216,7 @@ fn compare<const D: usize>() -> Result<(), Failure> {
         let others = [unknown(&|_| false), unknown(&|k| k % 2 == 1)];
         for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
             let case = format!("{D}D {list:?} {regime:?} {shape:?}");
-            let (supports, nodes) = Supports::with_precision(&shape, &grid, &particles.position, Precision::Mixed)?;
+            let (supports, nodes) = Supports::new(&shape, &grid, &particles.position)?;
             let (plain, _) = Supports::plain(&shape, &grid, &particles.position)?;
             assert!(supports.is_tiled() && !plain.is_tiled());
             let u: Vec<Vector<f64, D>> =
@@ -248,11 +240,6 @@ fn compare<const D: usize>() -> Result<(), Failure> {
                     let apart = difference(found, expected);
                     assert!(apart < bound, "{case}: {name}: {apart:e}");
                 }
-                let (single, scale) = tiled.single.ok_or("the supports are prepared for single precision")?;
-                let single: Vec<_> = single.iter().map(|x| x.map(f64::from) * scale).collect();
-                let apart = difference(&single, &tiled.product);
-                assert!(apart < 1e-5, "{case}: single precision: {apart:e}");
-                assert!(plain.single.is_none());
             }
         }
     }
@@ -275,7 +262,7 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failur
             particles.displacement_gradient[p] = Tensor::from_diagonal(&Vector::from([det_f - 1.0, 0.0]));
         }
         let (shape, at) = (Approximation::from(Linear), &particles.position);
-        let (tiled, nodes) = Supports::with_precision(&shape, &grid, at, Precision::Mixed)?;
+        let (tiled, nodes) = Supports::new(&shape, &grid, at)?;
         let (plain, _) = Supports::plain(&shape, &grid, at)?;
         let zero = vec![Vector::zeros(); nodes.len()];
         let (known, unknown, loads) = (bodies([law.clone()]), bodies([Unknown { law, closed }]), Loads::default());
@@ -292,7 +279,7 @@ fn the_smallest_particle_that_cannot_be_deformed_is_named() -> Result<(), Failur
     Ok(())
 }
 
-/// Residual, tangents and potential return the same error.
+/// Residual, tangent and potential return the same error.
 fn fails<L: Law>(
     particles: &Particles<2>,
     bodies: &[Body<L>],
@@ -310,8 +297,6 @@ fn fails<L: Law>(
         Some(expected)
     );
     assert_eq!(equilibrium.tangent(zero).err(), Some(expected));
-    let single = equilibrium.single_tangent(None, zero).map(|single| single.is_some());
-    assert_eq!(single, if supports.is_tiled() { Err(expected) } else { Ok(false) });
     assert_eq!(equilibrium.potential(zero).map(|found| found.map(|_| ())), Some(Err(expected)));
 }
 

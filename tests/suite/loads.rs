@@ -175,7 +175,7 @@ fn inflation(cells: u32, functions: &str) -> Result<f64, Failure> {
     let ring = json!({"difference": {"of": disc(1.5), "minus": disc(1.0)}});
     let mut simulation: Simulation<2> = build(&json!({
         "grid": {"size": [2, 2], "spacing": 1.0 / f64::from(cells)},
-        "time": {"step": 1, "end": 1, "inertia": "none"},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
         "approximation": serde_json::from_str::<serde_json::Value>(functions)?,
         "bodies": [{
             "name": "ring", "density": 1, "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}},
@@ -297,7 +297,7 @@ fn every_load_follows_its_curve() -> Result<(), Failure> {
 /// A falling stone. Its weight comes from gravity, or from the same field given in code; with inertia and without.
 #[test]
 fn a_uniform_field_is_gravity() -> Result<(), Failure> {
-    let held = json!({"grid": {"size": [2, 2], "spacing": 0.5}, "time": {"inertia": "none", "step": 0.5, "end": 1},
+    let held = json!({"grid": {"size": [2, 2], "spacing": 0.5}, "time": {"scheme": "none", "step": 0.5, "end": 1},
         "bodies": [{"name": "block", "shape": {"box": {"min": [0, 0], "max": [2, 1]}}, "density": 3,
                     "material": {"neo_hookean": {"lambda": 1000, "shear": 1000}}}],
         "boundary": {"left": "fixed", "right": "fixed", "bottom": "fixed"}, "gravity": {"acceleration": [0, -9.81]}});

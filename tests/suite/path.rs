@@ -19,7 +19,7 @@ fn toggle(more: &[&str]) -> Result<Simulation<2>, Failure> {
         &format!(r#"bodies.0.shape={{"box":{{"min":[0,1.75],"max":[{LENGTH},2]}}}}"#),
         &format!(r#"bodies.0.material={{"neo_hookean":{{"young":{YOUNG},"poisson":0}}}}"#),
         r#"boundary={"left":"fixed","right":"sliding"}"#,
-        r#"time={"step":0.02,"end":0.4,"inertia":"arc_length"}"#,
+        r#"time={"step":0.02,"end":0.4,"scheme":"arc_length"}"#,
         "output={}",
         r#"tractions=[{"body":"beam","region":{"box":{"min":[9.75,2],"max":[10,3]}},"traction":[0,-400],"curve":[[-10,-10],[10,10]]}]"#,
     ];

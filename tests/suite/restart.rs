@@ -117,7 +117,7 @@ fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
             "elastica.json",
             &[
                 "--set",
-                r#"time={"step":0.02,"end":0.3,"inertia":"arc_length"}"#,
+                r#"time={"step":0.02,"end":0.3,"scheme":"arc_length"}"#,
                 "--set",
                 "grid.spacing=0.5",
                 "--set",

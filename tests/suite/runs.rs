@@ -19,9 +19,7 @@ fn bits<const D: usize>(simulation: &Simulation<D>) -> Vec<u64> {
 fn powers_of_two_as_units_give_the_same_bits() -> Result<(), Failure> {
     for exponent in [-30, 30] {
         let [length, mass, time] = [2.0_f64.powi(exponent), 2.0_f64.powi(-exponent / 2), 2.0_f64.powi(exponent / 3)];
-        let krylov =
-            if exponent > 0 { "solver.krylov.precision=\"mixed\"" } else { "solver.krylov.precision=\"double\"" };
-        let reference = scene::<2>("compaction.json", &[krylov])?;
+        let reference = scene::<2>("compaction.json", &[])?;
         let mut plain = reference.clone();
         let mut scaled = reference;
         // stress: mass / (length time²); density per area: mass / length³ of a unit thickness scaled with the rest
@@ -61,52 +59,15 @@ fn powers_of_two_as_units_give_the_same_bits() -> Result<(), Failure> {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() -> Result<(), Failure> {
-    let run = |threads: usize, precision: &str| -> Result<Vec<u64>, Failure> {
-        let precision = format!("solver.krylov.precision=\"{precision}\"");
-        let mut simulation = scene::<3>("ball_drop.json", &[&precision])?;
+    let run = |threads: usize| -> Result<Vec<u64>, Failure> {
+        let mut simulation = scene::<3>("ball_drop.json", &[])?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         pool.install(|| (0..4).try_for_each(|_| simulation.advance().map(|_| ())))?;
         Ok(bits(&simulation))
     };
-    for precision in ["double", "mixed"] {
-        let one = run(1, precision)?;
-        assert_eq!(one, run(2, precision)?, "{precision}");
-        assert_eq!(one, run(5, precision)?, "{precision}");
-    }
-    Ok(())
-}
-
-#[test]
-fn mixed_precision_meets_the_same_residual_and_takes_the_same_path() -> Result<(), Failure> {
-    // The run passes the first impact of the hard rebound, with half of the inertia consistent, by both Krylov methods.
-    let end = 5.0;
-    let common = ["time.lumping=0.5", "solver.newton.tolerance=1e-10"];
-    for method in ["{\"gmres\":{}}", "\"conjugate_gradient\""] {
-        let method = format!("solver.krylov.method={method}");
-        let run = |precision: &str| -> Result<(Simulation<2>, usize, f64), Failure> {
-            let precision = format!("solver.krylov.precision=\"{precision}\"");
-            let mut simulation = scene::<2>("rebound_fast.json", &[common[0], common[1], &method, &precision])?;
-            let (mut most, mut loosest) = (0, 0.0_f64);
-            while simulation.clock.time() < end {
-                let newton = simulation.advance()?.newton.history;
-                most = most.max(newton.iterations.len());
-                loosest = newton
-                    .iterations
-                    .iter()
-                    .map(|iteration| iteration.krylov.relative_residual)
-                    .fold(loosest, f64::max);
-            }
-            Ok((simulation, most, loosest))
-        };
-        let (double, most, tight) = run("double")?;
-        let (mixed, most_mixed, loose) = run("mixed")?;
-        // Single precision was in use, and it costs an iteration or two a step.
-        assert!(tight <= 1e-8 && (1e-7..1e-5).contains(&loose), "{tight:e} {loose:e}");
-        assert!(most_mixed <= most + 2, "{most_mixed} iterations for {most}");
-        for (x, y) in double.particles.by_id().position.iter().zip(&mixed.particles.by_id().position) {
-            assert!((x - y).amax() < 1e-8, "{x} {y}");
-        }
-    }
+    let one = run(1)?;
+    assert_eq!(one, run(2)?);
+    assert_eq!(one, run(5)?);
     Ok(())
 }
 

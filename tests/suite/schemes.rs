@@ -2,6 +2,7 @@
 
 use crate::support::{Failure, scene};
 use bfree::mechanics::schemes::{Alphas, Newmark, Scheme};
+use bfree::scene::{Override, read_file};
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use std::fmt::{Display, Formatter};
@@ -10,7 +11,7 @@ use std::sync::Arc;
 const FALL: &[&str] = &["gravity={\"acceleration\":[0,-0.01]}", "time.beta=null", "time.gamma=null"];
 
 fn generalized(rho: f64) -> String {
-    format!(r#"time.inertia={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
+    format!(r#"time.scheme={{"generalized_alpha":{{"spectral_radius":{rho}}}}}"#)
 }
 
 fn advance(simulation: &mut Simulation<2>, steps: usize) -> Result<(), Failure> {
@@ -72,7 +73,7 @@ fn a_moving_wall_arrives_and_its_work_is_counted() -> Result<(), Failure> {
         advance(&mut simulation, 30)?;
         Ok(simulation)
     };
-    let newmark = run("time.inertia=\"newmark\"")?;
+    let newmark = run("time.scheme=\"newmark\"")?;
     let top = |of: &Simulation<2>| of.particles.position.iter().map(|x| x[1]).fold(f64::MIN, f64::max);
     for rho in [0.6, 1.0] {
         let other = run(&generalized(rho))?;
@@ -138,14 +139,32 @@ fn a_scheme_of_ones_own_runs_the_step() -> Result<(), Failure> {
     Ok(())
 }
 
+/// The key `time.inertia` of an earlier version selects the scheme, with a note, unless `time.scheme` is given.
+#[test]
+fn the_old_key_of_the_scheme_is_read_with_a_note() -> Result<(), Failure> {
+    for (overrides, has_inertia) in [
+        (&[r#"time={"step":0.25,"end":1,"inertia":"none"}"#][..], false),
+        (&[r#"time={"step":0.25,"end":1,"scheme":"none","inertia":"newmark"}"#], false),
+        (&[r#"time={"step":0.25,"end":1,"inertia":"newmark"}"#], true),
+    ] {
+        let overrides: Result<Vec<Override>, _> = overrides.iter().map(|text| text.parse()).collect();
+        let scene = read_file("scenes/cook.json".as_ref(), &overrides?)?;
+        let simulation = scene.build::<2>("scenes".as_ref())?;
+        assert_eq!(simulation.settings.scheme.has_inertia(), has_inertia);
+        let warnings = scene.warnings(&simulation);
+        assert!(warnings.iter().any(|text| text.contains("time.inertia is now called time.scheme")), "{warnings:?}");
+    }
+    Ok(())
+}
+
 #[test]
 fn what_is_newmarks_own_is_refused_elsewhere() {
     for (more, words) in [
         ("time.beta=0.25", "time.beta"),
         ("time.gamma=0.5", "time.gamma"),
-        ("time.inertia.generalized_alpha.spectral_radius=1.5", "time.inertia.generalized_alpha.spectral_radius"),
-        ("time.inertia.generalized_alpha.spectral_radius=-0.1", "must"),
-        ("time.inertia.generalized_alpha.radius=0.1", "radius"),
+        ("time.scheme.generalized_alpha.spectral_radius=1.5", "time.scheme.generalized_alpha.spectral_radius"),
+        ("time.scheme.generalized_alpha.spectral_radius=-0.1", "must"),
+        ("time.scheme.generalized_alpha.radius=0.1", "radius"),
     ] {
         let error = scene::<2>("rebound.json", &["time.beta=null", "time.gamma=null", &generalized(0.5), more])
             .expect_err(more)

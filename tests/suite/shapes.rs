@@ -286,7 +286,7 @@ fn a_region_that_ends_on_nodes_holds_them_whatever_the_round_off() -> Result<(),
     // The row of nodes at −0.3 + 3 · 0.1 = 5.6e-17 belongs to the half-space y ≤ 0, which is held.
     let scene = json!({
         "grid": {"origin": [0, -0.3], "size": [0.4, 0.6], "spacing": 0.1}, "approximation": "linear",
-        "time": {"step": 1, "end": 1, "inertia": "none"},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
         "bodies": [{"name": "body", "shape": {"box": {"min": [0, 0], "max": [0.4, 0.2]}}, "density": 1,
                     "layout": "regular", "material": {"neo_hookean": {"young": 1, "poisson": 0}}}],
         "prescribed": [{"region": {"half_space": {"point": [0, 0], "normal": [0, 1]}}, "displacement": [[0, [0, 0]]]}],

@@ -315,7 +315,7 @@ fn ply((vertices, _): &Triangles) -> String {
 
 fn with_shape(shape: &Value) -> Value {
     json!({
-        "grid": {"size": [4, 4, 4], "spacing": 0.25}, "time": {"step": 1, "end": 1, "inertia": "none"},
+        "grid": {"size": [4, 4, 4], "spacing": 0.25}, "time": {"step": 1, "end": 1, "scheme": "none"},
         "bodies": [{"name": "body", "shape": shape, "density": 1, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}],
         "prescribed": [{"region": shape, "displacement": [[0, [0, 0, 0]]]}]
     })

@@ -17,7 +17,6 @@ use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
 use bfree::pooled::Pool;
 use bfree::scalar::Real;
-use bfree::solver::Precision;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
@@ -336,19 +335,17 @@ fn several_waves_of_blocks_sum_the_same_bits_and_those_of_the_plain_sweep() -> R
     several_waves([20, 20, 24])
 }
 
-/// Reused memory leaves no trace of the former shape-function values, with other blocks, widths and precision.
+/// Reused memory leaves no trace of the former shape-function values, with other blocks and widths.
 fn renewal<const D: usize>() {
     let (grid, after) = case::<D>();
     let mut random = Irregular(7);
     let before: Vec<Vector<f64, D>> =
         after.iter().map(|_| grid.origin + random.vector::<D>().map(|x| (0.5 + 0.4 * x) * 0.7)).collect();
     for shape in shapes() {
-        let anew = Supports::with_precision(&shape, &grid, &after, Precision::Mixed).unwrap();
-        for (other, precision) in shapes().into_iter().zip([Precision::Double, Precision::Mixed].into_iter().cycle()) {
-            let (spare, _) = Supports::with_precision(&other, &grid, &before, precision).unwrap();
-            let renewed =
-                Supports::renewed(Some(spare), &shape, &grid, &Points::at(&after), Precision::Mixed, &Pool::default())
-                    .unwrap();
+        let anew = Supports::new(&shape, &grid, &after).unwrap();
+        for other in shapes() {
+            let (spare, _) = Supports::new(&other, &grid, &before).unwrap();
+            let renewed = Supports::renewed(Some(spare), &shape, &grid, &Points::at(&after), &Pool::default()).unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {

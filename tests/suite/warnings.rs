@@ -151,6 +151,18 @@ fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failu
 }
 
 #[test]
+fn the_deprecated_precision_is_read_and_named() -> Result<(), Failure> {
+    let body = || json!([block("a", [1.0, 1.0], [4.0, 4.0])]);
+    for precision in ["double", "mixed"] {
+        let found = warnings(body(), json!({"solver": {"krylov": {"precision": precision}}}), Path::new("."))?;
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_one(&found, &["solver.krylov.precision", "Remove the key"]);
+    }
+    assert_eq!(warnings(body(), json!({}), Path::new("."))?, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
 fn shipped_scenes_have_nothing_to_warn_of() -> Result<(), Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     for entry in std::fs::read_dir(&folder)? {

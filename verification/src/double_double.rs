@@ -1,4 +1,4 @@
-//! Numbers of twice the digits, through the same generic code as `f64` and `f32`. They are the reference for these two.
+//! Numbers of twice the digits, through the same generic code as `f64`. They are the reference for `f64`.
 //!
 //! Sums, products and square roots come from the crate `twofloat` (Joldes, Muller, Popescu, "Tight and rigorous error bounds for basic
 //! building blocks of double-word arithmetic", 2017). Its quotients (version 0.8.4) and logarithms are accurate to 1e-16 only, so this

@@ -35,9 +35,8 @@ impl<const D: usize> Prepared<D> {
     /// A particle without shape functions, or a projection that overflows.
     pub fn new<L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Result<Self, StepError> {
         let (t, dt) = (simulation.clock.time(), simulation.clock.step());
-        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
         let (supports, nodes) =
-            Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision)?;
+            Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
         let supports = simulation.aggregated(supports);
         let prescribed = simulation.prescribed(&nodes);
         let nodal = simulation.project(&supports)?.with_prescribed(&prescribed);

@@ -157,7 +157,7 @@ mod tests {
 
     const BAR: &str = r#"{
         "grid": { "size": [3], "spacing": 0.25 },
-        "time": { "step": 0.1, "end": 1, "inertia": "none" },
+        "time": { "step": 0.1, "end": 1, "scheme": "none" },
         "bodies": [{ "name": "bar", "shape": { "box": { "min": [0], "max": [2] } }, "density": 1,
                      "material": { "neo_hookean": { "lambda": 100, "shear": 60 } } }],
         "boundary": { "left": "fixed" },

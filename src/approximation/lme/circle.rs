@@ -1,6 +1,7 @@
 //! LME on a circle of nodes, as in the paper: a D-dimensional Newton method for the Lagrange multipliers of a particle.
 
-use super::{Lme, radius, validate};
+use super::locality::{radius, validate};
+use super::separable::Lme;
 use crate::approximation::product::{Place, inside};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use crate::grid::{Grid, indices};

@@ -3,13 +3,15 @@
 //! Arroyo & Ortiz, Int. J. Numer. Meth. Engng 65 (2006). Lengths are in units of the spacing, so β̂ = γ̂/h².
 
 mod circle;
+mod locality;
 mod separable;
 mod starts;
 
 pub use circle::LmeCircle;
+pub use locality::SMALLEST_TOLERANCE;
 pub use separable::Lme;
 
-use super::{Approximation, ApproximationError, Cells, Listed};
+use super::{Approximation, Cells, Listed};
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,25 +81,4 @@ impl Listed for Lme {
             ("lme circle 3", LmeCircle::new(3.0, 1e-6).into()),
         ]
     }
-}
-
-/// The smallest TOL₀ that a family accepts. Such a weight is far below round-off next to 1, and still far from underflow.
-pub const SMALLEST_TOLERANCE: f64 = 1e-100;
-
-/// R_a/h = sqrt(−ln TOL₀ / γ̂)
-fn radius(gamma: f64, tolerance: f64) -> f64 {
-    (-tolerance.ln() / gamma).sqrt()
-}
-
-/// Checks that γ̂ and TOL₀ are in range.
-fn validate(gamma: f64, tolerance: f64) -> Result<(), ApproximationError> {
-    if !(gamma > 0.0 && gamma.is_finite()) {
-        let parameter = "the locality γ of max-ent";
-        return Err(ApproximationError::Parameter { parameter, value: gamma, allowed: "finite and > 0" });
-    }
-    if !(SMALLEST_TOLERANCE..1.0).contains(&tolerance) {
-        let parameter = "the support tolerance of max-ent";
-        return Err(ApproximationError::Parameter { parameter, value: tolerance, allowed: ">= 1e-100 and < 1" });
-    }
-    Ok(())
 }

@@ -1,8 +1,9 @@
 //! LME on a box of nodes: a product of one-dimensional LME functions, each of which needs the root of one scalar equation.
 
+use super::locality::{radius, validate};
 use super::starts::Starts;
-use super::{radius, validate};
-use crate::approximation::interior::{Column, FURTHEST, Interior, Lane, NODES, SETTLED, distance};
+use crate::approximation::interior::{Column, FURTHEST, Interior, NODES, SETTLED, distance};
+use crate::approximation::lane::Lane;
 use crate::approximation::product::Place;
 use crate::approximation::{ApproximationError, AtSurface, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
@@ -78,7 +79,7 @@ impl Lme {
     pub fn new(gamma: f64, tolerance: f64) -> Self {
         let radius = radius(gamma, tolerance);
         let mut lme = Self { gamma, tolerance, radius, decay: (-2.0 * gamma).exp(), starts: None };
-        lme.starts = Starts::new(&lme).map(Arc::new);
+        lme.starts = Starts::new(gamma, radius, |place| lme.table_entry(place)).map(Arc::new);
         lme
     }
 
@@ -218,7 +219,7 @@ impl Lme {
     }
 
     /// q and dq/da away from walls: f depends on a directly and through μ, so dμ/da = −(∂f/∂a)/(∂f/∂μ).
-    pub(super) fn table_entry(&self, place: &Place) -> [f64; 2] {
+    fn table_entry(&self, place: &Place) -> [f64; 2] {
         let reach = self.free_reach(place);
         let mu = self.solve(place, reach);
         let q = mu.exp();

@@ -3,7 +3,6 @@
 //! Away from walls the root depends only on the distance a from the lower node of the cell. The table replaces the λ of the last step as a
 //! starting value, for all particles. No λ is stored, so a step does not depend on the steps before it.
 
-use super::separable::Lme;
 use crate::approximation::interior::FURTHEST;
 use crate::approximation::product::Place;
 
@@ -24,16 +23,17 @@ const INTERVALS: f64 = 96.0;
 pub(super) struct Starts(Vec<[f64; 2]>);
 
 impl Starts {
-    /// The table of `lme`. `None` if functions reach only the nodes of the cell, if they reach very far, or if γ̂ is large.
-    pub(super) fn new(lme: &Lme) -> Option<Self> {
-        let narrow_enough = lme.radius() > 1.0 && lme.radius() <= LARGEST_RADIUS;
-        if !(narrow_enough && lme.gamma() > 0.0 && lme.gamma() <= LARGEST_GAMMA) {
+    /// The table of functions with this locality and radius. `root` gives q and dq/da at a place. `None` if functions reach only the nodes
+    /// of the cell, if they reach very far, or if γ̂ is large.
+    pub(super) fn new(gamma: f64, radius: f64, root: impl Fn(&Place) -> [f64; 2]) -> Option<Self> {
+        let has_table = radius > 1.0 && radius <= LARGEST_RADIUS && gamma > 0.0 && gamma <= LARGEST_GAMMA;
+        if !has_table {
             return None;
         }
-        let intervals = (INTERVALS * lme.gamma().max(1.0)).ceil();
+        let intervals = (INTERVALS * gamma.max(1.0)).ceil();
         let at = |i: u32| {
             let below = f64::from(i) / intervals;
-            lme.table_entry(&Place { cell: 0, below, above: 1.0 - below })
+            root(&Place { cell: 0, below, above: 1.0 - below })
         };
         Some(Self((0..=intervals as u32).map(at).collect()))
     }

@@ -5,7 +5,7 @@ use crate::approximation::AtSurface;
 use crate::grid::Grid;
 use crate::mechanics::sweep::Points;
 use crate::particles::Particles;
-use crate::shape::HAIR;
+use crate::shape::SURFACE_DEPTH;
 use crate::tensor::{Vector, cofactor, identity};
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, HashMap};
 const SAME: f64 = 1e-6;
 
 /// The evaluation points of all particles, with loaded surface points continued to the surface. Surface points lie slightly below the
-/// surface (by `HAIR`), in the cell of the body.
+/// surface (by `SURFACE_DEPTH`), in the cell of the body.
 pub(crate) fn at_surface_points<'a, const D: usize>(
     mut points: Points<'a, D>,
     particles: &Particles<D>,
@@ -29,7 +29,7 @@ pub(crate) fn at_surface_points<'a, const D: usize>(
             let f = identity::<f64, D>() + reference.displacement_gradient[point.particle];
             let normal = cofactor(&f) * point.normal;
             let outward = normal.try_normalize(0.0).unwrap_or(normal);
-            (point.particle as u32, reference.position[point.particle] + outward * (HAIR * grid.spacing))
+            (point.particle as u32, reference.position[point.particle] + outward * (SURFACE_DEPTH * grid.spacing))
         })
         .collect();
     let below: HashMap<u32, Vector<f64, D>> = match at_surface {

@@ -63,9 +63,9 @@ impl Renewal {
 impl Display for Renewal {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::EveryStep => f.write_str("new in every step"),
-            Self::Never => f.write_str("kept"),
-            Self::Strain(most) => write!(f, "kept until a particle has strained by {most}"),
+            Self::EveryStep => f.write_str("reset in every step"),
+            Self::Never => f.write_str("never reset"),
+            Self::Strain(most) => write!(f, "reset when a particle has strained by {most}"),
         }
     }
 }

@@ -58,7 +58,7 @@ pub trait Scheme: Debug + Display + Send + Sync {
 /// The time integration scheme.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(rename = "Inertia")]
+#[schemars(rename = "TimeScheme")]
 pub enum Parameters {
     /// Dynamics, by Newmark's method.
     #[default]

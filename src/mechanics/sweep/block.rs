@@ -33,8 +33,6 @@ pub struct Groups {
     pub(super) windows: Vec<Span>,
     /// Weights of the groups, one after the other, as in [`Window`].
     pub(super) weights: Vec<[f64; LANES]>,
-    /// The weights in single precision, dN/dx in units of 1/h; empty where no tangent product asks for them.
-    pub(super) single: Vec<[f32; LANES]>,
     /// Particles of each group. The weights of unused lanes are zero.
     pub(super) particles: Vec<[u32; LANES]>,
 }
@@ -66,7 +64,6 @@ impl Groups {
     pub(super) fn renewed(mut self, dimension: usize, size: [usize; 3]) -> Self {
         self.windows.clear();
         self.weights.clear();
-        self.single.clear();
         self.particles.clear();
         Self { dimension, stride: [size[0], size[0] * size[1]], first: 0, ..self }
     }
@@ -81,16 +78,16 @@ impl Groups {
         Group { number: self.first + group, particles: &self.particles[group][..lanes] }
     }
 
-    /// Window and weights of a group. `weights` are the weights of all groups, in double or single precision.
+    /// Window and weights of a group.
     #[inline(always)]
-    pub(super) fn window<'w, X>(&self, group: usize, weights: &'w [[X; LANES]]) -> Window<'w, X> {
+    pub(super) fn window(&self, group: usize) -> Window<'_> {
         let Span { weights: start, first, width, lanes } = self.windows[group];
         let width = width.map(usize::from);
         let rows = 2 * width[..self.dimension].iter().sum::<usize>();
         Window {
             dimension: self.dimension,
             width,
-            weights: &weights[start as usize..start as usize + rows],
+            weights: &self.weights[start as usize..start as usize + rows],
             lanes: usize::from(lanes),
             first: first as usize,
             stride: self.stride,
@@ -105,7 +102,7 @@ impl Groups {
         lane: usize,
         mut visit: impl FnMut(usize, f64, Vector<f64, D>),
     ) {
-        let window = self.window(group, &self.weights);
+        let window = self.window(group);
         let weights = |k: usize, at: usize| {
             let (n, dn) = window.axis(k);
             [n[at][lane], dn[at][lane]]
@@ -137,7 +134,6 @@ impl Groups {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.windows.as_slice())
             + size_of_val(self.weights.as_slice())
-            + size_of_val(self.single.as_slice())
             + size_of_val(self.particles.as_slice())
     }
 }

@@ -48,14 +48,14 @@ pub(super) const fn pair(k: usize, l: usize) -> usize {
 /// With ∇N = (N_x' P_x, N_x P_y, N_x P_z), P_x = N_y N_z, …, row i of the block is
 /// N_x'² B_xx P_x P_x + N_x N_x' (B_xy P_x P_y + B_xz P_x P_z) + N_x² (B_yy P_y P_y + B_yz P_y P_z + B_zz P_z P_z + m P_x P_x e_i).
 pub(super) struct ScatterBlocks<'a> {
-    pub window: Window<'a, f64>,
+    pub window: Window<'a>,
     pub from: &'a Quadratic,
     pub out: &'a mut [f64],
 }
 
-impl<const D: usize> WithLanes<f64> for In<ScatterBlocks<'_>, D, D> {
+impl<const D: usize> WithLanes for In<ScatterBlocks<'_>, D, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let ScatterBlocks { window, from, out } = self.0;
         let rows = window.width[1] * window.width[2];
         let at_once = S::ROWS;
@@ -67,9 +67,9 @@ impl<const D: usize> WithLanes<f64> for In<ScatterBlocks<'_>, D, D> {
 }
 
 #[inline(always)]
-fn blocks_tile<S: Lanes<X = f64>, const D: usize, const W: usize>(
+fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, f64>,
+    window: &Window<'_>,
     start: usize,
     pairs: &Pairs<S, D>,
     from: &Quadratic,

@@ -22,8 +22,8 @@ pub(super) struct Scratch {
     groups: Vec<(Range<usize>, [[u32; 2]; 3])>,
 }
 
-/// The block of the particles `keys`. The number of its first group and its node numbers are filled in later. With `single` it has
-/// weights in single precision too. The arrays of `spare` are reused.
+/// The block of the particles `keys`. The number of its first group and its node numbers are filled in later. The arrays of `spare` are
+/// reused.
 ///
 /// # Errors
 /// The error of the shape functions of one of the particles.
@@ -32,7 +32,6 @@ pub(super) fn block<const D: usize>(
     grid: &Grid<D>,
     points: &Points<'_, D>,
     keys: &[Key],
-    single: bool,
     spare: Block,
     scratch: &mut Scratch,
 ) -> Result<Block, ApproximationError> {
@@ -50,28 +49,10 @@ pub(super) fn block<const D: usize>(
     active.clear();
     active.resize(size[1] * size[2], 0);
     let building = Building { family, grid, keys, origin, size };
-    let mut groups = building.groups(groups, scratch, &mut active)?;
-    if single {
-        groups.round(grid.spacing);
-    }
+    let groups = building.groups(groups, scratch, &mut active)?;
     nodes.clear();
     places.clear();
     Ok(Block { groups, origin, size, nodes, places, active })
-}
-
-impl Groups {
-    /// Adds the weights in single precision, dN/dx in units of 1/h.
-    fn round(&mut self, h: f64) {
-        let Self { dimension, windows, weights, single, .. } = self;
-        single.reserve_exact(weights.len());
-        for window in windows {
-            for nodes in window.width[..*dimension].iter().map(|&nodes| usize::from(nodes)) {
-                let (values, derivatives) = weights[single.len()..single.len() + 2 * nodes].split_at(nodes);
-                single.extend(values.iter().map(|row| row.map(|n| n as f32)));
-                single.extend(derivatives.iter().map(|row| row.map(|dn| (dn * h) as f32)));
-            }
-        }
-    }
 }
 
 /// The smallest interval that holds all `spans`.

@@ -4,7 +4,7 @@
 //! of nodes and functions ([`AxisWeights`]) is evaluated for each particle.
 
 use super::Points;
-use super::lanes::{LANES, Lanes, Widest, WithLanes};
+use super::lanes::{LANES, Lanes, WithLanes, widest};
 use super::order::Key;
 use super::supports::WIDEST;
 use crate::approximation::{
@@ -66,8 +66,8 @@ impl<'a> Family<'a> {
     /// The error of the first particle whose functions cannot be evaluated.
     pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), ApproximationError> {
         approximation::check(axis)?;
-        if let Some((_, radius)) = self.shipped {
-            f64::widest(Places { axis, radius, along });
+        if let Some((shipped, radius)) = self.shipped {
+            widest(Places { axis, radius, edge: shipped.edge(), along });
         } else {
             along.spans.clear();
             for &x in &along.x {
@@ -131,13 +131,15 @@ fn span(list: &AxisWeights) -> [u32; 2] {
 struct Places<'a> {
     axis: &'a Axis,
     radius: f64,
+    /// See [`Shipped::edge`].
+    edge: f64,
     along: &'a mut Along,
 }
 
-impl WithLanes<f64> for Places<'_> {
+impl WithLanes for Places<'_> {
     #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, _: S) {
-        let Self { axis, radius, along } = self;
+    fn run<S: Lanes>(self, _: S) {
+        let Self { axis, radius, edge, along } = self;
         let count = along.x.len();
         along.cells.resize(count, 0);
         along.below.resize(count, 0.0);
@@ -147,7 +149,7 @@ impl WithLanes<f64> for Places<'_> {
         let last = f64::from(axis.cells);
         let places = along.cells.iter_mut().zip(&mut along.below).zip(&mut along.above);
         for (&x, ((cell, below), above)) in along.x.iter().zip(places) {
-            let place = Place::at(axis, axis.spacings(x).min(last));
+            let place = Place::at(axis, axis.spacings(x).min(last)).at_edge(edge, axis.round_off(x));
             (*cell, *below, *above) = (place.cell, place.below, place.above);
         }
         // Number of integers j ≥ 1 with j < R − d: nodes beyond the cell within the radius R.
@@ -229,7 +231,7 @@ impl InteriorVisitor for InLanes<'_> {
     fn visit<const M: usize>(self, interior: &impl Interior) {
         self.out.first = [-(M as i64); LANES];
         let starts = self.below.map(|below| interior.start(below));
-        f64::widest(Evaluate::<_, M> { interior, starts, lanes: self });
+        widest(Evaluate::<_, M> { interior, starts, lanes: self });
     }
 }
 
@@ -239,9 +241,9 @@ struct Evaluate<'a, 'b, I, const M: usize> {
     lanes: InLanes<'b>,
 }
 
-impl<I: Interior, const M: usize> WithLanes<f64> for Evaluate<'_, '_, I, M> {
+impl<I: Interior, const M: usize> WithLanes for Evaluate<'_, '_, I, M> {
     #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;
         let wide = |x: &[f64; LANES]| Wide(s, s.load(x));
         let (below, above) = (wide(&below), wide(&above));
@@ -262,20 +264,20 @@ impl<I: Interior, const M: usize> WithLanes<f64> for Evaluate<'_, '_, I, M> {
 }
 
 /// The lanes of a vector, with operators.
-struct Wide<S: Lanes<X = f64>>(S, S::N);
+struct Wide<S: Lanes>(S, S::N);
 
-impl<S: Lanes<X = f64>> Clone for Wide<S> {
+impl<S: Lanes> Clone for Wide<S> {
     #[inline(always)]
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<S: Lanes<X = f64>> Copy for Wide<S> {}
+impl<S: Lanes> Copy for Wide<S> {}
 
 macro_rules! operator {
     ($operator:ident, $method:ident) => {
-        impl<S: Lanes<X = f64>> $operator for Wide<S> {
+        impl<S: Lanes> $operator for Wide<S> {
             type Output = Self;
 
             #[inline(always)]
@@ -291,7 +293,7 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-impl<S: Lanes<X = f64>> Lane for Wide<S> {
+impl<S: Lanes> Lane for Wide<S> {
     #[inline(always)]
     fn constant(self, x: f64) -> Self {
         Self(self.0, self.0.splat(x))

@@ -1,7 +1,5 @@
 //! The evaluation mode of a pass: values, gradients or both, and the weights of its scatter.
 
-use crate::scalar::Real;
-
 /// The evaluation mode of a pass over the particles. It holds for gather and scatter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flow {
@@ -40,7 +38,7 @@ pub enum Weights {
 
 impl Weights {
     /// The function applied to every weight; `None` where weights stay unchanged.
-    pub(super) fn changed<X: Real>(self) -> Option<fn(X) -> X> {
+    pub(super) fn changed(self) -> Option<fn(f64) -> f64> {
         match self {
             Self::Signed => None,
             Self::Magnitude => Some(|n| n.abs()),

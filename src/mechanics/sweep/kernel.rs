@@ -10,20 +10,19 @@ use super::lanes::{LANES, Lanes, WithLanes};
 use crate::scalar::{Arithmetic, Real};
 use crate::tensor::Vector;
 use nalgebra::SMatrix;
-use num_traits::One;
 
 /// The widest tile of nodes along x that a kernel sums at a time. A group of neighbouring cells has no wider window along x.
 pub(super) const WIDEST_TILE: usize = 6;
 
 /// A group's window of nodes and its weights.
 #[derive(Clone, Copy)]
-pub struct Window<'a, X> {
+pub struct Window<'a> {
     /// 1, 2 or 3.
     pub dimension: usize,
     /// Nodes along each axis; 1 along axes that do not exist.
     pub width: [usize; 3],
     /// Axis after axis: N of each node, then dN/dx of each node, a lane a particle.
-    pub weights: &'a [[X; LANES]],
+    pub weights: &'a [[f64; LANES]],
     /// Number of particles. The lanes behind them are empty and have zero weights.
     pub lanes: usize,
     /// Place of the first node in the box of the block.
@@ -32,10 +31,10 @@ pub struct Window<'a, X> {
     pub stride: [usize; 2],
 }
 
-impl<X> Window<'_, X> {
+impl Window<'_> {
     /// N and dN/dx along axis `k`.
     #[inline(always)]
-    pub(super) fn axis(&self, k: usize) -> (&[[X; LANES]], &[[X; LANES]]) {
+    pub(super) fn axis(&self, k: usize) -> (&[[f64; LANES]], &[[f64; LANES]]) {
         let start: usize = 2 * self.width[..k].iter().sum::<usize>();
         self.weights[start..start + 2 * self.width[k]].split_at(self.width[k])
     }
@@ -98,17 +97,17 @@ pub(super) use each_tile;
 pub(super) struct In<W, const C: usize, const D: usize>(pub W);
 
 /// Fills `value` and `gradient`, C and C·D rows, from the box `nodal`, which holds the C components of node after node.
-pub struct Gather<'a, X> {
-    pub window: Window<'a, X>,
-    pub nodal: &'a [X],
+pub struct Gather<'a> {
+    pub window: Window<'a>,
+    pub nodal: &'a [f64],
     pub flow: Flow,
-    pub value: &'a mut [[X; LANES]],
-    pub gradient: &'a mut [[X; LANES]],
+    pub value: &'a mut [[f64; LANES]],
+    pub gradient: &'a mut [[f64; LANES]],
 }
 
-impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Gather<'_, X>, C, D> {
+impl<const C: usize, const D: usize> WithLanes for In<Gather<'_>, C, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = X>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let Gather { window, nodal, flow, value, gradient } = self.0;
         let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
         each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
@@ -142,7 +141,7 @@ type Sums<N, const C: usize, const K: usize> = [[N; C]; K];
 fn row<S: Lanes, const C: usize, const W: usize>(
     s: S,
     weights: &[[S::N; W]; 2],
-    nodal: &[S::X],
+    nodal: &[f64],
     first: usize,
     width: usize,
 ) -> Sums<S::N, C, 2> {
@@ -162,9 +161,9 @@ fn row<S: Lanes, const C: usize, const W: usize>(
 #[inline(always)]
 fn plane<S: Lanes, const C: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X>,
+    window: &Window<'_>,
     weights: &[[S::N; W]; 2],
-    nodal: &[S::X],
+    nodal: &[f64],
     first: usize,
     width: usize,
 ) -> Sums<S::N, C, 3> {
@@ -185,9 +184,9 @@ fn plane<S: Lanes, const C: usize, const W: usize>(
 #[inline(always)]
 fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X>,
+    window: &Window<'_>,
     start: usize,
-    nodal: &[S::X],
+    nodal: &[f64],
     with_value: bool,
     out: &mut Gathered<S::N, C, D>,
     width: usize,
@@ -233,17 +232,17 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 
 /// f_I += σ ∇N_I + q N_I. `value` is q in C rows, and `gradient` is σ in C·D rows, a lane a particle. `out` is a box with the layout of
 /// [`Gather::nodal`], one vector of lanes longer than its nodes need.
-pub struct Scatter<'a, X> {
-    pub window: Window<'a, X>,
+pub struct Scatter<'a> {
+    pub window: Window<'a>,
     pub flow: Flow,
-    pub value: &'a [[X; LANES]],
-    pub gradient: &'a [[X; LANES]],
-    pub out: &'a mut [X],
+    pub value: &'a [[f64; LANES]],
+    pub gradient: &'a [[f64; LANES]],
+    pub out: &'a mut [f64],
 }
 
-impl<X: Real, const C: usize, const D: usize> WithLanes<X> for In<Scatter<'_, X>, C, D> {
+impl<const C: usize, const D: usize> WithLanes for In<Scatter<'_>, C, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = X>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let Scatter { window, flow, value, gradient, out } = self.0;
         // Fixed lengths, so that no index is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
@@ -266,7 +265,7 @@ pub(super) struct Pairs<S: Lanes, const D: usize> {
 
 impl<S: Lanes, const D: usize> Pairs<S, D> {
     #[inline(always)]
-    pub(super) fn new(s: S, window: &Window<'_, S::X>, start: usize) -> Self {
+    pub(super) fn new(s: S, window: &Window<'_>, start: usize) -> Self {
         let [_, wy, wz] = window.width;
         let count = (wy * wz - start).min(S::ROWS);
         let mut products = [[s.zero(); LANES]; D];
@@ -275,7 +274,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         for lane in 0..count {
             places[lane] = window.first + y * window.stride[0] + z * window.stride[1];
             if D == 1 {
-                products[0][lane] = s.splat(S::X::one());
+                products[0][lane] = s.splat(1.0);
             } else {
                 let (n, dn) = window.axis(1);
                 let (ny, dy) = (s.load(&n[y]), s.load(&dn[y]));
@@ -305,7 +304,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
     /// Adds `sums` to the rows of the box, from the node `at` of each row on. `sums` are the entries of a row in order, `numbers` for each
     /// node, and hold a row in each lane.
     #[inline(always)]
-    pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [S::X]) {
+    pub(super) fn add(&self, s: S, sums: &[<S::Rows as Arithmetic>::N], at: usize, numbers: usize, out: &mut [f64]) {
         let mut places = self.places;
         for place in &mut places {
             *place = (*place + at) * numbers;
@@ -318,13 +317,13 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
 #[allow(clippy::too_many_arguments)] // what a window, its rows and its particles are
 fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     s: S,
-    window: &Window<'_, S::X>,
+    window: &Window<'_>,
     start: usize,
     pairs: &Pairs<S, D>,
     flow: Flow,
-    value: &[[S::X; LANES]; C],
-    gradient: &[[[S::X; LANES]; D]; C],
-    out: &mut [S::X],
+    value: &[[f64; LANES]; C],
+    gradient: &[[[f64; LANES]; D]; C],
+    out: &mut [f64],
     width: usize,
 ) {
     let (lanes, s) = (s, s.rows());
@@ -371,9 +370,8 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::{Portable, Registers, Widest};
+    use super::super::lanes::{PORTABLE, Registers, widest};
     use super::*;
-    use pulp::Scalar;
 
     const WIDTH: [usize; 3] = [7, 3, 5];
     const BOX: [usize; 3] = [9, 4, 6];
@@ -385,18 +383,18 @@ mod tests {
     }
 
     /// Gathers a field, and scatters the gathered values and gradients.
-    struct ThereAndBack<'a, X>(&'a [[X; LANES]], &'a [X], &'a mut Vec<(Vec<X>, Vec<X>)>);
+    struct ThereAndBack<'a>(&'a [[f64; LANES]], &'a [f64], &'a mut Vec<(Vec<f64>, Vec<f64>)>);
 
-    impl<X: Real> WithLanes<X> for ThereAndBack<'_, X> {
+    impl WithLanes for ThereAndBack<'_> {
         #[inline(always)]
-        fn run<S: Lanes<X = X>>(self, s: S) {
+        fn run<S: Lanes>(self, s: S) {
             let stride = [BOX[0], BOX[0] * BOX[1]];
             let window = Window { dimension: 3, width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
-            let (flow, mut at) = (Flow::BOTH, At::<X, 3, 3>::zero());
+            let (flow, mut at) = (Flow::BOTH, At::<f64, 3, 3>::zero());
             let At { value, gradient } = &mut at;
             let gradient = gradient.as_flattened_mut();
             In::<_, 3, 3>(Gather { window, nodal: self.1, flow, value, gradient }).run(s);
-            let mut out = vec![X::zero(); self.1.len() + LANES];
+            let mut out = vec![0.0; self.1.len() + LANES];
             let (value, gradient) = (at.value.as_slice(), at.gradient.as_flattened());
             In::<_, 3, 3>(Scatter { window, flow, value, gradient, out: &mut out }).run(s);
             self.2.push((gradient.iter().chain(value).flatten().copied().collect(), out));
@@ -405,10 +403,10 @@ mod tests {
 
     /// Weights, nodal values, and the expected results, from plain sums over place, N and ∇N of every node of the window.
     #[allow(clippy::type_complexity)]
-    fn problem<X: Real>() -> (Vec<[X; LANES]>, Vec<X>, Vec<f64>, Vec<f64>) {
+    fn problem() -> (Vec<[f64; LANES]>, Vec<f64>, Vec<f64>, Vec<f64>) {
         let rows = 2 * WIDTH.iter().sum::<usize>();
         let weight = |row: usize, lane: usize| if lane < PARTICLES { irregular(row * 8 + lane) } else { 0.0 };
-        let weights = (0..rows).map(|row| std::array::from_fn(|lane| X::lit(weight(row, lane)))).collect();
+        let weights = (0..rows).map(|row| std::array::from_fn(|lane| weight(row, lane))).collect();
         let nodal: Vec<f64> = (0..3 * BOX.iter().product::<usize>()).map(irregular).collect();
         let of = |k: usize, at: usize, lane: usize| {
             let start = 2 * WIDTH[..k].iter().sum::<usize>() + at;
@@ -437,35 +435,22 @@ mod tests {
                 }
             }
         }
-        (weights, nodal.iter().map(|&x| X::lit(x)).collect(), gathered.into_iter().flatten().collect(), expected)
-    }
-
-    fn judge<X: Real>(found: Vec<(Vec<X>, Vec<X>)>, gathered: &[f64], scattered: &[f64], tolerance: f64) {
-        let close = |a: &[X], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a.value() - b).abs() < tolerance);
-        for (at, out) in found {
-            assert!(close(&at, gathered) && close(&out, scattered));
-        }
+        (weights, nodal, gathered.into_iter().flatten().collect(), expected)
     }
 
     #[test]
     fn all_instruction_sets_give_the_plain_sums() {
-        let (weights, nodal, gathered, scattered) = problem::<f64>();
+        let (weights, nodal, gathered, scattered) = problem();
         let mut found = Vec::new();
-        ThereAndBack(&weights, &nodal, &mut found).run(Portable::<f64>::of(Scalar));
-        f64::widest(ThereAndBack(&weights, &nodal, &mut found));
+        ThereAndBack(&weights, &nodal, &mut found).run(PORTABLE);
+        widest(ThereAndBack(&weights, &nodal, &mut found));
         #[cfg(target_arch = "x86_64")]
         if let Some(s) = pulp::x86::V3::try_new() {
-            ThereAndBack(&weights, &nodal, &mut found).run(Registers::<_, f64, 2, 1>::of(s));
+            ThereAndBack(&weights, &nodal, &mut found).run(Registers::<_, 2, 1>(s));
         }
-        judge(found, &gathered, &scattered, 1e-13);
-    }
-
-    #[test]
-    fn so_they_do_in_single_precision() {
-        let (weights, nodal, gathered, scattered) = problem::<f32>();
-        let mut found = Vec::new();
-        ThereAndBack(&weights, &nodal, &mut found).run(Portable::<f32>::of(Scalar));
-        f32::widest(ThereAndBack(&weights, &nodal, &mut found));
-        judge(found, &gathered, &scattered, 1e-4);
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13);
+        for (at, out) in found {
+            assert!(close(&at, &gathered) && close(&out, &scattered));
+        }
     }
 }

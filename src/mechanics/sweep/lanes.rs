@@ -3,25 +3,22 @@
 //! The operations and their order are the same on every processor. Results differ between processors in one way only: a·b + c is
 //! rounded once with FMA, and twice without.
 
-use crate::scalar::{Arithmetic, Real};
+use crate::scalar::Arithmetic;
 use pulp::{Scalar, Simd};
-use std::marker::PhantomData;
 
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
 
-/// Number of lanes of a vector, in double and in single precision.
+/// Number of lanes of a vector.
 pub const LANES: usize = 8;
 
 /// Arithmetic on lanes. A value of this type proves that the processor has the instructions.
 pub trait Lanes: Arithmetic {
-    /// The number in a lane.
-    type X: Real;
     /// Whether these lanes only serve the rare processor without AVX2. Kernels are then not compiled for every width.
     const RARE: bool;
-    fn splat(self, x: Self::X) -> Self::N;
-    fn load(self, x: &[Self::X; LANES]) -> Self::N;
-    fn store(self, v: Self::N, out: &mut [Self::X; LANES]);
+    fn splat(self, x: f64) -> Self::N;
+    fn load(self, x: &[f64; LANES]) -> Self::N;
+    fn store(self, v: Self::N, out: &mut [f64; LANES]);
     fn abs(self, a: Self::N) -> Self::N;
     fn sub(self, a: Self::N, b: Self::N) -> Self::N;
     fn div(self, a: Self::N, b: Self::N) -> Self::N;
@@ -32,57 +29,73 @@ pub trait Lanes: Arithmetic {
     /// Number of rows in such a vector.
     const ROWS: usize;
     fn rows(self) -> Self::Rows;
-    fn splat_rows(self, x: Self::X) -> <Self::Rows as Arithmetic>::N;
+    fn splat_rows(self, x: f64) -> <Self::Rows as Arithmetic>::N;
     /// Transposes: a vector of particles for each row becomes a vector of rows for each particle.
     fn columns(self, rows: &[Self::N; LANES]) -> [<Self::Rows as Arithmetic>::N; LANES];
     /// Adds the `k`-th of `sums` to the `k`-th number from `places[row]` on, for every row. Whole vectors are read and written, so `out`
     /// has to be one vector longer than the numbers it holds.
-    fn add_up(self, sums: &[<Self::Rows as Arithmetic>::N], places: &[usize], out: &mut [Self::X]);
+    fn add_up(self, sums: &[<Self::Rows as Arithmetic>::N], places: &[usize], out: &mut [f64]);
 }
 
 /// An instruction set that transposes a square of numbers, one row a register.
 pub(super) trait Square: Simd {
     #[inline(always)]
-    fn transpose_f64s(self, rows: &mut [Self::f64s]) {
-        transpose::<f64>(bytemuck::cast_slice_mut(rows), Self::F64_LANES);
-    }
-    #[inline(always)]
-    fn transpose_f32s(self, rows: &mut [Self::f32s]) {
-        transpose::<f32>(bytemuck::cast_slice_mut(rows), Self::F32_LANES);
+    fn transpose(self, rows: &mut [Self::f64s]) {
+        let numbers: &mut [f64] = bytemuck::cast_slice_mut(rows);
+        for i in 0..Self::F64_LANES {
+            for k in 0..i {
+                numbers.swap(i * Self::F64_LANES + k, k * Self::F64_LANES + i);
+            }
+        }
     }
 }
 
 /// A computation that is generic over the lanes.
-pub trait WithLanes<X> {
+pub trait WithLanes {
     /// Runs the computation with the lanes `s`.
-    fn run<S: Lanes<X = X>>(self, s: S);
+    fn run<S: Lanes>(self, s: S);
 }
 
-/// A number type that has vectors.
-pub trait Widest: Real {
-    /// Runs `work` with the widest lanes of this processor.
-    fn widest(work: impl WithLanes<Self>);
+/// Runs `work` with the widest lanes of this processor.
+#[inline]
+pub fn widest(work: impl WithLanes) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if let Some(s) = V4::try_new() {
+            return s.vectorize(Call(work, Registers::<_, 1, 1>(s)));
+        }
+        if let Some(s) = V3::try_new() {
+            return s.vectorize(Call(work, Registers::<_, 2, 1>(s)));
+        }
+    }
+    work.run(PORTABLE);
 }
 
-/// Eight numbers in `N` registers of the instruction set `I`. A vector of rows of nodes takes `R` registers.
-#[derive(Clone, Copy)]
-pub(super) struct Registers<I, X, const N: usize, const R: usize>(I, PhantomData<X>);
+/// The call in the form that `pulp` takes.
+#[cfg(target_arch = "x86_64")]
+struct Call<W, S>(W, S);
 
-/// Plain numbers.
-pub(super) type Portable<X> = Registers<Scalar, X, LANES, LANES>;
-
-impl<I, X, const N: usize, const R: usize> Registers<I, X, N, R> {
-    /// The lanes of an instruction set. The value `instructions` proves that the processor has it.
+#[cfg(target_arch = "x86_64")]
+impl<W: WithLanes, S: Lanes> pulp::NullaryFnOnce for Call<W, S> {
+    type Output = ();
     #[inline(always)]
-    pub(super) fn of(instructions: I) -> Self {
-        Self(instructions, PhantomData)
+    fn call(self) {
+        self.0.run(self.1);
     }
 }
 
-/// Defines an operation on lanes, register by register.
+/// Eight numbers in `N` registers of the instruction set `I`. A vector of rows of nodes takes `R` registers. A value of `I` proves that the
+/// processor has the instructions.
+#[derive(Clone, Copy)]
+pub(super) struct Registers<I, const N: usize, const R: usize>(pub(super) I);
+
+/// Plain numbers, one a register.
+pub(super) const PORTABLE: Registers<Scalar, LANES, LANES> = Registers(Scalar);
+
+/// Defines operations on lanes, register by register.
 macro_rules! by_register {
-    ($method:ident($($a:ident),+) = $of_one:ident) => {
-        #[inline(always)]
+    ($($method:ident($($a:ident),+) = $of_one:ident),+ $(,)?) => {
+        $(#[inline(always)]
         fn $method(self, $($a: Self::N),+) -> Self::N {
             // A loop, not a closure: a closure that is not inlined loses the wide instructions.
             let mut out = self.zero();
@@ -90,124 +103,105 @@ macro_rules! by_register {
                 out[i] = self.0.$of_one($($a[i]),+);
             }
             out
-        }
+        })+
     };
 }
 
-/// Defines the lanes and rows of one number type for any instruction set, given the names of its operations in `pulp`.
-macro_rules! registers {
-    ($number:ident: $vector:ident, $in_one:ident, $read:ident, $written:ident, $splat:ident, $less:ident, $select:ident, $transpose:ident;
-     $($arithmetic:ident $arguments:tt = $of_one:ident),+; $($more:ident $more_arguments:tt = $more_of_one:ident),+;) => {
-        impl<I: Simd, const N: usize, const R: usize> Arithmetic for Registers<I, $number, N, R> {
-            type N = [I::$vector; N];
-            #[inline(always)]
-            fn zero(self) -> Self::N {
-                [self.0.$splat(0.0); N]
-            }
-            $(by_register!($arithmetic $arguments = $of_one);)+
-        }
-
-        impl<I: Square, const N: usize, const R: usize> Lanes for Registers<I, $number, N, R> {
-            type X = $number;
-            type Rows = Registers<I, $number, R, R>;
-            // An x86-64 without AVX2.
-            const RARE: bool = I::IS_SCALAR && cfg!(target_arch = "x86_64");
-            #[inline(always)]
-            fn splat(self, x: $number) -> Self::N {
-                [self.0.$splat(x); N]
-            }
-            #[inline(always)]
-            fn load(self, x: &[$number; LANES]) -> Self::N {
-                let mut out = self.zero();
-                out.copy_from_slice(I::$read(x).0);
-                out
-            }
-            #[inline(always)]
-            fn store(self, v: Self::N, out: &mut [$number; LANES]) {
-                I::$written(out).0.copy_from_slice(&v);
-            }
-            #[inline(always)]
-            fn where_less(self, a: Self::N, b: Self::N, then: Self::N, mut otherwise: Self::N) -> Self::N {
-                for i in 0..N {
-                    otherwise[i] = self.0.$select(self.0.$less(a[i], b[i]), then[i], otherwise[i]);
-                }
-                otherwise
-            }
-            $(by_register!($more $more_arguments = $more_of_one);)+
-            const ROWS: usize = R * I::$in_one;
-            #[inline(always)]
-            fn rows(self) -> Self::Rows {
-                Registers::of(self.0)
-            }
-            #[inline(always)]
-            fn splat_rows(self, x: $number) -> [I::$vector; R] {
-                [self.0.$splat(x); R]
-            }
-            #[inline(always)]
-            fn columns(self, rows: &[Self::N; LANES]) -> [[I::$vector; R]; LANES] {
-                self.turned(rows)
-            }
-            #[inline(always)]
-            fn add_up(self, sums: &[[I::$vector; R]], places: &[usize], out: &mut [$number]) {
-                for (part, some) in sums.chunks(Self::ROWS).enumerate() {
-                    let mut rows = [self.rows().zero(); LANES];
-                    rows[..some.len()].copy_from_slice(some);
-                    let rows = self.turned::<R, R>(&rows);
-                    for (row, &place) in rows[..Self::ROWS].iter().zip(places) {
-                        let to = &mut out[place + part * Self::ROWS..][..Self::ROWS];
-                        if let Some(to) = I::$written(to).0.first_chunk_mut() {
-                            *to = self.rows().add(*to, *row);
-                        }
-                    }
-                }
-            }
-        }
-
-        impl<I: Square, const N: usize, const R: usize> Registers<I, $number, N, R> {
-            /// Transposes rows of `A` registers into columns of `B` registers.
-            #[inline(always)]
-            fn turned<const A: usize, const B: usize>(self, rows: &[[I::$vector; A]; LANES]) -> [[I::$vector; B]; LANES] {
-                let mut columns = [[self.0.$splat(0.0); B]; LANES];
-                for a in 0..A {
-                    for b in 0..B {
-                        let mut square = [self.0.$splat(0.0); LANES];
-                        for i in 0..I::$in_one {
-                            square[i] = rows[b * I::$in_one + i][a];
-                        }
-                        self.0.$transpose(&mut square[..I::$in_one]);
-                        for i in 0..I::$in_one {
-                            columns[a * I::$in_one + i][b] = square[i];
-                        }
-                    }
-                }
-                columns
-            }
-        }
-    };
+impl<I: Simd, const N: usize, const R: usize> Arithmetic for Registers<I, N, R> {
+    type N = [I::f64s; N];
+    #[inline(always)]
+    fn zero(self) -> Self::N {
+        [self.0.splat_f64s(0.0); N]
+    }
+    by_register! {
+        add(a, b) = add_f64s,
+        mul(a, b) = mul_f64s,
+        mul_add(a, b, c) = mul_add_e_f64s,
+        mul_sub(a, b, c) = negate_mul_add_e_f64s,
+    }
 }
 
-registers! {
-    f64: f64s, F64_LANES, as_simd_f64s, as_mut_simd_f64s, splat_f64s, less_than_f64s, select_f64s, transpose_f64s;
-    add(a, b) = add_f64s, mul(a, b) = mul_f64s, mul_add(a, b, c) = mul_add_e_f64s, mul_sub(a, b, c) = negate_mul_add_e_f64s;
-    sub(a, b) = sub_f64s, div(a, b) = div_f64s, abs(a) = abs_f64s;
-}
-registers! {
-    f32: f32s, F32_LANES, as_simd_f32s, as_mut_simd_f32s, splat_f32s, less_than_f32s, select_f32s, transpose_f32s;
-    add(a, b) = add_f32s, mul(a, b) = mul_f32s, mul_add(a, b, c) = mul_add_e_f32s, mul_sub(a, b, c) = negate_mul_add_e_f32s;
-    sub(a, b) = sub_f32s, div(a, b) = div_f32s, abs(a) = abs_f32s;
-}
-
-impl Square for Scalar {}
-
-/// Transposes a square of numbers in place.
-#[inline(always)]
-fn transpose<X>(numbers: &mut [X], edge: usize) {
-    for i in 0..edge {
-        for k in 0..i {
-            numbers.swap(i * edge + k, k * edge + i);
+impl<I: Square, const N: usize, const R: usize> Lanes for Registers<I, N, R> {
+    type Rows = Registers<I, R, R>;
+    // An x86-64 without AVX2.
+    const RARE: bool = I::IS_SCALAR && cfg!(target_arch = "x86_64");
+    const ROWS: usize = R * I::F64_LANES;
+    #[inline(always)]
+    fn splat(self, x: f64) -> Self::N {
+        [self.0.splat_f64s(x); N]
+    }
+    #[inline(always)]
+    fn load(self, x: &[f64; LANES]) -> Self::N {
+        let mut out = self.zero();
+        out.copy_from_slice(I::as_simd_f64s(x).0);
+        out
+    }
+    #[inline(always)]
+    fn store(self, v: Self::N, out: &mut [f64; LANES]) {
+        I::as_mut_simd_f64s(out).0.copy_from_slice(&v);
+    }
+    #[inline(always)]
+    fn where_less(self, a: Self::N, b: Self::N, then: Self::N, mut otherwise: Self::N) -> Self::N {
+        for i in 0..N {
+            otherwise[i] = self.0.select_f64s(self.0.less_than_f64s(a[i], b[i]), then[i], otherwise[i]);
+        }
+        otherwise
+    }
+    by_register! {
+        sub(a, b) = sub_f64s,
+        div(a, b) = div_f64s,
+        abs(a) = abs_f64s,
+    }
+    #[inline(always)]
+    fn rows(self) -> Self::Rows {
+        Registers(self.0)
+    }
+    #[inline(always)]
+    fn splat_rows(self, x: f64) -> [I::f64s; R] {
+        [self.0.splat_f64s(x); R]
+    }
+    #[inline(always)]
+    fn columns(self, rows: &[Self::N; LANES]) -> [[I::f64s; R]; LANES] {
+        self.turned(rows)
+    }
+    #[inline(always)]
+    fn add_up(self, sums: &[[I::f64s; R]], places: &[usize], out: &mut [f64]) {
+        for (part, some) in sums.chunks(Self::ROWS).enumerate() {
+            let mut rows = [self.rows().zero(); LANES];
+            rows[..some.len()].copy_from_slice(some);
+            let rows = self.turned::<R, R>(&rows);
+            for (row, &place) in rows[..Self::ROWS].iter().zip(places) {
+                let to = &mut out[place + part * Self::ROWS..][..Self::ROWS];
+                if let Some(to) = I::as_mut_simd_f64s(to).0.first_chunk_mut() {
+                    *to = self.rows().add(*to, *row);
+                }
+            }
         }
     }
 }
+
+impl<I: Square, const N: usize, const R: usize> Registers<I, N, R> {
+    /// Transposes rows of `A` registers into columns of `B` registers.
+    #[inline(always)]
+    fn turned<const A: usize, const B: usize>(self, rows: &[[I::f64s; A]; LANES]) -> [[I::f64s; B]; LANES] {
+        let mut columns = [[self.0.splat_f64s(0.0); B]; LANES];
+        for a in 0..A {
+            for b in 0..B {
+                let mut square = [self.0.splat_f64s(0.0); LANES];
+                for i in 0..I::F64_LANES {
+                    square[i] = rows[b * I::F64_LANES + i][a];
+                }
+                self.0.transpose(&mut square[..I::F64_LANES]);
+                for i in 0..I::F64_LANES {
+                    columns[a * I::F64_LANES + i][b] = square[i];
+                }
+            }
+        }
+        columns
+    }
+}
+
+impl Square for Scalar {}
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -217,7 +211,7 @@ mod x86 {
 
     impl Square for V3 {
         #[inline(always)]
-        fn transpose_f64s(self, rows: &mut [f64x4]) {
+        fn transpose(self, rows: &mut [f64x4]) {
             let x = self.avx;
             let &mut [a, b, c, d] = rows else { return };
             let (ab_low, ab_high) = (x._mm256_unpacklo_pd(cast(a), cast(b)), x._mm256_unpackhi_pd(cast(a), cast(b)));
@@ -238,7 +232,7 @@ mod x86 {
 
     impl Square for V4 {
         #[inline(always)]
-        fn transpose_f64s(self, rows: &mut [f64x8]) {
+        fn transpose(self, rows: &mut [f64x8]) {
             let x = self.avx512f;
             // Two rows are interleaved into columns (0, 2, 4, 6) and (1, 3, 5, 7), two numbers a quarter. Then quarters are exchanged.
             let mut two = [[x._mm512_setzero_pd(); 4]; 2];
@@ -260,54 +254,14 @@ mod x86 {
     }
 }
 
-/// The call in the form that `pulp` takes.
-#[cfg(target_arch = "x86_64")]
-struct Call<W, S>(W, S);
-
-#[cfg(target_arch = "x86_64")]
-impl<W: WithLanes<S::X>, S: Lanes> pulp::NullaryFnOnce for Call<W, S> {
-    type Output = ();
-    #[inline(always)]
-    fn call(self) {
-        self.0.run(self.1);
-    }
-}
-
-impl Widest for f64 {
-    #[inline]
-    fn widest(work: impl WithLanes<Self>) {
-        #[cfg(target_arch = "x86_64")]
-        {
-            if let Some(s) = V4::try_new() {
-                return s.vectorize(Call(work, Registers::<_, f64, 1, 1>::of(s)));
-            }
-            if let Some(s) = V3::try_new() {
-                return s.vectorize(Call(work, Registers::<_, f64, 2, 1>::of(s)));
-            }
-        }
-        work.run(Portable::<f64>::of(Scalar));
-    }
-}
-
-impl Widest for f32 {
-    #[inline]
-    fn widest(work: impl WithLanes<Self>) {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(s) = V3::try_new() {
-            return s.vectorize(Call(work, Registers::<_, f32, 1, 1>::of(s)));
-        }
-        work.run(Portable::<f32>::of(Scalar));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// Sums, products and the transposition of an irregular matrix.
-    struct Everything<'a, X>(&'a mut Vec<[X; LANES]>);
+    struct Everything<'a>(&'a mut Vec<[f64; LANES]>);
 
-    fn results<X>(run: impl FnOnce(Everything<'_, X>)) -> Vec<[X; LANES]> {
+    fn results(run: impl FnOnce(Everything<'_>)) -> Vec<[f64; LANES]> {
         let mut out = Vec::new();
         run(Everything(&mut out));
         out
@@ -317,22 +271,18 @@ mod tests {
         ((i * LANES + k + 1) as f64 * 0.618_033_988_749_894_9).fract() - 0.5
     }
 
-    impl<X: Real> WithLanes<X> for Everything<'_, X> {
+    impl WithLanes for Everything<'_> {
         #[inline(always)]
-        fn run<S: Lanes<X = X>>(self, s: S) {
+        fn run<S: Lanes>(self, s: S) {
             let mut rows = [s.zero(); LANES];
             for (i, row) in rows.iter_mut().enumerate() {
-                let mut numbers = [X::zero(); LANES];
-                for (k, x) in numbers.iter_mut().enumerate() {
-                    *x = X::lit(entry(i, k));
-                }
-                *row = s.load(&numbers);
+                *row = s.load(&std::array::from_fn(|k| entry(i, k)));
             }
             // Transposed into columns, and back by adding them to rows in memory.
-            let mut written = vec![X::zero(); LANES * LANES + LANES];
+            let mut written = vec![0.0; LANES * LANES + LANES];
             let places: Vec<usize> = (0..S::ROWS).map(|row| row * LANES).collect();
             s.add_up(&s.columns(&rows), &places, &mut written);
-            let (a, b, c) = (rows[1], rows[2], s.splat(X::lit(0.3)));
+            let (a, b, c) = (rows[1], rows[2], s.splat(0.3));
             let results = [
                 s.add(a, b),
                 s.mul(a, b),
@@ -343,11 +293,11 @@ mod tests {
                 s.div(a, b),
                 s.where_less(a, b, c, a),
             ];
-            let mut out: Vec<[X; LANES]> = written.as_chunks().0[..LANES].to_vec();
+            let mut out: Vec<[f64; LANES]> = written.as_chunks().0[..LANES].to_vec();
             out.truncate(S::ROWS);
-            out.resize(LANES, [X::zero(); LANES]);
+            out.resize(LANES, [0.0; LANES]);
             for v in results {
-                let mut numbers = [X::zero(); LANES];
+                let mut numbers = [0.0; LANES];
                 s.store(v, &mut numbers);
                 out.push(numbers);
             }
@@ -355,39 +305,31 @@ mod tests {
         }
     }
 
-    fn judge<X: Real>(all: Vec<Vec<[X; LANES]>>, epsilon: f64) {
-        for results in all {
-            // The rows were transposed twice. At least four of them were written.
-            let rows = if results[4][0].value() == 0.0 { 4 } else { LANES };
-            for i in 0..rows {
-                for k in 0..LANES {
-                    assert_eq!(results[i][k].value(), X::lit(entry(i, k)).value());
-                }
-            }
+    fn judge(results: &[[f64; LANES]]) {
+        // The rows were transposed twice. At least four of them were written.
+        let rows = if results[4][0] == 0.0 { 4 } else { LANES };
+        for i in 0..rows {
             for k in 0..LANES {
-                let (a, b, c) = (entry(1, k), entry(2, k), 0.3);
-                let expected = [a + b, a * b, a * b + c, c - a * b, a.abs(), a - b, a / b, if a < b { c } else { a }];
-                for (result, expected) in results[LANES..].iter().zip(expected) {
-                    assert!(
-                        (result[k].value() - expected).abs() <= epsilon * expected.abs().max(1.0),
-                        "{} for {expected}",
-                        result[k]
-                    );
-                }
+                assert_eq!(results[i][k], entry(i, k));
+            }
+        }
+        for k in 0..LANES {
+            let (a, b, c) = (entry(1, k), entry(2, k), 0.3);
+            let expected = [a + b, a * b, a * b + c, c - a * b, a.abs(), a - b, a / b, if a < b { c } else { a }];
+            for (result, expected) in results[LANES..].iter().zip(expected) {
+                let apart = (result[k] - expected).abs();
+                assert!(apart <= f64::EPSILON * expected.abs().max(1.0), "{} for {expected}", result[k]);
             }
         }
     }
 
     #[test]
     fn all_instruction_sets_compute_the_same() {
-        let mut double = vec![results(|work| work.run(Portable::<f64>::of(Scalar))), results(|work| f64::widest(work))];
-        let mut single = vec![results(|work| work.run(Portable::<f32>::of(Scalar))), results(|work| f32::widest(work))];
+        judge(&results(|work| work.run(PORTABLE)));
+        judge(&results(|work| widest(work)));
         #[cfg(target_arch = "x86_64")]
         if let Some(s) = V3::try_new() {
-            double.push(results(|work| work.run(Registers::<_, f64, 2, 1>::of(s))));
-            single.push(results(|work| work.run(Registers::<_, f32, 1, 1>::of(s))));
+            judge(&results(|work| work.run(Registers::<_, 2, 1>(s))));
         }
-        judge(double, f64::EPSILON);
-        judge(single, 2.0 * f64::from(f32::EPSILON));
     }
 }

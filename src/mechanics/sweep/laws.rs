@@ -4,7 +4,7 @@
 //! their loops into vector instructions with the same bits. These loops are compiled once, here. Any other law keeps a plain loop.
 //! The loop of each body is chosen once a pass over the particles.
 
-use super::lanes::{LANES, Lanes, Widest, WithLanes};
+use super::lanes::{LANES, Lanes, WithLanes, widest};
 use super::tangents::{Form, general};
 use super::{At, Group, Number};
 use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
@@ -138,18 +138,17 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         self.bodies.iter().map(|body| form::<L, D>(&body.law)).max().unwrap_or(Form::Closed)
     }
 
-    /// The point function that linearises the laws at ∇u and fills the rows of their tangents times `factor`, for one pass.
+    /// The point function that linearises the laws at ∇u and fills the rows of their tangents, for one pass.
     pub(crate) fn tangents(
         &self,
         part: Part,
         form: Form,
-        factor: f64,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
         let chosen = self.chosen(move |law| match law.shipped() {
             Some(material) if part == Part::Whole && form != Form::General => {
-                shipped(material, D, What::Tangents { form, factor })
+                shipped(material, D, What::Tangents(form))
             }
-            _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, (part, form, factor), out, det_f)),
+            _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, part, form, out, det_f)),
         });
         move |group, at, rows| {
             let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
@@ -197,12 +196,13 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     out.copy_from_slice(&rows[..D * D]);
 }
 
-/// The tangents of every lane times `factor`: those of `part`, stored in `form`.
+/// The tangents of every lane: those of `part`, stored in `form`.
 #[inline(always)]
 fn tangents_of<L: Law, const D: usize>(
     law: &L,
     states: &States<'_, f64>,
-    (part, form, factor): (Part, Form, f64),
+    part: Part,
+    form: Form,
     out: &mut [[f64; LANES]],
     det_f: &mut [f64; LANES],
 ) {
@@ -213,18 +213,18 @@ fn tangents_of<L: Law, const D: usize>(
         det_f[lane] = det;
         match (frozen, form) {
             (point::Frozen::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
-                write(&closed, factor, form, &mut rows, lane);
+                write(&closed, form, &mut rows, lane);
             }
             (frozen, _) => {
                 for k in 0..D {
                     for l in 0..D {
                         let block = match &frozen {
-                            point::Frozen::Closed(closed) => closed.unit_block(Single::default(), k, l),
+                            point::Frozen::Closed(closed) => closed.unit_block(Single, k, l),
                             point::Frozen::General(blocks) => blocks[k][l],
                         };
                         for i in 0..D {
                             for j in 0..D {
-                                out[general::<D>(k, l, i, j)][lane] = factor * block[i][j];
+                                out[general::<D>(k, l, i, j)][lane] = block[i][j];
                             }
                         }
                     }
@@ -237,10 +237,9 @@ fn tangents_of<L: Law, const D: usize>(
     }
 }
 
-/// Writes A, B, κ, q, b and c of the tangent times `factor`. Of B, b and c it writes the upper triangle, column by column. The tangent is
-/// linear in B, κ, q and c, so only these are multiplied.
+/// Writes A, B, κ, q, b and c of the tangent. Of B, b and c it writes the upper triangle, column by column.
 #[inline(always)]
-fn write<const D: usize>(closed: &ClosedTangent<f64, D>, factor: f64, form: Form, out: &mut ClosedRows, lane: usize) {
+fn write<const D: usize>(closed: &ClosedTangent<f64, D>, form: Form, out: &mut ClosedRows, lane: usize) {
     let symmetric = D * (D + 1) / 2;
     let scalars = D * D + symmetric;
     for i in 0..D {
@@ -248,21 +247,21 @@ fn write<const D: usize>(closed: &ClosedTangent<f64, D>, factor: f64, form: Form
             out[i * D + k][lane] = closed.a[i][k];
         }
     }
-    write_upper(&closed.right, factor, out, D * D, lane);
-    out[scalars][lane] = closed.bulk * factor;
-    out[scalars + 1][lane] = closed.q * factor;
+    write_upper(&closed.right, out, D * D, lane);
+    out[scalars][lane] = closed.bulk;
+    out[scalars + 1][lane] = closed.q;
     if let (Some([b, c]), Form::ClosedWithBoth) = (&closed.both, form) {
-        write_upper(b, 1.0, out, scalars + 2, lane);
-        write_upper(c, factor, out, scalars + 2 + symmetric, lane);
+        write_upper(b, out, scalars + 2, lane);
+        write_upper(c, out, scalars + 2 + symmetric, lane);
     }
 }
 
 #[inline(always)]
-fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedRows, first: usize, lane: usize) {
+fn write_upper<const D: usize>(a: &[[f64; D]; D], out: &mut ClosedRows, first: usize, lane: usize) {
     for k in 0..D {
         for i in 0..D {
             if i <= k {
-                out[first + k * (k + 1) / 2 + i][lane] = a[i][k] * factor;
+                out[first + k * (k + 1) / 2 + i][lane] = a[i][k];
             }
         }
     }
@@ -272,7 +271,7 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], factor: f64, out: &mut ClosedR
 #[derive(Clone, Copy)]
 pub(super) enum What {
     Stresses,
-    Tangents { form: Form, factor: f64 },
+    Tangents(Form),
 }
 
 /// The loop of a shipped law. It is not generic, so it is compiled here and not by every crate that uses it.
@@ -291,7 +290,7 @@ impl LawVisitor for Choose {
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
         fn in_dimension<L: Law + 'static, const D: usize>(law: L, what: What) -> Box<Loop<'static, f64>> {
-            Box::new(move |states, out, det_f| f64::widest(Evaluate::<L, D> { law: &law, what, states, out, det_f }))
+            Box::new(move |states, out, det_f| widest(Evaluate::<L, D> { law: &law, what, states, out, det_f }))
         }
         match self.dimension {
             1 => in_dimension::<L, 1>(law, self.what),
@@ -309,14 +308,14 @@ struct Evaluate<'a, L, const D: usize> {
     det_f: &'a mut [f64; LANES],
 }
 
-impl<L: Law, const D: usize> WithLanes<f64> for Evaluate<'_, L, D> {
+impl<L: Law, const D: usize> WithLanes for Evaluate<'_, L, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, _: S) {
+    fn run<S: Lanes>(self, _: S) {
         let Self { law, what, states, out, det_f } = self;
         match what {
             What::Stresses => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
-            What::Tangents { form, factor } => {
-                tangents_of::<L, D>(law, states, (Part::Whole, form, factor), out, det_f);
+            What::Tangents(form) => {
+                tangents_of::<L, D>(law, states, Part::Whole, form, out, det_f);
             }
         }
     }

@@ -39,22 +39,21 @@ pub use block::Group;
 pub use blocks::Quadratic;
 pub use flow::{Flow, Weights};
 pub use kernel::At;
-pub use laned::Laned;
-pub(crate) use laned::add_quadratic;
+pub(crate) use laned::{add_quadratic, product};
 pub use lanes::LANES;
 pub use laws::Laws;
 pub use number::Number;
 pub use supports::{Points, SupportError, Supports};
-pub use tangents::{Form, Product};
+pub(crate) use tangents::{AddTo, Form, Product};
 
 /// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
-type Point<'a, X, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<X, C, D>], &mut [At<X, C, D>]) + Sync + 'a;
+type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [At<f64, C, D>]) + Sync + 'a;
 
 /// `(particle, u and L of every field, lane)`: the result at the particle in this lane.
 type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D>], usize) -> R + Sync + 'a;
 
 /// `(group, u and L, rows)`: fills the rows of a group.
-pub(crate) type Fill<'a, Y, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [Y]) + Sync + 'a;
+pub(crate) type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;
 
 /// A [`Point`] function of one field.
-pub(crate) type Linear<'a, X, const D: usize> = dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a;
+pub(crate) type Linear<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a;

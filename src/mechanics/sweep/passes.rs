@@ -2,7 +2,7 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Fill, Flow, Group, Laned, Linear, Number, Quadratic, Supports, Weights};
+use super::{Fill, Flow, Group, LANES, Linear, Number, Quadratic, Supports, Weights};
 use crate::parallel::First;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
@@ -30,25 +30,26 @@ impl<const D: usize> Supports<D> {
         };
         let field = field.map(T::flat);
         T::add_flat(out, |out| {
-            either!(self, way => way.sweep::<f64, C>(T::FIELDS, field.as_deref(), flow, out, &point));
+            either!(self, way => way.sweep::<C>(T::FIELDS, field.as_deref(), flow, out, &point));
         });
         failure.check()
     }
 
-    /// [`Self::sweep`] for D plain numbers a node, in double or single precision. It computes products with a tangent.
-    pub(crate) fn product<X: Laned>(&self, field: &[X], flow: Flow, out: &mut [X], point: &Linear<'_, X, D>) {
+    /// [`Self::sweep`] for D plain numbers a node. It computes products with a tangent.
+    pub(crate) fn product(&self, field: &[f64], flow: Flow, out: &mut [f64], point: &Linear<'_, D>) {
         self.pass();
-        let point = |group: Group<'_>, at: &[At<X, D, D>], sums: &mut [At<X, D, D>]| point(group, &at[0], &mut sums[0]);
-        either!(self, way => way.sweep::<X, D>(1, Some(field), flow, out, &point));
+        let point =
+            |group: Group<'_>, at: &[At<f64, D, D>], sums: &mut [At<f64, D, D>]| point(group, &at[0], &mut sums[0]);
+        either!(self, way => way.sweep::<D>(1, Some(field), flow, out, &point));
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(crate) fn fill_rows<Y: Send>(
+    pub(crate) fn fill_rows(
         &self,
         field: &[Vector<f64, D>],
         count: usize,
-        rows: &mut [Y],
-        fill: &Fill<'_, Y, D>,
+        rows: &mut [[f64; LANES]],
+        fill: &Fill<'_, D>,
     ) {
         self.pass();
         either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
@@ -153,7 +154,7 @@ impl<const D: usize> Supports<D> {
             }
         };
         let flow = Flow { weights, ..Flow::VALUE };
-        either!(self, way => way.sweep::<f64, C>(1, None, flow, bytemuck::cast_slice_mut(out), &point));
+        either!(self, way => way.sweep::<C>(1, None, flow, bytemuck::cast_slice_mut(out), &point));
     }
 
     /// Σ u_I N_I at every particle.

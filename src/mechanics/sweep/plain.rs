@@ -10,7 +10,6 @@ use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::parallel;
-use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
 use num_traits::Zero;
 use std::ops::{AddAssign, Range};
@@ -96,17 +95,17 @@ impl<const D: usize> Plain<D> {
         groups.map(move |(group, particles)| Group { number: b * GROUPS + group, particles })
     }
 
-    pub(super) fn sweep<X: Real + Send + Sync, const C: usize>(
+    pub(super) fn sweep<const C: usize>(
         &self,
         fields: usize,
-        field: Option<&[X]>,
+        field: Option<&[f64]>,
         flow: Flow,
-        out: &mut [X],
-        point: &Point<'_, X, C, D>,
+        out: &mut [f64],
+        point: &Point<'_, C, D>,
     ) {
         let numbers = fields * C;
-        self.scatter(numbers, out, |block, group, buffer: &mut [X]| {
-            let mut at = vec![At::<X, C, D>::zero(); fields];
+        self.scatter(numbers, out, |block, group, buffer: &mut [f64]| {
+            let mut at = vec![At::<f64, C, D>::zero(); fields];
             let mut sums = at.clone();
             if let Some(field) = field {
                 block.gather(group, field, &mut at);
@@ -114,7 +113,7 @@ impl<const D: usize> Plain<D> {
             point(group, &at, &mut sums);
             for (lane, (place, n, grad_n)) in block.entries_of(group) {
                 let changed = flow.weights.changed().unwrap_or(|n| n);
-                let (n, grad_n) = (X::lit(changed(n)), grad_n.map(|n| X::lit(changed(n))));
+                let (n, grad_n) = (changed(n), grad_n.map(changed));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
                         let to = &mut buffer[place * numbers + f * C + c];
@@ -161,7 +160,7 @@ impl<const D: usize> Plain<D> {
         parts.into_iter().flatten().enumerate().for_each(|(p, result)| take(p, result));
     }
 
-    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         parallel::for_each(rows.chunks_mut(GROUPS * count).enumerate(), &|(b, rows)| {
             for (group, rows) in self.groups_of(b).zip(rows.chunks_mut(count)) {
                 let mut at = [At::zero()];
@@ -244,11 +243,10 @@ impl<const D: usize> Block<D> {
     }
 
     /// Adds Σ u_I N_I and Σ u_I ⊗ ∇_n N_I of the particles of a group to `at`.
-    fn gather<X: Real, const C: usize>(&self, group: Group<'_>, field: &[X], at: &mut [At<X, C, D>]) {
+    fn gather<const C: usize>(&self, group: Group<'_>, field: &[f64], at: &mut [At<f64, C, D>]) {
         let numbers = at.len() * C;
         for (lane, (place, n, grad_n)) in self.entries_of(group) {
             let node = self.nodes[place] as usize;
-            let (n, grad_n) = (X::lit(n), grad_n.map(X::lit));
             for (f, at) in at.iter_mut().enumerate() {
                 for c in 0..C {
                     let u = field[node * numbers + f * C + c];

@@ -9,7 +9,6 @@ use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
-use crate::solver::Precision;
 use crate::tensor::{Tensor, Vector};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -52,8 +51,6 @@ pub struct Supports<const D: usize> {
     grid: Grid<D>,
     /// Active nodes.
     nodes: Nodes,
-    /// h, if weights in single precision are stored.
-    unit: Option<f64>,
     /// Number of passes over all particles so far.
     passes: AtomicU64,
     /// Memory pool of the nodal fields.
@@ -64,10 +61,10 @@ pub struct Supports<const D: usize> {
 
 impl<const D: usize> Clone for Supports<D> {
     fn clone(&self) -> Self {
-        let Self { way, grid, nodes, unit, pool, extension, .. } = self;
+        let Self { way, grid, nodes, pool, extension, .. } = self;
         let passes = AtomicU64::new(self.passes());
         let (way, nodes, pool, extension) = (way.clone(), nodes.clone(), pool.clone(), extension.clone());
-        Self { way, grid: *grid, nodes, unit: *unit, passes, pool, extension }
+        Self { way, grid: *grid, nodes, passes, pool, extension }
     }
 }
 
@@ -135,32 +132,16 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::with_precision(approximation, grid, positions, Precision::Double)
+        Self::renewed(None, approximation, grid, &Points::at(positions), &Pool::default())
     }
 
-    /// [`Self::new`] with weights in single precision too, if `precision` asks for them and shape functions are products.
-    ///
-    /// Example: [`single_tangent`](crate::mechanics::residual::Equilibrium::single_tangent).
-    ///
-    /// # Errors
-    /// The errors of [`Self::new`].
-    pub fn with_precision<A: ShapeFunction>(
-        approximation: &A,
-        grid: &Grid<D>,
-        positions: &[Vector<f64, D>],
-        precision: Precision,
-    ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, &Points::at(positions), precision, &Pool::default())
-    }
-
-    /// [`Self::with_precision`] in the memory of `spare`, such as the supports of the last step. Sorting begins with the order of particles
+    /// [`Self::new`] in the memory of `spare`, such as the supports of the last step. Sorting begins with the order of particles
     /// in `spare`. The result does not depend on `spare`. If the points have ids, the result does not depend on the order of particles
     /// in memory either, because sums run over cells and ids.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::{Points, Supports}};
     /// use bfree::pooled::Pool;
-    /// use bfree::solver::Precision;
     /// use bfree::tensor::Vector;
     ///
     /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
@@ -169,7 +150,7 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &Points::at(&now), Precision::Double, &Pool::default())?;
+    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &Points::at(&now), &Pool::default())?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
@@ -184,23 +165,21 @@ impl<const D: usize> Supports<D> {
         approximation: &A,
         grid: &Grid<D>,
         points: &Points<'_, D>,
-        precision: Precision,
         pool: &Pool,
     ) -> Result<(Self, Nodes), SupportError> {
         match approximation.separable() {
             Some(product) if product.width() <= WIDEST => {
-                let single = precision == Precision::Mixed;
                 let spare = spare.and_then(|spare| match spare.way {
                     Way::Plain(_) => None,
                     Way::Tiled(tiled) => Some(tiled),
                 });
-                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, single, spare)?;
-                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, single.then_some(grid.spacing), pool), nodes))
+                let (tiled, nodes) = Tiled::new(approximation, product, grid, points, spare)?;
+                Ok((Self::of_way(Way::Tiled(tiled), grid, &nodes, pool), nodes))
             }
             _ => {
                 let by_id = |error: SupportError| SupportError { particle: points.id(error.particle), ..error };
                 let (plain, nodes) = Plain::new(approximation, grid, points).map_err(by_id)?;
-                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, pool), nodes))
+                Ok((Self::of_way(Way::Plain(plain), grid, &nodes, pool), nodes))
             }
         }
     }
@@ -239,12 +218,12 @@ impl<const D: usize> Supports<D> {
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
         let (plain, nodes) = Plain::new(approximation, grid, &Points::at(positions))?;
-        Ok((Self::of_way(Way::Plain(plain), grid, &nodes, None, &Pool::default()), nodes))
+        Ok((Self::of_way(Way::Plain(plain), grid, &nodes, &Pool::default()), nodes))
     }
 
-    fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, unit: Option<f64>, pool: &Pool) -> Self {
+    fn of_way(way: Way<D>, grid: &Grid<D>, nodes: &Nodes, pool: &Pool) -> Self {
         let (nodes, passes, pool) = (nodes.clone(), AtomicU64::new(0), pool.clone());
-        Self { way, grid: *grid, nodes, unit, passes, pool, extension: None }
+        Self { way, grid: *grid, nodes, passes, pool, extension: None }
     }
 
     /// These supports with an extension u = E û: outer nodes follow inner ones, and equilibria are solved for the inner nodes alone.
@@ -349,11 +328,6 @@ impl<const D: usize> Supports<D> {
     /// Counts a pass over the particles.
     pub(super) fn pass(&self) {
         self.passes.fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// The spacing h that scales the derivatives in single precision, stored as h dN/dx; `None` without weights in single precision.
-    pub fn unit(&self) -> Option<f64> {
-        self.unit
     }
 
     /// Whether the loop takes particles in vector lanes, as it does for shape functions that are products.

@@ -4,11 +4,10 @@ use super::blocks::{Quadratic, pair};
 use super::kernel::In;
 use super::lanes::{LANES, Lanes, WithLanes};
 use crate::material::ClosedTangent;
-use crate::scalar::Real;
 
 /// The storage form of a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Form {
+pub(crate) enum Form {
     /// A, B, κ and q of a [`ClosedTangent`].
     Closed,
     /// A, B, κ and q, then b and c.
@@ -31,7 +30,7 @@ impl Form {
 
     /// Reads the closed tangent from the rows of a group.
     #[inline(always)]
-    fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[S::X; LANES]]) -> ClosedTangent<S::N, D> {
+    fn read<S: Lanes, const D: usize>(self, s: S, rows: &[[f64; LANES]]) -> ClosedTangent<S::N, D> {
         let mut at = 0;
         let mut a = [[s.zero(); D]; D];
         for i in 0..D {
@@ -57,7 +56,7 @@ pub(super) const fn general<const D: usize>(k: usize, l: usize, i: usize, j: usi
 
 /// Reads a symmetric tensor from its upper triangle, stored column by column.
 #[inline(always)]
-fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut usize) -> [[S::N; D]; D] {
+fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], at: &mut usize) -> [[S::N; D]; D] {
     let mut b = [[s.zero(); D]; D];
     for k in 0..D {
         for i in 0..=k {
@@ -70,20 +69,20 @@ fn symmetric<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], at: &mut us
 }
 
 /// `out` += 𝔸 : L of a group. `l` and `out` are stored by rows.
-pub struct Product<'a, X> {
+pub(crate) struct Product<'a> {
     /// The form of the tangents.
     pub form: Form,
     /// The tangents.
-    pub rows: &'a [[X; LANES]],
+    pub rows: &'a [[f64; LANES]],
     /// L
-    pub l: &'a [[X; LANES]],
+    pub l: &'a [[f64; LANES]],
     /// δσ
-    pub out: &'a mut [[X; LANES]],
+    pub out: &'a mut [[f64; LANES]],
 }
 
-impl<X: Real, const D: usize> WithLanes<X> for In<Product<'_, X>, D, D> {
+impl<const D: usize> WithLanes for In<Product<'_>, D, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = X>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let Product { form, rows, l, out } = self.0;
         let mut gradient = [[s.zero(); D]; D];
         for i in 0..D {
@@ -120,16 +119,16 @@ impl<X: Real, const D: usize> WithLanes<X> for In<Product<'_, X>, D, D> {
 }
 
 /// Adds `factor` times the quadratic form of the tangents of a group to `into`.
-pub(super) struct AddTo<'a> {
+pub(crate) struct AddTo<'a> {
     pub form: Form,
     pub rows: &'a [[f64; LANES]],
     pub factor: f64,
     pub into: &'a mut Quadratic,
 }
 
-impl<const D: usize> WithLanes<f64> for In<AddTo<'_>, D, D> {
+impl<const D: usize> WithLanes for In<AddTo<'_>, D, D> {
     #[inline(always)]
-    fn run<S: Lanes<X = f64>>(self, s: S) {
+    fn run<S: Lanes>(self, s: S) {
         let AddTo { form, rows, factor, into } = self.0;
         let factor = s.splat(factor);
         let closed = if form == Form::General { None } else { Some(form.read::<S, D>(s, rows)) };
@@ -154,7 +153,7 @@ impl<const D: usize> WithLanes<f64> for In<AddTo<'_>, D, D> {
 
 /// 𝔸_kl of a general tangent.
 #[inline(always)]
-fn entries<S: Lanes, const D: usize>(s: S, rows: &[[S::X; LANES]], k: usize, l: usize) -> [[S::N; D]; D] {
+fn entries<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], k: usize, l: usize) -> [[S::N; D]; D] {
     let mut block = [[s.zero(); D]; D];
     for i in 0..D {
         for j in 0..D {

@@ -36,7 +36,6 @@ impl<const D: usize> Tiled<D> {
         product: &dyn Separable,
         grid: &Grid<D>,
         points: &Points<'_, D>,
-        single: bool,
         spare: Option<Self>,
     ) -> Result<(Self, Nodes), SupportError> {
         let positions = &*points.positions;
@@ -61,7 +60,6 @@ impl<const D: usize> Tiled<D> {
             grid,
             points,
             keys,
-            single,
             std::mem::take(place),
             scratch,
         ) {

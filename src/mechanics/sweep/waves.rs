@@ -7,13 +7,12 @@
 use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks};
 use super::kernel::{At, Gather, Scatter, Window};
-use super::laned::{self, Laned};
+use super::laned;
 use super::lanes::LANES;
 use super::tiled::Tiled;
 use super::{Fill, Flow, Point, Visit};
 use crate::parallel;
 use crate::tensor::Tensor;
-use num_traits::Zero;
 
 /// Number of blocks in a wave: their buffers stay in the second-level caches.
 const WAVE: usize = 64;
@@ -25,10 +24,10 @@ const SLAB: usize = 1024;
 const PARALLEL: usize = 256;
 
 /// `(block, scratch, buffer)`: fills the buffer of a block.
-type Work<'a, X, S> = dyn Fn(&Block, &mut S, &mut [X]) + Sync + 'a;
+type Work<'a, S> = dyn Fn(&Block, &mut S, &mut [f64]) + Sync + 'a;
 
 /// `(block, buffer, first, slab)`: adds the buffer's entries at the active nodes of the slab, which begins at the node `first`.
-type Add<'a, X> = dyn Fn(&Block, &[X], usize, &mut [X]) + Sync + 'a;
+type Add<'a> = dyn Fn(&Block, &[f64], usize, &mut [f64]) + Sync + 'a;
 
 impl<const D: usize> Tiled<D> {
     fn in_parallel(&self) -> bool {
@@ -36,26 +35,26 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// [`super::Supports::sweep`] for `fields` fields of C components side by side. Without a field nothing is gathered.
-    pub(super) fn sweep<X: Laned, const C: usize>(
+    pub(super) fn sweep<const C: usize>(
         &self,
         fields: usize,
-        field: Option<&[X]>,
+        field: Option<&[f64]>,
         flow: Flow,
-        out: &mut [X],
-        point: &Point<'_, X, C, D>,
+        out: &mut [f64],
+        point: &Point<'_, C, D>,
     ) {
         let numbers = fields * C;
         // The buffer of a field is one vector longer than its nodes, since scatters write whole vectors.
         let length = |block: &Block| block.box_nodes() * C + LANES;
-        let work = |block: &Block, scratch: &mut Scratch<X, C, D>, buffer: &mut [X]| {
+        let work = |block: &Block, scratch: &mut Scratch<C, D>, buffer: &mut [f64]| {
             let Scratch { nodal, at, sums, weights } = scratch;
             at.resize(fields, At::zero());
             sums.resize(fields, At::zero());
             if let Some(field) = field {
-                gather_boxes::<X, C>(block, field, fields, nodal);
+                gather_boxes::<C>(block, field, fields, nodal);
             }
             for group in 0..block.groups.len() {
-                let mut window = block.groups.window(group, X::weights(&block.groups));
+                let mut window = block.groups.window(group);
                 if field.is_some() {
                     gather(window, nodal, flow, at);
                 }
@@ -68,11 +67,11 @@ impl<const D: usize> Tiled<D> {
                 }
                 for (sums, buffer) in sums.iter().zip(buffer.chunks_mut(length(block))) {
                     let (value, gradient) = (&sums.value, sums.gradient.as_flattened());
-                    X::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
+                    laned::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
                 }
             }
         };
-        let add = |block: &Block, buffer: &[X], first: usize, out: &mut [X]| {
+        let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [f64]| {
             for (f, buffer) in buffer.chunks(length(block)).take(fields).enumerate() {
                 block.each_node(first, first + out.len() / numbers, |place, node| {
                     let to = node * numbers + f * C;
@@ -92,7 +91,7 @@ impl<const D: usize> Tiled<D> {
             for group in 0..block.groups.len() {
                 let mut form = Quadratic::zero();
                 quadratic(block.groups.group(group), &mut form);
-                let window = block.groups.window(group, &block.groups.weights);
+                let window = block.groups.window(group);
                 laned::blocks(ScatterBlocks { window, from: &form, out: buffer });
             }
         };
@@ -110,28 +109,28 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// Runs `work` and `add` for all blocks, wave by wave. A buffer has `numbers` numbers a node and `more` numbers behind them.
-    fn each_block<X: Laned, S: Default + Send>(
+    fn each_block<S: Default + Send>(
         &self,
         numbers: usize,
         more: usize,
-        out: &mut [X],
-        work: &Work<'_, X, S>,
-        add: &Add<'_, X>,
+        out: &mut [f64],
+        work: &Work<'_, S>,
+        add: &Add<'_>,
     ) {
         let length = self.blocks.iter().map(Block::box_nodes).max().unwrap_or(0) * numbers + more;
-        let one = |scratch: &mut S, buffer: &mut [X], block: &Block| {
-            buffer[..block.box_nodes() * numbers + more].fill(X::zero());
+        let one = |scratch: &mut S, buffer: &mut [f64], block: &Block| {
+            buffer[..block.box_nodes() * numbers + more].fill(0.0);
             work(block, scratch, buffer);
         };
         if !self.in_parallel() {
-            let (mut scratch, mut buffer) = (S::default(), vec![X::zero(); length]);
+            let (mut scratch, mut buffer) = (S::default(), vec![0.0; length]);
             for block in &self.blocks {
                 one(&mut scratch, &mut buffer, block);
                 add(block, &buffer, 0, out);
             }
             return;
         }
-        let mut buffers = vec![X::zero(); WAVE.min(self.blocks.len()) * length];
+        let mut buffers = vec![0.0; WAVE.min(self.blocks.len()) * length];
         for blocks in self.blocks.chunks(WAVE) {
             let parts = buffers.chunks_mut(length).zip(blocks);
             parallel::for_each_with(parts, &|scratch, (buffer, block)| one(scratch, buffer, block));
@@ -156,7 +155,7 @@ impl<const D: usize> Tiled<D> {
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
-        let gather = |scratch: &mut Scratch<f64, C, D>, block: &Block, take: &mut dyn FnMut(usize, R)| {
+        let gather = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(usize, R)| {
             gathered(block, field, fields, flow, scratch, |group, at| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     take(p as usize, point(p as usize, at, lane));
@@ -180,7 +179,7 @@ impl<const D: usize> Tiled<D> {
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
-    pub(super) fn fill_rows<Y: Send>(&self, field: &[f64], count: usize, rows: &mut [Y], fill: &Fill<'_, Y, D>) {
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
         let mut chunks = Vec::with_capacity(self.blocks.len());
         let mut rest = rows;
         for block in &self.blocks {
@@ -188,7 +187,7 @@ impl<const D: usize> Tiled<D> {
             chunks.push(chunk);
             rest = behind;
         }
-        let one = |scratch: &mut Scratch<f64, D, D>, (block, chunk): (&Block, &mut [Y])| {
+        let one = |scratch: &mut Scratch<D, D>, (block, chunk): (&Block, &mut [[f64; LANES]])| {
             let mut rows = chunk.chunks_mut(count);
             gathered(block, field, 1, Flow::GRADIENT, scratch, |group, at| {
                 if let Some(rows) = rows.next() {
@@ -208,22 +207,22 @@ impl<const D: usize> Tiled<D> {
 
 /// Working memory of one thread.
 #[derive(Default)]
-struct Scratch<X, const C: usize, const D: usize> {
+struct Scratch<const C: usize, const D: usize> {
     /// The boxes of the fields.
-    nodal: Vec<X>,
+    nodal: Vec<f64>,
     /// u and L of each field.
-    at: Vec<At<X, C, D>>,
+    at: Vec<At<f64, C, D>>,
     /// q and σ of each field.
-    sums: Vec<At<X, C, D>>,
+    sums: Vec<At<f64, C, D>>,
     /// The weights of a group: magnitudes or squares of its shape-function values.
-    weights: Vec<[X; LANES]>,
+    weights: Vec<[f64; LANES]>,
 }
 
 /// Copies nodal values into the boxes of the fields, one after the other. Nodes that are not active get zero.
-fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fields: usize, nodal: &mut Vec<X>) {
+fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nodal: &mut Vec<f64>) {
     let boxed = block.box_nodes() * C;
     nodal.clear();
-    nodal.resize(fields * boxed, X::zero());
+    nodal.resize(fields * boxed, 0.0);
     for (f, nodal) in nodal.chunks_mut(boxed).enumerate() {
         for (&node, &place) in block.nodes.iter().zip(&block.places) {
             let (to, from) = (place as usize * C, (node as usize * fields + f) * C);
@@ -233,14 +232,9 @@ fn gather_boxes<X: Copy + Zero, const C: usize>(block: &Block, field: &[X], fiel
 }
 
 /// Gathers u and L of a group from the boxes of the fields.
-fn gather<X: Laned, const C: usize, const D: usize>(
-    window: Window<'_, X>,
-    nodal: &[X],
-    flow: Flow,
-    at: &mut [At<X, C, D>],
-) {
+fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], flow: Flow, at: &mut [At<f64, C, D>]) {
     for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
-        X::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
+        laned::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
     }
 }
 
@@ -250,13 +244,13 @@ fn gathered<const C: usize, const D: usize>(
     field: &[f64],
     fields: usize,
     flow: Flow,
-    Scratch { nodal, at, .. }: &mut Scratch<f64, C, D>,
+    Scratch { nodal, at, .. }: &mut Scratch<C, D>,
     mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
 ) {
-    gather_boxes::<f64, C>(block, field, fields, nodal);
+    gather_boxes::<C>(block, field, fields, nodal);
     at.resize(fields, At::zero());
     for group in 0..block.groups.len() {
-        gather(block.groups.window(group, &block.groups.weights), nodal, flow, at);
+        gather(block.groups.window(group), nodal, flow, at);
         visit(block.groups.group(group), at);
     }
 }

@@ -18,12 +18,8 @@ impl<'a, const D: usize> CarriedOver<'a, D> {
 
 impl<const D: usize> CarriedOver<'_, D> {
     fn reasons(Given { scheme, renews, .. }: Given<'_, D>) -> Vec<Reason> {
-        vec![(
-            "carried over",
-            renews && !scheme.has_inertia(),
-            "in load steps, what a grid that is made anew does not balance".into(),
-        )]
+        vec![("out-of-balance force", renews && !scheme.has_inertia(), "after a grid reset in load steps".into())]
     }
 }
 
-dead_load!(CarriedOver<'_, D>, "carried over", Stores);
+dead_load!(CarriedOver<'_, D>, "out-of-balance force", Stores);

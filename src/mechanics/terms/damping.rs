@@ -3,13 +3,11 @@
 
 use super::inertia::FrozenMass;
 use super::stress::FrozenStress;
-use super::{
-    BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, Unit, summed,
-};
+use super::{BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Flow, Laned, Number};
+use crate::mechanics::sweep::{Flow, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::problems::Problems;
 use crate::tensor::{Tensor, Vector};
@@ -45,20 +43,20 @@ pub struct Damping<'a, const D: usize, L> {
     rayleigh: Rayleigh,
     step: Step<'a, D, L>,
     /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
-    stiffness: Option<FrozenStress<f64>>,
+    stiffness: Option<FrozenStress>,
 }
 
 impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
     pub(super) fn of(step: &Step<'a, D, L>) -> Option<Self> {
         let rayleigh = step.loads.damping.filter(|_| !step.nodal.is_static())?;
-        let stiff = (rayleigh.stiffness > 0.0).then(|| Self::stiffness::<f64>(step, Unit::ONE));
+        let stiff = (rayleigh.stiffness > 0.0).then(|| Self::stiffness(step));
         Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok) })
     }
 
     /// The material part of the stiffness at Δφ = 0.
-    fn stiffness<X: Laned>(step: &Step<'a, D, L>, unit: Unit) -> Result<FrozenStress<X>, Inadmissible> {
+    fn stiffness(step: &Step<'a, D, L>) -> Result<FrozenStress, Inadmissible> {
         let at_rest = vec![Vector::zeros(); step.supports.nodes()];
-        Stress::new(step).frozen(&at_rest, Part::Material, unit)
+        Stress::new(step).frozen(&at_rest, Part::Material)
     }
 }
 
@@ -67,12 +65,10 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        if let Some((flow, add)) =
-            self.stiffness.as_ref().and_then(|of| Frozen::<f64, D>::product_at_points(of, Some(v)))
-        {
+        if let Some((flow, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
             let out = bytemuck::cast_slice_mut(&mut of_stiffness);
-            self.step.supports.product::<f64>(bytemuck::cast_slice(v), flow, out, &add);
+            self.step.supports.product(bytemuck::cast_slice(v), flow, out, &add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
         }
         force
@@ -128,38 +124,38 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 
-    fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
+    fn freeze(&self, _: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
         let mut of_stress = None;
         if stiffness > 0.0 {
-            of_stress = Some(Self::stiffness::<X>(&self.step, unit)?.times(a4 * stiffness));
+            of_stress = Some(Self::stiffness(&self.step)?.times(a4 * stiffness));
         }
-        let of_mass = FrozenMass { mass: self.step.mass(), factor: a4 * mass / unit.scale };
+        let of_mass = FrozenMass { mass: self.step.mass(), factor: a4 * mass };
         Ok(Some(Box::new(FrozenDamping { of_mass, of_stress })))
     }
 }
 
 /// α₄ (a M̃ + b K_n)
-struct FrozenDamping<'a, X: Laned, const D: usize> {
+struct FrozenDamping<'a, const D: usize> {
     of_mass: FrozenMass<'a, D>,
-    of_stress: Option<FrozenStress<X>>,
+    of_stress: Option<FrozenStress>,
 }
 
-impl<X: Laned, const D: usize> FrozenDamping<'_, X, D> {
-    fn each(&self) -> impl Iterator<Item = &dyn Frozen<X, D>> {
-        let of_mass: &dyn Frozen<X, D> = &self.of_mass;
-        let of_stress = self.of_stress.as_ref().map(|frozen| frozen as &dyn Frozen<X, D>);
+impl<const D: usize> FrozenDamping<'_, D> {
+    fn each(&self) -> impl Iterator<Item = &dyn Frozen<D>> {
+        let of_mass: &dyn Frozen<D> = &self.of_mass;
+        let of_stress = self.of_stress.as_ref().map(|frozen| frozen as &dyn Frozen<D>);
         [Some(of_mass), of_stress].into_iter().flatten()
     }
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenDamping<'_, X, D> {
-    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+impl<const D: usize> Frozen<D> for FrozenDamping<'_, D> {
+    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         self.each().for_each(|frozen| frozen.add_product_at_nodes(u, out));
     }
 
-    fn product_at_points(&self, u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
         let (flows, all): (Vec<_>, Vec<_>) = self.each().filter_map(|of| of.product_at_points(u)).unzip();
         let flow = flows.into_iter().reduce(Flow::and)?;
         Some((flow, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))

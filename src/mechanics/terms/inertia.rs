@@ -1,12 +1,10 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
-};
+use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Flow, Laned, Number};
+use crate::mechanics::sweep::{Flow, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
@@ -50,7 +48,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     fn planned(Given { scheme, lumping, .. }: Given<'_, D>) -> Vec<Reason> {
         let moves = scheme.has_inertia();
         let consistent = "only for time.lumping < 1; its projection is an iteration";
-        let why = |why: String| if moves { why } else { format!("time.inertia says none: {scheme}") };
+        let why = |why: String| if moves { why } else { format!("time.scheme says none: {scheme}") };
         vec![
             ("inertia, lumped", moves && lumping > 0.0, why(format!("time.lumping = {lumping}, {scheme}"))),
             ("inertia, consistent", moves && lumping < 1.0, why(consistent.into())),
@@ -103,8 +101,8 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         }
     }
 
-    fn freeze<X: Laned>(&self, _: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
-        Ok(Some(Box::new(FrozenMass { mass: self.mass, factor: self.alphas.a1 / unit.scale })))
+    fn freeze(&self, _: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
+        Ok(Some(Box::new(FrozenMass { mass: self.mass, factor: self.alphas.a1 })))
     }
 }
 
@@ -114,18 +112,17 @@ pub(super) struct FrozenMass<'a, const D: usize> {
     pub(super) factor: f64,
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMass<'_, D> {
-    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+impl<const D: usize> Frozen<D> for FrozenMass<'_, D> {
+    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for ((out, u), m) in out.iter_mut().zip(u).zip(self.mass.lumped) {
-            let weight = X::lit(self.factor * self.mass.lumping * m);
-            (0..D).for_each(|i| out[i] += u[i] * weight);
+            *out += u * (self.factor * self.mass.lumping * m);
         }
     }
 
-    fn product_at_points(&self, _: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
-        let add: ProductAtPoints<'_, X, D> = Box::new(|group, at, sums| {
+    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
+        let add: ProductAtPoints<'_, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
-                let weight = X::lit(self.factor * self.mass.consistent(p as usize).unwrap_or(0.0));
+                let weight = self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);
                 (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
             }
         });

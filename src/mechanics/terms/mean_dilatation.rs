@@ -15,13 +15,12 @@
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
 use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit,
-    summed,
+    AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, summed,
 };
 use crate::material::{Law, MaterialState, VolumeResponse};
 use crate::mechanics::dilatation::{Cells, Member, total};
 use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Number, Product, Supports, add_quadratic};
+use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Number, Product, Supports, add_quadratic, product};
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
@@ -141,14 +140,13 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         Some(Ok(summed(energies.into_iter().flatten())))
     }
 
-    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
+    fn freeze(&self, dphi: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
         let supports = self.step.supports;
         let states = self.states(dphi);
         let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
-        let factor = 1.0 / (unit.scale * unit.length * unit.length);
-        let mut rows = supports.pool().unspecified(supports.groups() * count, [X::zero(); LANES]);
-        supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
-            rows.fill([X::zero(); LANES]);
+        let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
+        supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+            rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 let Some(cell) = self.cells.cell(p) else { continue };
                 let Local { jacobian, response, a } = self.local(p as usize, &at.lane(lane).1);
@@ -156,18 +154,18 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
                 let weight = volume * jacobian;
                 for i in 0..D {
                     for k in 0..D {
-                        rows[i * D + k][lane] = X::lit(a[(i, k)] / weight);
+                        rows[i * D + k][lane] = a[(i, k)] / weight;
                     }
                 }
                 // κ = V₀ (J π − J T'), q = V₀ (J π − T), and V₀ J
                 let of_mean = weight * states[cell].pressure;
-                rows[closed - 2][lane] = X::lit(factor * (of_mean - volume * response.stiffness));
-                rows[closed - 1][lane] = X::lit(factor * (of_mean - volume * response.stress));
-                rows[closed][lane] = X::lit(weight);
+                rows[closed - 2][lane] = of_mean - volume * response.stiffness;
+                rows[closed - 1][lane] = of_mean - volume * response.stress;
+                rows[closed][lane] = weight;
             }
         });
-        let stiffness = states.into_iter().map(|state| state.stiffness / unit.scale).collect();
-        Ok(Some(Box::new(FrozenMean { cells: &self.cells, supports, rows, stiffness, length: unit.length })))
+        let stiffness = states.into_iter().map(|state| state.stiffness).collect();
+        Ok(Some(Box::new(FrozenMean { cells: &self.cells, supports, rows, stiffness })))
     }
 }
 
@@ -177,59 +175,55 @@ pub(crate) const fn frozen_rows(dimension: usize) -> usize {
 }
 
 /// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
-struct FrozenMean<'a, X: Laned, const D: usize> {
+struct FrozenMean<'a, const D: usize> {
     cells: &'a Cells,
     supports: &'a Supports<D>,
     /// A, zeros, κ, q, and V₀ J.
-    rows: Pooled<[X; LANES]>,
-    /// k over the scale.
+    rows: Pooled<[f64; LANES]>,
+    /// k
     stiffness: Vec<f64>,
-    /// The unit of length of gradients.
-    length: f64,
 }
 
-impl<X: Laned, const D: usize> FrozenMean<'_, X, D> {
+impl<const D: usize> FrozenMean<'_, D> {
     /// A, zeros, κ and q of a group, and V₀ J.
-    fn of_group(&self, group: usize) -> (&[[X; LANES]], &[X; LANES]) {
+    fn of_group(&self, group: usize) -> (&[[f64; LANES]], &[f64; LANES]) {
         let count = frozen_rows(D);
         let rows = &self.rows[group * count..(group + 1) * count];
         (&rows[..count - 1], &rows[count - 1])
     }
 
     /// k δv of every cell, with δv = Σ V₀ J A : ∇u.
-    fn coupling(&self, u: &[Vector<X, D>]) -> Vec<X> {
-        let pool = self.supports.pool();
-        let u: Pooled<Vector<f64, D>> = pool.collect(u.iter().map(|u| u.map(X::value)));
-        let mut grown = pool.unspecified(self.supports.groups(), [0.0; LANES]);
-        self.supports.fill_rows(&u, 1, &mut grown, &|group, at, grown: &mut [[f64; LANES]]| {
+    fn coupling(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
+        let mut grown = self.supports.pool().unspecified(self.supports.groups(), [0.0; LANES]);
+        self.supports.fill_rows(u, 1, &mut grown, &|group, at, grown| {
             let (a, weight) = self.of_group(group.number);
             let mut sum = [0.0; LANES];
             for (a, l) in a.iter().zip(at.gradient.as_flattened()) {
-                (0..LANES).for_each(|lane| sum[lane] += a[lane].value() * l[lane]);
+                (0..LANES).for_each(|lane| sum[lane] += a[lane] * l[lane]);
             }
-            grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane].value());
+            grown[0] = std::array::from_fn(|lane| sum[lane] * weight[lane]);
         });
         let slot = |slot: u32| grown[slot as usize / LANES][slot as usize % LANES];
         let sum = |((members, _), k): ((&[Member], f64), &f64)| {
-            X::lit(k / self.length * members.iter().map(|member| slot(member.slot)).sum::<f64>())
+            k * members.iter().map(|member| slot(member.slot)).sum::<f64>()
         };
         self.cells.iter().zip(&self.stiffness).map(sum).collect()
     }
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
-    fn product_at_points(&self, u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+impl<const D: usize> Frozen<D> for FrozenMean<'_, D> {
+    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
         let coupling = self.coupling(u?);
         Some((
             Flow::GRADIENT,
             Box::new(move |group, at, sums| {
                 let (rows, weight) = self.of_group(group.number);
                 let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());
-                let mut pulls = [X::zero(); LANES];
+                let mut pulls = [0.0; LANES];
                 for (lane, &p) in group.particles.iter().enumerate() {
-                    pulls[lane] = self.cells.cell(p).map_or(X::zero(), |cell| coupling[cell] * weight[lane]);
+                    pulls[lane] = self.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
                 }
-                <X as Laned>::product(D, Product { form: Form::Closed, rows, l, out });
+                product(D, Product { form: Form::Closed, rows, l, out });
                 for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(rows) {
                     (0..LANES).for_each(|lane| out[lane] += pulls[lane] * a[lane]);
                 }
@@ -238,9 +232,9 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
     }
 
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        let factor = self.length * self.length;
-        Some(Box::new(move |group, form| {
-            add_quadratic(Form::Closed, D, self.of_group(group.number).0, factor, form);
+        Some(Box::new(|group, into| {
+            let (rows, _) = self.of_group(group.number);
+            add_quadratic(D, AddTo { form: Form::Closed, rows, factor: 1.0, into });
         }))
     }
 
@@ -252,7 +246,7 @@ impl<X: Laned, const D: usize> Frozen<X, D> for FrozenMean<'_, X, D> {
             for member in members {
                 let (group, lane) = (member.slot as usize / LANES, member.slot as usize % LANES);
                 let (rows, weight) = self.of_group(group);
-                let a = Tensor::<f64, D>::from_fn(|i, k| (rows[i * D + k][lane] * weight[lane]).value());
+                let a = Tensor::<f64, D>::from_fn(|i, k| rows[i * D + k][lane] * weight[lane]);
                 for (node, function) in functions(member.particle as usize) {
                     sums[node] += Vector::from_fn(|i, _| (a * function.gradient[i])[i]);
                     touched.push(node);

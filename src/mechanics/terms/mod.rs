@@ -33,7 +33,7 @@ use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::{Alphas, Scheme};
-use crate::mechanics::sweep::{At, Flow, Group, Laned, Number, Quadratic, Supports};
+use crate::mechanics::sweep::{At, Flow, Group, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
@@ -70,18 +70,6 @@ impl<const D: usize, L> Clone for Step<'_, D, L> {
 
 impl<const D: usize, L> Copy for Step<'_, D, L> {}
 
-impl<const D: usize, L: Law> Step<'_, D, L> {
-    /// Λ + 2G of an undeformed body: the stiffness of its first particle in uniaxial strain; 0 if the body has no particle.
-    pub fn modulus(&self, body: usize) -> f64 {
-        let along_x = Tensor::<f64, D>::from_fn(|i, k| if (i, k) == (0, 0) { 1.0 } else { 0.0 });
-        let first = self.particles.body.iter().position(|&of| of as usize == body);
-        first.map_or(0.0, |p| {
-            let undeformed = self.particles.state(p, self.dt).deformed(Tensor::zeros());
-            self.bodies[body].law.elasticity(&undeformed, &along_x)[(0, 0)].abs()
-        })
-    }
-}
-
 impl<'a, const D: usize, L> Step<'a, D, L> {
     /// The mass operator.
     pub fn mass(&self) -> Mass<'a, D> {
@@ -101,27 +89,13 @@ pub type AtPoints<'a, T, const D: usize> =
     Box<dyn Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync + 'a>;
 
 /// The contribution of a linearised term to the product, like [`AtPoints`]. A linearised term always exists, so there is no error.
-pub type ProductAtPoints<'a, X, const D: usize> = Box<dyn Fn(Group<'_>, &At<X, D, D>, &mut At<X, D, D>) + Sync + 'a>;
+pub type ProductAtPoints<'a, const D: usize> = Box<dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a>;
 
 /// The effective shape functions of all unknowns at a particle, by node.
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 /// Adds the quadratic form of a linearised tangent at the particles of a group.
 pub type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
-
-/// The scaling of a tangent in single precision: K/s, with gradients in units of 1/h. Both units are 1 in double precision.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unit {
-    /// s, a power of two near the largest entries of K.
-    pub scale: f64,
-    /// h
-    pub length: f64,
-}
-
-impl Unit {
-    /// The units in double precision.
-    pub const ONE: Self = Self { scale: 1.0, length: 1.0 };
-}
 
 /// A sum, and the sum of the magnitudes of its contributions.
 pub type Sum<T> = (T, f64);
@@ -147,7 +121,7 @@ fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
 }
 
 /// The result of linearising a term; `None` for a dead load.
-pub(crate) type Freezing<'a, X, const D: usize> = Result<Option<Box<dyn Frozen<X, D> + 'a>>, Inadmissible>;
+pub(crate) type Freezing<'a, const D: usize> = Result<Option<Box<dyn Frozen<D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
@@ -191,19 +165,19 @@ pub(crate) trait Term<const D: usize>: Sync {
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn freeze<X: Laned>(&self, _dphi: &[Vector<f64, D>], _part: Part, _unit: Unit) -> Freezing<'_, X, D> {
+    fn freeze(&self, _dphi: &[Vector<f64, D>], _part: Part) -> Freezing<'_, D> {
         Ok(None)
     }
 }
 
 /// A term linearised at one Δφ: the data that its product needs, and no more.
-pub(crate) trait Frozen<X, const D: usize>: Sync {
+pub(crate) trait Frozen<const D: usize>: Sync {
     /// Adds the contribution to the product at the nodes.
-    fn add_product_at_nodes(&self, _u: &[Vector<X, D>], _out: &mut [Vector<X, D>]) {}
+    fn add_product_at_nodes(&self, _u: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
     /// The contribution to the product with `u` at the particles, with its [`Flow`]. `u` is `None` if gradients are the same at all
     /// particles of a cell.
-    fn product_at_points(&self, _u: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
+    fn product_at_points(&self, _u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
         None
     }
 
@@ -343,15 +317,14 @@ macro_rules! terms {
             }
 
             /// Linearises all terms, or one piece.
-            pub(crate) fn freeze<X: Laned>(
+            pub(crate) fn freeze(
                 &self,
                 piece: Option<Piece>,
                 dphi: &[Vector<f64, D>],
-                unit: Unit,
-            ) -> Result<Vec<Box<dyn Frozen<X, D> + '_>>, Inadmissible> {
+            ) -> Result<Vec<Box<dyn Frozen<D> + '_>>, Inadmissible> {
                 let mut all = Vec::new();
                 $(if let Some(term) = self.$field.as_ref().filter(|_| piece.is_none_or(|piece| piece.term == <$term as Term<D>>::NAME)) {
-                    all.extend(term.freeze(dphi, piece.map_or(Part::Whole, |piece| piece.part), unit)?);
+                    all.extend(term.freeze(dphi, piece.map_or(Part::Whole, |piece| piece.part))?);
                 })*
                 Ok(all)
             }

@@ -1,9 +1,9 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
-use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term, Unit};
+use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term};
 use crate::mechanics::loads::{Pressing, PressurePoint};
 use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Laned, Number, Supports};
+use crate::mechanics::sweep::{Number, Supports};
 use crate::particles::Particles;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};
 
@@ -53,7 +53,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         }
     }
 
-    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], _: Part, unit: Unit) -> Freezing<'_, X, D> {
+    fn freeze(&self, dphi: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
         let freeze = |point: &PressurePoint<D>| {
             let (p, h_n) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
             let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));
@@ -61,7 +61,7 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
             FrozenPoint {
                 particle: p,
                 df_inv_t: f_inv_t * (identity::<f64, D>() + h_n).transpose(),
-                force: f_inv_t * point.force * (at.jacobian / unit.scale),
+                force: f_inv_t * point.force * at.jacobian,
             }
         };
         Ok(Some(Box::new(FrozenPressure { supports: self.supports, points: self.points.iter().map(freeze).collect() })))
@@ -80,14 +80,13 @@ struct FrozenPoint<const D: usize> {
     force: Vector<f64, D>,
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenPressure<'_, D> {
-    /// The product is evaluated particle by particle, in double precision.
-    fn add_product_at_nodes(&self, u: &[Vector<X, D>], out: &mut [Vector<X, D>]) {
+impl<const D: usize> Frozen<D> for FrozenPressure<'_, D> {
+    fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
-            let l = self.supports.gradient_at(*particle, u).map(X::value);
+            let l = self.supports.gradient_at(*particle, u);
             let delta = w * contract(a, &l) - a * (l.transpose() * w);
             for (node, n, _) in self.supports.of(*particle) {
-                (0..D).for_each(|i| out[node][i] += X::lit(delta[i] * n));
+                out[node] += delta * n;
             }
         }
     }

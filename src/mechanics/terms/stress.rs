@@ -1,11 +1,9 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, Unit, summed,
-};
+use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
 use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Flow, Form, LANES, Laned, Laws, Number, Product, Supports, add_quadratic};
+use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Laws, Number, Product, Supports, add_quadratic, product};
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
@@ -31,42 +29,21 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     }
 
     /// The tangent linearised at Δφ, whole or one `part`.
-    pub(super) fn frozen<X: Laned>(
-        &self,
-        dphi: &[Vector<f64, D>],
-        part: Part,
-        unit: Unit,
-    ) -> Result<FrozenStress<X>, Inadmissible> {
+    pub(super) fn frozen(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<FrozenStress, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
-        let factor = 1.0 / (unit.scale * unit.length * unit.length);
-        let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [X::zero(); LANES]);
-        let evaluate = self.laws.tangents(part, form, factor);
+        let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
+        let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows: &mut [[X; LANES]]| {
-            let mut tangents: [[f64; LANES]; MOST_ROWS];
-            let mut few = [[0.0; LANES]; FEW_ROWS];
-            let tangents = if count <= FEW_ROWS {
-                &mut few[..count]
-            } else {
-                tangents = [[0.0; LANES]; MOST_ROWS];
-                &mut tangents[..count]
-            };
-            if let Err(error) = evaluate(group, at, tangents) {
+        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+            if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
-            rows.iter_mut().zip(tangents).for_each(|(to, from)| *to = from.map(X::lit));
         });
         failure.check()?;
-        Ok(FrozenStress { form, rows, length: unit.length, factor: 1.0 })
+        Ok(FrozenStress { form, rows, factor: 1.0 })
     }
 }
-
-/// Rows of the longest closed form.
-const FEW_ROWS: usize = Form::ClosedWithBoth.rows(3);
-
-/// Rows of the largest form in three dimensions.
-const MOST_ROWS: usize = Form::General.rows(3);
 
 impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     const NAME: &'static str = "stress";
@@ -111,53 +88,52 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         })
     }
 
-    fn freeze<X: Laned>(&self, dphi: &[Vector<f64, D>], part: Part, unit: Unit) -> Freezing<'_, X, D> {
-        Ok(Some(Box::new(self.frozen::<X>(dphi, part, unit)?)))
+    fn freeze(&self, dphi: &[Vector<f64, D>], part: Part) -> Freezing<'_, D> {
+        Ok(Some(Box::new(self.frozen(dphi, part)?)))
     }
 }
 
 /// δσ = 𝔸 : L at all particles, one particle per lane.
-pub(super) struct FrozenStress<X: Laned> {
+pub(super) struct FrozenStress {
     form: Form,
-    rows: Pooled<[X; LANES]>,
-    /// The unit of length of gradients.
-    length: f64,
+    rows: Pooled<[f64; LANES]>,
     /// The factor of all products.
     factor: f64,
 }
 
-impl<X: Laned> FrozenStress<X> {
+impl FrozenStress {
     pub(super) fn times(self, factor: f64) -> Self {
         Self { factor: factor * self.factor, ..self }
     }
 
-    fn of_group(&self, group: usize, dimension: usize) -> &[[X; LANES]] {
+    fn of_group(&self, group: usize, dimension: usize) -> &[[f64; LANES]] {
         let count = self.form.rows(dimension);
         &self.rows[group * count..(group + 1) * count]
     }
 }
 
-impl<X: Laned, const D: usize> Frozen<X, D> for FrozenStress<X> {
-    fn product_at_points(&self, _: Option<&[Vector<X, D>]>) -> Option<(Flow, ProductAtPoints<'_, X, D>)> {
-        let factor = X::lit(self.factor);
+impl<const D: usize> Frozen<D> for FrozenStress {
+    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
         Some((
             Flow::GRADIENT,
-            Box::new(move |group, at, sums| {
+            Box::new(|group, at, sums| {
                 let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
                 if self.factor == 1.0 {
-                    <X as Laned>::product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
+                    product(D, Product { form, rows, l, out: sums.gradient.as_flattened_mut() });
                 } else {
-                    let mut product = [[[X::zero(); LANES]; D]; D];
-                    <X as Laned>::product(D, Product { form, rows, l, out: product.as_flattened_mut() });
-                    let both = sums.gradient.as_flattened_mut().iter_mut().zip(product.as_flattened());
-                    both.for_each(|(sum, x)| sum.iter_mut().zip(x).for_each(|(sum, &x)| *sum += factor * x));
+                    let mut unscaled = [[[0.0; LANES]; D]; D];
+                    product(D, Product { form, rows, l, out: unscaled.as_flattened_mut() });
+                    let both = sums.gradient.as_flattened_mut().iter_mut().zip(unscaled.as_flattened());
+                    both.for_each(|(sum, x)| sum.iter_mut().zip(x).for_each(|(sum, &x)| *sum += self.factor * x));
                 }
             }),
         ))
     }
 
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        let factor = self.factor * self.length * self.length;
-        Some(Box::new(move |group, form| add_quadratic(self.form, D, self.of_group(group.number, D), factor, form)))
+        Some(Box::new(|group, into| {
+            let rows = self.of_group(group.number, D);
+            add_quadratic(D, AddTo { form: self.form, rows, factor: self.factor, into });
+        }))
     }
 }

@@ -6,8 +6,11 @@ use super::svg::{Anchor, Point, Svg, width};
 /// Font size of tick labels and axis names.
 pub(super) const LABEL: f64 = 13.0;
 
-/// Heights of the tick labels and of the axis name below the frame.
-pub(super) const BELOW: (f64, f64) = (25.0, 20.0);
+/// Height of the tick labels below the frame.
+pub(super) const TICK_LABELS: f64 = 25.0;
+
+/// Height of the axis name below the tick labels.
+pub(super) const AXIS_NAME: f64 = 20.0;
 
 /// Ticks of an axis: multiples of 1, 2 or 5 times a power of ten.
 pub(super) struct Ticks {
@@ -106,7 +109,7 @@ impl Axes {
         }
         svg.line([(left, top), (left, bottom), (right, bottom), (right, top), (left, top)], GREY, 1.0);
         if !x.is_empty() {
-            svg.text(((left + right) / 2.0, bottom + BELOW.0 + 15.0), Anchor::Middle, LABEL, BLACK, &level.name(x));
+            svg.text(((left + right) / 2.0, bottom + TICK_LABELS + 15.0), Anchor::Middle, LABEL, BLACK, &level.name(x));
         }
         let beside = left - 16.0 - upright.width();
         svg.text((beside, (top + bottom) / 2.0), Anchor::Upright, LABEL, BLACK, &upright.name(y));

@@ -1,19 +1,26 @@
 //! Lines against time, in panels one above the other.
 
-use super::axes::{Axes, BELOW, LABEL, Ticks, range};
+use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
 use super::palette::{BLACK, Color, GREY};
 use super::svg::{Anchor, Point, Svg, shortened, width};
 
 /// Width of a figure, in SVG units.
 const WIDTH: f64 = 900.0;
-/// Largest width of a name beside a curve, and height of its line.
-const LEGEND: (f64, f64) = (250.0, 17.0);
+
+/// Largest width of a name beside a curve.
+const LEGEND_WIDTH: f64 = 250.0;
+
+/// Height of the line of a name beside a curve.
+const LEGEND_LINE: f64 = 17.0;
 
 /// A line with more than two points per interval is thinned to the extremes of this many intervals.
 const INTERVALS: usize = 1500;
 
-/// Font sizes of a title and of the line below it.
-const TITLE: (f64, f64) = (19.0, 13.0);
+/// Font size of a title.
+const TITLE: f64 = 19.0;
+
+/// Font size of the line below a title.
+const SUBTITLE: f64 = 13.0;
 
 /// A line with its place in the legend.
 pub(super) struct Line {
@@ -70,7 +77,7 @@ impl Heading {
     /// Draws the heading in the middle of a picture of width `wide`.
     pub(super) fn draw(&self, svg: &mut Svg, wide: f64) {
         let most = wide - 20.0;
-        let lines = [(&self.what, TITLE.0, 26.0, BLACK), (&self.run, TITLE.1, 45.0, GREY)];
+        let lines = [(&self.what, TITLE, 26.0, BLACK), (&self.run, SUBTITLE, 45.0, GREY)];
         for (text, size, base, color) in lines {
             svg.text((wide / 2.0, base), Anchor::Middle, size, color, &shortened(text, size, most));
         }
@@ -88,8 +95,8 @@ pub(super) fn draw(heading: &Heading, height: f64, panels: &[Panel]) -> String {
     };
     let shares: f64 = panels.iter().map(|panel| panel.share).sum();
     let captions = panels.iter().filter(|panel| !panel.caption.is_empty()).count() as f64 * 20.0;
-    let between = 14.0 + BELOW.0;
-    let free = height - top - captions - between * panels.len() as f64 - BELOW.1;
+    let between = 14.0 + TICK_LABELS;
+    let free = height - top - captions - between * panels.len() as f64 - AXIS_NAME;
     let tall = |panel: &Panel| free * panel.share / shares;
     let ticks = |panel: &Panel| {
         let (x, y) = spans(panel);
@@ -127,7 +134,7 @@ fn fitting(name: &str, height: f64) -> String {
 }
 
 fn name(line: &Line) -> String {
-    shortened(&line.label, LABEL, LEGEND.0)
+    shortened(&line.label, LABEL, LEGEND_WIDTH)
 }
 
 /// Draws each name at the end of its curve. Names that would overlap are moved apart.
@@ -145,11 +152,11 @@ fn legend(svg: &mut Svg, axes: &Axes, named: &[&Line]) {
 /// Moves ascending heights apart until lines of text fit between them. None lies below `lowest` as long as there is room above.
 fn apart(mut heights: Vec<f64>, lowest: f64) -> Vec<f64> {
     for k in 1..heights.len() {
-        heights[k] = heights[k].max(heights[k - 1] + LEGEND.1);
+        heights[k] = heights[k].max(heights[k - 1] + LEGEND_LINE);
     }
-    let mut below = lowest + LEGEND.1;
+    let mut below = lowest + LEGEND_LINE;
     for height in heights.iter_mut().rev() {
-        *height = height.min(below - LEGEND.1);
+        *height = height.min(below - LEGEND_LINE);
         below = *height;
     }
     heights

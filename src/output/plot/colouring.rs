@@ -1,6 +1,6 @@
 //! The field that colours particles, chosen by name or by default.
 
-use super::PlotError;
+use super::error::PlotError;
 use crate::output::vtu::{Array, Snapshot, Values};
 
 /// One number per particle.

@@ -1,7 +1,7 @@
 //! `report.html`: the pictures and the numbers of a run on one page that needs nothing else.
 
-use super::moves;
 use super::player::Played;
+use super::run_report::has_inertia;
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -40,46 +40,72 @@ details td { vertical-align: top; font-size: 13px } .note { color: #555 }
 /// The page of a run: its report, the player of its snapshots, and its pictures (name and SVG). A run without a report goes on or was
 /// killed.
 pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[(&str, String)]) -> String {
-    let nothing = Value::Null;
-    let report = report.unwrap_or(&nothing);
-    let text = |key: &str| report[key].as_str().unwrap_or_default();
+    let report = report.unwrap_or(&Value::Null);
     let title = report["settings"]["title"].as_str().unwrap_or("A run of bfree");
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n",
         escaped(title)
     );
-    let outcome = match text("outcome") {
-        "" => "killed",
-        outcome => outcome,
-    };
-    let message = match outcome {
-        "killed" => "There is no report: the run goes on, or it was killed. The pictures show what it wrote.",
-        _ => text("message"),
-    };
-    // Writing to a string cannot fail.
-    let _ = writeln!(out, "<p class=\"lead\">{}</p>", escaped(&command(report)));
-    let _ = writeln!(out, "<p class=\"outcome {outcome}\"><b>{outcome}</b>: {}</p>", escaped(message));
+    outcome(&mut out, report);
     warnings(&mut out, &report["warnings"]);
     if let Some(played) = played {
-        let _ = writeln!(out, "{CONTROLS}");
-        let note = |text: &String| writeln!(out, "<p class=\"note\">{}</p>", escaped(text));
-        let _ = played.note.as_ref().map(note);
+        controls(&mut out, played);
     }
     if report.is_object() {
-        out.push_str("<h2>Numbers</h2>\n<div class=\"tables\">\n");
-        // In load steps, loads act at once, and the energy balance says nothing of their work.
-        let left_out: &[&str] = if moves(Some(report)) { &[] } else { &["balance", "kinetic"] };
-        table(&mut out, "Energy at the end", &report["energies"], left_out);
-        table(&mut out, "Counts", &report["counts"], &[]);
-        seconds(&mut out, &report["seconds"]);
-        out.push_str("</div>\n");
+        numbers(&mut out, report);
     }
+    figures(&mut out, pictures);
+    details(&mut out, report);
+    if let Some(played) = played {
+        scripts(&mut out, played);
+    }
+    out.push_str("</body></html>\n");
+    out
+}
+
+// Writing to a string cannot fail, so results of `writeln!` are ignored.
+
+/// The command line, and how the run ended.
+fn outcome(out: &mut String, report: &Value) {
+    let text = |key: &str| report[key].as_str().unwrap_or_default();
+    let (outcome, message) = match text("outcome") {
+        "" => ("killed", "There is no report: the run goes on, or it was killed. The pictures show what it wrote."),
+        outcome => (outcome, text("message")),
+    };
+    let _ = writeln!(out, "<p class=\"lead\">{}</p>", escaped(&command(report)));
+    let _ = writeln!(out, "<p class=\"outcome {outcome}\"><b>{outcome}</b>: {}</p>", escaped(message));
+}
+
+/// The controls of the player, with the note of a recording.
+fn controls(out: &mut String, played: &Played) {
+    let _ = writeln!(out, "{CONTROLS}");
+    if let Some(note) = &played.note {
+        let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(note));
+    }
+}
+
+/// The tables of energies, counts and seconds.
+fn numbers(out: &mut String, report: &Value) {
+    out.push_str("<h2>Numbers</h2>\n<div class=\"tables\">\n");
+    // In load steps, loads act at once, and the energy balance says nothing of their work.
+    let left_out: &[&str] = if has_inertia(Some(report)) { &[] } else { &["balance", "kinetic"] };
+    table(out, "Energy at the end", &report["energies"], left_out);
+    table(out, "Counts", &report["counts"], &[]);
+    seconds(out, &report["seconds"]);
+    out.push_str("</div>\n");
+}
+
+fn figures(out: &mut String, pictures: &[(&str, String)]) {
     out.push_str("<h2>Pictures</h2>\n");
     for (name, svg) in pictures {
         // An XML declaration may stand at the start of a file only.
         let svg = svg.find("<svg").and_then(|start| svg.get(start..)).unwrap_or(svg);
         let _ = writeln!(out, "<figure id=\"{name}\">{svg}</figure>");
     }
+}
+
+/// The inputs of the run, each in a list that opens by a click.
+fn details(out: &mut String, report: &Value) {
     for (key, caption) in [
         ("accuracy", "What the accuracy has set"),
         ("settings", "The scene, with all defaults"),
@@ -88,17 +114,17 @@ pub(super) fn page(report: Option<&Value>, played: Option<&Played>, pictures: &[
     ] {
         if report[key].as_array().map_or(!report[key].is_null(), |list| !list.is_empty()) {
             let _ = writeln!(out, "<details><summary>{caption}</summary><table>");
-            rows(&mut out, String::new(), &report[key]);
+            rows(out, String::new(), &report[key]);
             out.push_str("</table></details>\n");
         }
     }
-    if let Some(Played { meta, numbers, .. }) = played {
-        let _ = writeln!(out, "<script type=\"application/json\" id=\"snapshots\">{meta}</script>");
-        let _ =
-            writeln!(out, "<script type=\"text/plain\" id=\"numbers\">{numbers}</script>\n<script>{PLAYER}</script>");
-    }
-    out.push_str("</body></html>\n");
-    out
+}
+
+/// The snapshots, and the script that plays them.
+fn scripts(out: &mut String, played: &Played) {
+    let Played { meta, numbers, .. } = played;
+    let _ = writeln!(out, "<script type=\"application/json\" id=\"snapshots\">{meta}</script>");
+    let _ = writeln!(out, "<script type=\"text/plain\" id=\"numbers\">{numbers}</script>\n<script>{PLAYER}</script>");
 }
 
 /// A row for every value, with its path. A list of plain values is one row.
@@ -120,7 +146,6 @@ fn rows(out: &mut String, path: String, value: &Value) {
         value => {
             let text = value.as_array().map(|list| list.iter().map(plain).collect::<Vec<_>>().join(", "));
             let text = text.unwrap_or_else(|| plain(value));
-            // Writing to a string cannot fail.
             let _ = writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", escaped(&path), escaped(&text));
         }
     }

@@ -9,6 +9,7 @@ mod axes;
 mod chart;
 mod colouring;
 mod convergence;
+mod error;
 mod histories;
 mod html;
 mod neighbours;
@@ -16,93 +17,27 @@ mod palette;
 mod particles;
 mod player;
 pub mod png;
+mod run_report;
 mod series;
 mod svg;
 mod table;
 mod view;
 
+pub use error::PlotError;
 pub use view::View;
 
+use super::OutputError;
 use super::files::write_atomically;
 use super::vtu::Snapshot;
-use super::{OutputError, vtu};
-use crate::mechanics::schemes::Parameters;
 use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
 use player::Recording;
-use serde::Deserialize;
+use run_report::{has_inertia, quantity};
 use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use table::Columns;
-
-/// Pictures could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    /// A file of the run cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Reason given by the operating system.
-        source: std::io::Error,
-    },
-    /// A table lacks a column.
-    #[error("{} has no column {column:?}", path.display())]
-    Column {
-        /// The table.
-        path: PathBuf,
-        /// The column.
-        column: String,
-    },
-    /// A cell of a table is no number.
-    #[error("{}, line {line}: {cell:?} is not a number", path.display())]
-    Cell {
-        /// The table.
-        path: PathBuf,
-        /// The line; the header is line 1.
-        line: usize,
-        /// The content of the cell.
-        cell: String,
-    },
-    /// The file is not a report of bfree.
-    #[error("{} is no report written by bfree: {source}", path.display())]
-    Report {
-        /// The file.
-        path: PathBuf,
-        /// The reason given by the JSON parser.
-        source: serde_json::Error,
-    },
-    /// A snapshot cannot be read.
-    #[error(transparent)]
-    Snapshot(#[from] vtu::ReadError),
-    /// There are no snapshots for a movie.
-    #[error("{} holds no snapshots: give the scene output.every", directory.display())]
-    NoSnapshots {
-        /// The directory.
-        directory: PathBuf,
-    },
-    /// The snapshots do not hold the field asked for.
-    #[error("the snapshots hold no field {field:?}; they hold {there}; the key output.fields says what a run writes")]
-    Field {
-        /// The field.
-        field: String,
-        /// The fields of the snapshots.
-        there: String,
-    },
-    /// The renderer refused.
-    #[error("cannot draw {name}: {reason}")]
-    Draw {
-        /// The picture.
-        name: &'static str,
-        /// The reason given by the renderer.
-        reason: String,
-    },
-    /// A picture cannot be written.
-    #[error(transparent)]
-    Write(#[from] OutputError),
-}
 
 /// Names of all possible pictures.
 const PICTURES: [&str; 7] = ["energies", "momentum", "iterations", "convergence", "probes", "reactions", "particles"];
@@ -177,7 +112,7 @@ pub(crate) fn is_picture(file: &str) -> bool {
 /// `history.csv` is missing or damaged. Another table, the report or a snapshot is damaged. The snapshots do not hold the field of `look`.
 /// The operating system refuses.
 pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError> {
-    let report = report(directory)?;
+    let report = run_report::read(directory)?;
     let pictures = charts(directory, report.as_ref())?;
     let snapshots = series::files(directory)?;
     let mut played = None;
@@ -192,7 +127,7 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError
             directions: view::Directions::new(look.view, dimension, plane),
             bounds: recording.bounds(),
             span: colouring.as_ref().map_or((0.0, 1.0), Colouring::extremes),
-            run: run_of(report.as_ref()),
+            run: run_report::title(report.as_ref()),
         };
         last = Some(("particles", particles::draw(&snapshot, &scene, colouring.as_ref())));
         played = Some(recording.page(plane));
@@ -214,11 +149,6 @@ pub fn plot_run(directory: &Path, look: &Look) -> Result<Vec<PathBuf>, PlotError
     Ok(written)
 }
 
-/// The title of a run's scene.
-fn run_of(report: Option<&Value>) -> String {
-    report.and_then(|report| report["settings"]["title"].as_str()).unwrap_or_default().to_owned()
-}
-
 /// The snapshot nearest to a time; without a time, the last snapshot.
 fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result<Snapshot, PlotError> {
     let mut nearest: Option<Snapshot> = None;
@@ -237,10 +167,10 @@ fn at_time(directory: &Path, snapshots: &[PathBuf], time: Option<f64>) -> Result
 /// The charts over time, with their names.
 fn charts(directory: &Path, report: Option<&Value>) -> Result<Vec<(&'static str, String)>, PlotError> {
     let history = Columns::read(directory.join("history.csv"))?;
-    let run = run_of(report);
+    let run = run_report::title(report);
     let heading = |what: &str| Heading { what: what.to_owned(), run: run.clone() };
     let mut pictures =
-        vec![("energies", chart::draw(&heading("Energies"), HEIGHT, &energies(&history, moves(report))?))];
+        vec![("energies", chart::draw(&heading("Energies"), HEIGHT, &energies(&history, has_inertia(report))?))];
     if let Some(panel) = momentum(&history, report)? {
         pictures.push(("momentum", chart::draw(&heading("Momentum"), HEIGHT, &[panel])));
     }
@@ -280,7 +210,7 @@ fn column(history: &Columns, column: &str, label: &str, color: palette::Color) -
 
 /// Panels of the energies, and of their balance if there is inertia. In load steps, loads act at once, and a balance says nothing of their
 /// work.
-fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
+fn energies(history: &Columns, has_inertia: bool) -> Result<Vec<Panel>, PlotError> {
     let mut lines = vec![
         column(history, "strain", "strain", palette::VERMILLION)?,
         column(history, "external", "external work", palette::GREEN)?,
@@ -289,7 +219,7 @@ fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
         let dissipated = column(history, "dissipated", "dissipated", palette::SKY)?;
         lines.extend(dissipated.points.iter().any(|point| point.1 != 0.0).then_some(dissipated));
     }
-    if !moves {
+    if !has_inertia {
         return Ok(vec![Panel::over_time("energy", lines)]);
     }
     lines.push(column(history, "total", "total", palette::BLACK)?);
@@ -307,7 +237,7 @@ fn energies(history: &Columns, moves: bool) -> Result<Vec<Panel>, PlotError> {
 /// The momentum of a run with inertia. `None` if it is round-off of its scale, |p| ≤ √(2 M K), with the mass M and the largest kinetic
 /// energy K.
 fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, PlotError> {
-    if !moves(report) {
+    if !has_inertia(report) {
         return Ok(None);
     }
     let axes = [
@@ -321,17 +251,6 @@ fn momentum(history: &Columns, report: Option<&Value>) -> Result<Option<Panel>, 
     let kinetic = Panel::over_time("", vec![column(history, "kinetic", "", palette::BLUE)?]).size();
     let mass = report.and_then(|report| report["mass"].as_f64()).unwrap_or(0.0);
     Ok(Some(panel).filter(|panel| panel.size() > ROUND_OFF * (2.0 * mass * kinetic).sqrt()))
-}
-
-/// The quantity of a panel of probes or reactions. Panels of the same quantity have the same scale.
-fn quantity(report: Option<&Value>, table: &str, panel: &str) -> String {
-    if table == "reactions" {
-        return if panel.ends_with("_torque") { "torque" } else { "force" }.to_owned();
-    }
-    let probes = report.and_then(|report| report["settings"]["output"]["probes"].as_array());
-    let probe = probes.into_iter().flatten().find(|probe| probe["name"] == panel);
-    // An unknown probe has its own scale.
-    probe.and_then(|probe| probe["field"].as_str()).unwrap_or(panel).to_owned()
 }
 
 /// Draws all snapshots of a run as `frame_0000.png`, `frame_0001.png`, … in the directory `frames`, which is created. An encoder makes a
@@ -354,7 +273,7 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
         dimension = snapshot.background.dimension;
     }
     let directions = view::Directions::new(look.view, dimension, series::view(dimension, recording.motion()));
-    let run = run_of(report(directory)?.as_ref());
+    let run = run_report::title(run_report::read(directory)?.as_ref());
     let scene = particles::Scene { directions, bounds: recording.bounds(), span, run };
     let mut written = Vec::new();
     for (number, path) in snapshots.iter().enumerate() {
@@ -365,22 +284,6 @@ pub fn plot_frames(directory: &Path, frames: &Path, look: &Look) -> Result<Vec<P
         written.push(path);
     }
     Ok(written)
-}
-
-/// Whether bodies had inertia according to the report; `true` if the report does not say.
-fn moves(report: Option<&Value>) -> bool {
-    let scheme = report.map(|report| Parameters::deserialize(&report["settings"]["time"]["inertia"]));
-    scheme.and_then(Result::ok).is_none_or(|scheme| scheme.has_inertia())
-}
-
-/// The report of a run that has ended.
-fn report(directory: &Path) -> Result<Option<Value>, PlotError> {
-    let path = directory.join("report.json");
-    match std::fs::read(&path) {
-        Ok(bytes) => serde_json::from_slice(&bytes).map(Some).map_err(|source| PlotError::Report { path, source }),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(PlotError::Read { path, source }),
-    }
 }
 
 #[cfg(test)]

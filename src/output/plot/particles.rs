@@ -1,6 +1,6 @@
 //! The particles of a snapshot over the background grid, coloured by a field.
 
-use super::axes::{Axes, BELOW, LABEL, Ticks, range};
+use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
 use super::chart::Heading;
 use super::colouring::Colouring;
 use super::neighbours::Neighbours;
@@ -9,15 +9,23 @@ use super::svg::{Anchor, Point, Svg, width};
 use super::view::{Directions, dot};
 use crate::output::vtu::Snapshot;
 
-/// Largest width and height of the drawing, and the smallest value of both.
-const MOST: (f64, f64, f64) = (760.0, 620.0, 160.0);
+/// Largest width of the drawing.
+const MAX_WIDTH: f64 = 760.0;
+
+/// Largest height of the drawing.
+const MAX_HEIGHT: f64 = 620.0;
+
+/// Smallest width and height of the drawing.
+const MIN_SIZE: f64 = 160.0;
 
 /// Largest number of grid lines along an axis. More grid lines would be a grey area.
 const MAX_LINES: f64 = 100.0;
 
-/// Largest number of particles that are drawn, and largest number drawn as cells. Beyond the first number an even sample is drawn, beyond
-/// the second number discs are drawn.
-const MAX_DRAWN: (usize, usize) = (50_000, 20_000);
+/// Largest number of particles that are drawn. Of more particles, an even sample is drawn.
+const MAX_DRAWN: usize = 50_000;
+
+/// Largest number of particles that are drawn as cells. More particles are drawn as discs.
+const MAX_CELLS: usize = 20_000;
 
 /// Radius of a disc over the distance of neighbours. The disc has the area of a square of the lattice.
 const RADIUS: f64 = 0.56;
@@ -38,7 +46,7 @@ pub(super) struct Scene {
 pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colouring>) -> String {
     let low_high = range([scene.span.0, scene.span.1].into_iter(), 0.0);
     let label = colouring.map_or("particles", |one| &one.label);
-    let stride = snapshot.points.len().div_ceil(MAX_DRAWN.0).max(1);
+    let stride = snapshot.points.len().div_ceil(MAX_DRAWN).max(1);
     let part = if stride > 1 { format!(", one particle in {stride}") } else { String::new() };
     let first = label.chars().next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
     let rest: String = label.chars().skip(1).collect();
@@ -49,7 +57,7 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
         return over_x(snapshot, scene, &heading, &ids, colouring);
     }
     let (mut x, mut y) = scene.window(snapshot);
-    let scale = (MOST.0 / (x.1 - x.0)).min(MOST.1 / (y.1 - y.0));
+    let scale = (MAX_WIDTH / (x.1 - x.0)).min(MAX_HEIGHT / (y.1 - y.0));
     let size = (widened(&mut x, scale), widened(&mut y, scale));
     let flat = scene.directions.plane();
     let ticks = [Ticks::new(x, (size.0 / 80.0) as usize, false), Ticks::new(y, (size.1 / 60.0) as usize, false)];
@@ -57,7 +65,7 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     let bar = Ticks::new(low_high, (size.1 / 60.0) as usize, false);
     let beside = if colouring.is_some() { 24.0 + 16.0 + 10.0 + bar.width() + 2.0 * LABEL + 8.0 } else { 20.0 };
     let wide = left + size.0 + beside;
-    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + BELOW.0 + BELOW.1 + 8.0);
+    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + TICK_LABELS + AXIS_NAME + 8.0);
     heading.draw(&mut svg, wide);
     let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
     match flat {
@@ -82,9 +90,9 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
 /// Widens a range to the smallest size of a drawing. Returns its length in the picture.
 fn widened(range: &mut (f64, f64), scale: f64) -> f64 {
     let length = (range.1 - range.0) * scale;
-    let air = 0.5 * (MOST.2 - length).max(0.0) / scale;
+    let air = 0.5 * (MIN_SIZE - length).max(0.0) / scale;
     *range = (range.0 - air, range.1 + air);
-    length.max(MOST.2)
+    length.max(MIN_SIZE)
 }
 
 impl Scene {
@@ -226,7 +234,7 @@ fn bodies(
     let neighbours = Neighbours::new(snapshot, ids);
     let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
     let mut order: Vec<usize> = (0..ids.len()).filter(|&k| finite(&ids[k])).collect();
-    if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_DRAWN.1 {
+    if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
         for k in order {
             let cell = neighbours.cell(ids[k]);
             svg.polygon(cell.into_iter().map(|[x, y]| axes.place((x, y))), color(ids[k]));
@@ -277,9 +285,9 @@ fn over_x(
     let (x, _) = scene.window(snapshot);
     let y = range([scene.span.0, scene.span.1].into_iter(), 0.05);
     let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
-    let (left, size) = (Axes::left(&ticks[1]), (MOST.0, MOST.0 / 2.0));
+    let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
     let wide = left + size.0 + 24.0;
-    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + BELOW.0 + BELOW.1 + 8.0);
+    let mut svg = Svg::new(wide, Heading::HEIGHT + size.1 + TICK_LABELS + AXIS_NAME + 8.0);
     heading.draw(&mut svg, wide);
     let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
     let label = colouring.map_or("", |one| &one.label);

@@ -1,7 +1,7 @@
 //! The snapshots of a run for `player.js`: one block of 16-bit numbers, and JSON with the place of every channel in the block.
 
-use super::PlotError;
 use super::colouring::words;
+use super::error::PlotError;
 use super::neighbours::Neighbours;
 use super::palette::VIRIDIS;
 use super::series::damaged;

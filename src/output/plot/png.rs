@@ -1,6 +1,6 @@
 //! PNG from SVG.
 
-use super::PlotError;
+use super::error::PlotError;
 use resvg::{tiny_skia, usvg};
 
 /// Pixels per unit of the SVG.

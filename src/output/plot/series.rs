@@ -1,6 +1,6 @@
 //! The snapshots of a run, and the default plane of its pictures.
 
-use super::PlotError;
+use super::error::PlotError;
 use crate::output::snapshots::SERIES;
 use crate::output::vtu::ReadError;
 use std::path::{Path, PathBuf};

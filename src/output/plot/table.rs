@@ -1,6 +1,6 @@
 //! Columns of numbers from a table written by this crate.
 
-use super::PlotError;
+use super::error::PlotError;
 use std::path::PathBuf;
 
 /// A table in memory.

@@ -97,42 +97,50 @@ pub(super) fn courant(bodies: &[Body], spacing: f64, time: f64) -> Option<f64> {
 ///
 /// # Errors
 /// The target error is outside the table, or a needed length or speed is not in the scene.
-pub(super) fn lay_under(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
+pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     let Some(accuracy) = part::<Accuracy>(&scene["accuracy"]) else { return Ok(Vec::new()) };
     let level = accuracy.level().ok_or_else(|| outside(accuracy))?;
     let Some(bodies) = part::<Vec<Body>>(&scene["bodies"]) else { return Ok(Vec::new()) };
-    let mut under = Under { scene, chosen: Vec::new() };
+    let mut setter = KeySetter { scene, chosen: Vec::new() };
     for (key, value) in level.keys() {
-        let refused = under.scene["time"]["inertia"] == "none" && NEED_INERTIA.iter().any(|word| key.starts_with(word));
+        let refused = has_load_steps(setter.scene) && NEED_INERTIA.iter().any(|word| key.starts_with(word));
         if !refused {
-            under.set(key, value);
+            setter.set(key, value);
         }
     }
     for (i, _) in bodies.iter().enumerate().filter(|(_, body)| body.shape.is_some()) {
-        under.set(&format!("bodies.{i}.particles_per_cell"), level.particles_per_cell.into());
+        setter.set(&format!("bodies.{i}.particles_per_cell"), level.particles_per_cell.into());
     }
-    if under.lacks("grid", "spacing") {
-        let mut with_any = under.scene["grid"].clone();
+    if setter.lacks("grid", "spacing") {
+        let mut with_any = setter.scene["grid"].clone();
         with_any["spacing"] = 1.into();
-        let Some(grid) = part::<GridBox>(&with_any) else { return Ok(under.chosen) };
+        let Some(grid) = part::<GridBox>(&with_any) else { return Ok(setter.chosen) };
         let spacing =
             spacing::fitting(&grid, &bodies, level.cells).map_err(|why| needed("grid.spacing", accuracy, &why))?;
-        under.set("grid.spacing", spacing.into());
+        setter.set("grid.spacing", spacing.into());
     }
-    if under.lacks("time", "step") {
-        let spacing = under.scene["grid"]["spacing"].as_f64().filter(|h| *h > 0.0 && h.is_finite());
-        let (Some(spacing), Some(end)) = (spacing, under.scene["time"]["end"].as_f64().filter(|end| *end > 0.0)) else {
-            return Ok(under.chosen);
+    if setter.lacks("time", "step") {
+        let spacing = setter.scene["grid"]["spacing"].as_f64().filter(|h| *h > 0.0 && h.is_finite());
+        let (Some(spacing), Some(end)) = (spacing, setter.scene["time"]["end"].as_f64().filter(|end| *end > 0.0))
+        else {
+            return Ok(setter.chosen);
         };
-        if under.scene["time"]["inertia"] == "none" {
+        if has_load_steps(setter.scene) {
             return Err(needed("time.step", accuracy, &Unknown::NoInertia));
         }
         let speed = spacing::speed(&bodies).map_err(|why| needed("time.step", accuracy, &why))?;
         let longest = level.courant * spacing / speed;
         // The end is reached in a whole number of steps.
-        under.set("time.step", (end / (end / longest).ceil().max(1.0)).into());
+        setter.set("time.step", (end / (end / longest).ceil().max(1.0)).into());
     }
-    Ok(under.chosen)
+    Ok(setter.chosen)
+}
+
+/// Whether the scene asks for load steps, by the key `time.scheme` or by its old name.
+fn has_load_steps(scene: &Value) -> bool {
+    let time = &scene["time"];
+    let scheme = if time["scheme"].is_null() { &time["inertia"] } else { &time["scheme"] };
+    scheme == "none"
 }
 
 /// A part of a scene; `None` if it does not have the type `T`.
@@ -155,12 +163,12 @@ fn needed(key: &str, accuracy: Accuracy, why: &Unknown) -> Problems {
 }
 
 /// A scene, and the keys inserted into it.
-struct Under<'a> {
+struct KeySetter<'a> {
     scene: &'a mut Value,
     chosen: Vec<Chosen>,
 }
 
-impl Under<'_> {
+impl KeySetter<'_> {
     /// Whether the section is present as an object without the key.
     fn lacks(&self, section: &str, key: &str) -> bool {
         self.scene.get(section).is_some_and(|section| section.is_object() && section.get(key).is_none())
@@ -196,13 +204,13 @@ mod tests {
     #[test]
     fn a_key_that_is_given_stays_and_so_does_what_holds_it() {
         let mut scene = json!({"time": {"end": 1}, "transfer": "flip", "bodies": [{}]});
-        let mut under = Under { scene: &mut scene, chosen: Vec::new() };
+        let mut setter = KeySetter { scene: &mut scene, chosen: Vec::new() };
         for key in
             ["time.end", "time.lumping", "transfer.blend.rate", "solver.newton.tolerance", "bodies.0.x", "bodies.7.x"]
         {
-            under.set(key, 7.into());
+            setter.set(key, 7.into());
         }
-        let keys: Vec<_> = under.chosen.iter().map(|chosen| chosen.key.as_str()).collect();
+        let keys: Vec<_> = setter.chosen.iter().map(|chosen| chosen.key.as_str()).collect();
         assert_eq!(keys, ["time.lumping", "solver.newton.tolerance", "bodies.0.x"]);
         let expected = json!({
             "time": {"end": 1, "lumping": 7}, "transfer": "flip", "bodies": [{"x": 7}], "solver": {"newton": {"tolerance": 7}}

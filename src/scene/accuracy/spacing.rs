@@ -11,7 +11,7 @@ use crate::tensor::Vector;
 const ON_NODE: f64 = 1e-6;
 
 /// Largest factor by which the number of cells along the shortest edge may exceed the required number.
-const FINER: usize = 2;
+const MAX_REFINEMENT: usize = 2;
 
 /// Maximum number of cells along the shortest edge of the box.
 const MOST_CELLS: f64 = 1e5;
@@ -90,10 +90,11 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
     let fewest = fewest as usize;
     let divides = |h: f64| GridBox { spacing: h, ..grid.clone() }.cells().is_some();
     let on_node = |x: f64, h: f64| (x / h - (x / h).round()).abs() < ON_NODE;
-    let mut candidates = (fewest..=FINER * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h)).peekable();
+    let mut candidates =
+        (fewest..=MAX_REFINEMENT * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h)).peekable();
     let first = candidates.peek().copied();
     let found = candidates.find(|&h| faces.iter().all(|&x| on_node(x, h))).or(first);
-    found.ok_or(Unknown::NoDivisor { finest: coarsest / FINER as f64, coarsest })
+    found.ok_or(Unknown::NoDivisor { finest: coarsest / MAX_REFINEMENT as f64, coarsest })
 }
 
 /// The greatest speed of pressure waves in the undeformed bodies, c = √(M/ρ), M = Λ + 2G in isotropic solids.

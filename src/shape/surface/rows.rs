@@ -4,7 +4,7 @@
 //! length of the line in the solid and in [x₀, x₁] is Σ ± (clamp(x, x₀, x₁) − x₀). The volume is the integral of this length over the
 //! section of the row: ∫ clamp(x) − x₀ over the projections of the triangles. Each triangle counts with the sign of its side.
 
-use super::Mesh;
+use super::mesh::Mesh;
 use super::tree::Bounds;
 use nalgebra::Vector3;
 

@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::vector::{Entry, axpy, dot, norm, scaled};
+use super::vector::{axpy, dot, norm, scaled};
 use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
@@ -75,11 +75,11 @@ impl Default for GmresSettings {
 ///
 /// # Errors
 /// A setting is out of range, the lengths differ, or a number is NaN or infinite.
-pub fn gmres<S: Entry>(
-    operator: &dyn LinearOperator<S>,
-    preconditioner: &dyn LinearOperator<S>,
-    rhs: &[S],
-    solution: &mut [S],
+pub fn gmres(
+    operator: &dyn LinearOperator,
+    preconditioner: &dyn LinearOperator,
+    rhs: &[f64],
+    solution: &mut [f64],
     settings: &GmresSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
@@ -94,8 +94,8 @@ pub fn gmres<S: Entry>(
     let mut restart = settings.restart.min(rhs.len());
     let mut r = workspace.collect(rhs.iter().copied());
     let mut r_norm = b_norm;
-    let mut trial = workspace.filled(rhs.len(), S::zero());
-    let mut correction = workspace.filled(rhs.len(), S::zero());
+    let mut trial = workspace.filled(rhs.len(), 0.0);
+    let mut correction = workspace.filled(rhs.len(), 0.0);
     loop {
         report.relative_residual = r_norm / b_norm;
         if report.iterations >= settings.max_iterations {
@@ -133,21 +133,21 @@ pub fn gmres<S: Entry>(
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the correction of x.
 /// Returns the number of iterations and the residual norm that the rotations predict.
-fn cycle<S: Entry>(
-    operator: &dyn LinearOperator<S>,
-    preconditioner: &dyn LinearOperator<S>,
-    r: &Pooled<S>,
+fn cycle(
+    operator: &dyn LinearOperator,
+    preconditioner: &dyn LinearOperator,
+    r: &Pooled<f64>,
     r_norm: f64,
     target: f64,
     length: usize,
-    correction: &mut [S],
+    correction: &mut [f64],
 ) -> Result<(usize, f64), LinearError> {
-    let fresh = || r.pool().filled(r.len(), S::zero());
+    let fresh = || r.pool().filled(r.len(), 0.0);
     let mut v = fresh();
     scaled(1.0 / r_norm, r, &mut v);
     // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
-    let mut basis: Vec<Pooled<S>> = Vec::new();
-    let exhausted_below = EXHAUSTED * S::EPSILON;
+    let mut basis: Vec<Pooled<f64>> = Vec::new();
+    let exhausted_below = EXHAUSTED * f64::EPSILON;
     let mut triangle = Triangle {
         columns: Vec::new(),
         rotations: Vec::new(),
@@ -180,7 +180,7 @@ fn cycle<S: Entry>(
 }
 
 /// Removes from `w` its components along the orthonormal `basis`. Returns these components and the norm of the remainder.
-fn orthogonalise<S: Entry>(w: &mut [S], w_norm: f64, basis: &[Pooled<S>]) -> (Vec<f64>, f64) {
+fn orthogonalise(w: &mut [f64], w_norm: f64, basis: &[Pooled<f64>]) -> (Vec<f64>, f64) {
     let mut column = vec![0.0; basis.len()];
     let mut before = w_norm;
     for _ in 0..2 {

@@ -7,11 +7,8 @@ use crate::pooled::Pooled;
 use crate::solver::conjugate_gradient::{ConjugateGradientSettings, conjugate_gradient};
 use crate::solver::forcing::LOOSEST;
 use crate::solver::gmres::{GmresSettings, gmres};
-use crate::solver::vector::{Entry, dot, norm};
+use crate::solver::vector::{dot, norm};
 use crate::solver::{LinearOperator, LinearOutcome, LinearReport, Linearization};
-
-/// The least relative residual wanted in single precision. A recurrence of vectors rounded to 6e-8 can still reach it.
-pub(super) const SINGLE_TOLERANCE: f64 = 1e-5;
 
 /// A solve that gave a step.
 pub(super) struct Solved {
@@ -32,10 +29,10 @@ pub(super) struct System<'a> {
     pub has_potential: &'a dyn Fn() -> bool,
 }
 
-/// Solves K d = −r as (K/s) d' = −r/ρ with ρ = 2ᵏ ≤ ‖r‖ and d = (ρ/s) d'. So single precision neither overflows nor underflows.
-pub(super) fn solve<S: Entry>(
-    tangent: &dyn Linearization<S>,
-    preconditioner: &dyn LinearOperator<S>,
+/// Solves K d = −r as K d' = −r/ρ with ρ = 2ᵏ ≤ ‖r‖ and d = ρ d'. So the squares of small or large forces neither underflow nor overflow.
+pub(super) fn solve(
+    tangent: &dyn Linearization,
+    preconditioner: &dyn LinearOperator,
     system: &System<'_>,
     settings: &NewtonSettings,
     counts: &mut NewtonCounts,
@@ -43,8 +40,8 @@ pub(super) fn solve<S: Entry>(
     let System { r, method, relative_tolerance, has_potential } = *system;
     let workspace = r.pool();
     let size = norm(r).log2().floor().exp2();
-    let rhs = workspace.collect(r.iter().map(|r| S::lit(-r / size)));
-    let mut d = workspace.filled(r.len(), S::zero());
+    let rhs = workspace.collect(r.iter().map(|r| -r / size));
+    let mut d = workspace.filled(r.len(), 0.0);
     let max_iterations = settings.max_krylov_iterations;
     let mut count = |report: LinearReport| {
         counts.tangent_products += report.products;
@@ -76,7 +73,6 @@ pub(super) fn solve<S: Entry>(
     if krylov.relative_residual >= LOOSEST && truncated.is_none() {
         return Err(LinearSolverFailure::NoProgress { report: krylov, wanted: relative_tolerance });
     }
-    let unit = size / tangent.scale();
-    let step = workspace.collect(d.iter().map(|d| unit * d.value()));
-    Ok(Solved { step, krylov, negative_curvature: given_up })
+    d.iter_mut().for_each(|d| *d *= size);
+    Ok(Solved { step: d, krylov, negative_curvature: given_up })
 }

@@ -10,13 +10,13 @@ mod tests;
 
 pub use failure::{LinearSolverFailure, NewtonError, NewtonFailure};
 pub use report::{Convergence, Merit, NewtonCounts, NewtonHistory, NewtonIteration, NewtonReport};
-pub use settings::{Krylov, NewtonSettings, Precision};
+pub use settings::{Krylov, NewtonSettings};
 
 use super::forcing::Progress;
 use super::vector::{dot, norm};
 use super::{NonlinearProblem, Preconditioner};
 use crate::pooled::Pool;
-use linear::{SINGLE_TOLERANCE, Solved, System, solve};
+use linear::{Solved, System, solve};
 use search::{Search, Step, search};
 
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
@@ -35,9 +35,9 @@ const DIVERGED: f64 = 1e8;
 ///
 /// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude). The magnitude is evaluated at the initial guess.
 /// 2. K = linearize(x). The preconditioner is prepared with K.
-/// 3. Solve K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, with η from [`Forcing`](super::Forcing), and at least 1e-5 in single
-///    precision. A solve that ends early is still used if it reaches η < 0.9. A solve ended by negative curvature is used if there is a
-///    potential, which falls along d (line-search Newton-CG: Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, alg. 7.1).
+/// 3. Solve K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, with η from [`Forcing`](super::Forcing). A solve that ends early is
+///    still used if it reaches η < 0.9. A solve ended by negative curvature is used if there is a potential, which falls along d
+///    (line-search Newton-CG: Nash, SIAM J. Numer. Anal. 21, 1984; Nocedal and Wright, alg. 7.1).
 /// 4. s = 1.
 /// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, with the η that the solve has reached. Accept it also if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
@@ -96,7 +96,6 @@ fn iterate<E: std::error::Error + 'static>(
     let mut residual = first;
     let mut progress = None;
     let mut stalled = 0;
-    let mut single = settings.precision == Precision::Mixed;
     let method = settings.krylov.chosen(problem.is_symmetric());
     loop {
         if residual <= target {
@@ -109,40 +108,24 @@ fn iterate<E: std::error::Error + 'static>(
         if iteration > settings.max_iterations {
             return Err(NewtonFailure::MaxIterations { allowed: settings.max_iterations, residual, target });
         }
-        let mut forcing = settings.forcing.next(progress, target / residual);
+        let forcing = settings.forcing.next(progress, target / residual);
+        history.counts.linearizations += 1;
         let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
-        let tangent = if single { problem.linearize_single(x).map_err(inadmissible)? } else { None };
-        single = tangent.is_some();
         let has_potential = &|| problem.potential(x).is_some();
-        let mut solved = None;
-        if let Some(tangent) = tangent {
-            history.counts.linearizations += 1;
-            let inverse = preconditioner.prepare_single(&*tangent);
-            let reachable = forcing.max(SINGLE_TOLERANCE);
-            let system = System { r: &r, method, relative_tolerance: reachable, has_potential };
-            // Double precision may solve a system that single precision cannot.
-            solved = solve::<f32>(&*tangent, &*inverse, &system, settings, &mut history.counts).ok();
-            forcing = if solved.is_some() { reachable } else { forcing };
-        }
+        let system = System { r: &r, method, relative_tolerance: forcing, has_potential };
+        let solved = {
+            let tangent = problem.linearize(x).map_err(inadmissible)?;
+            let inverse = preconditioner.prepare(&*tangent);
+            solve(&*tangent, &*inverse, &system, settings, &mut history.counts)
+        };
         let Solved { step, krylov, negative_curvature } = match solved {
-            Some(solved) => solved,
-            None => {
-                history.counts.linearizations += 1;
-                let tangent = problem.linearize(x).map_err(inadmissible)?;
-                let inverse = preconditioner.prepare(&*tangent);
-                let system = System { r: &r, method, relative_tolerance: forcing, has_potential };
-                match solve::<f64>(&*tangent, &*inverse, &system, settings, &mut history.counts) {
-                    Ok(solved) => solved,
-                    Err(source) => {
-                        // The remaining R may be round-off, which need not lie in the range of K.
-                        if residual
-                            <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)?
-                        {
-                            return Ok(Convergence::RoundOff);
-                        }
-                        return Err(NewtonFailure::LinearSolverFailed { iteration, residual, source });
-                    }
+            Ok(solved) => solved,
+            Err(source) => {
+                // The remaining R may be round-off, which need not lie in the range of K.
+                if residual <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)? {
+                    return Ok(Convergence::RoundOff);
                 }
+                return Err(NewtonFailure::LinearSolverFailed { iteration, residual, source });
             }
         };
         let at = Step { x, d: &step, residual, slope: dot(&r, &step), linear: krylov.relative_residual };

@@ -62,19 +62,6 @@ impl Display for Krylov {
     }
 }
 
-/// The precision of Krylov vectors and tangent products. Everything else is always in double precision.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Precision {
-    /// Double precision.
-    #[default]
-    Double,
-    /// Single precision, for half the memory and more speed. Each linear system is then solved to 1e-5 at best, so Newton's method takes
-    /// one iteration more to reach the same residual. Double precision is still used where the shape functions are not products, or a law
-    /// has no closed tangent.
-    Mixed,
-}
-
 /// Settings of [`newton()`](crate::solver::newton()).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonSettings {
@@ -89,8 +76,6 @@ pub struct NewtonSettings {
     pub forcing: Forcing,
     /// The Krylov method.
     pub krylov: Krylov,
-    /// The precision of Krylov vectors and tangent products.
-    pub precision: Precision,
     /// Krylov iterations allowed for each linear system, at least 1.
     pub max_krylov_iterations: usize,
     /// Halvings of the step allowed in a line search, at most 60.
@@ -106,7 +91,6 @@ impl Default for NewtonSettings {
             max_iterations: 30,
             forcing: Forcing::default(),
             krylov: Krylov::default(),
-            precision: Precision::default(),
             max_krylov_iterations: 2000,
             max_halvings: 25,
         }

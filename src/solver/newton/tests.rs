@@ -1,9 +1,8 @@
 //! Facts about the iteration on small problems with known answers.
 
 use super::*;
-use crate::pooled::Pooled;
 use crate::solver::testing::Dense;
-use crate::solver::{BlockJacobi, DiagonalBlocks, LinearOperator, Linearization};
+use crate::solver::{BlockJacobi, Linearization};
 use crate::solver::{Forcing, InvalidSetting, LinearOutcome, NonlinearProblem};
 
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -406,86 +405,6 @@ fn a_step_must_do_a_part_of_what_it_promises() {
         let error = failure(&slope, &mut [0.0], &NewtonSettings::default());
         let accepted = error.history.iterations.iter().filter(|i| i.merit == Merit::Potential).count();
         assert_eq!(accepted, if enough { 30 } else { 0 }, "{error:?}");
-    }
-}
-
-/// A problem whose tangent is divided by `scale` and rounded to single precision.
-struct Rounded<P> {
-    problem: P,
-    scale: f64,
-}
-
-struct RoundedTangent<'a> {
-    exact: Box<dyn Linearization + 'a>,
-    scale: f64,
-}
-
-impl<P: NonlinearProblem> NonlinearProblem for Rounded<P> {
-    type Inadmissible = P::Inadmissible;
-
-    fn residual(&self, x: &[f64], r: &mut [f64]) -> Result<(), Self::Inadmissible> {
-        self.problem.residual(x, r)
-    }
-    fn magnitude(&self, x: &[f64]) -> Result<f64, Self::Inadmissible> {
-        self.problem.magnitude(x)
-    }
-    fn potential(&self, x: &[f64]) -> Option<Result<(f64, f64), Self::Inadmissible>> {
-        self.problem.potential(x)
-    }
-    fn linearize(&self, x: &[f64]) -> Result<Box<dyn Linearization + '_>, Self::Inadmissible> {
-        self.problem.linearize(x)
-    }
-    fn linearize_single(&self, x: &[f64]) -> Result<Option<Box<dyn Linearization<f32> + '_>>, Self::Inadmissible> {
-        Ok(Some(Box::new(RoundedTangent { exact: self.problem.linearize(x)?, scale: self.scale })))
-    }
-}
-
-impl LinearOperator<f32> for RoundedTangent<'_> {
-    fn apply(&self, x: &[f32], y: &mut [f32]) {
-        let x: Vec<f64> = x.iter().map(|&x| f64::from(x)).collect();
-        let mut exact = vec![0.0; x.len()];
-        self.exact.apply(&x, &mut exact);
-        y.iter_mut().zip(exact).for_each(|(y, exact)| *y = (exact / self.scale) as f32);
-    }
-}
-
-impl DiagonalBlocks for RoundedTangent<'_> {
-    fn diagonal_blocks(&self) -> Pooled<f64> {
-        let mut blocks = self.exact.diagonal_blocks();
-        blocks.iter_mut().for_each(|entry| *entry /= self.scale);
-        blocks
-    }
-}
-
-impl Linearization<f32> for RoundedTangent<'_> {
-    fn scale(&self) -> f64 {
-        self.scale
-    }
-}
-
-#[test]
-fn single_precision_reaches_the_same_solution_in_any_units() {
-    let n = 12;
-    for krylov in [Krylov::Gmres { restart: 12 }, Krylov::ConjugateGradient] {
-        let double = NewtonSettings { krylov, ..NewtonSettings::default() };
-        let mixed = NewtonSettings { precision: Precision::Mixed, ..double };
-        // Single precision holds neither 3e40 nor 3e-50.
-        for force in [1.0, 2.0_f64.powi(134), 2.0_f64.powi(-166)] {
-            let problem = || springs(3.0 * force, 1.0, 1.2 * force, n);
-            let (mut exact, mut u) = (vec![0.0; n], vec![0.0; n]);
-            newton(&problem(), &mut exact, &double).unwrap();
-            let history = newton(&Rounded { problem: problem(), scale: force }, &mut u, &mixed).unwrap().history;
-            assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
-            assert!(history.iterations.iter().all(|i| i.forcing == 1e-5 && i.krylov.relative_residual <= 1e-5));
-            assert_eq!(history.counts.linearizations, history.iterations.len());
-            // Divided by a scale so large that all entries vanish, the tangent gives no step in single precision.
-            let mut u = vec![0.0; n];
-            let nothing = Rounded { problem: problem(), scale: 1e100 * force };
-            let history = newton(&nothing, &mut u, &mixed).unwrap().history;
-            assert!(u.iter().zip(&exact).all(|(u, v)| (u - v).abs() < 1e-8));
-            assert!(history.iterations.iter().all(|i| i.forcing == 1e-8));
-            assert_eq!(history.counts.linearizations, 2 * history.iterations.len());
-        }
     }
 }
 

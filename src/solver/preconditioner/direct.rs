@@ -4,7 +4,6 @@
 //! entries, with r the reach of a node. The entries contain every term of the product, with the accuracy of the product.
 
 use super::{BlockJacobi, Neighbours, Preconditioner};
-use crate::solver::vector::Entry;
 use crate::solver::{LinearOperator, Linearization};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
@@ -19,7 +18,7 @@ const PAR: Par = Par::Seq;
 ///
 /// ```
 /// use bfree::pooled::Pooled;
-/// use bfree::solver::{DiagonalBlocks, Direct, LinearOperator, Neighbours, Preconditioner};
+/// use bfree::solver::{Direct, LinearOperator, Linearization, Neighbours, Preconditioner};
 ///
 /// /// −u″ on a line of nodes, h = 1, with u = 0 beyond both ends.
 /// struct Laplacian(usize);
@@ -31,7 +30,7 @@ const PAR: Par = Par::Seq;
 ///     }
 /// }
 ///
-/// impl DiagonalBlocks for Laplacian {
+/// impl Linearization for Laplacian {
 ///     fn diagonal_blocks(&self) -> Pooled<f64> {
 ///         vec![2.0; self.0].into()
 ///     }
@@ -75,20 +74,20 @@ struct Lower {
 }
 
 impl Lower {
-    fn of<S: Entry, const D: usize>(tangent: &dyn LinearOperator<S>, neighbours: &Neighbours) -> Self {
+    fn of<const D: usize>(tangent: &dyn LinearOperator, neighbours: &Neighbours) -> Self {
         let Neighbours { nodes, fixed, .. } = neighbours;
         let sharing = sharing::<D>(neighbours);
         let size = D * nodes.len();
-        let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![S::zero(); size], vec![S::zero(); size]);
+        let (mut columns, mut x, mut y) = (vec![Vec::new(); size], vec![0.0; size], vec![0.0; size]);
         for colour in colours(&sharing) {
             for k in 0..D {
-                x.fill(S::zero());
-                colour.iter().filter(|&node| !fixed[node * D + k]).for_each(|node| x[node * D + k] = S::one());
+                x.fill(0.0);
+                colour.iter().filter(|&node| !fixed[node * D + k]).for_each(|node| x[node * D + k] = 1.0);
                 tangent.apply(&x, &mut y);
                 for (column, around) in colour.iter().map(|node| (node * D + k, &sharing[*node])) {
                     let rows = around.iter().flat_map(|node| node * D..(node + 1) * D).filter(|&row| row >= column);
                     // A zero on the diagonal belongs to a fixed value, which gets the identity's row.
-                    let value = |row: usize| if row == column && y[row] == S::zero() { 1.0 } else { y[row].value() };
+                    let value = |row: usize| if row == column && y[row] == 0.0 { 1.0 } else { y[row] };
                     columns[column].extend(rows.map(|row| (row, value(row))).filter(|&(_, value)| value != 0.0));
                 }
             }
@@ -162,14 +161,13 @@ fn around<const D: usize>(at: [u32; 3], reach: u32, numbers: &HashMap<[u32; 3], 
     found
 }
 
-impl<S: Entry> LinearOperator<S> for Factors {
-    fn apply(&self, r: &[S], z: &mut [S]) {
-        let mut x: Vec<f64> = r.iter().map(|r| r.value()).collect();
-        let size = x.len();
+impl LinearOperator for Factors {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
+        z.copy_from_slice(r);
         let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1, PAR));
-        let (right, memory) = (MatMut::from_column_major_slice_mut(&mut x, size, 1), MemStack::new(&mut memory));
+        let memory = MemStack::new(&mut memory);
+        let right = MatMut::from_column_major_slice_mut(z, r.len(), 1);
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, right, PAR, memory);
-        z.iter_mut().zip(&x).for_each(|(z, &x)| *z = S::lit(x));
     }
 }
 
@@ -181,10 +179,12 @@ impl<const D: usize> Direct<D> {
             _ => None,
         }
     }
+}
 
-    fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
+impl<const D: usize> Preconditioner for Direct<D> {
+    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
         let made = self.made.get_or_insert_with(|| {
-            let factors = tangent.neighbours().and_then(|neighbours| Lower::of::<S, D>(tangent, &neighbours).factors());
+            let factors = tangent.neighbours().and_then(|neighbours| Lower::of::<D>(tangent, &neighbours).factors());
             factors.map_or_else(
                 || {
                     let mut blocks = BlockJacobi::default();
@@ -201,22 +201,12 @@ impl<const D: usize> Direct<D> {
     }
 }
 
-impl<const D: usize> Preconditioner for Direct<D> {
-    fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        self.prepared(tangent)
-    }
-
-    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
-        self.prepared(tangent)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::pooled::Pooled;
+    use crate::solver::direct_bytes;
     use crate::solver::testing::{Dense, distance, irregular};
-    use crate::solver::{DiagonalBlocks, direct_bytes};
     use crate::tensor::{Tensor, Vector};
 
     /// Nodes on a square lattice. Each node pulls at its neighbours in both components and sits on a spring. The first node is fixed.
@@ -251,7 +241,7 @@ mod tests {
         }
     }
 
-    impl DiagonalBlocks for Net {
+    impl Linearization for Net {
         fn diagonal_blocks(&self) -> Pooled<f64> {
             Pooled::from(vec![self.block(); self.side.pow(2) as usize]).into_numbers()
         }

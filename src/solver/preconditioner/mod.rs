@@ -12,27 +12,9 @@ pub(crate) use multigrid::bytes as multigrid_bytes;
 pub use multigrid::{LocalForm, Multigrid};
 
 use super::{LinearOperator, Linearization};
-use crate::pooled::Pooled;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
-
-/// The entries of a tangent that preconditioners are made from. They are in double precision, even where products are in single precision.
-pub trait DiagonalBlocks {
-    /// The square blocks on the diagonal, one after the other, each column by column. Prescribed degrees of freedom have the row and column
-    /// of the identity. A common positive factor does not matter.
-    fn diagonal_blocks(&self) -> Pooled<f64>;
-
-    /// The operator as a form on the cells of a grid, from which multigrid makes coarser levels; `None` if it has no such form.
-    fn local_form(&self) -> Option<LocalForm> {
-        None
-    }
-
-    /// The sparsity pattern; `None` if it is unknown.
-    fn neighbours(&self) -> Option<Neighbours> {
-        None
-    }
-}
 
 /// The sparsity pattern of a tangent: positions of the nodes in the grid, and the reach of an entry.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,7 +35,7 @@ pub struct Neighbours {
 ///
 /// ```
 /// use bfree::pooled::{Pool, Pooled};
-/// use bfree::solver::{BlockJacobi, DiagonalBlocks, GmresSettings, LinearOperator, Preconditioner, gmres};
+/// use bfree::solver::{BlockJacobi, GmresSettings, LinearOperator, Linearization, Preconditioner, gmres};
 ///
 /// /// A diagonal matrix.
 /// struct Diagonal(Vec<f64>);
@@ -64,7 +46,7 @@ pub struct Neighbours {
 ///     }
 /// }
 ///
-/// impl DiagonalBlocks for Diagonal {
+/// impl Linearization for Diagonal {
 ///     fn diagonal_blocks(&self) -> Pooled<f64> {
 ///         self.0.clone().into()
 ///     }
@@ -81,9 +63,6 @@ pub struct Neighbours {
 pub trait Preconditioner {
     /// The approximate inverse of a tangent. It may be made from an earlier tangent of the step.
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a>;
-
-    /// The approximate inverse of a tangent in single precision; see [`Self::prepare`].
-    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a>;
 }
 
 /// The preconditioner of the linear systems.
@@ -242,18 +221,14 @@ pub(crate) fn direct_bytes(nodes: usize, dimension: usize, reach: usize) -> usiz
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity;
 
-impl<S: Copy> LinearOperator<S> for Identity {
-    fn apply(&self, r: &[S], z: &mut [S]) {
+impl LinearOperator for Identity {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
         z.copy_from_slice(r);
     }
 }
 
 impl Preconditioner for Identity {
     fn prepare<'a>(&'a mut self, _: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        Box::new(Self)
-    }
-
-    fn prepare_single<'a>(&'a mut self, _: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
         Box::new(Self)
     }
 }

@@ -26,7 +26,7 @@ fn carried(angle: f64, more: &Value) -> Value {
             "region": {"box": {"min": [-1, -1], "max": [9, 9]}},
             "rotation": {"center": [4, 4], "angle": [[0, 0], [1, angle]]}
         }],
-        "time": {"inertia": "none", "step": 1, "end": 1}
+        "time": {"scheme": "none", "step": 1, "end": 1}
     });
     scene.as_object_mut().into_iter().zip(more.as_object()).for_each(|(scene, more)| scene.extend(more.clone()));
     scene
@@ -98,7 +98,7 @@ fn a_round_bar_twists_by_its_torque() -> Result<(), Failure> {
             "shape": {"cylinder": {"from": [2, 2, 0], "to": [2, 2, 3], "radius": 1}}
         }],
         "boundary": {"back": "fixed", "front": {"rotation": rotation}},
-        "time": {"inertia": "none", "step": 1, "end": 1}
+        "time": {"scheme": "none", "step": 1, "end": 1}
     }))?;
     let report = simulation.advance()?;
     let exact = shear * 0.5 * PI * angle / 3.0;

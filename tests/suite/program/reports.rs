@@ -295,7 +295,7 @@ fn check_says_which_bodies_are_glued_from_the_start() -> Result<(), Failure> {
 #[test]
 fn the_summary_of_a_plastic_block_balances_its_energy_and_repeats_what_it_warned_of() -> Result<(), Failure> {
     let (said, _, report) = ran(&json!({
-        "grid": {"size": [4, 3], "spacing": 0.5}, "time": {"step": 0.1, "end": 1, "inertia": "none"}, "output": {},
+        "grid": {"size": [4, 3], "spacing": 0.5}, "time": {"step": 0.1, "end": 1, "scheme": "none"}, "output": {},
         "bodies": [{"name": "block", "density": 1, "shape": {"box": {"min": [0, 0], "max": [2, 2]}},
                     "material": {"von_mises": {"elastic": {"young": 100, "poisson": 0.3}, "yield_stress": {"initial": 0.1, "linear": 10}}}}],
         "boundary": {"left": "sliding", "bottom": "sliding"},

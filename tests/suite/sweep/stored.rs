@@ -75,7 +75,7 @@ impl Law for General {
 fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Result<(), Failure> {
     let (grid, positions) = regular([3; D], 2);
     let shape = Approximation::from(Linear);
-    let (tiled, _) = Supports::with_precision(&shape, &grid, &positions, Precision::Mixed)?;
+    let (tiled, _) = Supports::new(&shape, &grid, &positions)?;
     let (plain, _) = Supports::plain(&shape, &grid, &positions)?;
     let mut particles = Particles::default();
     positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
@@ -87,16 +87,12 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0, dilatation: Default::default() }];
     let general =
         [Body { name: "body".into(), law: General(law.clone()), density: 1.0, dilatation: Default::default() }];
-    for (precision, size) in [(Precision::Double, 8), (Precision::Mixed, 4)] {
-        // Eight lanes per group, full or not.
-        let lanes = 8 * tiled.windows().len();
-        let counted = frozen_bytes(&particles, &bodies, &tiled, precision);
-        assert_eq!(counted, lanes * numbers * size, "{D}D {law:?}, {precision:?}");
-        let counted = frozen_bytes(&particles, &general, &tiled, precision);
-        assert_eq!(counted, lanes * D.pow(4) * size, "{D}D {law:?} by ℂmat, {precision:?}");
-    }
+    // Eight lanes per group, full or not.
+    let lanes = 8 * tiled.windows().len();
+    assert_eq!(frozen_bytes(&particles, &bodies, &tiled), lanes * numbers * 8, "{D}D {law:?}");
+    assert_eq!(frozen_bytes(&particles, &general, &tiled), lanes * D.pow(4) * 8, "{D}D {law:?} by ℂmat");
     let lanes = 8 * positions.len().div_ceil(8);
-    assert_eq!(frozen_bytes(&particles, &bodies, &plain, Precision::Double), lanes * numbers * 8);
+    assert_eq!(frozen_bytes(&particles, &bodies, &plain), lanes * numbers * 8);
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use super::{BFree, BlockMatrix, Pattern, assemble};
 use bfree::material::Law;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::pooled::Pooled;
-use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
+use bfree::solver::{LinearOperator, Linearization, NonlinearProblem};
 use bfree::tensor::{Tensor, Vector};
 
 /// An equilibrium whose tangent is assembled at every linearisation, on a given pattern; without follower pressure and damping.
@@ -51,7 +51,7 @@ impl<const D: usize, L: Law> LinearOperator for Matrix<'_, D, L> {
     }
 }
 
-impl<const D: usize, L: Law> DiagonalBlocks for Matrix<'_, D, L> {
+impl<const D: usize, L: Law> Linearization for Matrix<'_, D, L> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         let Assembled { equilibrium, pattern } = self.problem;
         let mut blocks: Vec<Tensor<f64, D>> = (0..pattern.rows()).map(|node| self.matrix.get(node, node)).collect();

@@ -22,19 +22,12 @@ const BLOCKS: usize = 24;
 /// The most halvings of an increment until it is admissible.
 const HALVINGS: u32 = 30;
 
-/// The largest relative difference of a product in single precision.
-const SINGLE: f64 = 64.0 * f32::EPSILON as f64;
-
-/// The suffix of the name of a piece whose product is in single precision.
-pub(crate) const IN_SINGLE: &str = ", f32";
-
 /// The piece whose contributions cancel in 1D and whose tangent is not symmetric.
 const PRESSURE: &str = "follower pressure";
 
 /// Checks the tangent of the next step of a simulation. Every piece, linearised alone, and the whole tangent are compared with dual numbers
-/// through the residual, by the solver's product. The comparison includes single precision if the simulation uses it. The blocks of the
-/// preconditioner are compared with the product. If symmetry and a potential exist, symmetry is checked, and the residual against the
-/// gradient of the potential. Labels are (quantity, Δφ).
+/// through the residual, by the solver's product. The blocks of the preconditioner are compared with the product. If symmetry and a
+/// potential exist, symmetry is checked, and the residual against the gradient of the potential. Labels are (quantity, Δφ).
 ///
 /// The Δφ are zero, Δt v_n, and a random one of a hundredth of the spacing, shortened until no particle has det F ≤ 0.
 pub fn check_tangent<const D: usize, L: Law, A: ShapeFunction>(simulation: &Simulation<D, L, A>) -> Report {
@@ -115,8 +108,6 @@ pub(crate) fn measure<const D: usize, L: Law>(
         })
         .collect();
     let mut measured = Vec::new();
-    // The scales of the last whole term; its parts follow it in the list.
-    let mut of_term = [0.0; DIRECTIONS];
     // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
     let mut sizes = vec![0.0; dphi.len()];
     let pieces = equilibrium.terms.pieces();
@@ -125,57 +116,34 @@ pub(crate) fn measure<const D: usize, L: Law>(
         if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
             sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
         }
-        let single = equilibrium.single_tangent(Some(piece), dphi)?;
-        let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
+        let mut worst: f64 = 0.0;
         let mut products = Vec::new();
-        for (u, of_term) in directions.iter().zip(&mut of_term) {
+        for u in &directions {
             let mut dual = equilibrium.derivative(piece, dphi, u)?;
             equilibrium.clear_prescribed(&mut dual);
             let analytic = product(&frozen, u);
             let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
             worst = worse(worst, relative(&analytic, &dual, scale));
-            if piece.name == piece.term {
-                *of_term = scale;
-            }
-            if let Some(single) = &single {
-                // In 1D the numbers rounded to single precision may cancel within a part, such as the material part at large J.
-                let scale = if D == 1 { scale.max(*of_term) } else { scale };
-                worst_in_single = worse(worst_in_single, relative(&product_in_single(single, u), &dual, scale));
-            }
             products.push(analytic);
         }
         measured.push(Measured::new(piece.name, worst, bound));
-        if single.is_some() {
-            measured.push(Measured::new(format!("{}{IN_SINGLE}", piece.name), worst_in_single, Bound::AtMost(SINGLE)));
-        }
         if piece.name == PRESSURE && D > 1 {
             measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(&directions, &products), Bound::Reported));
         }
     }
 
     let tangent = equilibrium.tangent(dphi)?;
-    let single = equilibrium.single_tangent(None, dphi)?;
-    let (mut worst, mut worst_in_single): (f64, f64) = (0.0, 0.0);
+    let mut worst: f64 = 0.0;
     for u in &directions {
         let residual = equilibrium.residual(&seeded(dphi, u))?;
         let mut dual: Field<D> = residual.iter().map(|r| r.map(|x| x.eps)).collect();
         equilibrium.clear_prescribed(&mut dual);
         let analytic = product(&tangent, u);
         worst = worse(worst, relative(&analytic, &dual, norm(&analytic)));
-        if let Some(single) = &single {
-            let rough = product_in_single(single, u);
-            worst_in_single = worse(worst_in_single, relative(&rough, &dual, norm(&analytic)));
-        }
     }
     measured.push(Measured::new("whole product", worst, bound));
     let columns = columns(equilibrium, &tangent, dphi.len());
     measured.push(Measured::new("diagonal blocks", apart(&tangent.diagonal_blocks(), &columns, &sizes), bound));
-    if let Some(single) = &single {
-        measured.push(Measured::new(format!("whole product{IN_SINGLE}"), worst_in_single, Bound::AtMost(SINGLE)));
-        let blocks: Vec<_> = single.diagonal_blocks().iter().map(|block| block * single.scale()).collect();
-        let value = apart(&free_rows(equilibrium, blocks), &columns, &sizes);
-        measured.push(Measured::new(format!("diagonal blocks{IN_SINGLE}"), value, Bound::AtMost(SINGLE)));
-    }
 
     if equilibrium.is_symmetric() {
         let products: Vec<_> = directions.iter().map(|u| product(&tangent, u)).collect();
@@ -203,13 +171,6 @@ fn product<const D: usize>(tangent: &Tangent<'_, D>, u: &[Vector<f64, D>]) -> Fi
     out
 }
 
-fn product_in_single<const D: usize>(tangent: &Tangent<'_, D, f32>, u: &[Vector<f64, D>]) -> Field<D> {
-    let u: Vec<_> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-    let mut out = vec![Vector::zeros(); u.len()];
-    tangent.product(&u, &mut out);
-    out.iter().map(|x| x.map(f64::from) * tangent.scale()).collect()
-}
-
 /// The scale of differences of a product: its norm. In 1D cof F = 1, so a pressure is a dead load and the two parts of its tangent cancel.
 /// Each part has the size of the force times that of the gradients of u.
 fn scale<const D: usize, L: Law>(
@@ -223,15 +184,6 @@ fn scale<const D: usize, L: Law>(
         return Ok(norm(&equilibrium.residual_of::<f64>(piece, dphi)?) * gradient);
     }
     Ok(product)
-}
-
-/// The blocks of a scaled tangent. The identity rows of prescribed degrees of freedom are scaled back.
-fn free_rows<const D: usize, L>(
-    equilibrium: &Equilibrium<'_, D, L>,
-    mut blocks: Vec<Tensor<f64, D>>,
-) -> Vec<Tensor<f64, D>> {
-    equilibrium.prescribed.iter().for_each(|dof| blocks[dof.node][(dof.component, dof.component)] = 1.0);
-    blocks
 }
 
 /// Columns (node, component, K_II e_k) of some diagonal blocks, by products with unit vectors.

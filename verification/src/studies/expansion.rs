@@ -70,7 +70,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
     let overrides = [
         format!(r#"grid={{"size":[{box_side},{box_side}],"spacing":{h},"renewed":"never"}}"#),
         r#"approximation="linear""#.to_owned(),
-        format!(r#"time={{"step":{},"end":1,"inertia":"none","initial_guess":"last_step"}}"#, 1.0 / f64::from(STEPS)),
+        format!(r#"time={{"step":{},"end":1,"scheme":"none","initial_guess":"last_step"}}"#, 1.0 / f64::from(STEPS)),
         body,
         format!(
             r#"bodies.0.material={{"von_mises":{{"elastic":{{"bulk":{bulk},"shear":{shear}}},"yield_stress":{{"initial":{YIELD}}}}}}}"#

@@ -173,7 +173,7 @@ fn scene(case: &Case, family: &Value, cells: u32, exact: &Exact, law: &Material)
         "grid": { "size": [1.5, 1.5], "spacing": spacing },
         "approximation": family,
         "aggregation": true,
-        "time": { "step": 1, "end": 1, "inertia": "none" },
+        "time": { "step": 1, "end": 1, "scheme": "none" },
         "bodies": [{
             "name": "body",
             "shape": case.form.shape(spacing),

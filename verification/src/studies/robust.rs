@@ -76,7 +76,7 @@ fn scene<const D: usize>(shape: Shape, family: &Value, h: f64, more: &Value) -> 
     let mut scene = json!({
         "grid": {"size": vec![2; D], "spacing": h},
         "approximation": family,
-        "time": {"step": 1, "end": 1, "inertia": "none"},
+        "time": {"step": 1, "end": 1, "scheme": "none"},
         "bodies": [{
             "name": "body", "shape": body, "density": 1, "particles_per_cell": 2,
             "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}

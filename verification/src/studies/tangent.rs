@@ -1,5 +1,5 @@
-//! Every piece of the tangent against dual numbers, by the solver's product: every law × every shape function × both transfers × both
-//! precisions × D = 1, 2, 3 × every regime.
+//! Every piece of the tangent against dual numbers, by the solver's product: every law × every shape function × both transfers × D = 1,
+//! 2, 3 × every regime.
 
 use super::{Effort, Outcome, StudyError, short};
 use crate::check::regime::Regime;
@@ -19,7 +19,6 @@ use bfree::mechanics::terms::Rayleigh;
 use bfree::particles::{Body, Dilatation, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
-use bfree::solver::{NewtonSettings, Precision};
 use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, trace};
 
 pub(super) const ABOUT: &str = "every term of the tangent against dual numbers, for every law, shape function, dimension, regime";
@@ -63,8 +62,7 @@ fn shapes() -> Vec<(&'static str, Approximation)> {
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let columns = ["quantity", "law", "D", "regime", "shape function"];
     let mut report = Report::new(
-        "tangent: |K u - dual(R) u| / |K u|, worst shape function of each place, bound min(64 eps k(F)^2, 1e-10), \
-         f32: 64 eps of it",
+        "tangent: |K u - dual(R) u| / |K u|, worst shape function of each place, bound min(64 eps k(F)^2, 1e-10)",
         &columns,
     )
     .as_matrix(&[0, 2, 1], 3, 4);
@@ -81,10 +79,6 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     report.note(
         "Pieces are frozen alone and applied by the solver's product, in vector lanes and ('plain') one particle after \
          the other.",
-    );
-    report.note(
-        "f32: the product in single precision; in 1D, where its numbers may cancel, that of a part is relative to its \
-         term.",
     );
     report.note("Diagonal blocks: relative to the sum of the sizes of their parts, which cancel where J is large.");
     report.note(
@@ -178,7 +172,7 @@ fn average<const D: usize, L: Law>(simulation: &mut Simulation<D, L>, random: &m
 }
 
 /// Jittered particles of one body, two along each axis of some cells at a wall. They are randomly deformed and damped, under gravity and
-/// under pressure on part of their surface, for products in both precisions. Speeds and step make inertia as large as stiffness.
+/// under pressure on part of their surface. Speeds and step make inertia as large as stiffness.
 pub(super) fn cloud<const D: usize, L: Law>(
     law: L,
     approximation: Approximation,
@@ -226,8 +220,6 @@ pub(super) fn cloud<const D: usize, L: Law>(
         }, // Not a half, where ε and 1 − ε are the same.
         settings: Settings {
             lumping: 0.3,
-
-            newton: NewtonSettings { precision: Precision::Mixed, ..NewtonSettings::default() },
             ..Settings::default()
         }, ..Simulation::new(grid, approximation, bodies, particles, Clock::new(dt, 0)) })
 }

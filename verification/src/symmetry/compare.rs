@@ -5,8 +5,8 @@
 //! coordinates and to 1. Each difference of the answers over δ gives the amplification of round-off. Where round-off decides, the answer
 //! jumps; such a jump raises the bound to a value 1/√ε ≈ 7e7 times smaller than the jump.
 //!
-//! If the image has other linear systems, Newton's method ends elsewhere within its tolerance. The size of this difference is measured with
-//! the scene itself, by solving its linear systems less accurately.
+//! Sums have another order in the image, so Newton's method ends elsewhere within its tolerance. The size of this difference is measured
+//! with the scene itself, by solving its linear systems less accurately.
 
 use super::scene::{FACES, Scene};
 use super::transform::{Map, Pair};
@@ -97,8 +97,7 @@ pub fn compare(pair: &Pair) -> Result<Vec<Disagreement>, SymmetryError> {
         let exact = |(quantity, difference, _)| Disagreement { quantity, difference, bound: 0.0 };
         return Ok(apart.into_iter().map(exact).collect());
     }
-    let itself =
-        Pair { scenes: [scene.clone(), scene.clone()], map: Map::SAME, times: 1.0, bits: false, other_systems: false };
+    let itself = Pair { scenes: [scene.clone(), scene.clone()], map: Map::SAME, times: 1.0, bits: false };
     let identity: Vec<Vec<usize>> = (0..one.start.len()).map(|p| vec![p]).collect();
     let mut condition = vec![0.0_f64; apart.len()];
     for seed in 0..PERTURBED {
@@ -108,13 +107,9 @@ pub fn compare(pair: &Pair) -> Result<Vec<Disagreement>, SymmetryError> {
             *condition = condition.max(difference / PERTURBATION);
         }
     }
-    let mut left = vec![0.0; apart.len()];
-    if pair.other_systems {
-        let otherwise = Scene { forcing: LESS_FAR * scene.forcing, ..scene.clone() };
-        let solved = answer(&otherwise, None).map_err(SymmetryError::Scene)?;
-        let moved = differences(&one, &solved, &identity, &itself);
-        left.iter_mut().zip(moved).for_each(|(left, (_, difference, _))| *left = difference);
-    }
+    let otherwise = Scene { forcing: LESS_FAR * scene.forcing, ..scene.clone() };
+    let solved = answer(&otherwise, None).map_err(SymmetryError::Scene)?;
+    let left = differences(&one, &solved, &identity, &itself).into_iter().map(|(_, difference, _)| difference);
     let judged = |(((quantity, difference, size), condition), left): (((&'static str, f64, f64), f64), f64)| {
         let bound = ROUNDINGS * f64::EPSILON * (size + condition) + SOLVED * left;
         let size = if size > 0.0 { size } else { 1.0 };

@@ -28,19 +28,23 @@ pub fn draw(seed: u64, transformation: Transformation, devices: Devices) -> (Pai
     let regular = family_name == "uGIMP"
         || family_name == "quadratic" && matches!(transformation, Transformation::Split | Transformation::Slab);
     let layout = if regular { "regular" } else { one_of(random, &["regular", "gauss"]) };
-    // Particles of uGIMP on grid lines have nodes at the edge of their support, and round-off decides which.
-    let on_lines = devices == Devices::Default || family_name != "uGIMP";
-    let (form_name, form) = form(random, spacing, transformation, held, on_lines);
+    let (form_name, form) = form(random, spacing, transformation, held);
     // Points that integrate polynomials over cut cells differ from those of the mirror image.
-    let fills: &[&str] =
-        if devices == Devices::Off && layout == "gauss" { &["particles"] } else { &["cut", "particles"] };
+    let fills: &[&str] = match (devices, layout) {
+        (Devices::Off, "gauss") => &["particles"],
+        // Aggregation takes the domain of a particle for a cube. Cut particles have other edges in the plane and in space.
+        _ if transformation == Transformation::Slab && !inertia => &["particles"],
+        _ => &["cut", "particles"],
+    };
     let law = law(random, half);
-    let averaged = law.has_volumetric_part() && one_of(random, &[true, false]);
     let renewed = match transformation {
         // Bodies in contact reset the grid in every step; without inertia they are bonded.
         Transformation::Split if inertia => json!("every_step"),
         _ => one_of(random, &[json!("every_step"), json!("never"), json!({ "strain": 0.02 })]),
     };
+    // Means of cells are taken body by body, and particles that cross a cut before a grid reset change the body that they count for.
+    let averages = law.has_volumetric_part() && (transformation != Transformation::Split || renewed == "never");
+    let averaged = averages && one_of(random, &[true, false]);
     let steps = 3;
     // Without inertia bodies carry smaller loads.
     let share = if inertia { 1.0 } else { 0.3 };
@@ -138,13 +142,7 @@ fn law(random: &mut Random, half: bool) -> Law {
 }
 
 /// A body 3 to 4 cells wide; `held` bodies stand on the bottom, and halves begin at the left face.
-fn form(
-    random: &mut Random,
-    h: f64,
-    transformation: Transformation,
-    held: bool,
-    on_lines: bool,
-) -> (&'static str, Form) {
+fn form(random: &mut Random, h: f64, transformation: Transformation, held: bool) -> (&'static str, Form) {
     let half = transformation == Transformation::Doubled;
     let at = [if half { 0.0 } else { 2.0 * h }, if held { 0.0 } else { 2.0 * h }];
     let off = |random: &mut Random, at_plane: bool| if at_plane { 0.0 } else { random.between(0.1, 0.9) * h };
@@ -156,7 +154,7 @@ fn form(
     } else {
         4
     };
-    match one_of(random, &[0, 1, 2, 3][usize::from(!on_lines)..forms]) {
+    match one_of(random, &[0, 1, 2, 3][..forms]) {
         0 => ("box on grid lines", Form::Box { min: at, max: [at[0] + 3.0 * h, at[1] + 3.0 * h] }),
         1 => {
             let min = [at[0] + off(random, half), at[1] + off(random, held)];
@@ -185,8 +183,13 @@ fn form(
 fn faces(random: &mut Random, half: bool, held: bool, inertia: bool) -> [Option<Hold>; 4] {
     let across = if half { 0.0 } else { random.between(-0.02, 0.02) };
     let moves = Hold::Moves([across, random.between(-0.02, 0.02)]);
-    let holds = [Hold::Fixed, moves, Hold::Sliding];
-    let bottom = held.then(|| one_of(random, &holds[..if inertia { 3 } else { 2 }]));
+    let holds: &[Hold] = match (half, inertia) {
+        // A moving wall changes velocities at its corner with the plane of symmetry, which the whole body does not have.
+        (true, true) => &[Hold::Fixed, Hold::Sliding],
+        (false, true) => &[Hold::Fixed, moves, Hold::Sliding],
+        (_, false) => &[Hold::Fixed, moves],
+    };
+    let bottom = held.then(|| one_of(random, holds));
     [half.then_some(Hold::Sliding), None, bottom, None]
 }
 
@@ -207,9 +210,10 @@ fn load(random: &mut Random, scene: &Scene, form: &Form, share: f64, devices: De
         }
     };
     let h = scene.spacing;
-    // The region extends beyond the body, so that no particle lies on its edge; a half begins at its plane.
+    // The region extends beyond the body, so that no particle lies on its edge; a half begins at its plane. The region is less deep than a
+    // layer of particles. The next layer would count as loaded beside the faces of cuts and slabs, which the image does not have.
     let lower = if half { 0.0 } else { ends[0] - 0.1 * h };
-    let region = Form::Box { min: [lower, top - 0.53 * h], max: [ends[1] + 0.1 * h, top + 0.1 * h] };
+    let region = Form::Box { min: [lower, top - 0.499 * h], max: [ends[1] + 0.1 * h, top + 0.1 * h] };
     let carried = (devices == Devices::Off).then_some(([0.0, 1.0], 0.5 * h));
     Some(Load { region, pressing, carried })
 }

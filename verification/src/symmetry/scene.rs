@@ -234,7 +234,7 @@ impl Scene {
     fn time(&self) -> Value {
         let step = self.step * self.units.time;
         let mut time = json!({ "step": step, "end": f64::from(self.steps) * step, "max_halvings": 0 });
-        time["inertia"] = match self.scheme {
+        time["scheme"] = match self.scheme {
             Scheme::Newmark => json!("newmark"),
             Scheme::GeneralizedAlpha => json!({ "generalized_alpha": { "spectral_radius": 0.6 } }),
             Scheme::LoadSteps => json!("none"),

@@ -85,8 +85,6 @@ pub struct Pair {
     pub times: f64,
     /// Whether the second has the same bits.
     pub bits: bool,
-    /// Whether the second has other linear systems.
-    pub other_systems: bool,
 }
 
 impl Transformation {
@@ -139,13 +137,7 @@ impl Transformation {
             Self::Scaled => image.units = Units { length: 3.7, time: 3.7 * 3.7, density: 3.7_f64.recip() },
             Self::Mirrored | Self::Turned | Self::Moved => {}
         }
-        Pair {
-            scenes: [scene, image],
-            map,
-            times,
-            bits: self == Self::PowersOfTwo,
-            other_systems: self.changes_systems(),
-        }
+        Pair { scenes: [scene, image], map, times, bits: self == Self::PowersOfTwo }
     }
 }
 

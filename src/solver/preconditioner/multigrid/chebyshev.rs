@@ -1,7 +1,7 @@
 //! Smoothing by Chebyshev polynomials over block-Jacobi, and the largest eigenvalue that they need.
 
 use crate::solver::LinearOperator;
-use crate::solver::vector::dot;
+use crate::solver::vector::{axpy, dot, xpby};
 use nalgebra::DMatrix;
 
 /// Degree of the smoothing polynomials.
@@ -14,37 +14,41 @@ const ESTIMATE: usize = 10;
 /// The estimate is a lower bound and is multiplied by this factor.
 const MARGIN: f64 = 1.15;
 
-/// The largest eigenvalue of D⁻¹K, estimated by the Lanczos method in the inner product of D, with a margin.
+/// The largest eigenvalue of D⁻¹K, with a margin. Conjugate gradients with the preconditioner D have the coefficients of the Lanczos method
+/// (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., section 6.7.3). These coefficients are ratios: units of length, mass and
+/// time do not change their bits.
 pub(super) fn largest(operator: &dyn LinearOperator, jacobi: &dyn Fn(&[f64], &mut [f64]), n: usize) -> f64 {
-    let mut r: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
-    let (mut before, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    let mut matrix = DMatrix::<f64>::zeros(ESTIMATE, ESTIMATE);
-    // Two products clear the entries at prescribed unknowns.
-    jacobi(&r, &mut z);
-    operator.apply(&z, &mut w);
+    let start: Vec<f64> = (1..=n).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect();
+    let (mut r, mut z, mut w) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    // A product clears the entries at prescribed unknowns. It comes first, because there D is 1 in any units.
+    operator.apply(&start, &mut w);
     jacobi(&w, &mut z);
     operator.apply(&z, &mut r);
     jacobi(&r, &mut z);
-    let mut beta = dot(&r, &z).max(0.0).sqrt();
+    let mut p = z.clone();
+    let mut r_z = dot(&r, &z);
+    let mut matrix = DMatrix::<f64>::zeros(ESTIMATE, ESTIMATE);
+    let mut carried = 0.0;
     for step in 0..ESTIMATE {
+        operator.apply(&p, &mut w);
+        let alpha = r_z / dot(&p, &w);
+        if !alpha.is_normal() {
+            break;
+        }
+        matrix[(step, step)] = 1.0 / alpha + carried;
+        axpy(-alpha, &w, &mut r);
+        jacobi(&r, &mut z);
+        let r_z_next = dot(&r, &z);
+        let beta = r_z_next / r_z;
         if beta.is_nan() || beta <= 0.0 {
             break;
         }
-        // r = D v, z = v
-        r.iter_mut().for_each(|x| *x /= beta);
-        z.iter_mut().for_each(|x| *x /= beta);
-        operator.apply(&z, &mut w);
-        let alpha = dot(&w, &z);
-        matrix[(step, step)] = alpha;
-        for i in 0..n {
-            let next = w[i] - alpha * r[i] - if step > 0 { beta * before[i] } else { 0.0 };
-            (before[i], r[i]) = (r[i], next);
-        }
-        jacobi(&r, &mut z);
-        beta = dot(&r, &z).max(0.0).sqrt();
         if step + 1 < ESTIMATE {
-            (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta, beta);
+            (matrix[(step, step + 1)], matrix[(step + 1, step)]) = (beta.sqrt() / alpha, beta.sqrt() / alpha);
         }
+        xpby(&z, beta, &mut p);
+        carried = beta / alpha;
+        r_z = r_z_next;
     }
     let finite = matrix.iter().all(|x| x.is_finite());
     let largest = if finite { MARGIN * matrix.symmetric_eigenvalues().max() } else { 0.0 };

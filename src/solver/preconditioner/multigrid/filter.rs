@@ -19,8 +19,9 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Filter {
     /// The two neighbours of each node along each axis: before and behind the node.
     beside: [Vec<[u32; 2]>; 3],
-    /// D^{−½} of each unknown; 0 for values that are no unknowns.
+    /// (D unit)^{−½} of each unknown; 0 for values that are no unknowns.
     scale: Vec<f64>,
+    unit: f64,
 }
 
 impl Filter {
@@ -37,11 +38,16 @@ impl Filter {
             numbers.get(&next).copied().unwrap_or(NONE)
         };
         let along = |axis: usize| form.nodes.iter().map(|&at| [beside(axis, at, 0), beside(axis, at, 2)]).collect();
-        let root = |k: usize| if fixed[k] { 0.0 } else { inverses[k / D][(k % D, k % D)].sqrt() };
+        let diagonal = |k: usize| if fixed[k] { 0.0 } else { inverses[k / D][(k % D, k % D)] };
+        let largest = (0..fixed.len()).map(diagonal).fold(0.0, f64::max);
+        // A power of two, so that units by powers of two do not change the bits of the roots.
+        let unit = if largest > 0.0 { largest.log2().floor().exp2() } else { 1.0 };
+        let root = |k: usize| (diagonal(k) / unit).sqrt();
         let usable = |scale: f64| if scale.is_finite() { scale } else { 0.0 };
         Self {
             beside: std::array::from_fn(|axis| if axis < D { along(axis) } else { Vec::new() }),
             scale: (0..fixed.len()).map(|k| usable(root(k))).collect(),
+            unit,
         }
     }
 
@@ -50,7 +56,7 @@ impl Filter {
         let mut x: Vec<f64> = r.iter().zip(&self.scale).map(|(r, scale)| r * scale).collect();
         (0..D).rev().for_each(|axis| self.invert::<D>(axis, &mut x));
         (0..D).for_each(|axis| self.invert::<D>(axis, &mut x));
-        z.iter_mut().zip(&x).zip(&self.scale).for_each(|((z, x), scale)| *z += x * scale);
+        z.iter_mut().zip(&x).zip(&self.scale).for_each(|((z, x), scale)| *z += x * scale * self.unit);
     }
 
     /// x ← q(B) x with B = [1 4 1]/6 along an axis and the polynomial q ≈ 1/B.

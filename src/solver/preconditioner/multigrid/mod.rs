@@ -15,7 +15,6 @@ mod level;
 pub use form::LocalForm;
 
 use super::{BlockJacobi, Preconditioner};
-use crate::solver::vector::Entry;
 use crate::solver::{LinearOperator, Linearization};
 use chebyshev::{chebyshev, largest};
 use filter::Filter;
@@ -33,8 +32,6 @@ pub struct Multigrid<const D: usize> {
     blocks: BlockJacobi<D>,
     /// The filter of the finest smoother, for cubic B-splines.
     filter: Option<Filter>,
-    /// The scale by which the tangent was divided when the levels were made.
-    scale: f64,
     /// An estimate of the largest eigenvalue of M K, with the M of the finest smoother.
     largest: f64,
     levels: Vec<Level<D>>,
@@ -109,54 +106,28 @@ impl<const D: usize> Multigrid<D> {
 }
 
 /// A V-cycle whose finest level is the present tangent.
-struct Cycle<'a, const D: usize, S> {
+struct Cycle<'a, const D: usize> {
     levels: &'a Multigrid<D>,
-    tangent: Doubled<'a, S>,
+    tangent: &'a dyn Linearization,
 }
 
-/// A tangent of either precision as an operator in double precision, times the factor that brings it to the scale of the levels.
-struct Doubled<'a, S>(&'a dyn Linearization<S>, f64);
-
-impl<S: Entry> LinearOperator for Doubled<'_, S> {
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
-        let (x, mut out) = (x.iter().map(|&x| S::lit(x)).collect::<Vec<_>>(), vec![S::zero(); y.len()]);
-        self.0.apply(&x, &mut out);
-        y.iter_mut().zip(&out).for_each(|(y, out)| *y = self.1 * out.value());
-    }
-}
-
-impl<S: Entry, const D: usize> LinearOperator<S> for Cycle<'_, D, S> {
-    fn apply(&self, r: &[S], z: &mut [S]) {
-        let b: Vec<f64> = r.iter().map(|r| r.value()).collect();
-        let mut x = vec![0.0; b.len()];
-        let (fine, levels) = (&self.tangent, self.levels);
+impl<const D: usize> LinearOperator for Cycle<'_, D> {
+    fn apply(&self, r: &[f64], z: &mut [f64]) {
+        let Self { levels, tangent } = *self;
         let jacobi = |r: &[f64], z: &mut [f64]| levels.smooth(r, z);
-        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, true);
-        levels.correct(0, fine, &b, &mut x);
-        chebyshev(fine, &jacobi, levels.largest, &b, &mut x, false);
-        z.iter_mut().zip(&x).for_each(|(z, x)| *z = S::lit(*x));
-    }
-}
-
-impl<const D: usize> Multigrid<D> {
-    fn prepared<'a, S: Entry>(&'a mut self, tangent: &'a dyn Linearization<S>) -> Box<dyn LinearOperator<S> + 'a> {
-        if self.levels.is_empty() {
-            self.blocks.take(tangent);
-            self.scale = tangent.scale();
-            self.build(tangent.local_form(), &Doubled(tangent, 1.0));
-        }
-        // A system that single precision could not solve comes again in double precision, with another scale.
-        let tangent = Doubled(tangent, tangent.scale() / self.scale);
-        Box::new(Cycle { levels: self, tangent })
+        z.fill(0.0);
+        chebyshev(tangent, &jacobi, levels.largest, r, z, true);
+        levels.correct(0, tangent, r, z);
+        chebyshev(tangent, &jacobi, levels.largest, r, z, false);
     }
 }
 
 impl<const D: usize> Preconditioner for Multigrid<D> {
     fn prepare<'a>(&'a mut self, tangent: &'a dyn Linearization) -> Box<dyn LinearOperator + 'a> {
-        self.prepared(tangent)
-    }
-
-    fn prepare_single<'a>(&'a mut self, tangent: &'a dyn Linearization<f32>) -> Box<dyn LinearOperator<f32> + 'a> {
-        self.prepared(tangent)
+        if self.levels.is_empty() {
+            self.blocks.take(tangent);
+            self.build(tangent.local_form(), tangent);
+        }
+        Box::new(Cycle { levels: self, tangent })
     }
 }

@@ -14,7 +14,6 @@ use bfree::clock::Clock;
 use bfree::material::{Law, Material, MaterialState};
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::tangent::frozen_bytes;
-use bfree::solver::Precision;
 use bfree::simulation::Simulation;
 use bfree::pooled::Pool;
 use bfree::solver::{BlockJacobi, GmresSettings, gmres};
@@ -131,7 +130,7 @@ impl Study {
         self.report.push(&["product, matrix - matrix-free", &case], difference, Bound::AtMost(ENTRIES));
 
         let particles = simulation.particles.len();
-        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports);
         let free_bytes = prepared.supports.bytes() + frozen;
         let megabytes = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
         let seconds = |s: f64| format!("{s:.5}");

@@ -46,7 +46,7 @@ pub(super) fn run() -> Report {
     report
 }
 
-/// A number of either precision, between 10^−decades and 10^decades, with digits in both halves.
+/// A number between 10^−decades and 10^decades, with digits in both halves.
 fn number(random: &mut Random, decades: f64) -> DoubleDouble {
     let size = 10.0_f64.powf(random.between(-decades, decades));
     DoubleDouble::from(size) + DoubleDouble::from(size * 1e-17 * random.signed())

@@ -1,4 +1,4 @@
-//! Energy and stress at one deformation: in a precision under test, in double-double, and by textbook formulas.
+//! Energy and stress at one deformation: in `f64`, in double-double, and by textbook formulas.
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
@@ -7,32 +7,14 @@ use bfree::scalar::Real;
 use bfree::tensor::{Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
 
-/// A precision under test.
-pub(super) trait Precision: Real {
-    const NAME: &'static str;
-    /// The distance from 1 to the next number.
-    const EPSILON: f64;
-}
-
-impl Precision for f64 {
-    const NAME: &'static str = "f64";
-    const EPSILON: f64 = Self::EPSILON;
-}
-
-impl Precision for f32 {
-    const NAME: &'static str = "f32";
-    const EPSILON: f64 = Self::EPSILON as f64;
-}
-
-/// ν = 0.3. The constants have few digits, so that they are equal in every precision. Laws in logarithmic strains have no textbook formula
-/// that every precision could evaluate, and are left out.
+/// ν = 0.3. Laws in logarithmic strains have no textbook formula that double-double could evaluate, and are left out.
 pub(super) fn laws() -> Vec<(String, Material)> {
     let closed = |(name, law): (&str, Material)| {
         let spectral = matches!(
             law,
             Material::Ogden(_) | Material::Viscoelastic(_) | Material::VonMises(_) | Material::DruckerPrager(_)
         );
-        // e^{k₂ (I₄ − 1)²} exceeds the range of every precision there.
+        // e^{k₂ (I₄ − 1)²} exceeds the range of f64 there.
         let exponential = matches!(law, Material::FibreReinforced(_));
         (!spectral && !exponential).then(|| (short(name), law))
     };
@@ -88,32 +70,29 @@ impl Errors {
     }
 }
 
-/// Measures the errors of `law` in precision `T` at `h`, rounded to `T`.
+/// Measures the errors of `law` at `h`.
 ///
 /// To first order in eps, rounding of the input changes S by ‖∂S/∂H‖ eps ‖H‖ and W by ‖P‖ eps ‖H‖. If W is of second order in a strain
 /// below eps, it also changes by ½ ‖∂P/∂H‖ (eps ‖H‖)².
-pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
-    let given: Tensor<T, D> = h.map(T::lit);
-    let h = given.map(T::value);
-    let at = MaterialState::new(given);
+pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
+    let at = MaterialState::new(*h);
     let exact_at = MaterialState::new(h.map(DoubleDouble::from));
     let (exact_w, exact_s) = (law.energy(&exact_at), law.stress(&exact_at));
-    let error = |w: T, s: Tensor<T, D>| {
-        let w = (DoubleDouble::from(w.value()) - exact_w).magnitude();
-        let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s.value()) - exact).magnitude()).norm();
+    let error = |w: f64, s: Tensor<f64, D>| {
+        let w = (DoubleDouble::from(w) - exact_w).magnitude();
+        let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s) - exact).magnitude()).norm();
         (w, s)
     };
     let (energy, stress) = error(law.energy(&at), law.stress(&at));
-    let (naive_w, naive_s) = naive(law, &given);
+    let (naive_w, naive_s) = naive(law, h);
     let (naive_energy, naive_stress) = error(naive_w, naive_s);
 
-    let near = MaterialState::new(h);
     let (w, s) = (exact_w.magnitude(), exact_s.map(DoubleDouble::value));
-    let piola = near.f * s;
+    let piola = at.f * s;
     let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
     let response = |i: usize, k: usize| {
-        let strain = near.f.transpose() * outer(&unit(i), &unit(k));
-        law.elasticity(&near, &strain).norm()
+        let strain = at.f.transpose() * outer(&unit(i), &unit(k));
+        law.elasticity(&at, &strain).norm()
     };
     let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
     let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
@@ -121,20 +100,20 @@ pub(super) fn judge<T: Precision, const D: usize>(law: &Material, h: &Tensor<f64
         Rounding::Displacement => (piola.norm() * h.norm(), stiffness * h.norm()),
         Rounding::Products => {
             // δF = F δJ/(D J) is a purely volumetric change.
-            let volume = permanent(&near.f.abs()) / (D as f64 * near.jacobian);
-            let response = law.elasticity(&near, &(near.f.transpose() * near.f)).norm();
-            let change_w = piola.norm() * h.norm() + contract(&piola, &near.f).abs() * volume;
+            let volume = permanent(&at.f.abs()) / (D as f64 * at.jacobian);
+            let response = law.elasticity(&at, &(at.f.transpose() * at.f)).norm();
+            let change_w = piola.norm() * h.norm() + contract(&piola, &at.f).abs() * volume;
             (change_w, stiffness * h.norm() + response * volume)
         }
         Rounding::Entries => (
-            contract(&piola.abs(), &near.f.abs()),
-            pairs().map(|(i, k)| near.f[(i, k)].abs() * response(i, k)).sum(),
+            contract(&piola.abs(), &at.f.abs()),
+            pairs().map(|(i, k)| at.f[(i, k)].abs() * response(i, k)).sum(),
         ),
     };
-    let second = 0.5 * (near.f.norm() * stiffness + s.norm()) * (T::EPSILON * h.norm()).powi(2);
+    let second = 0.5 * (at.f.norm() * stiffness + s.norm()) * (f64::EPSILON * h.norm()).powi(2);
     Errors {
-        energy: ratio(energy, T::EPSILON * (w + change_w) + second),
-        stress: ratio(stress, T::EPSILON * (s.norm() + change_s)),
+        energy: ratio(energy, f64::EPSILON * (w + change_w) + second),
+        stress: ratio(stress, f64::EPSILON * (s.norm() + change_s)),
         relative_energy: ratio(energy, w),
         relative_stress: ratio(stress, s.norm()),
         naive_energy: ratio(naive_energy, w),

@@ -1,6 +1,6 @@
-//! Strains from 1e-15 to 10: all laws, in every dimension, in both precisions.
+//! Strains from 1e-15 to 10: all laws, in every dimension.
 
-use super::points::{Errors, Precision, Rounding, judge, laws, reference};
+use super::points::{Errors, Rounding, judge, laws, reference};
 use super::{Effort, Outcome, SOLVABLE};
 use crate::check::regime::rotation;
 use crate::figure::Axis;
@@ -69,33 +69,31 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
         Effort::Short => vec![1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 10.0],
         Effort::Full => (-30..=2).map(|k| 10.0_f64.powf(0.5 * f64::from(k))).collect(),
     };
-    let columns = ["quantity", "numbers", "beforehand", "law", "D", "strain", "kind"];
+    let columns = ["quantity", "beforehand", "law", "D", "strain", "kind"];
     let mut report = Report::new("strains 1e-15 to 10: roundings, in eps, that the errors of W and S amount to", &columns)
-        .as_matrix(&[0, 1, 2], 5, 6);
+        .as_matrix(&[0, 1], 4, 5);
     let mut judge_of_judge = super::rows("the reference against textbook formulas in double-double, strains 1e-3 to 10");
-    let (mut double, mut single) = (Vec::new(), Vec::new());
+    let mut series = Vec::new();
     let mut worst_reference: f64 = 0.0;
     for &size in &sizes {
-        let (mut here, mut here_single) = (Errors::NONE, Errors::NONE);
+        let mut here = Errors::NONE;
         for (name, law) in &laws() {
             let mut cell = Cells { name, law, size, report: &mut report };
-            cell.all::<f64>(&mut here);
-            cell.all::<f32>(&mut here_single);
+            cell.all(&mut here);
             if size >= RESOLVED {
                 for error in [check::<1>(law, size), check::<2>(law, size), check::<3>(law, size)] {
                     worst_reference = super::worse(worst_reference, error);
                 }
             }
         }
-        double.push((size, here));
-        single.push((size, here_single));
+        series.push((size, here));
     }
-    report.note("An error is judged by what rounding H to the same precision changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
+    report.note("An error is judged by what rounding H changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
     report.note("body turned by 2 rad is below the last digit of H itself, and no formula can know it.");
     super::solvable(&mut judge_of_judge, "W and S", "random", Ok::<_, std::convert::Infallible>(worst_reference), REFERENCE);
     outcome.reports.extend([judge_of_judge, report]);
-    outcome.tables.push(table(&double, &single));
-    outcome.sheets.push(sheet(&double, &single));
+    outcome.tables.push(table(&series));
+    outcome.sheets.push(sheet(&series));
 }
 
 /// The generic code in double-double against the textbook formulas.
@@ -117,9 +115,9 @@ struct Cells<'a> {
 
 impl Cells<'_> {
     /// All kinds in all dimensions; `random` collects the largest errors of the kinds without rotation.
-    fn all<T: Precision>(&mut self, random: &mut Errors) {
+    fn all(&mut self, random: &mut Errors) {
         for kind in Kind::ALL {
-            for errors in [self.one::<T, 1>(kind), self.one::<T, 2>(kind), self.one::<T, 3>(kind)].into_iter().flatten() {
+            for errors in [self.one::<1>(kind), self.one::<2>(kind), self.one::<3>(kind)].into_iter().flatten() {
                 if kind == Kind::Random {
                     *random = random.worse(errors);
                 }
@@ -127,16 +125,16 @@ impl Cells<'_> {
         }
     }
 
-    fn one<T: Precision, const D: usize>(&mut self, kind: Kind) -> Option<Errors> {
+    fn one<const D: usize>(&mut self, kind: Kind) -> Option<Errors> {
         let mut random = Random::new(47);
         let tried = (0..TRIES).map(|_| {
             let h = kind.displacement::<D>(self.size, &mut random)?;
-            Some(judge::<T, D>(self.law, &h, Rounding::Displacement))
+            Some(judge::<D>(self.law, &h, Rounding::Displacement))
         });
         let worst = tried.collect::<Option<Vec<_>>>()?.into_iter().fold(Errors::NONE, Errors::worse);
         let (dimension, size) = (D.to_string(), short(self.size));
         for (quantity, value) in [("W", worst.energy), ("S", worst.stress)] {
-            let labels = [quantity, T::NAME, SOLVABLE, self.name, &dimension, &size, kind.name()];
+            let labels = [quantity, SOLVABLE, self.name, &dimension, &size, kind.name()];
             self.report.push(&labels, value, Bound::AtMost(ROUNDINGS));
         }
         Some(worst)
@@ -153,26 +151,22 @@ const SHOWN: [[Shown; 2]; 2] = [
     [("S", |e| e.relative_stress), ("S, textbook", |e| e.naive_stress)],
 ];
 
-fn table(double: &Series, single: &Series) -> Table {
-    let header = ["quantity".into(), "numbers".into()].into_iter().chain(double.iter().map(|(size, _)| short(*size)));
+fn table(series: &Series) -> Table {
+    let header = std::iter::once("quantity".into()).chain(series.iter().map(|(size, _)| short(*size)));
     let mut table =
         Table::new("relative errors at random strains, all laws and dimensions; by textbook: C = F^T F, ln det C, tr C - 3", header);
     for (name, value) in SHOWN.into_iter().flatten() {
-        for (numbers, series) in [("f64", double), ("f32", single)] {
-            let values = series.iter().map(|(_, errors)| short(value(errors)));
-            table.push([name.into(), numbers.into()].into_iter().chain(values));
-        }
+        let values = series.iter().map(|(_, errors)| short(value(errors)));
+        table.push(std::iter::once(name.into()).chain(values));
     }
     table
 }
 
-fn sheet(double: &Series, single: &Series) -> Sheet {
+fn sheet(series: &Series) -> Sheet {
     let panels = SHOWN.into_iter().zip(["energy W", "stress S"]).map(|(shown, title)| {
-        let curves = [("f64", double, 1), ("f32", single, 2)].into_iter().flat_map(|(numbers, series, color)| {
-            shown.into_iter().zip([Mark::Joined, Mark::Dashed]).map(move |((name, value), mark)| {
-                let points = series.iter().map(|(size, errors)| (*size, value(errors))).collect();
-                Curve::new(format!("{name}, {numbers}"), color, mark, points)
-            })
+        let curves = shown.into_iter().zip([Mark::Joined, Mark::Dashed]).map(|((name, value), mark)| {
+            let points = series.iter().map(|(size, errors)| (*size, value(errors))).collect();
+            Curve::new(name, 1, mark, points)
         });
         Panel {
             title: title.into(),

@@ -8,7 +8,6 @@ use bfree::material::Lame;
 use bfree::mechanics::loads::{Curve, Gravity, Motion, Pressing, SurfaceLoad, SurfacePoint};
 use bfree::particles::Particles;
 use bfree::simulation::Simulation;
-use bfree::solver::Precision;
 use bfree::tensor::{Tensor, Vector};
 
 /// Steps over which answers are compared.
@@ -38,22 +37,15 @@ pub(super) fn run() -> Result<Report, StudyError> {
     let mut report = rows("units of length, mass and time: numbers that have other bits, or the largest dimensionless difference");
     let two = Scaling { name: "2^30", large: 2.0_f64.powi(30) };
     let ten = Scaling { name: "1e9", large: 1e9 };
-    for (name, precision) in [("double", Precision::Double), ("mixed", Precision::Mixed)] {
-        dimension::<1>(name, precision, [two, ten], &mut report)?;
-        dimension::<2>(name, precision, [two, ten], &mut report)?;
-        dimension::<3>(name, precision, [two, ten], &mut report)?;
-    }
+    dimension::<1>([two, ten], &mut report)?;
+    dimension::<2>([two, ten], &mut report)?;
+    dimension::<3>([two, ten], &mut report)?;
     Ok(report)
 }
 
-fn dimension<const D: usize>(
-    name: &str,
-    precision: Precision,
-    [two, ten]: [Scaling; 2],
-    report: &mut Report,
-) -> Result<(), StudyError> {
-    let plain = answer::<D>(ONE, precision)?;
-    let what = format!("a pressed block under gravity, D = {D}, {name} precision");
+fn dimension<const D: usize>([two, ten]: [Scaling; 2], report: &mut Report) -> Result<(), StudyError> {
+    let plain = answer::<D>(ONE)?;
+    let what = format!("a pressed block under gravity, D = {D}");
     for signs in 0..8_u32 {
         let power = |scaling: Scaling, bit: u32| {
             if signs >> bit & 1 == 1 { scaling.large.recip() } else { scaling.large }
@@ -63,24 +55,21 @@ fn dimension<const D: usize>(
             let sign = |bit: u32| if signs >> bit & 1 == 1 { "/" } else { "*" };
             format!("length {}, mass {}, time {} {}", sign(0), sign(1), sign(2), scaling.name)
         };
-        let bits = answer::<D>(units(two), precision).map(|other| {
+        let bits = answer::<D>(units(two)).map(|other| {
             plain.iter().zip(&other).filter(|(a, b)| a.0.to_bits() != b.0.to_bits()).count() as f64
         });
         solvable(report, &what, &case(two), bits, 0.0);
-        // One half has the same value in all units.
-        if precision == Precision::Double {
-            let difference = answer::<D>(units(ten), precision)
-                .map(|other| plain.iter().zip(&other).fold(0.0, |worst, (a, b)| worse(worst, (a.0 - b.0).abs() / a.1)));
-            solvable(report, &what, &case(ten), difference, DIMENSIONLESS);
-        }
+        let difference = answer::<D>(units(ten))
+            .map(|other| plain.iter().zip(&other).fold(0.0, |worst, (a, b)| worse(worst, (a.0 - b.0).abs() / a.1)));
+        solvable(report, &what, &case(ten), difference, DIMENSIONLESS);
     }
     Ok(())
 }
 
 /// The answer without units, each number with its reference size.
-fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64, f64)>, StudyError> {
+fn answer<const D: usize>(units: Units) -> Result<Vec<(f64, f64)>, StudyError> {
     let Units { length, time, .. } = units;
-    let mut simulation = problem::<D>(units, precision)?;
+    let mut simulation = problem::<D>(units)?;
     for _ in 0..STEPS {
         simulation.step()?;
     }
@@ -97,7 +86,7 @@ fn answer<const D: usize>(units: Units, precision: Precision) -> Result<Vec<(f64
 }
 
 /// A block in a corner, under growing gravity and a pressure on one side; half of the mass is consistent.
-fn problem<const D: usize>(units: Units, precision: Precision) -> Result<Simulation<D>, StudyError> {
+fn problem<const D: usize>(units: Units) -> Result<Simulation<D>, StudyError> {
     let Units { length, mass, time } = units;
     let grid = Grid { origin: Vector::repeat(0.25 * length), spacing: 0.5 * length, cells: [5; D] };
     let mut particles = Particles::default();
@@ -114,7 +103,6 @@ fn problem<const D: usize>(units: Units, precision: Precision) -> Result<Simulat
     let points = right.map(|particle| SurfacePoint { particle, normal: normal_x, area }).collect();
     let mut simulation = simulation(grid, Lme::new(3.0, 1e-6).into(), particles, vec![body(lame, density)], dt);
     simulation.settings = settings(0.5);
-    simulation.settings.newton.precision = precision;
     simulation.loads.gravity = Some(Gravity {
         acceleration: Vector::from_fn(|k, _| -1.0 - k as f64) * (length / (time * time)),
         curve: Curve::new(vec![[0.0, 0.5], [0.2 * time, 1.0]])?,

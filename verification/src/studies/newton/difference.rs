@@ -1,7 +1,7 @@
 //! Products with the tangent by differences of the residual, as in Jacobian-free Newton–Krylov methods.
 
 use bfree::pooled::Pooled;
-use bfree::solver::{DiagonalBlocks, LinearOperator, Linearization, NonlinearProblem};
+use bfree::solver::{LinearOperator, Linearization, NonlinearProblem};
 
 /// A problem whose tangent is known only through its residual; the blocks of the exact tangent precondition it.
 pub(super) struct Difference<'a, P> {
@@ -36,7 +36,7 @@ impl<P: NonlinearProblem> LinearOperator for DifferenceTangent<'_, P> {
     }
 }
 
-impl<P> DiagonalBlocks for DifferenceTangent<'_, P> {
+impl<P: NonlinearProblem> Linearization for DifferenceTangent<'_, P> {
     fn diagonal_blocks(&self) -> Pooled<f64> {
         self.exact.diagonal_blocks()
     }

@@ -10,13 +10,10 @@ use bfree::material::{Law, Material};
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::simulation::Simulation;
-use bfree::solver::{NonlinearProblem, Precision};
+use bfree::solver::NonlinearProblem;
 use bfree::tensor::{Tensor, Vector};
 
 const SAME: f64 = 1e-12;
-
-/// The error of a sum of some hundred products of numbers in single precision.
-const SAME_IN_SINGLE: f64 = 16.0 * f32::EPSILON as f64;
 
 /// h; the value 1 would hide a missing power of h.
 const SPACING: f64 = 0.3;
@@ -84,18 +81,6 @@ fn compare<const D: usize, L: Law>(
     for (quantity, (a, b)) in QUANTITIES.iter().zip(a.iter().zip(&b)) {
         report.push(&[quantity, &D.to_string(), law_name, shape_name], difference(a, b), Bound::AtMost(SAME));
     }
-    let (single, _) = Supports::with_precision(shape, grid, positions, Precision::Mixed)?;
-    let nodal = Nodal::project(&simulation.particles, &single, 0.5)?;
-    let alphas = simulation.settings.scheme.end(simulation.clock.step());
-    let equilibrium = simulation.equilibrium(&single, &nodal, &prescribed, alphas, 0.1);
-    let product = equilibrium.single_tangent(None, &dphi)?.map_or_else(Vec::new, |tangent| {
-        let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-        let mut out = vec![Vector::zeros(); count];
-        tangent.product(&u, &mut out);
-        out.iter().flatten().map(|&x| f64::from(x) * tangent.scale()).collect()
-    });
-    let cell = ["product in single precision", &D.to_string(), law_name, shape_name];
-    report.push(&cell, difference(&product, &b[0]), Bound::AtMost(SAME_IN_SINGLE));
     Ok(())
 }
 

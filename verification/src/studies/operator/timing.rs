@@ -18,7 +18,6 @@ use bfree::particles::Body;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::Precision;
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::time::Instant;
@@ -61,7 +60,7 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
     let mut table = Table::new(
         "one tangent product, and the other parts of a step in units of it",
         [
-            "case", "particles", "M particles/s", "ns", "floor ns", "useful share of peak", "with padding", "2 threads", "in single", "residual",
+            "case", "particles", "M particles/s", "ns", "floor ns", "useful share of peak", "with padding", "2 threads", "residual",
             "tangent frozen", "shape functions",
         ],
     );
@@ -83,15 +82,14 @@ fn products(peak: f64, copy: f64, two: &rayon::ThreadPool) -> Result<Table, Stud
 fn product<const D: usize, L: Law>(
     table: &mut Table,
     name: &str,
-    mut simulation: Simulation<D, L>,
+    simulation: Simulation<D, L>,
     jitter: f64,
     [peak, copy]: [f64; 2],
     two: &rayon::ThreadPool,
 ) -> Result<(), StudyError> {
     let shape = &simulation.approximation.clone();
-    let work = Work::of(&simulation, &Prepared::new(&simulation)?)?;
-    simulation.settings.newton.precision = Precision::Mixed;
     let prepared = Prepared::new(&simulation)?;
+    let work = Work::of(&simulation, &prepared)?;
     let equilibrium = prepared.equilibrium(&simulation);
     let mut random = Random::new(11);
     let u: Vec<Vector<f64, D>> = random.field(prepared.nodes.len()).iter().map(|x: &Vector<f64, D>| x * 0.01).collect();
@@ -99,14 +97,6 @@ fn product<const D: usize, L: Law>(
     let mut out = vec![Vector::zeros(); u.len()];
     let seconds = best(15, || tangent.product(&u, &mut out));
     let on_two = two.install(|| best(15, || tangent.product(&u, &mut out)));
-    let in_single = match equilibrium.single_tangent(None, &u)? {
-        Some(single) => {
-            let u: Vec<Vector<f32, D>> = u.iter().map(|u| u.map(|x| x as f32)).collect();
-            let mut out = vec![Vector::zeros(); u.len()];
-            best(15, || single.product(&u, &mut out))
-        }
-        None => f64::NAN,
-    };
     let particles = simulation.particles.len() as f64;
     // The memory of the last step is reused, as in a step, and the particles have moved by 0.05 h along each axis.
     let (grid, before) = (&simulation.grid, &simulation.particles.position);
@@ -115,7 +105,7 @@ fn product<const D: usize, L: Law>(
     let mut turns = [before, &after].into_iter().cycle();
     let shape_functions = best(6, || {
         let positions = turns.next().unwrap_or(before);
-        spare = Supports::renewed(spare.take(), shape, grid, &Points::at(positions), Precision::Double, &pool).ok().map(|(supports, _)| supports);
+        spare = Supports::renewed(spare.take(), shape, grid, &Points::at(positions), &pool).ok().map(|(supports, _)| supports);
     });
     let times = |s: f64| format!("{:.1}", s / seconds);
     let floor = (work.useful / peak).max(work.bytes / copy);
@@ -128,7 +118,6 @@ fn product<const D: usize, L: Law>(
         format!("{:.0} %", 100.0 * work.useful / seconds / peak),
         format!("{:.0} %", 100.0 * work.padded / seconds / peak),
         format!("{:.2} x", seconds / on_two),
-        format!("{:.2} x", seconds / in_single),
         times(best(5, || equilibrium.residual::<f64>(&u))),
         times(best(5, || equilibrium.tangent(&u).map(|_| ()))),
         times(shape_functions),
@@ -156,7 +145,7 @@ fn matrices(copy: f64, read: f64) -> Result<Table, StudyError> {
         let mut out = vec![Vector::zeros(); count];
         let by_matrix = best(9, || matrix.product(&u, &mut out));
         let free = best(9, || tangent.product(&u, &mut out));
-        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports);
         let bytes = prepared.supports.bytes() + frozen;
         table.push([
             name.into(),
@@ -181,13 +170,11 @@ fn steps() -> Result<Table, StudyError> {
         ],
     );
     for (name, shape) in shapes() {
-        for precision in [Precision::Double, Precision::Mixed] {
-            for cells in [80, 160] {
-                step::<2>(&mut table, name, &shape, cells, precision)?;
-            }
-            for cells in [20, 40] {
-                step::<3>(&mut table, name, &shape, cells, precision)?;
-            }
+        for cells in [80, 160] {
+            step::<2>(&mut table, name, &shape, cells)?;
+        }
+        for cells in [20, 40] {
+            step::<3>(&mut table, name, &shape, cells)?;
         }
     }
     Ok(table)
@@ -198,10 +185,8 @@ fn step<const D: usize>(
     name: &str,
     shape: &Approximation,
     cells: u32,
-    precision: Precision,
 ) -> Result<(), StudyError> {
     let mut simulation = arranged(block::<D>(shape.clone(), None, cells, 0.1, 1.0)?)?;
-    simulation.settings.newton.precision = precision;
     let particles = simulation.particles.len();
     let planned = Plan::of(&simulation)?.bytes();
     let product = {
@@ -225,7 +210,7 @@ fn step<const D: usize>(
     let counts = newton.history.counts;
     let units = counts.tangent_products + counts.residuals + counts.linearizations + 1;
     table.push([
-        format!("{D}D {name}{}", if precision == Precision::Mixed { ", mixed" } else { "" }),
+        format!("{D}D {name}"),
         particles.to_string(),
         format!("{:.2}", seconds / particles as f64 * 1e6),
         counts.tangent_products.to_string(),

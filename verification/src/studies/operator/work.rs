@@ -7,7 +7,6 @@ use crate::table::Table;
 use bfree::approximation::{Approximation, AxisWeights, Linear, Lme, ShapeFunction};
 use bfree::material::{Law, MaterialState};
 use bfree::mechanics::tangent::frozen_bytes;
-use bfree::solver::Precision;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, identity};
 
@@ -70,7 +69,7 @@ impl Work {
             work.padded += 2.0 * (LANES * (gather(width, D) + point) + lanes * scatter(rows, width[0], D)) as f64;
         }
         let field = prepared.nodes.len() * size_of::<Vector<f64, D>>();
-        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports, Precision::Double);
+        let frozen = frozen_bytes(&simulation.particles, &simulation.bodies, &prepared.supports);
         work.bytes = (prepared.supports.bytes() + frozen + 2 * field) as f64;
         Ok(work)
     }

@@ -28,7 +28,7 @@ fn shell(family: &str, cells: u32) -> Result<([f64; 2], f64), StudyError> {
     let text = format!(
         r#"{{
             "grid": {{ "size": [{size}, {size}, {size}], "spacing": {spacing} }},
-            "time": {{ "step": 1, "end": 1, "inertia": "none" }},
+            "time": {{ "step": 1, "end": 1, "scheme": "none" }},
             "approximation": {family},
             "bodies": [{{
                 "name": "shell",

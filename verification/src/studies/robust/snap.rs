@@ -20,7 +20,7 @@ fn toggle(cells: u32) -> Result<Simulation<2>, StudyError> {
     let joint = json!({"box": {"min": [LENGTH - 0.25 * DEPTH, 2], "max": [LENGTH, 3]}});
     let scene = json!({
         "grid": {"size": [LENGTH, 4], "spacing": DEPTH / f64::from(cells)},
-        "time": {"step": 0.02, "end": 1, "inertia": "arc_length"},
+        "time": {"step": 0.02, "end": 1, "scheme": "arc_length"},
         "bodies": [{
             "name": "bar", "shape": {"box": {"min": [0, 1.75], "max": [LENGTH, 2]}}, "density": 1, "particles_per_cell": 2,
             "material": {"neo_hookean": {"young": YOUNG, "poisson": 0}}

@@ -204,13 +204,12 @@ impl Units {
         let prepared = Prepared::new(simulation)?;
         let equilibrium = prepared.equilibrium(simulation);
         let (count, lumping) = (prepared.nodes.len(), simulation.settings.lumping);
-        let (positions, precision) = (&simulation.particles.position, simulation.settings.newton.precision);
+        let positions = &simulation.particles.position;
         let mut dphi = vec![Vector::zeros(); count];
         prepared.prescribe(&mut dphi);
         let u: Vec<Vector<f64, D>> = vec![Vector::repeat(1e-3); count];
         let mut out = vec![Vector::zeros(); count];
-        let shapes =
-            best(|| Supports::with_precision(&simulation.approximation, &simulation.grid, positions, precision).map(drop));
+        let shapes = best(|| Supports::new(&simulation.approximation, &simulation.grid, positions).map(drop));
         let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, lumping).map(drop));
         let residual = best(|| equilibrium.residual::<f64>(&dphi).map(drop));
         let mut bytes = Plan::of(simulation)?.bytes();
@@ -226,19 +225,9 @@ impl Units {
             });
             (made, best(|| matrix.product(&u, &mut out)))
         } else {
-            let free = best(|| equilibrium.tangent(&dphi).map(drop));
-            match equilibrium.single_tangent(None, &dphi)? {
-                Some(single) => {
-                    let u: Vec<Vector<f32, D>> = vec![Vector::repeat(1e-3); count];
-                    let mut out = vec![Vector::zeros(); count];
-                    let made = best(|| equilibrium.single_tangent(None, &dphi).map(drop));
-                    (made, best(|| single.product(&u, &mut out)))
-                }
-                None => {
-                    let tangent = equilibrium.tangent(&dphi)?;
-                    (free, best(|| tangent.product(&u, &mut out)))
-                }
-            }
+            let made = best(|| equilibrium.tangent(&dphi).map(drop));
+            let tangent = equilibrium.tangent(&dphi)?;
+            (made, best(|| tangent.product(&u, &mut out)))
         };
         let projection = projection / prepared.nodal.iterations.max(1) as f64;
         let product_of_one = product / simulation.particles.len() as f64;

@@ -138,7 +138,6 @@ pub(super) const KNOBS: &[Knob] = &[
         short: 1,
         dimensions: 1..=3,
     },
-    Knob { key: "solver.krylov.precision", values: &[r#""mixed""#, r#""double""#], short: 1, dimensions: 1..=3 },
 ];
 
 /// Names of the knobs that are not keys with a default.

@@ -1,8 +1,9 @@
 //! B-splines that may curve at walls.
 
-use super::product::Place;
-use super::{ApproximationError, AxisWeights, Bspline, Separable, Validate};
+use super::uniform::Bspline;
 use crate::aggregation::Pieces;
+use crate::approximation::product::Place;
+use crate::approximation::{ApproximationError, AxisWeights, Separable, Validate};
 use crate::grid::Axis;
 
 /// B-splines without a knot next to the end of an axis: up to the second knot from a wall they are one polynomial, which may curve.

@@ -1,15 +1,10 @@
 //! Uniform B-splines centred on the nodes.
 
-use super::interior::Lane;
-use super::kernel::{Kernel, folded};
-use super::{
-    Approximation, ApproximationError, AxisWeights, Cells, Listed, NotAKnotBspline, Separable, Shipped, Validate,
-};
 use crate::aggregation::Pieces;
+use crate::approximation::kernel::{Kernel, folded};
+use crate::approximation::lane::Lane;
+use crate::approximation::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
 use crate::grid::Axis;
-use crate::problems::Problems;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// A uniform B-spline of degree 2 or 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,50 +15,10 @@ pub enum Bspline {
     Cubic,
 }
 
-/// B-splines centred on the nodes.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[schemars(rename = "Bspline")]
-#[serde(default, deny_unknown_fields)]
-pub struct BsplineParameters {
-    /// The polynomial degree, 2 or 3. Default 3.
-    #[schemars(range(min = 2, max = 3))]
-    pub degree: u32,
-}
-
-impl Default for BsplineParameters {
-    fn default() -> Self {
-        Self { degree: 3 }
-    }
-}
-
-impl Listed for Bspline {
-    type Parameters = BsplineParameters;
-
-    fn build(given: &BsplineParameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
-        problems.whole(&format!("{path}.degree"), given.degree, 2, 3);
-        let spline = match given.degree {
-            2 => Self::Quadratic,
-            3 => Self::Cubic,
-            _ => return None,
-        };
-        Some(if cells.integrated { NotAKnotBspline(spline).into() } else { spline.into() })
-    }
-
-    fn examples() -> Vec<(&'static str, Approximation)> {
-        let not_a_knot = |spline| NotAKnotBspline(spline).into();
-        vec![
-            ("quadratic", Self::Quadratic.into()),
-            ("cubic", Self::Cubic.into()),
-            ("not-a-knot quadratic", not_a_knot(Self::Quadratic)),
-            ("not-a-knot cubic", not_a_knot(Self::Cubic)),
-        ]
-    }
-}
-
 impl Validate for Bspline {}
 
 /// The kernel of [`Bspline::Quadratic`].
-pub(super) struct Quadratic;
+pub(in crate::approximation) struct Quadratic;
 
 impl Kernel for Quadratic {
     fn radius(&self) -> f64 {
@@ -83,7 +38,7 @@ impl Kernel for Quadratic {
 }
 
 /// The kernel of [`Bspline::Cubic`].
-pub(super) struct Cubic;
+pub(in crate::approximation) struct Cubic;
 
 impl Kernel for Cubic {
     fn radius(&self) -> f64 {

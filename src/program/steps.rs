@@ -1,0 +1,112 @@
+//! The steps of a run.
+
+use bfree::checkpoint::Checkpoints;
+use bfree::clock::Clock;
+use bfree::output::Recorder;
+use bfree::simulation::{AdvanceError, Simulation};
+use std::error::Error;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The steps that a run takes: whole steps, and a shortened last step if the end lies between whole steps.
+pub struct Schedule {
+    end: f64,
+    /// Whole steps of the clock to take.
+    whole_steps: u64,
+    /// Whether a shortened step follows.
+    shortens: bool,
+}
+
+impl Schedule {
+    /// The steps until `end`, at most `most` of them. The shortened step counts as one.
+    pub fn new(clock: &Clock, end: f64, most: Option<u64>) -> Self {
+        let until_end = clock.whole_steps(end);
+        Self {
+            end,
+            whole_steps: most.map_or(until_end, |most| most.min(until_end)),
+            shortens: most.is_none_or(|most| most > until_end),
+        }
+    }
+
+    /// The time after the last step.
+    pub fn end_time(&self, clock: &Clock) -> f64 {
+        if self.shortens { self.end } else { self.whole_steps as f64 * clock.nominal() }
+    }
+
+    /// Whether steps are left to take.
+    pub fn is_left(&self, clock: &Clock) -> bool {
+        !self.whole_steps_are_taken(clock) || self.shortens && clock.to(self.end).is_some()
+    }
+
+    fn whole_steps_are_taken(&self, clock: &Clock) -> bool {
+        clock.nominal_steps() >= self.whole_steps
+    }
+
+    /// Makes the shortened last step the only step of the clock. Returns false if there is no such step.
+    fn shorten(&mut self, clock: &mut Clock) -> bool {
+        let Some(shortened) = clock.to(self.end).filter(|_| self.shortens) else { return false };
+        *clock = shortened;
+        self.whole_steps = 1;
+        self.shortens = false;
+        true
+    }
+}
+
+/// A simulation in progress, with its records.
+pub struct Steps<const D: usize> {
+    pub simulation: Simulation<D>,
+    pub recorder: Recorder<D>,
+    /// `None` without checkpoints, and after the last one.
+    pub checkpoints: Option<Checkpoints>,
+    pub schedule: Schedule,
+    /// Set by another thread to end the run after a whole step.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+/// The results until a time could not be written.
+pub struct Unwritten {
+    pub time: f64,
+    pub error: Box<dyn Error>,
+}
+
+impl<const D: usize> Steps<D> {
+    /// Takes steps until the end, an interruption, or a failed step, whose error is returned.
+    pub fn take(&mut self) -> Result<Option<AdvanceError>, Unwritten> {
+        loop {
+            self.write_checkpoint_if_due()?;
+            let interrupted = self.interrupted.load(Ordering::Relaxed);
+            if interrupted || self.schedule.whole_steps_are_taken(&self.simulation.clock) {
+                self.write_last_checkpoint()?;
+                if interrupted || !self.schedule.shorten(&mut self.simulation.clock) {
+                    return Ok(None);
+                }
+            }
+            match self.simulation.advance() {
+                Ok(step) => {
+                    let recorded = self.recorder.record(&self.simulation, &step);
+                    recorded.map_err(|error| self.unwritten(error))?;
+                }
+                // The next round of the loop handles the interruption.
+                Err(error) if error.cause.is_stopped() => {}
+                Err(error) => return Ok(Some(error)),
+            }
+        }
+    }
+
+    fn write_checkpoint_if_due(&mut self) -> Result<(), Unwritten> {
+        let Some(checkpoints) = &mut self.checkpoints else { return Ok(()) };
+        let written = checkpoints.write_if_due(&self.simulation, &mut self.recorder);
+        written.map_err(|error| self.unwritten(error))
+    }
+
+    /// Writes the checkpoint that precedes the last snapshot and a shortened step. A longer run has neither of them here.
+    fn write_last_checkpoint(&mut self) -> Result<(), Unwritten> {
+        let Some(mut checkpoints) = self.checkpoints.take() else { return Ok(()) };
+        let written = checkpoints.write(&self.simulation, &mut self.recorder);
+        written.map_err(|error| self.unwritten(error))
+    }
+
+    fn unwritten(&self, error: impl Error + 'static) -> Unwritten {
+        Unwritten { time: self.simulation.clock.time(), error: Box::new(error) }
+    }
+}
