@@ -16,7 +16,7 @@
 //! | m, V₀ | mass and reference volume of a particle | [`particles::Particles`] |
 //! | F, H = F − I, J = det F | deformation gradient; H is stored, so that small strains lose no digits | [`tensor::Deformation`] |
 //! | E = sym H + ½ HᵀH, C = I + 2E | Green–Lagrange and right Cauchy–Green strain | [`tensor::Deformation::green_lagrange`] |
-//! | W, S = ∂W/∂E, ℂ = ∂S/∂E | energy density, second Piola–Kirchhoff stress, its tangent | [`material::Elastic`] |
+//! | W, S = ∂W/∂E, ℂ = ∂S/∂E | energy density, second Piola–Kirchhoff stress, its tangent | [`material::Law`] |
 //! | P = F S (7) | first Piola–Kirchhoff stress | [`material::first_piola`] |
 //! | Λ, G | Lamé's constants | [`material::Lame`] |
 //! | h | spacing of the grid | [`grid::Grid`] |
@@ -100,7 +100,7 @@
 //! ```
 //!
 //! Each term linearises its part at one state ([`mechanics::residual::Equilibrium::tangent`]). A law with a closed form stores a handful of
-//! numbers ([`material::Elastic::closed`]). Any other law stores the blocks above for all pairs of unit vectors. So the product, too, is
+//! numbers ([`material::Law::closed`]). Any other law stores the blocks above for all pairs of unit vectors. So the product, too, is
 //! B-free, and the diagonal blocks come from the numbers of the product. For the paper's law, [`material::NeoHookean::ciarlet`] (39):
 //!
 //! ```text
@@ -133,7 +133,7 @@
 //! |---|---|
 //! | run a scene from JSON | [`scene::read_file`], [`scene::Scene::build`], [`simulation::Simulation::advance`], [`output::Recorder`] |
 //! | continue a run that was killed | [`checkpoint::Checkpoints`], [`checkpoint::restore`], [`output::Recorder::resume`] |
-//! | write a law | [`material::Elastic`], [`material::Law`] if it has internal variables, or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
+//! | write a law | [`material::Law`], or [`material::Energy`] for its energy alone; `examples/own_law`, `examples/law_from_energy.rs` |
 //! | write a shape function | [`approximation::ShapeFunction`], or [`approximation::Separable`] for a product |
 //! | see whole programs | the module `examples` |
 //! | follow the loop over particles | [`mechanics::sweep`] |

@@ -1,6 +1,6 @@
 //! The particles: structure of arrays, and the bodies they belong to.
 
-use crate::material::{Law, Start, VolumeResponse};
+use crate::material::{Law, MaterialState, VolumeResponse};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector};
 use schemars::JsonSchema;
@@ -225,15 +225,16 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// The arguments of the law at the place `p` in memory, for a step of length `dt`.
+    /// The state at t_n of the particle at the place `p` in memory, for a step of length `dt`.
     #[inline(always)]
-    pub fn start(&self, p: usize, dt: f64) -> Start<'_> {
-        Start { dt, memory: &self.memory[p * self.remembered..(p + 1) * self.remembered] }
+    pub fn state(&self, p: usize, dt: f64) -> MaterialState<'_, f64, D> {
+        let internal = &self.memory[p * self.remembered..(p + 1) * self.remembered];
+        MaterialState::new(self.displacement_gradient[p]).in_step(dt, internal)
     }
 
     /// Calls [`Self::remember_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
     pub(crate) fn remember<L: Law>(&mut self, bodies: &[Body<L>]) {
-        if bodies.iter().any(|body| body.law.memory().len() > self.remembered) {
+        if bodies.iter().any(|body| body.law.internal_variables().len() > self.remembered) {
             self.remember_rest(bodies);
         }
         self.make_room_for_dilatation(bodies);
@@ -253,10 +254,10 @@ impl<const D: usize> Particles<D> {
 
     /// Sets the internal variables of every particle to the values at rest of its law.
     pub fn remember_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
-        self.remembered = bodies.iter().map(|body| body.law.memory().len()).max().unwrap_or(0);
+        self.remembered = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
         let width = self.remembered;
         let at_rest = |&body: &u32| {
-            let names = bodies[body as usize].law.memory().iter().map(|one| one.at_rest);
+            let names = bodies[body as usize].law.internal_variables().iter().map(|one| one.at_rest);
             names.chain(std::iter::repeat(0.0)).take(width)
         };
         self.memory = self.body.iter().flat_map(at_rest).collect();

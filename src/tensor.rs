@@ -175,6 +175,11 @@ pub fn inverse<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, D> {
     scaled(&cofactor(a).transpose(), determinant(a).recip())
 }
 
+/// A 3×3 tensor with a D×D tensor as its upper left part, and zeros elsewhere.
+pub(crate) fn embed<T: Real, const D: usize>(a: &Tensor<T, D>) -> Tensor<T, 3> {
+    Tensor::from_fn(|i, k| if i < D && k < D { a[(i, k)] } else { T::zero() })
+}
+
 /// I₂(A), the sum of the principal 2×2 minors (0 in 1D, det A in 2D).
 #[inline(always)]
 pub(crate) fn second_invariant<T: Real, const D: usize>(a: &Tensor<T, D>) -> T {

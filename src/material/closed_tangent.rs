@@ -8,12 +8,12 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// `N` is a number, or a vector with one particle in each lane.
 ///
 /// ```
-/// use bfree::material::{Elastic, Lame, NeoHookean};
+/// use bfree::material::{Lame, Law, MaterialState, NeoHookean};
 /// use bfree::scalar::Single;
-/// use bfree::tensor::{Deformation, Tensor, identity};
+/// use bfree::tensor::{Tensor, identity};
 ///
 /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
-/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
+/// let at = MaterialState::new(Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1));
 /// let closed = law.closed(&identity(), &at, 1.0).ok_or("neo-Hooke has one")?;
 /// // Column j of the block of e_k and e_l is the product with L = e_j ⊗ e_l, applied to e_k.
 /// let (k, l, j) = (0, 1, 1);
@@ -128,7 +128,7 @@ fn tensor<const D: usize>(a: &[[f64; D]; D]) -> Tensor<f64, D> {
 impl<const D: usize> ClosedTangent<f64, D> {
     /// V₀ δP F_nᵀ from L.
     ///
-    /// Example: [`Elastic::closed`](super::Elastic::closed).
+    /// Example: [`Law::closed`](super::Law::closed).
     pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
         tensor(&self.product(Single, &rows(l)))
     }

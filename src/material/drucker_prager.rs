@@ -84,15 +84,15 @@ impl DruckerPrager {
     /// From φ and ψ in degrees, 0 ≤ ψ ≤ φ < 90, the cohesion and the cone.
     ///
     /// ```
-    /// use bfree::material::{Cone, DruckerPrager, Hardening, Lame, Law, Plastic, Start};
-    /// use bfree::tensor::{Deformation, Tensor, Vector};
+    /// use bfree::material::{Cone, DruckerPrager, Hardening, Lame, Law, MaterialState, Plastic};
+    /// use bfree::tensor::{Tensor, Vector};
     ///
     /// // Under tension on all sides the soil bears tr τ/3 = c cot φ.
     /// let (c, phi) = (0.1, 30.0_f64);
     /// let criterion = DruckerPrager::new(phi, 0.0, Hardening::perfect(c), Cone::Compression);
     /// let law = Plastic { solid: Lame::from_young_poisson(1000.0, 0.3)?, criterion };
-    /// let at = Deformation::<f64, 3>::new(Tensor::from_diagonal(&Vector::from([0.1; 3])));
-    /// let stress = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+    /// let at = MaterialState::new(Tensor::from_diagonal(&Vector::from([0.1; 3])));
+    /// let stress = at.f * law.stress(&at) * at.f.transpose();
     /// assert!((stress[(0, 0)] / (c / phi.to_radians().tan()) - 1.0).abs() < 1e-12);
     /// # Ok::<(), bfree::material::LameError>(())
     /// ```
@@ -104,7 +104,6 @@ impl DruckerPrager {
 
 impl Criterion for DruckerPrager {
     type Parameters = DruckerPragerParameters;
-    const NAME: &'static str = "Drucker-Prager";
     const ISOCHORIC: bool = false;
 
     fn build(given: &DruckerPragerParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {

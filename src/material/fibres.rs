@@ -1,6 +1,6 @@
 //! One family of fibres in an elastic matrix.
 
-use super::{Lame, Law, Listed, Material, NeoHookean, Parameters, Start, VolumeResponse};
+use super::{Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "FibreReinforced")]
 #[serde(deny_unknown_fields)]
-pub struct FibreReinforcedParameters {
+pub struct FibreReinforcedParameters<P> {
     /// The law of the matrix. It must be an elastic law.
-    pub base: Box<Parameters>,
+    pub base: Box<P>,
     /// Direction of the fibres in the undeformed body, of any length but 0. It has three numbers in every dimension.
     pub direction: [f64; 3],
     /// k₁ (stress), > 0. At rest, fibres add 4 k₁ to Young's modulus along their direction.
@@ -29,14 +29,14 @@ pub struct FibreReinforcedParameters {
 /// Gasser, Ogden, J. Elasticity 61, 2000).
 ///
 /// ```
-/// use bfree::material::{Elastic, FibreReinforced, Lame, Law, NeoHookean, Start};
-/// use bfree::tensor::{Deformation, Tensor, Vector};
+/// use bfree::material::{FibreReinforced, Lame, Law, MaterialState, NeoHookean};
+/// use bfree::tensor::{Tensor, Vector};
 ///
 /// let base = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
 /// let law = FibreReinforced::new(base, Vector::from([2.0, 0.0, 0.0]), 10.0, 0.0).ok_or("an elastic base, and a direction")?;
 /// let fibres = |h: f64| {
-///     let at = Deformation::<f64, 1>::new(Tensor::from_element(h));
-///     (law.stress(&at, &Start::NONE) - Elastic::stress(&base, &at))[(0, 0)]
+///     let at = MaterialState::new(Tensor::<f64, 1>::from_element(h));
+///     (law.stress(&at) - base.stress(&at))[(0, 0)]
 /// };
 /// // S = 2k₁ (I₄ − 1) with I₄ = 1.21; nothing in compression.
 /// assert!((fibres(0.1) - 2.0 * 10.0 * 0.21).abs() < 1e-13);
@@ -44,8 +44,8 @@ pub struct FibreReinforcedParameters {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct FibreReinforced {
-    base: Box<Material>,
+pub struct FibreReinforced<B> {
+    base: Box<B>,
     /// a
     direction: Vector<f64, 3>,
     /// k₁
@@ -54,12 +54,11 @@ pub struct FibreReinforced {
     exponent: f64,
 }
 
-impl FibreReinforced {
+impl<B: Law> FibreReinforced<B> {
     /// Fibres in a matrix. `None` unless the matrix is elastic, the direction has a length, `modulus` > 0 and `exponent` ≥ 0.
-    pub fn new(base: impl Into<Material>, direction: Vector<f64, 3>, modulus: f64, exponent: f64) -> Option<Self> {
-        let base = base.into();
+    pub fn new(base: B, direction: Vector<f64, 3>, modulus: f64, exponent: f64) -> Option<Self> {
         let unit = direction.try_normalize(0.0).filter(|unit| (unit.norm() - 1.0).abs() < 1e-9);
-        let good = base.memory().is_empty() && modulus > 0.0 && exponent >= 0.0;
+        let good = base.internal_variables().is_empty() && modulus > 0.0 && exponent >= 0.0;
         unit.filter(|_| good).map(|direction| Self { base: Box::new(base), direction, modulus, exponent })
     }
 
@@ -76,18 +75,18 @@ impl FibreReinforced {
     }
 
     /// 4 W″ = 4k₁ (1 + 2k₂ x²) e^{k₂ x²}, the factor of a ⊗ a ⊗ a ⊗ a in ℂ.
-    fn slope<T: Real>(&self, x: T) -> T {
-        self.stiffness(x) * (T::lit(4.0) + x * x * T::lit(8.0 * self.exponent))
+    fn slope(&self, x: f64) -> f64 {
+        self.stiffness(x) * (4.0 + x * x * (8.0 * self.exponent))
     }
 }
 
-impl Law for FibreReinforced {
+impl<B: Law> Law for FibreReinforced<B> {
     fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
         self.base.volumetric(at)
     }
 
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        let base = self.base.energy(at, start);
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        let base = self.base.energy(at);
         self.stretched(at).1.map_or(base, |x| {
             let squared = x * x;
             let (k_1, k_2) = (T::lit(0.5 * self.modulus), T::lit(self.exponent));
@@ -96,30 +95,20 @@ impl Law for FibreReinforced {
     }
 
     /// S = S_base + 2 W′ a ⊗ a
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        let (base, (along, stretch)) = (self.base.stress(at, start), self.stretched(at));
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let (base, (along, stretch)) = (self.base.stress(at), self.stretched(at));
         stretch.map_or(base, |x| base + scaled(&along, self.stiffness(x) * x * T::lit(2.0)))
     }
 
     /// ℂ:X = ℂ_base:X + 4 W″ (a·X a) a ⊗ a
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        let (base, (along, stretch)) = (self.base.elasticity(at, start, x), self.stretched(at));
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let (base, (along, stretch)) = (self.base.elasticity(at, x), self.stretched(at));
         stretch.map_or(base, |i| base + scaled(&along, self.slope(i) * contract(&along, x)))
     }
 
     /// The blocks of the base, plus 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        start: &Start<'_>,
-    ) -> [[Tensor<f64, D>; D]; D] {
-        let mut blocks = self.base.tangent_blocks(f_n, at, start);
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let mut blocks = self.base.tangent_blocks(f_n, at);
         if let (_, Some(x)) = self.stretched(at) {
             let a = Vector::<f64, D>::from_fn(|i, _| self.direction[i]);
             let (now, before) = (at.f * a, f_n * a);
@@ -132,14 +121,13 @@ impl Law for FibreReinforced {
     }
 }
 
-impl Listed for FibreReinforced {
-    type Parameters = FibreReinforcedParameters;
-    const NAME: &'static str = "fibre-reinforced";
+impl<B: Listed> Listed for FibreReinforced<B> {
+    type Parameters = FibreReinforcedParameters<B::Parameters>;
 
-    fn build(given: &FibreReinforcedParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+    fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
         let at = |key: &str| format!("{path}.{key}");
-        let base = given.base.law(problems, &at("base"));
-        let elastic = base.as_ref().is_none_or(|law| law.memory().is_empty());
+        let base = B::build(&given.base, problems, &at("base"));
+        let elastic = base.as_ref().is_none_or(|law| law.internal_variables().is_empty());
         problems.require(elastic, &at("base"), "a law with memory", "must be an elastic law");
         let direction = Vector::<f64, 3>::from(given.direction);
         for (k, &x) in given.direction.iter().enumerate() {
@@ -156,7 +144,7 @@ impl Listed for FibreReinforced {
 
     /// Fibres as stiff as the matrix, in no coordinate plane. The law is Hooke's only in compression along the fibres.
     fn example(lame: Lame) -> Self {
-        let base = Box::new(NeoHookean::ciarlet(lame).into());
+        let base = Box::new(B::example(lame));
         Self { base, direction: Vector::from([0.6, 0.64, 0.48]), modulus: 0.5 * lame.shear, exponent: 1e-3 }
     }
 }

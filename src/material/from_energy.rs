@@ -1,8 +1,8 @@
 //! A law given by its energy alone; stress and tangent come from dual numbers.
 
-use super::{Elastic, embed};
+use super::{Law, MaterialState};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, symmetric};
+use crate::tensor::{Tensor, embed, symmetric};
 use num_dual::Dual;
 
 /// The strain energy of a new law. A user writes this one function.
@@ -12,9 +12,9 @@ use num_dual::Dual;
 /// invariants.
 ///
 /// ```
-/// use bfree::material::{Elastic, Energy, FromEnergy};
+/// use bfree::material::{Energy, FromEnergy, Law, MaterialState};
 /// use bfree::scalar::Real;
-/// use bfree::tensor::{Deformation, Tensor, contract, trace};
+/// use bfree::tensor::{Tensor, contract, trace};
 ///
 /// struct Hooke { lambda: f64, shear: f64 }
 ///
@@ -26,7 +26,7 @@ use num_dual::Dual;
 ///
 /// let law = FromEnergy(Hooke { lambda: 1.0, shear: 1.0 });
 /// // Stretched to twice the length, E = (F² − 1)/2 = 3/2: W = ½ (Λ + 2G) E², S = (Λ + 2G) E.
-/// let at = Deformation::<f64, 1>::new(Tensor::from_element(1.0));
+/// let at = MaterialState::new(Tensor::<f64, 1>::from_element(1.0));
 /// assert_eq!((law.energy(&at), law.stress(&at)[(0, 0)]), (0.5 * 3.0 * 1.5 * 1.5, 3.0 * 1.5));
 /// ```
 pub trait Energy: Send + Sync {
@@ -63,23 +63,20 @@ impl<W: Energy> FromEnergy<W> {
         }
         stress
     }
-
-    /// ℂ:X = dS(E + ε X)/dε
-    fn elasticity_at<T: Real, const D: usize>(&self, e: &Tensor<T, 3>, x: &Tensor<T, 3>) -> Tensor<T, D> {
-        self.stress_at::<Dual<T>, D>(&seeded(e, x)).map(|s| s.eps)
-    }
 }
 
-impl<W: Energy> Elastic for FromEnergy<W> {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+impl<W: Energy> Law for FromEnergy<W> {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         self.0.energy(&embed(&at.green_lagrange()))
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         self.stress_at(&embed(&at.green_lagrange()))
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        self.elasticity_at(&embed(&at.green_lagrange()), &embed(&symmetric(x)))
+    /// ℂ:X = dS(E + ε X)/dε
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let e = seeded(&embed(&at.green_lagrange()), &embed(&symmetric(x)));
+        self.stress_at::<_, D>(&e).map(|s| s.eps)
     }
 }

@@ -5,9 +5,9 @@
 //! exponential map (Weber and Anand, 1990; Simo, 1992). All tensors are in three dimensions, and the missing stretches of F are 1.
 
 use super::spectral::{Function, Hencky, artanh_over, function, principal_axes};
-use super::{Lame, embed};
+use super::{Lame, TangentBlocks};
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
+use crate::tensor::{Deformation, Tensor, Vector, contract, embed, identity, outer, scaled, symmetric, trace};
 
 /// Rows and columns of the six numbers of a symmetric tensor.
 const SIX: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
@@ -85,50 +85,49 @@ impl<T: Real> Strained<T> {
 }
 
 /// A state in the principal axes of b.
-pub(super) struct Principal<T: Real> {
-    at: Deformation<T, 3>,
+pub(super) struct Principal {
+    at: Deformation<f64, 3>,
     /// Eigenvectors of b, in columns.
-    axes: Tensor<T, 3>,
+    axes: Tensor<f64, 3>,
     /// Eigenvalues of ½ (b − I).
-    x: [T; 3],
+    x: [f64; 3],
     /// The principal strains εᵢ.
-    pub strains: [T; 3],
+    pub strains: [f64; 3],
 }
 
-impl<T: Real> Principal<T> {
+impl Principal {
     /// From the arguments of [`Strained::new`].
-    pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
+    pub fn new<const D: usize>(at: &Deformation<f64, D>, flowed: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
         let half = half_b_less_one(&at, flowed);
-        let axes = principal_axes(&half.map(T::value)).map(T::lit);
+        let axes = principal_axes(&half);
         let turned = axes.transpose() * half * axes;
-        let x: [T; 3] = std::array::from_fn(|i| turned[(i, i)]);
+        let x: [f64; 3] = std::array::from_fn(|i| turned[(i, i)]);
         Self { at, axes, x, strains: x.map(|x| Hencky.value(x)) }
     }
 
     /// tr ε
-    pub fn volume(&self) -> T {
+    pub fn volume(&self) -> f64 {
         self.strains[0] + self.strains[1] + self.strains[2]
     }
 
     /// The principal values of dev ε.
-    pub fn deviator(&self) -> [T; 3] {
-        let mean = self.volume() * T::lit(1.0 / 3.0);
+    pub fn deviator(&self) -> [f64; 3] {
+        let mean = self.volume() * (1.0 / 3.0);
         self.strains.map(|strain| strain - mean)
     }
 
     /// ‖dev ε‖
-    pub fn norm(&self) -> T {
+    pub fn norm(&self) -> f64 {
         let [a, b, c] = self.deviator();
-        let square = a * a + b * b + c * c;
-        if square.value() > 0.0 { square.sqrt() } else { T::zero() }
+        (a * a + b * b + c * c).sqrt()
     }
 
     /// ℂ in these axes, from the principal Kirchhoff stresses `tau`, their derivatives ∂τᵢ/∂εⱼ, and the secants (τᵢ − τⱼ)/(εᵢ − εⱼ).
     ///
     /// With L = sym(F⁻ᵀ X F⁻¹), δb = L b + b L makes δεᵢⱼ = (Δ coth Δ) Lᵢⱼ with Δ = εᵢ − εⱼ, so that
     /// F (ℂ:X) Fᵀ = δτ − L τ − τ L is Σⱼ ∂τᵢ/∂εⱼ Lⱼⱼ − 2τᵢ Lᵢᵢ on the diagonal, and [(τᵢ − τⱼ) coth Δ − τᵢ − τⱼ] Lᵢⱼ off it.
-    pub fn moduli(&self, tau: [T; 3], slopes: Tensor<T, 3>, secant: impl Fn(usize, usize) -> T) -> Moduli<T> {
+    pub fn moduli(&self, tau: [f64; 3], slopes: Tensor<f64, 3>, secant: impl Fn(usize, usize) -> f64) -> Moduli {
         let mut normal = slopes;
         let mut shear = Tensor::zeros();
         for i in 0..3 {
@@ -141,19 +140,17 @@ impl<T: Real> Principal<T> {
     }
 
     /// [`Self::moduli`] for τ = p I + g dev ε, where p and t = g d depend on v = tr ε and d = ‖dev ε‖ alone.
-    pub fn radial_moduli(&self, radial: &Radial<T>) -> Moduli<T> {
+    pub fn radial_moduli(&self, radial: &Radial<f64>) -> Moduli {
         let Radial { p, g, p_v, p_d, t_v, t_d } = *radial;
         let (deviator, d) = (self.deviator(), self.norm());
-        let n = deviator.map(|x| if d.value() > 0.0 { x / d } else { T::zero() });
+        let n = deviator.map(|x| if d > 0.0 { x / d } else { 0.0 });
         let slopes = Tensor::from_fn(|i, j| {
-            let turned = if i == j { g } else { T::zero() } - g * T::lit(1.0 / 3.0);
+            let turned = if i == j { g } else { 0.0 } - g * (1.0 / 3.0);
             p_v + p_d * n[j] + n[i] * (t_v + (t_d - g) * n[j]) + turned
         });
         self.moduli(deviator.map(|x| p + g * x), slopes, |_, _| g)
     }
-}
 
-impl Principal<f64> {
     /// Writes the six numbers of G − I after a flow with the principal strains `flow`: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
     pub fn flow(&self, flow: [f64; 3], flowed: &[f64], next: &mut [f64]) {
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
@@ -189,16 +186,16 @@ impl<T: Real> Radial<T> {
 }
 
 /// ℂ in the principal axes of b.
-pub(super) struct Moduli<T: Real> {
-    f_inv_t: Tensor<T, 3>,
-    axes: Tensor<T, 3>,
-    normal: Tensor<T, 3>,
-    shear: Tensor<T, 3>,
+pub(super) struct Moduli {
+    f_inv_t: Tensor<f64, 3>,
+    axes: Tensor<f64, 3>,
+    normal: Tensor<f64, 3>,
+    shear: Tensor<f64, 3>,
 }
 
-impl<T: Real> Moduli<T> {
+impl Moduli {
     /// δτ − L τ − τ L, both in the axes.
-    fn response(&self, l: &Tensor<T, 3>) -> Tensor<T, 3> {
+    fn response(&self, l: &Tensor<f64, 3>) -> Tensor<f64, 3> {
         let mut z = l.component_mul(&self.shear);
         for i in 0..3 {
             for j in 0..3 {
@@ -209,16 +206,14 @@ impl<T: Real> Moduli<T> {
     }
 
     /// ℂ:X
-    pub fn elasticity<const D: usize>(&self, x: &Tensor<T, D>) -> Tensor<T, D> {
+    pub fn elasticity<const D: usize>(&self, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         let back = self.axes.transpose() * self.f_inv_t;
         let l = back * embed(&symmetric(x)) * back.transpose();
         cut(&(back.transpose() * self.response(&l) * back))
     }
-}
 
-impl Moduli<f64> {
     /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
-    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut [[Tensor<f64, D>; D]; D]) {
+    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
         let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
         let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();
         for j in 0..D {

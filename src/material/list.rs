@@ -1,29 +1,12 @@
 //! The list of shipped laws, from which [`Material`] and [`Parameters`] are made.
 
 use super::{
-    Ciarlet, DruckerPrager, FibreReinforced, Lame, Law, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
+    Ciarlet, DruckerPrager, FibreReinforced, Lame, Law, Listed, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
     StVenantKirchhoff, Viscoelastic, VonMises,
 };
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// A law of the list: its parameters in a scene, its name, its constructor and an example.
-pub trait Listed: Law + Sized {
-    /// The parameters of the law in a scene. The doc comments of the fields are the manual. Isotropic laws share
-    /// [`LameParameters`](super::LameParameters).
-    type Parameters;
-
-    /// The name of the law in reports.
-    const NAME: &'static str;
-
-    /// Builds the law. `None` if a value below the key `path` is not allowed; `problems` then says why.
-    fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self>;
-
-    /// An example for tests and studies. At small strain it is Hooke's law of Λ and G, apart from the stiffness of fibres. Its other
-    /// constants are free.
-    fn example(lame: Lame) -> Self;
-}
 
 /// A generic operation on a law of any type.
 pub(crate) trait LawVisitor {
@@ -35,7 +18,7 @@ pub(crate) trait LawVisitor {
 
 /// Generates [`Material`], [`Parameters`] and the conversions from the list of laws.
 macro_rules! materials {
-    ($($(#[$sentence:meta])+ $key:literal => $law:ident($formula:ty);)*) => {
+    ($($(#[$sentence:meta])+ $key:literal, $name:literal => $law:ident($formula:ty);)*) => {
         /// One of the shipped laws.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Material {
@@ -78,11 +61,24 @@ macro_rules! materials {
             }
         }
 
+        impl Listed for Material {
+            type Parameters = Parameters;
+
+            fn build(given: &Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
+                given.law(problems, path)
+            }
+
+            /// The paper's law.
+            fn example(lame: Lame) -> Self {
+                NeoHookean::ciarlet(lame).into()
+            }
+        }
+
         impl Material {
             /// An example of every law, with its name, for tests and studies. At small strain each is Hooke's law of Λ and G; fibres add
             /// their stiffness.
             pub fn examples(lame: Lame) -> Vec<(&'static str, Self)> {
-                vec![$((<$formula>::NAME, Self::$law(Listed::example(lame)))),*]
+                vec![$(($name, Self::$law(Listed::example(lame)))),*]
             }
 
             /// Calls `visitor` with the concrete law, so that a loop over particles does not branch on the type of the law.
@@ -99,25 +95,25 @@ macro_rules! materials {
     };
 }
 
-// An entry has the sentence of the manual, the key in a scene, and the type. CONTRIBUTING.md lists the other places that a shipped law
-// touches.
+// An entry has the sentence of the manual, the key in a scene, the name in reports, and the type. CONTRIBUTING.md lists the other places
+// that a shipped law touches.
 materials! {
     /// Neo-Hookean with Ciarlet's volumetric energy Λ/4 (J² − 1) − Λ/2 ln J: the paper's law.
-    "neo_hookean" => NeoHookean(NeoHookean<Ciarlet>);
+    "neo_hookean", "neo-Hookean, Ciarlet" => NeoHookean(NeoHookean<Ciarlet>);
     /// Neo-Hookean with the volumetric energy Λ/2 (ln J)².
-    "neo_hookean_logarithmic" => NeoHookeanLogarithmic(NeoHookean<Logarithmic>);
+    "neo_hookean_logarithmic", "neo-Hookean, logarithmic" => NeoHookeanLogarithmic(NeoHookean<Logarithmic>);
     /// St. Venant–Kirchhoff: linear in the Green–Lagrange strain; not for strong compression.
-    "st_venant_kirchhoff" => StVenantKirchhoff(StVenantKirchhoff);
+    "st_venant_kirchhoff", "St. Venant-Kirchhoff" => StVenantKirchhoff(StVenantKirchhoff);
     /// Rubber: Mooney and Rivlin's solid, with the two invariants of C, compressible.
-    "mooney_rivlin" => MooneyRivlin(MooneyRivlin);
+    "mooney_rivlin", "Mooney-Rivlin" => MooneyRivlin(MooneyRivlin);
     /// Rubber: Ogden's solid, with powers of the principal stretches, compressible.
-    "ogden" => Ogden(Ogden);
+    "ogden", "Ogden" => Ogden(Ogden);
     /// Tissue, reinforced rubber: one family of fibres in an elastic matrix. The fibres bear tension alone.
-    "fibre_reinforced" => FibreReinforced(FibreReinforced);
+    "fibre_reinforced", "fibre-reinforced" => FibreReinforced(FibreReinforced<Material>);
     /// Maxwell branches parallel to an elastic law, at finite strain.
-    "viscoelastic" => Viscoelastic(Viscoelastic);
+    "viscoelastic", "viscoelastic" => Viscoelastic(Viscoelastic<Material>);
     /// Metal: linear elasticity in logarithmic strains, and plastic flow at a von Mises yield stress that may harden.
-    "von_mises" => VonMises(Plastic<VonMises>);
+    "von_mises", "von Mises" => VonMises(Plastic<VonMises>);
     /// Soil: linear elasticity in logarithmic strains, and Drucker and Prager's yield cone with cohesion, friction and dilatancy.
-    "drucker_prager" => DruckerPrager(Plastic<DruckerPrager>);
+    "drucker_prager", "Drucker-Prager" => DruckerPrager(Plastic<DruckerPrager>);
 }

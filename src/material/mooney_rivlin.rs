@@ -1,6 +1,6 @@
 //! A compressible Mooney–Rivlin solid.
 
-use super::{Ciarlet, Elastic, Lame, Listed, VolumeResponse, Volumetric};
+use super::{Ciarlet, Lame, Law, Listed, MaterialState, VolumeResponse, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, contract, identity, scaled, second_invariant, symmetric, trace};
@@ -52,20 +52,20 @@ impl MooneyRivlin {
     }
 }
 
-impl Elastic for MooneyRivlin {
+impl Law for MooneyRivlin {
     fn volumetric<T: Real>(&self, at: &Deformation<T, 1>) -> Option<VolumeResponse<T>> {
         Some(Ciarlet::response(self.volumetric, at))
     }
 
     /// 2 (c₁ + 2c₂) (tr E − ln J) + 4c₂ I₂(E) + U, for I₁ − 3 = 2 tr E and I₂ − 3 = 4 tr E + 4 I₂(E)
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         at.trace_e_minus_log_jacobian() * T::lit(self.shear())
             + four_minors(at) * T::lit(self.c2)
             + Ciarlet::energy(at) * T::lit(0.5 * self.volumetric)
     }
 
     /// S = 2 (c₁ + 2c₂) (I − C⁻¹) + 4c₂ (tr E I − E) + J U' C⁻¹, with I − C⁻¹ = F⁻¹ (H + F⁻ᵀ Hᵀ) as for the neo-Hookean solids
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let (f_inv_t, e) = (at.inverse_transpose(), at.green_lagrange());
         let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.shear()));
         let first = f_inv_t.transpose() * (scaled(&f_inv_t, Ciarlet::stress(self.volumetric, at)) + shear);
@@ -73,20 +73,19 @@ impl Elastic for MooneyRivlin {
     }
 
     /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹ + 4c₂ (tr X I − sym X), with q = J U' − 2 (c₁ + 2c₂)
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
         let x = symmetric(x);
-        let q = Ciarlet::stress(self.volumetric, at) - T::lit(self.shear());
+        let q = Ciarlet::stress(self.volumetric, at) - self.shear();
         scaled(&c_inv, Ciarlet::stiffness(self.volumetric, at) * contract(&c_inv, &x))
             - scaled(&(c_inv * x * c_inv), q + q)
-            + scaled(&(scaled(&identity(), trace(&x)) - x), T::lit(4.0 * self.c2))
+            + scaled(&(scaled(&identity(), trace(&x)) - x), 4.0 * self.c2)
     }
 }
 
 impl Listed for MooneyRivlin {
     type Parameters = MooneyRivlinParameters;
-    const NAME: &'static str = "Mooney-Rivlin";
 
     fn build(given: &MooneyRivlinParameters, problems: &mut Problems, path: &str) -> Option<Self> {
         let MooneyRivlinParameters { c1, c2, bulk } = *given;

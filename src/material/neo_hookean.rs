@@ -1,97 +1,23 @@
 //! Compressible neo-Hookean solids: one shear response, two volumetric ones.
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed, VolumeResponse};
+use super::{
+    Ciarlet, ClosedTangent, Lame, LameParameters, Law, Listed, Logarithmic, MaterialState, VolumeResponse, Volumetric,
+};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, Vector, contract, outer, scaled};
 
-/// The volumetric energy U(J) of a solid, over Λ. It is a type, so that a loop over particles does not branch on it.
-pub trait Volumetric: Copy + Default + Send + Sync + 'static {
-    /// The name of the solid in reports.
-    const NAME: &'static str;
-
-    /// 2 U/Λ.
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T;
-
-    /// J U'(J) for Λ = `lambda`.
-    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
-
-    /// J (J U')' for Λ = `lambda`.
-    fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T;
-
-    /// U and its derivatives for Λ = `lambda`.
-    fn response<T: Real>(lambda: f64, at: &Deformation<T, 1>) -> VolumeResponse<T> {
-        VolumeResponse {
-            energy: Self::energy(at) * T::lit(0.5 * lambda),
-            stress: Self::stress(lambda, at),
-            stiffness: Self::stiffness(lambda, at),
-        }
-    }
-}
-
-/// Ciarlet: Λ/4 (J²−1) − Λ/2 ln J, the paper's law (appendix B.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Ciarlet;
-
-impl Volumetric for Ciarlet {
-    const NAME: &'static str = "neo-Hookean, Ciarlet";
-
-    /// ½ j² + (j − ln J)
-    #[inline(always)]
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
-        T::lit(0.5) * at.j * at.j + at.j_minus_log_jacobian()
-    }
-
-    /// Λ/2 (J²−1)
-    #[inline(always)]
-    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
-        T::lit(0.5 * lambda) * at.jacobian_squared_minus_one()
-    }
-
-    /// ΛJ²
-    #[inline(always)]
-    fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
-        T::lit(lambda) * at.jacobian * at.jacobian
-    }
-}
-
-/// Λ/2 (ln J)², the law most other programs ship.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Logarithmic;
-
-impl Volumetric for Logarithmic {
-    const NAME: &'static str = "neo-Hookean, logarithmic";
-
-    /// (ln J)²
-    #[inline(always)]
-    fn energy<T: Real, const D: usize>(at: &Deformation<T, D>) -> T {
-        at.log_jacobian() * at.log_jacobian()
-    }
-
-    /// Λ ln J
-    #[inline(always)]
-    fn stress<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
-        T::lit(lambda) * at.log_jacobian()
-    }
-
-    /// Λ
-    #[inline(always)]
-    fn stiffness<T: Real, const D: usize>(lambda: f64, _at: &Deformation<T, D>) -> T {
-        T::lit(lambda)
-    }
-}
-
 /// Compressible neo-Hookean solid, W = U(J) − G ln J + G tr E.
 ///
 /// ```
-/// use bfree::material::{Elastic, Lame, NeoHookean};
-/// use bfree::tensor::{Deformation, Tensor};
+/// use bfree::material::{Lame, Law, MaterialState, NeoHookean};
+/// use bfree::tensor::Tensor;
 ///
 /// let lame = Lame::new(1.0, 1.0)?;
 /// let (ciarlet, logarithmic) = (NeoHookean::ciarlet(lame), NeoHookean::logarithmic(lame));
 /// let energies = |h| {
-///     let at = Deformation::<f64, 1>::new(Tensor::from_element(h));
+///     let at = MaterialState::new(Tensor::<f64, 1>::from_element(h));
 ///     [ciarlet.energy(&at), logarithmic.energy(&at), 0.5 * lame.p_wave_modulus() * h * h]
 /// };
 /// // Both are linear elasticity, ½ (Λ + 2G) h², at small strain, and differ at large.
@@ -127,7 +53,6 @@ impl NeoHookean<Logarithmic> {
 
 impl<U: Volumetric> Listed for NeoHookean<U> {
     type Parameters = LameParameters;
-    const NAME: &'static str = U::NAME;
 
     fn build(given: &LameParameters, problems: &mut Problems, path: &str) -> Option<Self> {
         given.lame(problems, path).map(Self::example)
@@ -138,10 +63,10 @@ impl<U: Volumetric> Listed for NeoHookean<U> {
     }
 }
 
-impl<U: Volumetric> Elastic for NeoHookean<U> {
+impl<U: Volumetric> Law for NeoHookean<U> {
     /// W = Λ/2 [½ j² + (j − ln J)] + G [(tr E − j) + (j − ln J)], or with Λ/2 (ln J)² in place of the first bracket.
     #[inline(always)]
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let half_lambda = T::lit(0.5 * self.lame.lambda);
         half_lambda * U::energy(at) + T::lit(self.lame.shear) * at.trace_e_minus_log_jacobian()
     }
@@ -151,7 +76,7 @@ impl<U: Volumetric> Elastic for NeoHookean<U> {
     /// H + F⁻ᵀHᵀ = F − F⁻ᵀ is small where strain and rotation are small, and no larger than F where F is large. Other forms lose more
     /// digits: in C⁻¹ [J U' I + 2G E] shear is a difference of products of size ‖F‖², and in G (I − C⁻¹) a difference of numbers of size 1.
     #[inline(always)]
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let f_inv_t = at.inverse_transpose();
         let shear = scaled(&(at.h + f_inv_t * at.h.transpose()), T::lit(self.lame.shear));
         f_inv_t.transpose() * (scaled(&f_inv_t, U::stress(self.lame.lambda, at)) + shear)
@@ -159,25 +84,25 @@ impl<U: Volumetric> Elastic for NeoHookean<U> {
 
     /// ℂ:X = ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ sym(X) C⁻¹, with q = J U'(J) − G
     #[inline(always)]
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
-        let q = U::stress(self.lame.lambda, at) - T::lit(self.lame.shear);
+        let q = U::stress(self.lame.lambda, at) - self.lame.shear;
         scaled(&c_inv, U::stiffness(self.lame.lambda, at) * contract(&c_inv, x))
             - scaled(&(c_inv * (x + x.transpose()) * c_inv), q)
     }
 
     /// ℂmat{v,b} = ΛJ² (C⁻¹v ⊗ C⁻¹b) − q (C⁻¹b·v) C⁻¹ − q (C⁻¹b ⊗ C⁻¹v)   (eq. 39)
     #[inline(always)]
-    fn tangent_density<T: Real, const D: usize>(
+    fn tangent_density<const D: usize>(
         &self,
-        at: &Deformation<T, D>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
+        at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
-        let q = U::stress(self.lame.lambda, at) - T::lit(self.lame.shear);
+        let q = U::stress(self.lame.lambda, at) - self.lame.shear;
         let (cv, cb) = (c_inv * v, c_inv * b);
         scaled(&outer(&cv, &cb), U::stiffness(self.lame.lambda, at))
             - scaled(&c_inv, q * cb.dot(v))
@@ -194,7 +119,7 @@ impl<U: Volumetric> Elastic for NeoHookean<U> {
     fn closed<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         let shear = self.lame.shear;

@@ -1,9 +1,8 @@
 //! Ogden's solid: powers of the principal stretches.
 
-use super::hencky::{Principal, Strained};
-use super::law::derivative;
+use super::hencky::{Moduli, Principal, Strained};
 use super::spectral::{Function, Power, primitive_trace};
-use super::{Ciarlet, Lame, Law, Listed, Start, VolumeResponse, Volumetric};
+use super::{Ciarlet, Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse, Volumetric};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor, identity, scaled};
@@ -43,14 +42,14 @@ const MOST: usize = 8;
 /// In Hencky's strain ε the Kirchhoff stress is τ = Σ μ (e^{αε} − I) + J U' I.
 ///
 /// ```
-/// use bfree::material::{Elastic, Lame, Law, NeoHookean, Ogden, OgdenTerm, Start};
-/// use bfree::tensor::{Deformation, Tensor};
+/// use bfree::material::{Lame, Law, MaterialState, NeoHookean, Ogden, OgdenTerm};
+/// use bfree::tensor::Tensor;
 ///
 /// // One term with α = 2 is the neo-Hookean solid of μ = G.
 /// let ogden = Ogden { terms: vec![OgdenTerm { modulus: 2.0, exponent: 2.0 }], lambda: 3.0 };
 /// let neo_hookean = NeoHookean::ciarlet(Lame::new(3.0, 2.0)?);
-/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.3, 0.5, -0.2, 0.1));
-/// let apart = ogden.stress(&at, &Start::NONE) - Elastic::stress(&neo_hookean, &at);
+/// let at = MaterialState::new(Tensor::<f64, 2>::new(0.3, 0.5, -0.2, 0.1));
+/// let apart = ogden.stress(&at) - neo_hookean.stress(&at);
 /// assert!(apart.norm() < 1e-14);
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
@@ -64,7 +63,7 @@ pub struct Ogden {
 
 impl Law for Ogden {
     /// Σ μα tr R(ε) + U, with R(x) = (e^{αx} − 1 − αx)/α² and tr ε = ln J
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let strain = Strained::new(at, &[]).strain();
         let terms = self
             .terms
@@ -73,7 +72,7 @@ impl Law for Ogden {
         terms.fold(Ciarlet::energy(at) * T::lit(0.5 * self.lambda), |sum, term| sum + term)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, _: &Start<'_>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let strained = Strained::new(at, &[]);
         let terms = self
             .terms
@@ -83,16 +82,7 @@ impl Law for Ogden {
         strained.pulled_back(&terms.fold(pressure, |sum: Tensor<T, 3>, term| sum + term))
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        // The axes of [`Principal`] carry no derivatives.
-        if T::NDERIV > 0 {
-            return derivative(at, x, |at| self.stress(at, start));
-        }
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         self.moduli(at).elasticity(x)
     }
 
@@ -100,12 +90,7 @@ impl Law for Ogden {
         Some(Ciarlet::response(self.lambda, at))
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        _: &Start<'_>,
-    ) -> [[Tensor<f64, D>; D]; D] {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let mut blocks = [[Tensor::zeros(); D]; D];
         self.moduli(at).add_blocks(f_n, &mut blocks);
         blocks
@@ -114,13 +99,13 @@ impl Law for Ogden {
 
 impl Ogden {
     /// τᵢ = Σ μ (e^{αεᵢ} − 1) + J U' and its derivatives.
-    fn moduli<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> super::hencky::Moduli<T> {
+    fn moduli<const D: usize>(&self, at: &Deformation<f64, D>) -> Moduli {
         let principal = Principal::new(at, &[]);
         let (strains, pressure) = (principal.strains, Ciarlet::stress(self.lambda, at));
-        let sum = |of: &dyn Fn(&Power) -> T| {
+        let sum = |of: &dyn Fn(&Power) -> f64| {
             let terms = self.terms.iter();
-            let terms = terms.map(|term| of(&Power(term.exponent)) * T::lit(term.modulus * term.exponent));
-            terms.fold(T::zero(), |sum, term| sum + term)
+            let terms = terms.map(|term| of(&Power(term.exponent)) * (term.modulus * term.exponent));
+            terms.fold(0.0, |sum, term| sum + term)
         };
         let secant = |i: usize, j: usize| sum(&|f| f.difference(strains[i], strains[j]));
         let bulk = Ciarlet::stiffness(self.lambda, at);
@@ -131,7 +116,6 @@ impl Ogden {
 
 impl Listed for Ogden {
     type Parameters = OgdenParameters;
-    const NAME: &'static str = "Ogden";
 
     fn build(given: &OgdenParameters, problems: &mut Problems, path: &str) -> Option<Self> {
         let (terms, count) = (format!("{path}.terms"), given.terms.len());

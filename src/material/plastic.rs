@@ -1,9 +1,9 @@
 //! Finite plasticity: Hencky's elasticity, and a return map in logarithmic strains to a yield criterion.
 
 use super::hencky::{Principal, Radial, Strained};
-use super::law::derivative;
 use super::{
-    DISSIPATED, Lame, Law, Listed, Logarithmic, PLASTIC_STRAIN, Remembered, Start, VolumeResponse, Volumetric,
+    DISSIPATED, InternalVariable, Lame, Law, Listed, Logarithmic, MaterialState, PLASTIC_STRAIN, TangentBlocks,
+    VolumeResponse, Volumetric,
 };
 use crate::problems::Problems;
 use crate::scalar::Real;
@@ -16,9 +16,6 @@ use crate::tensor::{Deformation, Tensor};
 pub trait Criterion: Clone + Send + Sync + Sized + 'static {
     /// The parameters of the criterion in a scene.
     type Parameters;
-
-    /// The name of the solid in reports.
-    const NAME: &'static str;
 
     /// Whether plastic flow is normal to the yield surface. The tangent is then symmetric.
     fn is_associated(&self) -> bool;
@@ -74,14 +71,14 @@ pub(super) fn round_off(modulus: f64, d: f64, before: f64) -> f64 {
 /// Eng. 99, 1992; de Souza Neto, Perić, Owen, Computational Methods for Plasticity, 2008, ch. 14).
 ///
 /// ```
-/// use bfree::material::{Hardening, Lame, Law, Plastic, Start, VonMises};
-/// use bfree::tensor::{Deformation, Tensor};
+/// use bfree::material::{Hardening, Lame, Law, MaterialState, Plastic, VonMises};
+/// use bfree::tensor::Tensor;
 ///
 /// // Sheared far beyond yield, the solid bears √3 τ_xy = σ_y, up to a rotation of the stress of the order of the elastic strain.
 /// let solid = Lame::from_young_poisson(1000.0, 0.3)?;
 /// let law = Plastic { solid, criterion: VonMises { yield_stress: Hardening::perfect(0.1) } };
-/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.0, 0.0));
-/// let stress = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+/// let at = MaterialState::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.0, 0.0));
+/// let stress = at.f * law.stress(&at) * at.f.transpose();
 /// assert!((3.0_f64.sqrt() * stress[(0, 1)] / 0.1 - 1.0).abs() < 1e-3);
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
@@ -93,46 +90,33 @@ pub struct Plastic<Y> {
     pub criterion: Y,
 }
 
-/// An internal variable that is 0 at rest.
-pub(super) const fn zero(name: &'static str) -> Remembered {
-    Remembered { name, at_rest: 0.0 }
-}
-
 /// The accumulated plastic strain, the dissipated energy, and C_p⁻¹ − I.
-const MEMORY: [Remembered; 8] = [
-    zero(PLASTIC_STRAIN),
-    zero(DISSIPATED),
-    zero("inverse_plastic_xx"),
-    zero("inverse_plastic_yy"),
-    zero("inverse_plastic_zz"),
-    zero("inverse_plastic_xy"),
-    zero("inverse_plastic_yz"),
-    zero("inverse_plastic_xz"),
+const INTERNAL: [InternalVariable; 8] = [
+    InternalVariable::zero(PLASTIC_STRAIN),
+    InternalVariable::zero(DISSIPATED),
+    InternalVariable::zero("inverse_plastic_xx"),
+    InternalVariable::zero("inverse_plastic_yy"),
+    InternalVariable::zero("inverse_plastic_zz"),
+    InternalVariable::zero("inverse_plastic_xy"),
+    InternalVariable::zero("inverse_plastic_yz"),
+    InternalVariable::zero("inverse_plastic_xz"),
 ];
 
 /// The plastic strain and C_p⁻¹ − I at t_n. Without internal variables both are those of a body at rest.
-fn remembered<'a>(start: &Start<'a>) -> (f64, &'a [f64]) {
-    (start.memory.first().copied().unwrap_or(0.0), start.memory.get(2..).unwrap_or(&[]))
+fn at_start<'a, T: Real, const D: usize>(at: &MaterialState<'a, T, D>) -> (f64, &'a [f64]) {
+    (at.internal.first().copied().unwrap_or(0.0), at.internal.get(2..).unwrap_or(&[]))
 }
 
 impl<Y: Criterion> Plastic<Y> {
-    fn returned<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-    ) -> (Strained<T>, Returned<T>) {
-        let (before, flowed) = remembered(start);
+    fn returned<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> (Strained<T>, Returned<T>) {
+        let (before, flowed) = at_start(at);
         let strained = Strained::new(at, flowed);
         let returned = self.criterion.returned(&self.solid, strained.volume, strained.norm(), before);
         (strained, returned)
     }
 
-    fn principal<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-    ) -> (Principal<T>, Returned<T>) {
-        let (before, flowed) = remembered(start);
+    fn principal<const D: usize>(&self, at: &MaterialState<f64, D>) -> (Principal, Returned<f64>) {
+        let (before, flowed) = at_start(at);
         let principal = Principal::new(at, flowed);
         let returned = self.criterion.returned(&self.solid, principal.volume(), principal.norm(), before);
         (principal, returned)
@@ -140,8 +124,8 @@ impl<Y: Criterion> Plastic<Y> {
 }
 
 impl<Y: Criterion> Law for Plastic<Y> {
-    fn memory(&self) -> &[Remembered] {
-        &MEMORY
+    fn internal_variables(&self) -> &[InternalVariable] {
+        &INTERNAL
     }
 
     fn is_symmetric(&self) -> bool {
@@ -153,38 +137,24 @@ impl<Y: Criterion> Law for Plastic<Y> {
     }
 
     /// W of the elastic strain plus the dissipation of the step. For associated flow the sum is stationary with respect to the flow.
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        let (strained, Returned { radial: Radial { p, g, .. }, dissipated, .. }) = self.returned(at, start);
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        let (strained, Returned { radial: Radial { p, g, .. }, dissipated, .. }) = self.returned(at);
         let (bulk, shear) = (self.solid.bulk_modulus(), self.solid.shear);
         p * p * T::lit(0.5 / bulk) + g * g * strained.square() * T::lit(0.25 / shear) + dissipated
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        let (strained, Returned { radial, .. }) = self.returned(at, start);
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let (strained, Returned { radial, .. }) = self.returned(at);
         strained.stress(radial.p, radial.g)
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        // The axes of [`Principal`] carry no derivatives.
-        if T::NDERIV > 0 {
-            return derivative(at, x, |at| self.stress(at, start));
-        }
-        let (principal, Returned { radial, .. }) = self.principal(at, start);
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let (principal, Returned { radial, .. }) = self.principal(at);
         principal.radial_moduli(&radial).elasticity(x)
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        start: &Start<'_>,
-    ) -> [[Tensor<f64, D>; D]; D] {
-        let (principal, Returned { radial, .. }) = self.principal(at, start);
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let (principal, Returned { radial, .. }) = self.principal(at);
         let mut blocks = [[Tensor::zeros(); D]; D];
         principal.radial_moduli(&radial).add_blocks(f_n, &mut blocks);
         blocks
@@ -195,25 +165,26 @@ impl<Y: Criterion> Law for Plastic<Y> {
         Y::ISOCHORIC.then(|| Logarithmic::response(self.solid.bulk_modulus(), at))
     }
 
-    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-        let (principal, Returned { radial, plastic_strain, dissipated }) = self.principal(at, start);
-        let (before, flowed) = remembered(start);
-        if plastic_strain == before {
-            return;
-        }
-        if let [strain, lost, next @ ..] = next {
-            (*strain, *lost) = (plastic_strain, *lost + dissipated);
+    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+        let (principal, Returned { radial, plastic_strain, dissipated }) = self.principal(at);
+        let (before, flowed) = at_start(at);
+        let mut next = at.internal.to_vec();
+        if let [strain, lost, plastic @ ..] = next.as_mut_slice()
+            && plastic_strain != before
+        {
+            *strain = plastic_strain;
+            *lost += dissipated;
             // Δε = ε_trial − ε
             let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
             let share = 1.0 - radial.g / (2.0 * self.solid.shear);
-            principal.flow(principal.deviator().map(|x| share * x + volume), flowed, next);
+            principal.flow(principal.deviator().map(|x| share * x + volume), flowed, plastic);
         }
+        next
     }
 }
 
 impl<Y: Criterion> Listed for Plastic<Y> {
     type Parameters = Y::Parameters;
-    const NAME: &'static str = Y::NAME;
 
     fn build(given: &Y::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
         Y::build(given, problems, path).map(|(solid, criterion)| Self { solid, criterion })

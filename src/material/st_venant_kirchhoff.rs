@@ -1,10 +1,10 @@
 //! St. Venant–Kirchhoff solid (the paper's appendix B.2).
 
 use super::closed_tangent::rows;
-use super::{ClosedTangent, Elastic, Lame, LameParameters, Listed};
+use super::{ClosedTangent, Lame, LameParameters, Law, Listed, MaterialState};
 use crate::problems::Problems;
 use crate::scalar::Real;
-use crate::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
+use crate::tensor::{Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
 /// W = Λ/2 (tr E)² + G E:E, for moderate strains. The solid softens in compression.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,6 @@ pub struct StVenantKirchhoff {
 
 impl Listed for StVenantKirchhoff {
     type Parameters = LameParameters;
-    const NAME: &'static str = "St. Venant-Kirchhoff";
 
     fn build(given: &LameParameters, problems: &mut Problems, path: &str) -> Option<Self> {
         given.lame(problems, path).map(Self::example)
@@ -32,37 +31,35 @@ fn hooke<T: Real, const D: usize>(lambda: T, shear: T, x: &Tensor<T, D>) -> Tens
     scaled(&identity(), lambda * trace(x)) + scaled(x, T::lit(2.0) * shear)
 }
 
-impl Elastic for StVenantKirchhoff {
+impl Law for StVenantKirchhoff {
     #[inline(always)]
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let e = at.green_lagrange();
         T::lit(0.5 * self.lame.lambda) * trace(&e) * trace(&e) + T::lit(self.lame.shear) * contract(&e, &e)
     }
 
     /// S = Λ tr(E) I + 2G E
     #[inline(always)]
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         hooke(T::lit(self.lame.lambda), T::lit(self.lame.shear), &at.green_lagrange())
     }
 
     /// ℂ:X = Λ tr(X) I + 2G sym X   (B9, with 2G)
     #[inline(always)]
-    fn elasticity<T: Real, const D: usize>(&self, _at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        hooke(T::lit(self.lame.lambda), T::lit(self.lame.shear), &symmetric(x))
+    fn elasticity<const D: usize>(&self, _at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        hooke(self.lame.lambda, self.lame.shear, &symmetric(x))
     }
 
     /// ℂmat{v,b} = Λ v⊗b + G (v·b) I + G b⊗v
     #[inline(always)]
-    fn tangent_density<T: Real, const D: usize>(
+    fn tangent_density<const D: usize>(
         &self,
-        _at: &Deformation<T, D>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
-        let shear = T::lit(self.lame.shear);
-        scaled(&outer(v, b), T::lit(self.lame.lambda))
-            + scaled(&identity(), shear * v.dot(b))
-            + scaled(&outer(b, v), shear)
+        _at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
+        let Lame { lambda, shear } = self.lame;
+        scaled(&outer(v, b), lambda) + scaled(&identity(), shear * v.dot(b)) + scaled(&outer(b, v), shear)
     }
 
     /// V₀ [ L F_n S F_nᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_n ],  M = F F_nᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_n, pushed
@@ -71,7 +68,7 @@ impl Elastic for StVenantKirchhoff {
     fn closed<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         let shear = self.lame.shear * volume;

@@ -4,8 +4,8 @@
 /// calls the law of the active variant.
 ///
 /// ```
-/// use bfree::material::{Lame, Law, NeoHookean, StVenantKirchhoff, Start};
-/// use bfree::tensor::{Deformation, Tensor};
+/// use bfree::material::{Lame, Law, MaterialState, NeoHookean, StVenantKirchhoff};
+/// use bfree::tensor::Tensor;
 ///
 /// enum Mine {
 ///     Soft(NeoHookean),
@@ -17,53 +17,52 @@
 /// }
 ///
 /// let lame = Lame::new(1.0, 1.0)?;
-/// let (soft, at) = (NeoHookean::ciarlet(lame), Deformation::<f64, 1>::new(Tensor::from_element(0.1)));
-/// assert_eq!(Mine::Soft(soft).stress(&at, &Start::NONE), Law::stress(&soft, &at, &Start::NONE));
-/// # assert!(Mine::Hard(StVenantKirchhoff { lame }).memory().is_empty());
+/// let (soft, at) = (NeoHookean::ciarlet(lame), MaterialState::new(Tensor::<f64, 1>::from_element(0.1)));
+/// assert_eq!(Mine::Soft(soft).stress(&at), soft.stress(&at));
+/// # assert!(Mine::Hard(StVenantKirchhoff { lame }).internal_variables().is_empty());
 /// # Ok::<(), bfree::material::LameError>(())
 /// ```
 #[macro_export]
 macro_rules! law_of_variants {
     (Self: $($variant:ident),+) => {
-        fn memory(&self) -> &[$crate::material::Remembered] {
-            match self { $(Self::$variant(law) => $crate::material::Law::memory(law)),+ }
-        }
-        fn is_symmetric(&self) -> bool {
-            match self { $(Self::$variant(law) => $crate::material::Law::is_symmetric(law)),+ }
-        }
-        fn has_potential(&self) -> bool {
-            match self { $(Self::$variant(law) => $crate::material::Law::has_potential(law)),+ }
-        }
-        fn energy<T: $crate::scalar::Real, const D: usize>(
-            &self,
-            at: &$crate::tensor::Deformation<T, D>,
-            start: &$crate::material::Start<'_>,
-        ) -> T {
-            match self { $(Self::$variant(law) => $crate::material::Law::energy(law, at, start)),+ }
+        fn energy<T: $crate::scalar::Real, const D: usize>(&self, at: &$crate::material::MaterialState<T, D>) -> T {
+            match self { $(Self::$variant(law) => $crate::material::Law::energy(law, at)),+ }
         }
         fn stress<T: $crate::scalar::Real, const D: usize>(
             &self,
-            at: &$crate::tensor::Deformation<T, D>,
-            start: &$crate::material::Start<'_>,
+            at: &$crate::material::MaterialState<T, D>,
         ) -> $crate::tensor::Tensor<T, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::stress(law, at, start)),+ }
+            match self { $(Self::$variant(law) => $crate::material::Law::stress(law, at)),+ }
         }
-        fn elasticity<T: $crate::scalar::Real, const D: usize>(
+        fn elasticity<const D: usize>(
             &self,
-            at: &$crate::tensor::Deformation<T, D>,
-            start: &$crate::material::Start<'_>,
-            x: &$crate::tensor::Tensor<T, D>,
-        ) -> $crate::tensor::Tensor<T, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::elasticity(law, at, start, x)),+ }
+            at: &$crate::material::MaterialState<f64, D>,
+            x: &$crate::tensor::Tensor<f64, D>,
+        ) -> $crate::tensor::Tensor<f64, D> {
+            match self { $(Self::$variant(law) => $crate::material::Law::elasticity(law, at, x)),+ }
         }
-        fn tangent_density<T: $crate::scalar::Real, const D: usize>(
+        fn tangent_density<const D: usize>(
             &self,
-            at: &$crate::tensor::Deformation<T, D>,
-            start: &$crate::material::Start<'_>,
-            v: &$crate::tensor::Vector<T, D>,
-            b: &$crate::tensor::Vector<T, D>,
-        ) -> $crate::tensor::Tensor<T, D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::tangent_density(law, at, start, v, b)),+ }
+            at: &$crate::material::MaterialState<f64, D>,
+            v: &$crate::tensor::Vector<f64, D>,
+            b: &$crate::tensor::Vector<f64, D>,
+        ) -> $crate::tensor::Tensor<f64, D> {
+            match self { $(Self::$variant(law) => $crate::material::Law::tangent_density(law, at, v, b)),+ }
+        }
+        fn tangent_blocks<const D: usize>(
+            &self,
+            f_n: &$crate::tensor::Tensor<f64, D>,
+            at: &$crate::material::MaterialState<f64, D>,
+        ) -> $crate::material::TangentBlocks<D> {
+            match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_n, at)),+ }
+        }
+        fn closed<const D: usize>(
+            &self,
+            f_n: &$crate::tensor::Tensor<f64, D>,
+            at: &$crate::material::MaterialState<f64, D>,
+            volume: f64,
+        ) -> Option<$crate::material::ClosedTangent<f64, D>> {
+            match self { $(Self::$variant(law) => $crate::material::Law::closed(law, f_n, at, volume)),+ }
         }
         fn volumetric<T: $crate::scalar::Real>(
             &self,
@@ -71,36 +70,17 @@ macro_rules! law_of_variants {
         ) -> Option<$crate::material::VolumeResponse<T>> {
             match self { $(Self::$variant(law) => $crate::material::Law::volumetric(law, at)),+ }
         }
-        fn closed<const D: usize>(
-            &self,
-            f_n: &$crate::tensor::Tensor<f64, D>,
-            at: &$crate::tensor::Deformation<f64, D>,
-            volume: f64,
-        ) -> Option<$crate::material::ClosedTangent<f64, D>> {
-            match self { $(Self::$variant(law) => $crate::material::Law::closed(law, f_n, at, volume)),+ }
+        fn internal_variables(&self) -> &[$crate::material::InternalVariable] {
+            match self { $(Self::$variant(law) => $crate::material::Law::internal_variables(law)),+ }
         }
-        fn tangent_blocks<const D: usize>(
-            &self,
-            f_n: &$crate::tensor::Tensor<f64, D>,
-            at: &$crate::tensor::Deformation<f64, D>,
-            start: &$crate::material::Start<'_>,
-        ) -> [[$crate::tensor::Tensor<f64, D>; D]; D] {
-            match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_n, at, start)),+ }
+        fn updated_variables<const D: usize>(&self, at: &$crate::material::MaterialState<f64, D>) -> Vec<f64> {
+            match self { $(Self::$variant(law) => $crate::material::Law::updated_variables(law, at)),+ }
         }
-        fn remember<const D: usize>(
-            &self,
-            at: &$crate::tensor::Deformation<f64, D>,
-            start: &$crate::material::Start<'_>,
-            next: &mut [f64],
-        ) {
-            match self { $(Self::$variant(law) => $crate::material::Law::remember(law, at, start, next)),+ }
+        fn is_symmetric(&self) -> bool {
+            match self { $(Self::$variant(law) => $crate::material::Law::is_symmetric(law)),+ }
         }
-        fn out_of_plane_stress<const D: usize>(
-            &self,
-            at: &$crate::tensor::Deformation<f64, D>,
-            start: &$crate::material::Start<'_>,
-        ) -> f64 {
-            match self { $(Self::$variant(law) => $crate::material::Law::out_of_plane_stress(law, at, start)),+ }
+        fn has_potential(&self) -> bool {
+            match self { $(Self::$variant(law) => $crate::material::Law::has_potential(law)),+ }
         }
     };
 }

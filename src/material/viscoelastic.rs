@@ -1,9 +1,7 @@
 //! Finite viscoelasticity: Maxwell branches parallel to an elastic law.
 
 use super::hencky::{Principal, Radial, Strained};
-use super::law::derivative;
-use super::plastic::zero;
-use super::{DISSIPATED, Lame, Law, Listed, Material, NeoHookean, Parameters, Remembered, Start, VolumeResponse};
+use super::{DISSIPATED, InternalVariable, Lame, Law, Listed, MaterialState, TangentBlocks, VolumeResponse};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Tensor};
@@ -27,9 +25,9 @@ pub struct Branch {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[schemars(rename = "Viscoelastic")]
 #[serde(deny_unknown_fields)]
-pub struct ViscoelasticParameters {
+pub struct ViscoelasticParameters<P> {
     /// The law that remains when all branches have relaxed. It must be an elastic law.
-    pub base: Box<Parameters>,
+    pub base: Box<P>,
     /// The Maxwell branches parallel to the base, 1 to 8.
     #[schemars(length(min = 1, max = 8))]
     pub branches: Vec<Branch>,
@@ -43,26 +41,24 @@ pub struct ViscoelasticParameters {
 /// dev ε_trial.
 ///
 /// ```
-/// use bfree::material::{Branch, Lame, Law, NeoHookean, Start, Viscoelastic};
-/// use bfree::tensor::{Deformation, Tensor};
+/// use bfree::material::{Branch, Lame, Law, MaterialState, NeoHookean, Viscoelastic};
+/// use bfree::tensor::Tensor;
 ///
 /// // A small shear is held: G∞ + G₁ e^{−t/τ} remains, whatever the number of steps.
 /// let base = NeoHookean::ciarlet(Lame::new(10.0, 1.0)?);
 /// let law = Viscoelastic::new(base, vec![Branch { shear: 3.0, relaxation_time: 2.0 }]).ok_or("an elastic base")?;
-/// let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 1e-6, 0.0, 0.0));
-/// let mut memory = vec![0.0; law.memory().len()];
+/// let sheared = MaterialState::new(Tensor::<f64, 2>::new(0.0, 1e-6, 0.0, 0.0));
+/// let mut internal = vec![0.0; law.internal_variables().len()];
 /// for dt in [0.5, 1.5] {
-///     let mut next = memory.clone();
-///     law.remember(&at, &Start { dt, memory: &memory }, &mut next);
-///     memory = next;
+///     internal = law.updated_variables(&sheared.in_step(dt, &internal));
 /// }
-/// let modulus = law.stress(&at, &Start { dt: 0.0, memory: &memory })[(0, 1)] / 1e-6;
+/// let modulus = law.stress(&sheared.in_step(0.0, &internal))[(0, 1)] / 1e-6;
 /// assert!((modulus - (1.0 + 3.0 * (-1.0_f64).exp())).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Viscoelastic {
-    base: Box<Material>,
+pub struct Viscoelastic<B> {
+    base: Box<B>,
     branches: Vec<Branch>,
 }
 
@@ -74,33 +70,36 @@ const SIX: usize = 6;
 
 macro_rules! names {
     ($($branch:literal)*) => {
-        [zero(DISSIPATED), $(
-            zero(concat!("inverse_viscous_", $branch, "_xx")),
-            zero(concat!("inverse_viscous_", $branch, "_yy")),
-            zero(concat!("inverse_viscous_", $branch, "_zz")),
-            zero(concat!("inverse_viscous_", $branch, "_xy")),
-            zero(concat!("inverse_viscous_", $branch, "_yz")),
-            zero(concat!("inverse_viscous_", $branch, "_xz"))
+        [InternalVariable::zero(DISSIPATED), $(
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_xx")),
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_yy")),
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_zz")),
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_xy")),
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_yz")),
+            InternalVariable::zero(concat!("inverse_viscous_", $branch, "_xz"))
         ),*]
     };
 }
 
 /// The dissipated energy, and C_v⁻¹ − I of every branch.
-const MEMORY: [Remembered; 1 + SIX * MOST] = names!(1 2 3 4 5 6 7 8);
+const INTERNAL: [InternalVariable; 1 + SIX * MOST] = names!(1 2 3 4 5 6 7 8);
 
-impl Viscoelastic {
+impl<B: Law> Viscoelastic<B> {
     /// Branches parallel to a law. `None` if the law has internal variables, or if there are more than eight branches.
-    pub fn new(base: impl Into<Material>, branches: Vec<Branch>) -> Option<Self> {
-        let base = base.into();
-        (base.memory().is_empty() && branches.len() <= MOST).then(|| Self { base: Box::new(base), branches })
+    pub fn new(base: B, branches: Vec<Branch>) -> Option<Self> {
+        (base.internal_variables().is_empty() && branches.len() <= MOST)
+            .then(|| Self { base: Box::new(base), branches })
     }
 
     /// Every branch with its C_v⁻¹ − I at t_n and e^{−Δt/τ_r}. Without internal variables the slice is empty, which means rest.
-    fn branches<'a>(&'a self, start: &Start<'a>) -> impl Iterator<Item = (&'a Branch, &'a [f64], f64)> {
-        let (dt, memory) = (start.dt, start.memory);
+    fn branches<'a, T: Real, const D: usize>(
+        &'a self,
+        at: &MaterialState<'a, T, D>,
+    ) -> impl Iterator<Item = (&'a Branch, &'a [f64], f64)> {
+        let (dt, internal) = (at.dt, at.internal);
         self.branches.iter().enumerate().map(move |(i, branch)| {
             let first = 1 + SIX * i;
-            (branch, memory.get(first..first + SIX).unwrap_or(&[]), (-dt / branch.relaxation_time).exp())
+            (branch, internal.get(first..first + SIX).unwrap_or(&[]), (-dt / branch.relaxation_time).exp())
         })
     }
 }
@@ -111,40 +110,31 @@ fn relaxed<T: Real>(branch: &Branch, decay: f64) -> Radial<T> {
     Radial { p: zero, g, p_v: zero, p_d: zero, t_v: zero, t_d: g }
 }
 
-impl Law for Viscoelastic {
-    fn memory(&self) -> &[Remembered] {
-        MEMORY.get(..1 + SIX * self.branches.len()).unwrap_or(&MEMORY)
+impl<B: Law> Law for Viscoelastic<B> {
+    fn internal_variables(&self) -> &[InternalVariable] {
+        INTERNAL.get(..1 + SIX * self.branches.len()).unwrap_or(&INTERNAL)
     }
 
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let springs = self
-            .branches(start)
+            .branches(at)
             .map(|(branch, flowed, decay)| Strained::new(at, flowed).square() * T::lit(branch.shear * decay));
-        springs.fold(self.base.energy(at, &Start::NONE), |sum, energy| sum + energy)
+        springs.fold(self.base.energy(at), |sum, energy| sum + energy)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        let springs = self.branches(start).map(|(branch, flowed, decay)| {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let springs = self.branches(at).map(|(branch, flowed, decay)| {
             let radial = relaxed(branch, decay);
             Strained::new(at, flowed).stress(radial.p, radial.g)
         });
-        springs.fold(self.base.stress(at, &Start::NONE), |sum, stress: Tensor<T, D>| sum + stress)
+        springs.fold(self.base.stress(at), |sum, stress: Tensor<T, D>| sum + stress)
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        // The axes of [`Principal`] carry no derivatives.
-        if T::NDERIV > 0 {
-            return derivative(at, x, |at| self.stress(at, start));
-        }
-        let springs = self.branches(start).map(|(branch, flowed, decay)| {
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let springs = self.branches(at).map(|(branch, flowed, decay)| {
             Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).elasticity(x)
         });
-        springs.fold(self.base.elasticity(at, &Start::NONE, x), |sum, stress: Tensor<T, D>| sum + stress)
+        springs.fold(self.base.elasticity(at, x), |sum, stress: Tensor<f64, D>| sum + stress)
     }
 
     /// The response of the base, because branches have neither springs nor viscosity in volume.
@@ -152,38 +142,35 @@ impl Law for Viscoelastic {
         self.base.volumetric(at)
     }
 
-    fn tangent_blocks<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
-        start: &Start<'_>,
-    ) -> [[Tensor<f64, D>; D]; D] {
-        let mut blocks = self.base.tangent_blocks(f_n, at, &Start::NONE);
-        for (branch, flowed, decay) in self.branches(start) {
+    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let mut blocks = self.base.tangent_blocks(f_n, at);
+        for (branch, flowed, decay) in self.branches(at) {
             Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).add_blocks(f_n, &mut blocks);
         }
         blocks
     }
 
     /// The branches dissipate G (1 − e^{−2Δt/τ_r}) dev ε_trial : dev ε_trial.
-    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-        let Some((lost, next)) = next.split_first_mut() else { return };
-        for ((branch, flowed, decay), next) in self.branches(start).zip(next.chunks_mut(SIX)) {
-            let principal = Principal::new(at, flowed);
-            *lost += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
-            principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), flowed, next);
+    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+        let mut next = at.internal.to_vec();
+        if let [dissipated, viscous @ ..] = next.as_mut_slice() {
+            for ((branch, flowed, decay), viscous) in self.branches(at).zip(viscous.chunks_mut(SIX)) {
+                let principal = Principal::new(at, flowed);
+                *dissipated += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
+                principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), flowed, viscous);
+            }
         }
+        next
     }
 }
 
-impl Listed for Viscoelastic {
-    type Parameters = ViscoelasticParameters;
-    const NAME: &'static str = "viscoelastic";
+impl<B: Listed> Listed for Viscoelastic<B> {
+    type Parameters = ViscoelasticParameters<B::Parameters>;
 
-    fn build(given: &ViscoelasticParameters, problems: &mut Problems, path: &str) -> Option<Self> {
+    fn build(given: &Self::Parameters, problems: &mut Problems, path: &str) -> Option<Self> {
         let (base, branches) = (format!("{path}.base"), format!("{path}.branches"));
-        let law = given.base.law(problems, &base);
-        let elastic = law.as_ref().is_none_or(|law| law.memory().is_empty());
+        let law = B::build(&given.base, problems, &base);
+        let elastic = law.as_ref().is_none_or(|law| law.internal_variables().is_empty());
         problems.require(elastic, &base, "a law with memory", "must be an elastic law");
         let count = given.branches.len();
         let few = (1..=MOST).contains(&count);
@@ -204,8 +191,8 @@ impl Listed for Viscoelastic {
     /// Half of G relaxes.
     fn example(lame: Lame) -> Self {
         let Lame { lambda, shear } = lame;
-        let base = NeoHookean::ciarlet(Lame { lambda: lambda + shear / 3.0, shear: 0.5 * shear });
+        let base = B::example(Lame { lambda: lambda + shear / 3.0, shear: 0.5 * shear });
         let branch = |relaxation_time| Branch { shear: 0.25 * shear, relaxation_time };
-        Self { base: Box::new(base.into()), branches: vec![branch(0.5), branch(5.0)] }
+        Self { base: Box::new(base), branches: vec![branch(0.5), branch(5.0)] }
     }
 }

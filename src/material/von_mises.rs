@@ -30,7 +30,6 @@ pub struct VonMisesParameters {
 
 impl Criterion for VonMises {
     type Parameters = VonMisesParameters;
-    const NAME: &'static str = "von Mises";
     const ISOCHORIC: bool = true;
 
     fn build(given: &VonMisesParameters, problems: &mut Problems, path: &str) -> Option<(Lame, Self)> {

@@ -1,7 +1,7 @@
 //! The tangent check of a run. Each piece of the tangent, through the products that the solver applies, is compared with the derivative of
 //! the residual by dual numbers.
 
-use crate::material::{Law, admissible};
+use crate::material::{Law, MaterialState};
 use crate::mechanics::point::{Part, compose};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
@@ -145,7 +145,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     fn worst_bound(&self, dphi: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let particles = self.step.particles;
         let bounds = self.step.supports.interpolate(dphi, |p, _, g| {
-            let at = admissible(compose(&g, &particles.reference().displacement_gradient[p]))
+            let at = MaterialState::new(compose(&g, &particles.reference().displacement_gradient[p]))
+                .admissible()
                 .map_err(|source| Inadmissible { particle: particles.id[p] as usize, source })?;
             Ok(tangent_bound(&at.f))
         })?;

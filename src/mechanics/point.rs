@@ -3,7 +3,7 @@
 //! The code is generic over the number type. No function returns early, so a loop over particles is pure arithmetic. The compiler
 //! vectorises this loop if the law is pure arithmetic, too.
 
-use crate::material::{ClosedTangent, Law, NonPositiveJacobian, Start, admissible_or_rest, piola};
+use crate::material::{ClosedTangent, Law, MaterialState, NonPositiveJacobian, first_piola};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, identity, scaled};
 
@@ -53,22 +53,21 @@ pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) 
     g + h_n + g * h_n
 }
 
-/// V₀ F S F_nᵀ at ∇u = `g`; its product with ∇_n N_I is the internal force on node I. Also returns det F, which the caller must check.
+/// V₀ F S F_nᵀ at ∇u = `g`, from the state `at_n` at t_n; its product with ∇_n N_I is the internal force on node I. Also returns det F, which the caller must check.
 /// Where det F ≤ 0, S is that of the undeformed body. Only the F of `part` carry derivatives.
 #[inline(always)]
 pub(super) fn internal<L: Law, T: Real, const D: usize>(
     law: &L,
-    start: &Start<'_>,
+    at_n: &MaterialState<f64, D>,
     g: &Tensor<T, D>,
-    h_n: &Tensor<f64, D>,
     volume: f64,
     part: Part,
 ) -> (Tensor<T, D>, f64) {
-    let h = compose(g, h_n);
+    let h = compose(g, &at_n.h);
     let f_left = identity::<T, D>() + h.map(|x| carried(x, part != Part::Material));
-    let (at, det_f) = admissible_or_rest(h.map(|x| carried(x, part != Part::Geometric)));
-    let piola = piola(law, &f_left, &at, start);
-    let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
+    let (at, det_f) = at_n.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
+    let piola = first_piola(law, &f_left, &at);
+    let f_n_t = at_n.f.transpose().map(T::lit);
     (scaled(&(piola * f_n_t), T::lit(volume)), det_f)
 }
 
@@ -83,23 +82,22 @@ pub(super) enum Frozen<const D: usize> {
 #[inline(always)]
 pub(super) fn freeze<L: Law, const D: usize>(
     law: &L,
-    start: &Start<'_>,
+    at_n: &MaterialState<f64, D>,
     g: &Tensor<f64, D>,
-    h_n: &Tensor<f64, D>,
     volume: f64,
     part: Part,
 ) -> (Frozen<D>, f64) {
-    let (at, det_f) = admissible_or_rest(compose(g, h_n));
-    let f_n = identity::<f64, D>() + h_n;
+    let (at, det_f) = at_n.deformed(compose(g, &at_n.h)).admissible_or_rest();
+    let f_n = at_n.f;
     // δF S F_nᵀ = L B with B = F_n S F_nᵀ
-    let geometric = || f_n * law.stress(&at, start) * f_n.transpose();
+    let geometric = || f_n * law.stress(&at) * f_n.transpose();
     let frozen = match law.closed(&f_n, &at, volume) {
         Some(closed) if part == Part::Whole => Frozen::Closed(closed),
         Some(closed) => Frozen::Closed(closed.part(&scaled(&geometric(), volume), part == Part::Geometric)),
         None => {
             let mut blocks = match part {
                 Part::Geometric => [[Tensor::zeros(); D]; D],
-                Part::Whole | Part::Material => law.tangent_blocks(&f_n, &at, start),
+                Part::Whole | Part::Material => law.tangent_blocks(&f_n, &at),
             };
             if part != Part::Material {
                 let geometric = geometric();

@@ -2,9 +2,12 @@
 
 use super::{OutputError, Reference};
 use crate::field::Field;
-use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN, Start, admissible, piola, principal_values};
+use crate::material::{
+    DISSIPATED, Law, MaterialState, NonPositiveJacobian, PLASTIC_STRAIN, first_piola, internal_variable,
+    out_of_plane_stress, principal_values,
+};
 use crate::simulation::Simulation;
-use crate::tensor::{Deformation, Tensor, Vector};
+use crate::tensor::{Tensor, Vector, embed, identity};
 
 /// Rows and columns of the components of [`Kind::Symmetric`].
 const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
@@ -53,16 +56,16 @@ impl Field {
     ) -> Result<(), OutputError> {
         let particles = &simulation.particles;
         let id = particles.id[place] as usize;
-        let h = || particles.displacement_gradient[place];
+        let at = || particles.state(place, 0.0);
         let body = &simulation.bodies[particles.body[place] as usize];
         let law = || &body.law;
-        let averaged = || body.averaged(particles.dilatation(place), Deformation::new(h()).j);
+        let averaged = || body.averaged(particles.dilatation(place), at().j);
         let stress = || {
-            cauchy_stress(law(), &particles.start(place, 0.0), h())
+            cauchy_stress(law(), at())
                 .map(|stress| stress + Tensor::<f64, 3>::identity() * averaged()[1])
                 .map_err(|source| OutputError::Inadmissible { particle: id, source })
         };
-        let recalled = |name| particles.start(place, 0.0).recall(law(), name).unwrap_or(0.0);
+        let recalled = |name| internal_variable(law(), &at(), name).unwrap_or(0.0);
         match self {
             Self::Position => out.extend(padded(&particles.position[place])),
             Self::Displacement => {
@@ -73,12 +76,12 @@ impl Field {
                 out.extend(padded(particles.acceleration.get(place).ok_or(OutputError::Inertia(self))?));
             }
             Self::DeformationGradient => {
-                let f = crate::tensor::identity::<f64, 3>() + crate::material::embed(&h());
+                let f = identity::<f64, 3>() + embed(&at().h);
                 out.extend(f.transpose().iter());
             }
-            Self::Jacobian => out.push(Deformation::new(h()).jacobian),
+            Self::Jacobian => out.push(at().jacobian),
             Self::Strain => {
-                let strain = crate::material::embed(&Deformation::new(h()).green_lagrange());
+                let strain = embed(&at().green_lagrange());
                 out.extend(SYMMETRIC.map(|at| strain[at]));
             }
             Self::Stress => {
@@ -88,9 +91,7 @@ impl Field {
             Self::PrincipalStress => out.extend(principal_values(&stress()?)),
             Self::Pressure => out.push(-stress()?.trace() / 3.0),
             Self::VonMises => out.push(von_mises(&stress()?)),
-            Self::EnergyDensity => {
-                out.push(law().energy(&Deformation::new(h()), &particles.start(place, 0.0)) + averaged()[0]);
-            }
+            Self::EnergyDensity => out.push(law().energy(&at()) + averaged()[0]),
             Self::PlasticStrain => out.push(recalled(PLASTIC_STRAIN)),
             Self::DissipatedDensity => out.push(recalled(DISSIPATED)),
             Self::Mass => out.push(particles.mass[place]),
@@ -141,14 +142,13 @@ pub(crate) fn padded<const D: usize>(v: &Vector<f64, D>) -> [f64; 3] {
 /// σ = P Fᵀ / J with P = F S (eq. 7). In plane or uniaxial strain, the rest of the diagonal is the out-of-plane normal stress.
 fn cauchy_stress<const D: usize, L: Law>(
     law: &L,
-    start: &Start<'_>,
-    h: Tensor<f64, D>,
-) -> Result<Tensor<f64, 3>, crate::material::NonPositiveJacobian> {
-    let at = admissible(h)?;
-    let piola = piola(law, &at.f, &at, start);
-    let mut stress = crate::material::embed(&(piola * at.f.transpose() / at.jacobian));
+    at: MaterialState<f64, D>,
+) -> Result<Tensor<f64, 3>, NonPositiveJacobian> {
+    let at = at.admissible()?;
+    let piola = first_piola(law, &at.f, &at);
+    let mut stress = embed(&(piola * at.f.transpose() / at.jacobian));
     for i in D..3 {
-        stress[(i, i)] = law.out_of_plane_stress(&at, start);
+        stress[(i, i)] = out_of_plane_stress(law, &at);
     }
     Ok(stress)
 }

@@ -286,7 +286,8 @@ impl Scene {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn fields(&self) -> Vec<Field> {
-        let has_plastic_flow = self.laws().any(|law| law.memory().iter().any(|one| one.name == PLASTIC_STRAIN));
+        let has_plastic_flow =
+            self.laws().any(|law| law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN));
         self.output.fields(self.time.scheme().has_inertia(), has_plastic_flow)
     }
 

@@ -20,7 +20,7 @@ pub use touching::Sharing;
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, p_wave_modulus};
+use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, internal_variable, p_wave_modulus};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
@@ -31,7 +31,7 @@ use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
 use crate::solver::{Krylov, Preconditioned, Preconditioning};
-use crate::tensor::{Deformation, Vector};
+use crate::tensor::Vector;
 
 /// An implicit material point simulation in `D` dimensions.
 ///
@@ -181,7 +181,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// Whether a law has an internal variable of this name.
     pub(crate) fn remembers(&self, name: &str) -> bool {
-        self.bodies.iter().any(|body| body.law.memory().iter().any(|one| one.name == name))
+        self.bodies.iter().any(|body| body.law.internal_variables().iter().any(|one| one.name == name))
     }
 
     /// Energy dissipated by plastic flow and relaxation since the start: Σ V₀ times the density that each law records.
@@ -192,7 +192,7 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
         let particles = &self.particles;
         let lost = |p: usize| {
             let law = &self.bodies[particles.body[p] as usize].law;
-            particles.volume[p] * particles.start(p, 0.0).recall(law, DISSIPATED).unwrap_or(0.0)
+            particles.volume[p] * internal_variable(law, &particles.state(p, 0.0), DISSIPATED).unwrap_or(0.0)
         };
         (0..particles.len()).map(lost).sum()
     }
@@ -319,10 +319,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let particles = &self.particles;
         (0..particles.len())
             .map(|p| {
-                let at = Deformation::new(particles.displacement_gradient[p]);
+                let at = particles.state(p, 0.0);
                 let body = &self.bodies[particles.body[p] as usize];
                 let [more, _] = body.averaged(particles.dilatation(p), at.j);
-                particles.volume[p] * (body.law.energy(&at, &particles.start(p, 0.0)) + more)
+                particles.volume[p] * (body.law.energy(&at) + more)
             })
             .sum()
     }

@@ -3,10 +3,10 @@
 use super::Simulation;
 use crate::approximation::ShapeFunction;
 use crate::grid::{Grid, indices};
-use crate::material::{Law, admissible, p_wave_modulus, piola};
+use crate::material::{Law, first_piola, p_wave_modulus};
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::sweep::Supports;
-use crate::tensor::{Deformation, Tensor, Vector};
+use crate::tensor::{Tensor, Vector};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Particles with |N| below this value do not contribute to a node.
@@ -164,10 +164,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     fn cauchy_stress(&self, p: usize) -> Option<Tensor<f64, D>> {
         let particles = &self.particles;
         let body = &self.bodies[particles.body[p] as usize];
-        let h = particles.displacement_gradient[p];
-        let at = admissible(h).ok()?;
-        let stress = piola(&body.law, &at.f, &at, &particles.start(p, 0.0)) * at.f.transpose() / at.jacobian;
-        let [_, mean] = body.averaged(particles.dilatation(p), Deformation::new(h).j);
+        let at = particles.state(p, 0.0).admissible().ok()?;
+        let stress = first_piola(&body.law, &at.f, &at) * at.f.transpose() / at.jacobian;
+        let [_, mean] = body.averaged(particles.dilatation(p), at.j);
         Some(stress + Tensor::<f64, D>::identity() * mean)
     }
 }

@@ -4,7 +4,7 @@
 use crate::support::Failure;
 use bfree::approximation::{Approximation, Linear};
 use bfree::grid::Grid;
-use bfree::material::{ClosedTangent, Elastic, Lame, NeoHookean};
+use bfree::material::{ClosedTangent, Lame, Law, MaterialState, NeoHookean};
 use bfree::mechanics::check::{CheckError, TangentMismatch, direction, tangent_bound};
 use bfree::mechanics::loads::{Curve, Gravity, Loads, PrescribedDof, Pressing, SurfaceLoad, SurfacePoint};
 use bfree::mechanics::residual::Equilibrium;
@@ -15,7 +15,7 @@ use bfree::mechanics::transfer::Nodal;
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::solver::NonlinearProblem;
-use bfree::tensor::{Deformation, Tensor, Vector, outer, scaled};
+use bfree::tensor::{Tensor, Vector, outer, scaled};
 use std::sync::Arc;
 
 /// The function of a law that is wrong.
@@ -51,43 +51,43 @@ impl Faulty {
     }
 }
 
-impl Elastic for Faulty {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        Elastic::energy(&self.law, at)
+impl Law for Faulty {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.law.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let plain = size_of::<T>() == size_of::<f64>();
         let factor = self.factor(Fault::Stress) * if plain { self.factor(Fault::PlainStress) } else { 1.0 };
-        scaled(&Elastic::stress(&self.law, at), T::lit(factor))
+        scaled(&self.law.stress(at), T::lit(factor))
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        scaled(&Elastic::elasticity(&self.law, at, x), T::lit(self.factor(Fault::Elasticity)))
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.law.elasticity(at, x) * self.factor(Fault::Elasticity)
     }
 
-    fn tangent_density<T: Real, const D: usize>(
+    fn tangent_density<const D: usize>(
         &self,
-        at: &Deformation<T, D>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
+        at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
         // ℂmat as it follows from ℂ.
-        let mut density = Tensor::<T, D>::zeros();
+        let mut density = Tensor::<f64, D>::zeros();
         for k in 0..D {
-            let a = Vector::<T, D>::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
-            density.set_column(k, &(Elastic::elasticity(self, at, &outer(&a, b)) * v));
+            let a = Vector::<f64, D>::from_fn(|i, _| f64::from(i == k));
+            density.set_column(k, &(self.elasticity(at, &outer(&a, b)) * v));
         }
-        scaled(&density, T::lit(self.factor(Fault::Density)))
+        density * self.factor(Fault::Density)
     }
 
     fn closed<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
-        let closed = Elastic::closed(&self.law, f_n, at, volume * self.factor(Fault::Closed));
+        let closed = self.law.closed(f_n, at, volume * self.factor(Fault::Closed));
         closed.filter(|_| self.closed)
     }
 }

@@ -3,42 +3,40 @@
 use crate::support::{Failure, Random, output, restored, scene};
 use bfree::field::Field;
 use bfree::material::{
-    Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, NeoHookean, PLASTIC_STRAIN, Parameters,
-    Plastic, Start, Viscoelastic, VonMises,
+    Branch, Cone, DISSIPATED, DruckerPrager, Hardening, Lame, Law, Material, MaterialState, NeoHookean, PLASTIC_STRAIN,
+    Parameters, Plastic, Viscoelastic, VonMises, internal_variable,
 };
 use bfree::output::history::Energies;
 use bfree::output::{Recorder, Reference};
 use bfree::scene::Problems;
 use bfree::simulation::Simulation;
 use bfree::solver::Krylov;
-use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity};
+use bfree::tensor::{Tensor, Vector, determinant, identity};
 use std::num::NonZeroU64;
 
 /// A material point, deformed step by step, with its internal variables.
 struct Point<L> {
     law: L,
-    memory: Vec<f64>,
+    internal: Vec<f64>,
 }
 
 impl<L: Law> Point<L> {
     fn new(law: L) -> Self {
-        let memory = law.memory().iter().map(|one| one.at_rest).collect();
-        Self { law, memory }
+        let internal = law.internal_variables().iter().map(|one| one.at_rest).collect();
+        Self { law, internal }
     }
 
     /// The Kirchhoff stress at the end of a step to F.
     fn step<const D: usize>(&mut self, f: Tensor<f64, D>, dt: f64) -> Tensor<f64, D> {
-        let at = Deformation::new(f - identity());
-        let start = Start { dt, memory: &self.memory };
-        let stress = f * self.law.stress(&at, &start) * f.transpose();
-        let mut next = self.memory.clone();
-        self.law.remember(&at, &start, &mut next);
-        self.memory = next;
+        let at = MaterialState::new(f - identity()).in_step(dt, &self.internal);
+        let stress = f * self.law.stress(&at) * f.transpose();
+        self.internal = self.law.updated_variables(&at);
         stress
     }
 
-    fn recall(&self, name: &str) -> Option<f64> {
-        Start { dt: 0.0, memory: &self.memory }.recall(&self.law, name)
+    fn internal_variable(&self, name: &str) -> Option<f64> {
+        let at = MaterialState::new(Tensor::<f64, 3>::zeros()).in_step(0.0, &self.internal);
+        internal_variable(&self.law, &at, name)
     }
 }
 
@@ -67,7 +65,7 @@ fn uniaxial_yield_and_reversal_have_a_closed_form() -> Result<(), Failure> {
         let tau = point.step(Tensor::<f64, 1>::from_element(strain.exp()), 1.0)[0];
         let exact = bulk * strain + q / 1.5;
         assert!((tau - exact).abs() < 1e-12 * bulk, "{tau} instead of {exact} at {strain}");
-        assert!((point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN) - p).abs() < 1e-13);
+        assert!((point.internal_variable(PLASTIC_STRAIN).unwrap_or(f64::NAN) - p).abs() < 1e-13);
     }
     assert!(p > 0.4, "the path is meant to flow: {p}");
     Ok(())
@@ -87,16 +85,16 @@ fn a_return_ends_on_the_surface_and_keeps_the_volume() -> Result<(), Failure> {
         for step in 1..=steps {
             tau = point.step(stretch(0.5 * f64::from(step) / f64::from(steps)), 1.0);
         }
-        let p = point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN);
+        let p = point.internal_variable(PLASTIC_STRAIN).unwrap_or(f64::NAN);
         let q = tau[(0, 0)] - tau[(1, 1)];
         assert!((q / hardening.strength(p) - 1.0).abs() < 1e-12, "{q} at {p}");
         // ε = p + q/(3G)
         assert!((p + q / (3.0 * solid()?.shear) - 0.5).abs() < 1e-12);
-        let flowed = &point.memory[2..];
+        let flowed = &point.internal[2..];
         let volume = (1.0 + flowed[0]) * (1.0 + flowed[1]) * (1.0 + flowed[2]);
         assert!((volume - 1.0).abs() < 1e-13, "det C_p = 1: {volume}");
         // The plastic work: ∫ σ_y dp.
-        let lost = point.recall("dissipated").unwrap_or(f64::NAN);
+        let lost = point.internal_variable("dissipated").unwrap_or(f64::NAN);
         assert!((lost / hardening.work(p) - 1.0).abs() < 1e-12);
         results.push(q);
     }
@@ -124,14 +122,14 @@ fn drucker_and_prager_return_to_the_cone_or_to_its_apex() -> Result<(), Failure>
         let p = tau.trace() / 3.0;
         let deviator = tau - identity::<f64, 3>() * p;
         let root_j2 = deviator.norm() / 2.0_f64.sqrt();
-        let flow = point.recall(PLASTIC_STRAIN).unwrap_or(f64::NAN);
+        let flow = point.internal_variable(PLASTIC_STRAIN).unwrap_or(f64::NAN);
         if flow == 0.0 {
             assert!(root_j2 + eta * p <= xi * c + 1e-12);
             continue;
         }
         assert!((root_j2 + eta * p - xi * c).abs() < 1e-11, "not on the surface: {}", root_j2 + eta * p - xi * c);
         // −½ ln det C_p⁻¹ is the plastic change of volume.
-        let [xx, yy, zz, xy, yz, xz] = point.memory[2..8].try_into()?;
+        let [xx, yy, zz, xy, yz, xz] = point.internal[2..8].try_into()?;
         let inverse_plastic = identity::<f64, 3>() + Tensor::<f64, 3>::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let dilated = -0.5 * determinant(&inverse_plastic).ln();
         if root_j2 > 1e-9 {
@@ -209,8 +207,8 @@ fn creep_converges_to_its_closed_form() -> Result<(), Failure> {
         for dt in std::iter::once(0.0).chain(std::iter::repeat_n(time / f64::from(steps), steps as usize)) {
             for _ in 0..4 {
                 let f = identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0);
-                let (at, start) = (Deformation::new(f - identity()), Start { dt, memory: &point.memory });
-                let tau = (f * point.law.stress(&at, &start) * f.transpose())[(0, 1)];
+                let at = MaterialState::new(f - identity()).in_step(dt, &point.internal);
+                let tau = (f * point.law.stress(&at) * f.transpose())[(0, 1)];
                 strain += (stress - tau) / (base + shear * (-dt / relaxation_time).exp());
             }
             point.step(identity::<f64, 2>() + Tensor::<f64, 2>::new(0.0, strain, 0.0, 0.0), dt);
@@ -338,7 +336,7 @@ fn flow_has_the_same_bits_for_any_threads_and_after_a_restart() -> Result<(), Fa
         let (particles, width) = (&continued.particles, continued.particles.remembered);
         for (field, name) in [(Field::PlasticStrain, PLASTIC_STRAIN), (Field::DissipatedDensity, DISSIPATED)] {
             let shown = field.values(&continued, &Reference::of(&continued))?;
-            let place = continued.bodies[0].law.memory().iter().position(|one| one.name == name);
+            let place = continued.bodies[0].law.internal_variables().iter().position(|one| one.name == name);
             let solid = particles.solid_places();
             let kept = |&p: &u32| place.map_or(0.0, |place| particles.memory[p as usize * width + place]);
             assert_eq!(shown, solid.iter().map(kept).collect::<Vec<_>>());

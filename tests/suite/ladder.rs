@@ -3,14 +3,14 @@
 
 use crate::support::{Failure, output, scene};
 use bfree::field::Field;
-use bfree::material::{ClosedTangent, Elastic, Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::output::{OutputSettings, Recorder, Reference};
 use bfree::particles::Body;
 use bfree::phases::Phase;
 use bfree::plan::Plan;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor};
+use bfree::tensor::Tensor;
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -123,19 +123,19 @@ struct Counting {
     stresses: Arc<AtomicU64>,
 }
 
-impl Elastic for Counting {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+impl Law for Counting {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         self.energies.fetch_add(1, Ordering::Relaxed);
-        Elastic::energy(&self.law, at)
+        self.law.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         self.stresses.fetch_add(1, Ordering::Relaxed);
-        Elastic::stress(&self.law, at)
+        self.law.stress(at)
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        Elastic::elasticity(&self.law, at, x)
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.law.elasticity(at, x)
     }
 }
 
@@ -147,27 +147,22 @@ struct Asked {
 }
 
 impl Law for Asked {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        self.law.energy(at, start)
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.law.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        self.law.stress(at, start)
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        self.law.stress(at)
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        self.law.elasticity(at, start, x)
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.law.elasticity(at, x)
     }
 
     fn closed<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         self.law.closed(f_n, at, volume)

@@ -3,7 +3,7 @@
 use crate::support::{Failure, closed_laws, piola};
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{ClosedTangent, Lame, Law, Material, NonPositiveJacobian, Start};
+use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NonPositiveJacobian};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
 use bfree::mechanics::schemes::{Alphas, Newmark};
@@ -23,37 +23,31 @@ struct Unknown {
 }
 
 impl Law for Unknown {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        self.law.energy(at, start)
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.law.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        self.law.stress(at, start)
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        self.law.stress(at)
     }
 
-    fn elasticity<T: Real, const D: usize>(
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.law.elasticity(at, x)
+    }
+
+    fn tangent_density<const D: usize>(
         &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        self.law.elasticity(at, start, x)
-    }
-
-    fn tangent_density<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
-        self.law.tangent_density(at, start, v, b)
+        at: &MaterialState<f64, D>,
+        v: &Vector<f64, D>,
+        b: &Vector<f64, D>,
+    ) -> Tensor<f64, D> {
+        self.law.tangent_density(at, v, b)
     }
 
     fn closed<const D: usize>(
         &self,
         f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+        at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         self.law.closed(f_n, at, volume).filter(|_| self.closed)
@@ -163,16 +157,16 @@ fn by_formulas<const D: usize>(
         let law = &bodies[particles.body[p] as usize].law;
         let (h_n, volume) = (&particles.displacement_gradient[p], particles.volume[p]);
         let f_n = identity::<f64, D>() + h_n;
-        let at = Deformation::new(compose(&supports.gradient_at(p, dphi), h_n));
+        let at = MaterialState::new(compose(&supports.gradient_at(p, dphi), h_n));
         let l = supports.gradient_at(p, u);
         // V₀ P F_nᵀ and V₀ δP F_nᵀ, the latter by ℂmat from unit gradients (eqs. 37, 38) if there is no closed form.
         let sigma = scaled(&(piola(law, at.h)? * f_n.transpose()), volume);
         let delta = law.closed(&f_n, &at, volume).map_or_else(
             || {
-                let (unit, stress) = (|k: usize| f_n.row(k).transpose(), law.stress(&at, &Start::NONE));
+                let (unit, stress) = (|k: usize| f_n.row(k).transpose(), law.stress(&at));
                 let mut delta = Tensor::zeros();
                 for (k, m) in (0..D).flat_map(|k| (0..D).map(move |m| (k, m))) {
-                    let density = law.tangent_density(&at, &Start::NONE, &unit(k), &unit(m));
+                    let density = law.tangent_density(&at, &unit(k), &unit(m));
                     let block = at.f * density * at.f.transpose() + identity() * unit(k).dot(&(stress * unit(m)));
                     let column = block * l.column(m) * volume;
                     (0..D).for_each(|i| delta[(i, k)] += column[i]);
@@ -183,8 +177,8 @@ fn by_formulas<const D: usize>(
         );
         // δP = δF S + F [ℂ : Fᵀ δF] with δF = L F_n is equal, with more rounding.
         let delta_f = l * f_n;
-        let material = at.f * law.elasticity(&at, &Start::NONE, &(at.f.transpose() * delta_f));
-        let delta_p = delta_f * law.stress(&at, &Start::NONE) + material;
+        let material = at.f * law.elasticity(&at, &(at.f.transpose() * delta_f));
+        let delta_p = delta_f * law.stress(&at) + material;
         let apart = (delta_p * f_n.transpose() * volume - delta).norm() / delta.norm();
         assert!(apart < 1e-11, "{law:?}, particle {p}: {apart:e}");
         let mass = (1.0 - LUMPING) * particles.mass[p];

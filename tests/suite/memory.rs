@@ -1,11 +1,11 @@
 //! A law with internal variables: restarts, failed steps and reordering must keep them.
 
 use crate::support::{Failure, Random, restored, scene};
-use bfree::material::{Lame, Law, NeoHookean, Remembered, Start};
+use bfree::material::{InternalVariable, Lame, Law, MaterialState, NeoHookean};
 use bfree::particles::Particles;
 use bfree::scalar::Real;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor, contract, scaled};
+use bfree::tensor::{Tensor, contract, scaled};
 use std::num::NonZeroU64;
 
 /// Ciarlet's solid softens with the largest strain energy W so far: S = e^(−κ/k) S₀, with κ' = κ + (W − κ) Δt/(τ + Δt) where W > κ. The
@@ -19,20 +19,17 @@ struct Softening {
 
 const LIMIT: f64 = 2.0;
 const TIME: f64 = 0.05;
-const NAMES: [Remembered; 2] =
-    [Remembered { name: "energy met", at_rest: 0.0 }, Remembered { name: "age", at_rest: 3.0 }];
+const NAMES: [InternalVariable; 2] =
+    [InternalVariable::zero("energy met"), InternalVariable { name: "age", at_rest: 3.0 }];
 
 impl Softening {
-    fn undamaged<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        Law::energy(&self.solid, at, &Start::NONE)
-    }
-
     /// κ' and dκ'/dW.
-    fn met<T: Real>(&self, energy: T, start: &Start<'_>) -> (T, f64) {
+    fn met<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> (T, f64) {
         if !self.softens {
             return (T::zero(), 0.0);
         }
-        let (met, rate) = (start.memory[0], start.dt / (TIME + start.dt));
+        let (met, rate) = (at.internal[0], at.dt / (TIME + at.dt));
+        let energy = self.solid.energy(at);
         if energy.value() > met {
             (T::lit(met) + (energy - T::lit(met)) * T::lit(rate), rate)
         } else {
@@ -46,45 +43,36 @@ impl Softening {
 }
 
 impl Law for Softening {
-    fn memory(&self) -> &[Remembered] {
+    fn internal_variables(&self) -> &[InternalVariable] {
         if self.softens { &NAMES } else { &[] }
     }
 
     /// ∫ e^(−κ'(W)/k) dW
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        let energy = self.undamaged(at);
-        let (met, rate) = self.met(energy, start);
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        let (met, rate) = self.met(at);
         if rate == 0.0 {
-            return energy * Self::factor(met);
+            return self.solid.energy(at) * Self::factor(met);
         }
-        let before = start.memory[0];
+        let before = at.internal[0];
         let sum = Self::factor(T::lit(before)) - Self::factor(met);
         T::lit(before * Self::factor(before)) + sum * T::lit(LIMIT / rate)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        let (met, _) = self.met(self.undamaged(at), start);
-        scaled(&Law::stress(&self.solid, at, &Start::NONE), Self::factor(met))
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let (met, _) = self.met(at);
+        scaled(&self.solid.stress(at), Self::factor(met))
     }
 
     /// ℂ:X = e^(−κ'/k) [ℂ₀:X − (dκ'/dW)/k (S₀:X) S₀]
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        let (met, rate) = self.met(self.undamaged(at), start);
-        let stress = Law::stress(&self.solid, at, &Start::NONE);
-        let softer = scaled(&stress, T::lit(rate / LIMIT) * contract(&stress, x));
-        scaled(&(Law::elasticity(&self.solid, at, &Start::NONE, x) - softer), Self::factor(met))
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let (met, rate) = self.met(at);
+        let stress = self.solid.stress(at);
+        let softer = stress * (rate / LIMIT * contract(&stress, x));
+        scaled(&(self.solid.elasticity(at, x) - softer), Self::factor(met))
     }
 
-    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-        if self.softens {
-            next[0] = self.met(self.undamaged(at), start).0;
-            next[1] = start.memory[1] + start.dt;
-        }
+    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+        if self.softens { vec![self.met(at).0, at.internal[1] + at.dt] } else { at.internal.to_vec() }
     }
 }
 
@@ -104,7 +92,7 @@ const STEPS: usize = 30;
 
 /// The internal variables of each particle.
 fn remembered(particles: &Particles<2>) -> Vec<[f64; 2]> {
-    (0..particles.len()).map(|p| std::array::from_fn(|i| particles.start(p, 0.0).memory[i])).collect()
+    (0..particles.len()).map(|p| std::array::from_fn(|i| particles.state(p, 0.0).internal[i])).collect()
 }
 
 #[test]
@@ -120,7 +108,7 @@ fn particles_remember_at_the_end_of_every_step_what_their_law_says() -> Result<(
         let particles = simulation.particles.by_id();
         for p in 0..particles.len() {
             if particles.body[p] == 0 {
-                let energy = simulation.bodies[0].law.undamaged(&Deformation::new(particles.displacement_gradient[p]));
+                let energy = simulation.bodies[0].law.solid.energy(&particles.state(p, 0.0));
                 let [met, age] = expected[p];
                 let grown = met + (energy - met) * (report.dt / (TIME + report.dt));
                 expected[p] = [if energy > met { grown } else { met }, age + report.dt];
@@ -225,7 +213,7 @@ fn what_remembers_nothing_has_no_memory() -> Result<(), Failure> {
     for _ in 0..2 {
         simulation.advance()?;
         assert_eq!((simulation.particles.memory.len(), simulation.particles.remembered), (0, 0));
-        assert!(simulation.particles.start(0, 1.0).memory.is_empty());
+        assert!(simulation.particles.state(0, 1.0).internal.is_empty());
     }
     Ok(())
 }

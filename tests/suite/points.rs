@@ -2,10 +2,8 @@
 
 use bfree::approximation::{Approximation, Gimp, Linear, Lme, LmeCircle, Scratch, ShapeFunction, Support};
 use bfree::grid::Grid;
-use bfree::material::{
-    Elastic, Lame, LameError, Law, Material, NeoHookean, StVenantKirchhoff, Start, admissible, first_piola,
-};
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::material::{Lame, LameError, Law, Material, MaterialState, NeoHookean, StVenantKirchhoff, first_piola};
+use bfree::tensor::{Tensor, Vector, identity};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -110,11 +108,11 @@ fn shape_functions_are_those_of_the_reference() {
     }
 }
 
-fn law_is_that_of_the_reference(law: &impl Elastic, point: &Point) {
+fn law_is_that_of_the_reference(law: &impl Law, point: &Point) {
     let rows = |a: [[f64; 2]; 2]| Tensor::<f64, 2>::from_fn(|i, k| a[i][k]);
     let f = rows(point.F);
     let h = f - identity::<f64, 2>();
-    let at = admissible(h).expect("det F > 0");
+    let at = MaterialState::new(h).admissible().expect("det F > 0");
     let (v, b) = (Vector::from(point.v), Vector::from(point.b));
     let check = |what: &str, found: Tensor<f64, 2>, expected: [[f64; 2]; 2]| {
         let expected = rows(expected);
@@ -122,17 +120,17 @@ fn law_is_that_of_the_reference(law: &impl Elastic, point: &Point) {
         println!("{} {what}: {error:.1e}", point.kind);
         assert!(error < 1e-13, "{} {what}: {found} instead of {expected}", point.kind);
     };
-    let error = Elastic::energy(law, &at) / point.W - 1.0;
+    let error = law.energy(&at) / point.W - 1.0;
     assert!(error.abs() < 1e-13, "{} W: off by {error:e}", point.kind);
-    check("S", Elastic::stress(law, &at), point.S);
-    check("P", first_piola(law, &f, h).expect("det F > 0"), point.P);
-    check("ℂmat", Elastic::tangent_density(law, &at, &v, &b), point.Cmat);
+    check("S", law.stress(&at), point.S);
+    check("P", first_piola(law, &f, &at), point.P);
+    check("ℂmat", law.tangent_density(&at, &v, &b), point.Cmat);
     // The reference gives the block for gradients in the reference configuration.
-    let closed = Elastic::closed(law, &identity(), &at, 1.0).expect("a closed form");
+    let closed = law.closed(&identity(), &at, 1.0).expect("a closed form");
     check("K", closed.block(&v, &b), point.K_vb_per_unit_volume);
     // The same block by ℂmat: F ℂmat{v, b} Fᵀ + (v · S b) I.
-    let geometric = identity::<f64, 2>() * v.dot(&(Elastic::stress(law, &at) * b));
-    let material = f * Elastic::tangent_density(law, &at, &v, &b) * f.transpose();
+    let geometric = identity::<f64, 2>() * v.dot(&(law.stress(&at) * b));
+    let material = f * law.tangent_density(&at, &v, &b) * f.transpose();
     check("K by ℂmat", material + geometric, point.K_vb_per_unit_volume);
 }
 
@@ -164,7 +162,7 @@ fn three_pairs_of_constants_are_one_solid() -> Result<(), LameError> {
         }
         // The stiffness of a bar that cannot contract.
         for (_, law) in Material::examples(solid) {
-            let stiffness = law.elasticity(&Deformation::new(Tensor::<f64, 1>::zeros()), &Start::NONE, &identity())[0];
+            let stiffness = law.elasticity(&MaterialState::new(Tensor::<f64, 1>::zeros()), &identity())[0];
             assert!((stiffness / solid.p_wave_modulus() - 1.0).abs() < 1e-15, "{law:?}");
         }
     }
@@ -194,7 +192,7 @@ fn constants_at_the_limits_of_stability_are_refused() {
 fn a_body_without_volume_or_of_infinite_volume_is_inadmissible() {
     for stretch in [0.0, -1.0, f64::INFINITY, f64::NAN] {
         let h = Tensor::<f64, 2>::new(stretch - 1.0, 0.0, 0.0, 0.0);
-        assert!(admissible(h).is_err(), "F = diag({stretch}, 1)");
+        assert!(MaterialState::new(h).admissible().is_err(), "F = diag({stretch}, 1)");
     }
-    assert!(admissible(Tensor::<f64, 2>::new(f64::EPSILON - 1.0, 0.0, 0.0, 0.0)).is_ok());
+    assert!(MaterialState::new(Tensor::<f64, 2>::new(f64::EPSILON - 1.0, 0.0, 0.0, 0.0)).admissible().is_ok());
 }

@@ -1,11 +1,11 @@
 //! Shared code of the tests of whole runs.
 
 use bfree::checkpoint::{Checkpoints, Identity, restore};
-use bfree::material::{Lame, Law, Material, NonPositiveJacobian, Start, admissible};
+use bfree::material::{Lame, Law, Material, MaterialState, NonPositiveJacobian};
 use bfree::output::{Audience, OutputSettings, Recorder, Reference};
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor, identity};
+use bfree::tensor::{Tensor, identity};
 use serde_json::Value;
 use std::path::Path;
 
@@ -58,15 +58,15 @@ pub fn apart<const D: usize>(a: &Simulation<D>, b: &Simulation<D>) -> f64 {
 
 /// The shipped laws whose tangent has a closed form. Vector lanes linearise only these.
 pub fn closed_laws(lame: Lame) -> Vec<Material> {
-    let at_rest = Deformation::new(Tensor::zeros());
+    let at_rest = MaterialState::new(Tensor::zeros());
     let closed = |law: &Material| law.closed(&identity::<f64, 1>(), &at_rest, 1.0).is_some();
     Material::examples(lame).into_iter().map(|(_, law)| law).filter(closed).collect()
 }
 
 /// P = F S of a law without internal variables.
 pub fn piola<const D: usize>(law: &impl Law, h: Tensor<f64, D>) -> Result<Tensor<f64, D>, NonPositiveJacobian> {
-    let at = admissible(h)?;
-    Ok(at.f * law.stress(&at, &Start::NONE))
+    let at = MaterialState::new(h).admissible()?;
+    Ok(at.f * law.stress(&at))
 }
 
 /// λ with P(λ) = `stress` in uniaxial strain, by bisection.

@@ -5,7 +5,7 @@ mod stored;
 use crate::support::{Failure, closed_laws};
 use bfree::approximation::{Approximation, Linear, Lme, ShapeFunction};
 use bfree::grid::Grid;
-use bfree::material::{ClosedTangent, Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHookean};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Newmark;
@@ -17,7 +17,7 @@ use bfree::nodes::Nodes;
 use bfree::particles::{Body, Particles};
 use bfree::pooled::Pool;
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
 use std::convert::Infallible;
 

@@ -7,7 +7,7 @@
 use bfree::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support, Validate};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Law, admissible};
+use bfree::material::Law;
 use bfree::mechanics::loads::{Loads, prescribed_dofs};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible};
 use bfree::mechanics::schemes::{Newmark, Scheme};
@@ -228,9 +228,10 @@ impl<const D: usize, L: Law> Elements<D, L> {
     /// A Gauss point with det F ≤ 0.
     pub fn energy(&self, frame: &Vector<f64, D>) -> Result<f64, StepError> {
         let parts = self.supports.interpolate(&self.displacement, |p, _, g| {
-            let at = admissible(g).map_err(|source| Inadmissible { particle: p, source })?;
+            let at = self.points.state(p, 0.0).deformed(g).admissible();
+            let at = at.map_err(|source| Inadmissible { particle: p, source })?;
             let body = &self.bodies[self.points.body[p] as usize];
-            Ok::<_, Inadmissible>(self.points.volume[p] * body.law.energy(&at, &self.points.start(p, 0.0)))
+            Ok::<_, Inadmissible>(self.points.volume[p] * body.law.energy(&at))
         })?;
         let kinetic =
             self.point_velocity().into_iter().zip(&self.points.mass).map(|(v, m)| 0.5 * m * (v - frame).norm_squared());

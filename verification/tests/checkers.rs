@@ -3,11 +3,11 @@
 use bfree::approximation::{Approximation, ApproximationError, AxisWeights, Bspline, Linear, Lme, Separable, Validate};
 use bfree::clock::Clock;
 use bfree::grid::{Axis, Grid};
-use bfree::material::{Elastic, Lame, LameError, Law, Material, NeoHookean, Remembered, Start};
+use bfree::material::{InternalVariable, Lame, LameError, Law, Material, MaterialState, NeoHookean};
 use bfree::particles::{Body, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};
-use bfree::tensor::{Deformation, Tensor, Vector, contract, scaled, symmetric};
+use bfree::tensor::{Tensor, Vector, contract, scaled, symmetric};
 use verification::{Report, check_approximation, check_material, check_material_from, check_tangent};
 
 /// The labels in column `column` of the cells that fail, each once.
@@ -55,26 +55,25 @@ struct Wrong {
     fault: Fault,
 }
 
-impl Elastic for Wrong {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        Elastic::energy(&self.right, at)
+impl Law for Wrong {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.right.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        Elastic::stress(&self.right, at)
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        self.right.stress(at)
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
         if self.fault == Fault::Factor {
-            return scaled(&Elastic::elasticity(&self.right, at, x), T::lit(2.0));
+            return scaled(&self.right.elasticity(at, x), 2.0);
         }
         // ΛJ² (C⁻¹:X) C⁻¹ − 2q C⁻¹ X C⁻¹
         let Lame { lambda, shear } = self.right.lame;
         let f_inv_t = at.inverse_transpose();
         let c_inv = f_inv_t.transpose() * f_inv_t;
-        let q = T::lit(0.5 * lambda) * at.jacobian_squared_minus_one() - T::lit(shear);
-        scaled(&c_inv, T::lit(lambda) * at.jacobian * at.jacobian * contract(&c_inv, x))
-            - scaled(&(c_inv * x * c_inv), q + q)
+        let q = 0.5 * lambda * at.jacobian_squared_minus_one() - shear;
+        scaled(&c_inv, lambda * at.jacobian * at.jacobian * contract(&c_inv, x)) - scaled(&(c_inv * x * c_inv), q + q)
     }
 }
 
@@ -106,35 +105,29 @@ struct Damaged {
 }
 
 impl Law for Damaged {
-    fn memory(&self) -> &[Remembered] {
-        &[Remembered { name: "damage", at_rest: 0.0 }]
+    fn internal_variables(&self) -> &[InternalVariable] {
+        &[InternalVariable { name: "damage", at_rest: 0.0 }]
     }
 
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let e = at.green_lagrange();
-        contract(&e, &e) * T::lit(self.shear * (1.0 - start.memory[0]))
+        contract(&e, &e) * T::lit(self.shear * (1.0 - at.internal[0]))
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        scaled(&at.green_lagrange(), T::lit(2.0 * self.shear * (1.0 - start.memory[0])))
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        scaled(&at.green_lagrange(), T::lit(2.0 * self.shear * (1.0 - at.internal[0])))
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        _: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        let left = if self.forgets { 1.0 } else { 1.0 - start.memory[0] };
-        scaled(&symmetric(x), T::lit(2.0 * self.shear * left))
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let left = if self.forgets { 1.0 } else { 1.0 - at.internal[0] };
+        scaled(&symmetric(x), 2.0 * self.shear * left)
     }
 }
 
 #[test]
 fn a_law_with_memory_is_judged_from_where_it_starts() {
-    let damaged = Start { dt: 0.1, memory: &[0.25] };
     for law in [Damaged { shear: 3.0, forgets: false }, Damaged { shear: 3.0, forgets: true }] {
-        let (at_rest, later) = (check_material(&law), check_material_from(&law, &damaged));
+        let (at_rest, later) = (check_material(&law), check_material_from(&law, 0.1, &[0.25]));
         assert!(at_rest.passed(), "{at_rest}");
         let expected: &[&str] = if law.forgets { &["C:X against dual(S)"] } else { &[] };
         assert_eq!(red(&later, 0), expected, "{later}");

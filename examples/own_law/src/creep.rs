@@ -3,9 +3,9 @@
 //! You write the energy, the stress and the internal variables. The tangent comes from dual numbers, through the equation:
 //! [`bfree::scalar::implicit`] gives the root of the equation the derivatives that the number type needs.
 
-use bfree::material::{DISSIPATED, Law, PLASTIC_STRAIN, Remembered, Start};
+use bfree::material::{DISSIPATED, InternalVariable, Law, MaterialState, PLASTIC_STRAIN};
 use bfree::scalar::{Real, implicit};
-use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, trace};
+use bfree::tensor::{Tensor, contract, identity, scaled, trace};
 
 /// S = (Λ + 2G/3) tr(E) I + 2G dev(E − E_c). The creep strain E_c grows along the deviator of S: ṗ = A (q/σ₀)ⁿ with q = √(3/2) ‖dev S‖ and
 /// the accumulated creep strain p. Backward Euler in time. Strains must be small; rotations may be large.
@@ -23,21 +23,16 @@ pub struct Creep {
     pub power: i32,
 }
 
-const MEMORY: [Remembered; 8] = {
-    const fn zero(name: &'static str) -> Remembered {
-        Remembered { name, at_rest: 0.0 }
-    }
-    [
-        zero(PLASTIC_STRAIN),
-        zero(DISSIPATED),
-        zero("creep_xx"),
-        zero("creep_yy"),
-        zero("creep_zz"),
-        zero("creep_xy"),
-        zero("creep_yz"),
-        zero("creep_xz"),
-    ]
-};
+const INTERNAL: [InternalVariable; 8] = [
+    InternalVariable::zero(PLASTIC_STRAIN),
+    InternalVariable::zero(DISSIPATED),
+    InternalVariable::zero("creep_xx"),
+    InternalVariable::zero("creep_yy"),
+    InternalVariable::zero("creep_zz"),
+    InternalVariable::zero("creep_xy"),
+    InternalVariable::zero("creep_yz"),
+    InternalVariable::zero("creep_xz"),
+];
 
 /// Rows and columns of the six components of E_c.
 const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
@@ -53,11 +48,11 @@ struct Crept<T> {
 
 impl Creep {
     /// q + 3G A Δt (q/σ₀)ⁿ = q_trial
-    fn crept<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Crept<T> {
+    fn crept<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Crept<T> {
         let e = at.green_lagrange();
         let mut strain: Tensor<T, 3> = Tensor::from_fn(|i, k| if i < D && k < D { e[(i, k)] } else { T::zero() });
         let volume = trace(&strain);
-        for (&(i, k), &crept) in PLACES.iter().zip(start.memory.iter().skip(2)) {
+        for (&(i, k), &crept) in PLACES.iter().zip(at.internal.iter().skip(2)) {
             strain[(i, k)] -= T::lit(crept);
             strain[(k, i)] = strain[(i, k)];
         }
@@ -67,7 +62,7 @@ impl Creep {
             return Crept { volume, trial, q: [T::zero(); 2] };
         }
         let q_trial = squared.sqrt() * T::lit(6.0_f64.sqrt() * self.shear);
-        let factor = 3.0 * self.shear * self.rate * start.dt;
+        let factor = 3.0 * self.shear * self.rate * at.dt;
         let slope =
             |q: f64| 1.0 + factor * f64::from(self.power) / self.stress * (q / self.stress).powi(self.power - 1);
         // Newton's method converges from above, because the left side is convex.
@@ -85,13 +80,13 @@ impl Creep {
 }
 
 impl Law for Creep {
-    fn memory(&self) -> &[Remembered] {
-        &MEMORY
+    fn internal_variables(&self) -> &[InternalVariable] {
+        &INTERNAL
     }
 
     /// The potential of the step: the elastic energy plus q Δp n/(n + 1).
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        let Crept { volume, q: [q_trial, q], .. } = self.crept(at, start);
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        let Crept { volume, q: [q_trial, q], .. } = self.crept(at);
         let (bulk, power) = (self.lambda + 2.0 * self.shear / 3.0, f64::from(self.power));
         let delta_p = (q_trial - q) / T::lit(3.0 * self.shear);
         volume * volume * T::lit(0.5 * bulk)
@@ -99,25 +94,26 @@ impl Law for Creep {
             + q * delta_p * T::lit(power / (power + 1.0))
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        let Crept { volume, trial, q: [q_trial, q] } = self.crept(at, start);
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let Crept { volume, trial, q: [q_trial, q] } = self.crept(at);
         let pressure = volume * T::lit(self.lambda + 2.0 * self.shear / 3.0);
         let share = if q_trial.value() > 0.0 { q / q_trial } else { T::one() };
         let stress = scaled(&identity(), pressure) + scaled(&trial, share * T::lit(2.0 * self.shear));
         Tensor::from_fn(|i, k| stress[(i, k)])
     }
 
-    fn remember<const D: usize>(&self, at: &Deformation<f64, D>, start: &Start<'_>, next: &mut [f64]) {
-        let Crept { trial, q: [q_trial, q], .. } = self.crept(at, start);
-        if q_trial == 0.0 {
-            return;
+    fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
+        let Crept { trial, q: [q_trial, q], .. } = self.crept(at);
+        let mut next = at.internal.to_vec();
+        if q_trial > 0.0 {
+            let delta_p = (q_trial - q) / (3.0 * self.shear);
+            next[0] += delta_p;
+            next[1] += q * delta_p;
+            for (next, place) in next[2..].iter_mut().zip(PLACES) {
+                *next += (1.0 - q / q_trial) * trial[place];
+            }
         }
-        let delta_p = (q_trial - q) / (3.0 * self.shear);
-        next[0] += delta_p;
-        next[1] += q * delta_p;
-        for (next, place) in next[2..].iter_mut().zip(PLACES) {
-            *next += (1.0 - q / q_trial) * trial[place];
-        }
+        next
     }
 }
 
@@ -134,25 +130,24 @@ mod tests {
     fn stress_and_tangent_are_the_derivatives_of_the_potential() {
         let report = check_material(&LAW);
         assert!(report.passed(), "{report}");
-        let memory = [0.02, 0.1, 0.01, -0.005, -0.005, 0.01, -0.003, 0.002];
-        let report = check_material_from(&LAW, &Start { dt: 0.3, memory: &memory });
+        let internal = [0.02, 0.1, 0.01, -0.005, -0.005, 0.01, -0.003, 0.002];
+        let report = check_material_from(&LAW, 0.3, &internal);
         assert!(report.passed(), "{report}");
     }
 
     /// Relaxation at constant strain: q̇ = −3G A (q/σ₀)ⁿ.
     #[test]
     fn stress_relaxes_as_the_closed_form_with_order_one() {
-        let at = Deformation::<f64, 2>::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.01, 0.0));
+        let sheared = MaterialState::new(Tensor::<f64, 2>::new(0.0, 0.01, 0.01, 0.0));
         let q = |stress: &Tensor<f64, 2>| 3.0_f64.sqrt() * stress[(0, 1)];
         let error = |steps: u32| {
-            let (mut memory, mut stress, dt) = ([0.0; 8], Tensor::zeros(), 1.0 / f64::from(steps));
+            let (mut internal, mut stress, dt) = (vec![0.0; 8], Tensor::zeros(), 1.0 / f64::from(steps));
             for _ in 0..steps {
-                let (mut next, start) = (memory, Start { dt, memory: &memory });
-                stress = LAW.stress(&at, &start);
-                LAW.remember(&at, &start, &mut next);
-                memory = next;
+                let at = sheared.in_step(dt, &internal);
+                stress = LAW.stress(&at);
+                internal = LAW.updated_variables(&at);
             }
-            let q_0 = q(&LAW.stress(&at, &Start { dt: 0.0, memory: &[0.0; 8] }));
+            let q_0 = q(&LAW.stress(&sheared.in_step(0.0, &[0.0; 8])));
             let closed = (q_0.powi(-2) + 2.0 * 3.0 * LAW.shear * LAW.rate / LAW.stress.powi(3)).powf(-0.5);
             q(&stress) / closed - 1.0
         };

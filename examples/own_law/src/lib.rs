@@ -1,14 +1,15 @@
 //! Your own law with its own analytic tangent, checked in your CI.
 //!
-//! A quadratic–cubic solid, W = Λ/2 (tr E)² + G E:E + κ/3 (tr E)³: St. Venant–Kirchhoff that stiffens in tension by κ. You write energy, stress and the
-//! action ℂ:X of the tangent. The first test below is all that is needed to know, by term and by name, that they belong together; the
-//! second pulls a bar: `cargo test --release --package own_law`.
+//! A quadratic–cubic solid, W = Λ/2 (tr E)² + G E:E + κ/3 (tr E)³: St. Venant–Kirchhoff that stiffens in tension by κ. A law needs its
+//! energy and its stress. This one also writes the action ℂ:X of its tangent; without it, dual numbers would differentiate the stress. The
+//! first test below is all that is needed to know, by term and by name, that they belong together. The second test pulls a bar:
+//! `cargo test --release --package own_law`.
 
 pub mod creep;
 
-use bfree::material::Elastic;
+use bfree::material::{Law, MaterialState};
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, contract, identity, scaled, symmetric, trace};
+use bfree::tensor::{Tensor, contract, identity, scaled, symmetric, trace};
 
 /// W = Λ/2 (tr E)² + G E:E + κ/3 (tr E)³
 #[derive(Clone, Copy, Debug)]
@@ -21,8 +22,8 @@ pub struct Stiffening {
     pub kappa: f64,
 }
 
-impl Elastic for Stiffening {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
+impl Law for Stiffening {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let e = at.green_lagrange();
         let tr = trace(&e);
         T::lit(0.5 * self.lambda) * tr * tr
@@ -31,7 +32,7 @@ impl Elastic for Stiffening {
     }
 
     /// S = (Λ tr E + κ (tr E)²) I + 2G E
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
         let e = at.green_lagrange();
         let tr = trace(&e);
         scaled(&identity(), T::lit(self.lambda) * tr + T::lit(self.kappa) * tr * tr)
@@ -39,9 +40,9 @@ impl Elastic for Stiffening {
     }
 
     /// ℂ:X = (Λ + 2κ tr E) tr(X) I + 2G sym X
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        let volumetric = T::lit(self.lambda) + T::lit(2.0 * self.kappa) * trace(&at.green_lagrange());
-        scaled(&identity(), volumetric * trace(x)) + scaled(&symmetric(x), T::lit(2.0 * self.shear))
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let volumetric = self.lambda + 2.0 * self.kappa * trace(&at.green_lagrange());
+        scaled(&identity(), volumetric * trace(x)) + scaled(&symmetric(x), 2.0 * self.shear)
     }
 }
 

@@ -7,11 +7,11 @@
 use super::lanes::{LANES, Lanes, WithLanes, widest};
 use super::tangents::{Form, general};
 use super::{At, Group, Number};
-use crate::material::{ClosedTangent, Law, LawVisitor, Material, NonPositiveJacobian, Start};
+use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
 use crate::mechanics::point::{self, Inadmissible, Part};
 use crate::particles::{Body, Particles};
 use crate::scalar::{Real, Single};
-use crate::tensor::{Deformation, Tensor, identity};
+use crate::tensor::{Tensor, identity};
 
 /// The laws of all particles, and their states at t_n.
 #[derive(Clone, Copy)]
@@ -37,8 +37,10 @@ pub struct States<'a, T> {
     h_n: Rows<f64>,
     /// V₀
     volume: [f64; LANES],
-    /// Δt and the internal variables of each particle at t_n.
-    start: [Start<'a>; LANES],
+    /// Δt
+    dt: f64,
+    /// The internal variables of each particle at t_n.
+    internal: [&'a [f64]; LANES],
 }
 
 impl<'a, T: Real> States<'a, T> {
@@ -46,11 +48,11 @@ impl<'a, T: Real> States<'a, T> {
         let mut gradient = [[T::zero(); LANES]; 9];
         gradient[..D * D].copy_from_slice(at);
         // Empty lanes take the internal variables of the first particle.
-        let start = [particles.start(group[0] as usize, dt); LANES];
-        let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], start };
+        let internal = [particles.state(group[0] as usize, dt).internal; LANES];
+        let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal };
         let reference = particles.reference();
         for (lane, &p) in group.iter().enumerate().take(LANES) {
-            states.start[lane] = particles.start(p as usize, dt);
+            states.internal[lane] = particles.state(p as usize, dt).internal;
             let h_n = &reference.displacement_gradient[p as usize];
             for i in 0..D {
                 for k in 0..D {
@@ -62,11 +64,12 @@ impl<'a, T: Real> States<'a, T> {
         states
     }
 
-    /// ∇u, H_n and V₀ of one particle.
+    /// ∇u, the state at t_n, and V₀ of one particle.
     #[inline(always)]
-    fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<T, D>, Tensor<f64, D>, f64) {
+    fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<T, D>, MaterialState<'_, f64, D>, f64) {
         let gradient = Tensor::from_fn(|i, k| self.gradient[i * D + k][lane]);
-        (gradient, Tensor::from_fn(|i, k| self.h_n[i * D + k][lane]), self.volume[lane])
+        let h_n = Tensor::from_fn(|i, k| self.h_n[i * D + k][lane]);
+        (gradient, MaterialState::new(h_n).in_step(self.dt, self.internal[lane]), self.volume[lane])
     }
 }
 
@@ -162,7 +165,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
 
 /// The form of the tangents of a law.
 fn form<L: Law, const D: usize>(law: &L) -> Form {
-    match law.closed(&identity::<f64, D>(), &Deformation::new(Tensor::zeros()), 1.0) {
+    match law.closed(&identity::<f64, D>(), &MaterialState::new(Tensor::zeros()), 1.0) {
         None => Form::General,
         Some(closed) if closed.both.is_some() => Form::ClosedWithBoth,
         Some(_) => Form::Closed,
@@ -181,8 +184,8 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     // Fixed lengths, so that no index is checked and the loop becomes vector instructions.
     let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
     for lane in 0..LANES {
-        let (gradient, h_n, volume) = states.of_lane::<D>(lane);
-        let (stress, det) = point::internal(law, &states.start[lane], &gradient, &h_n, volume, part);
+        let (gradient, at_n, volume) = states.of_lane::<D>(lane);
+        let (stress, det) = point::internal(law, &at_n, &gradient, volume, part);
         for i in 0..D {
             for k in 0..D {
                 rows[i * D + k][lane] = stress[(i, k)];
@@ -205,8 +208,8 @@ fn tangents_of<L: Law, const D: usize>(
 ) {
     let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
     for lane in 0..LANES {
-        let (gradient, h_n, volume) = states.of_lane::<D>(lane);
-        let (frozen, det) = point::freeze(law, &states.start[lane], &gradient, &h_n, volume, part);
+        let (gradient, at_n, volume) = states.of_lane::<D>(lane);
+        let (frozen, det) = point::freeze(law, &at_n, &gradient, volume, part);
         det_f[lane] = det;
         match (frozen, form) {
             (point::Frozen::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {

@@ -17,7 +17,7 @@
 use super::{
     AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, summed,
 };
-use crate::material::{Law, VolumeResponse, admissible_or_rest};
+use crate::material::{Law, MaterialState, VolumeResponse};
 use crate::mechanics::dilatation::{Cells, Member, total};
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Number, Product, Supports, add_quadratic, product};
@@ -69,7 +69,7 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
     /// U at J, which the law contains already.
     fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
         let h_n = &self.step.particles.reference().displacement_gradient[p];
-        let (at, _) = admissible_or_rest(compose(g, h_n));
+        let (at, _) = MaterialState::new(compose(g, h_n)).admissible_or_rest();
         let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
         let a = scaled(&(cofactor(&at.f) * f_n_t), T::lit(self.step.particles.volume[p]));
         Local { jacobian: at.jacobian, response: self.response(p, at.j), a }

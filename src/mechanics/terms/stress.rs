@@ -1,7 +1,7 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
 use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
-use crate::material::{Law, admissible};
+use crate::material::Law;
 use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Laws, Number, Product, Supports, add_quadratic, product};
 use crate::parallel::First;
@@ -64,9 +64,10 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         let particles = self.laws.particles;
         let energies = self.supports.interpolate(dphi, |p, _, g| {
             let id = particles.id[p] as usize;
-            let at = admissible(compose(&g, &particles.reference().displacement_gradient[p]))
-                .map_err(|source| Inadmissible { particle: id, source })?;
-            Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at, &particles.start(p, self.laws.dt)))
+            let h_n = &particles.reference().displacement_gradient[p];
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
+            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
+            Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
         });
         Some(energies.map(summed))
     }
@@ -77,11 +78,11 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
             let h_n = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
-            let at = admissible(compose(&g, h_n)).map_err(|source| Inadmissible { particle: id, source })?;
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
+            let at = at.map_err(|source| Inadmissible { particle: id, source })?;
             let f_n = (identity::<f64, D>() + h_n).norm();
             let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
-            let start = particles.start(p, self.laws.dt);
-            let response = self.law(p).elasticity(&at, &start, &(at.f.transpose() * at.f)).norm();
+            let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change = response * (at.h.norm() + moved * f_n) * f_n * particles.volume[p];
             Ok((Vector::zeros(), Tensor::repeat(change)))
         })

@@ -2,7 +2,7 @@
 
 use super::Nodal;
 use crate::grid::Grid;
-use crate::material::{Law, PLASTIC_STRAIN, Start, admissible_or_rest};
+use crate::material::{Law, MaterialState, PLASTIC_STRAIN};
 use crate::mechanics::dilatation;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::residual::compose;
@@ -240,10 +240,9 @@ impl<'a, const D: usize> Update<'a, D> {
         dt: f64,
     ) -> Committed {
         let (remembered, mut largest) = (particles.remembered, 0.0_f64);
-        let place = |body: &Body<L>| body.law.memory().iter().position(|one| one.name == PLASTIC_STRAIN);
+        let place = |body: &Body<L>| body.law.internal_variables().iter().position(|one| one.name == PLASTIC_STRAIN);
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
-        let mut next = vec![0.0; remembered];
         particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
         let Particles {
             position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
@@ -261,15 +260,16 @@ impl<'a, const D: usize> Update<'a, D> {
                 displacement_gradient[p] = compose(&g, &h_n);
                 if remembered > 0 {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
-                    let (at, _) = admissible_or_rest(displacement_gradient[p]);
-                    next.copy_from_slice(memory);
+                    let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();
                     let body = body[p] as usize;
-                    bodies[body].law.remember(&at, &Start { dt, memory }, &mut next);
+                    let next = bodies[body].law.updated_variables(&at.in_step(dt, memory));
                     if let Some(place) = plastic_strain[body] {
                         plastic += volume[p];
-                        yielding += if next[place] > memory[place] { volume[p] } else { 0.0 };
+                        yielding += if next.get(place) > memory.get(place) { volume[p] } else { 0.0 };
                     }
-                    memory.copy_from_slice(&next);
+                    for (variable, next) in memory.iter_mut().zip(next) {
+                        *variable = next;
+                    }
                 }
             },
         );

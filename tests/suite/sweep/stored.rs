@@ -59,21 +59,16 @@ fn bytes_are_those_of_the_arrays<const D: usize>() -> Result<(), Failure> {
 struct General(Material);
 
 impl Law for General {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
-        self.0.energy(at, start)
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        self.0.energy(at)
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-        self.0.stress(at, start)
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        self.0.stress(at)
     }
 
-    fn elasticity<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        start: &Start<'_>,
-        x: &Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        self.0.elasticity(at, start, x)
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        self.0.elasticity(at, x)
     }
 }
 
@@ -86,7 +81,7 @@ fn frozen_bytes_are_those_of_the_tangent<const D: usize>(law: &Material) -> Resu
     positions.iter().for_each(|&x| particles.push(x, Vector::zeros(), 1.0, 1.0, 0));
     // A, the upper triangle of B, κ and q; also b and c if the law has them; 𝔸 itself without a closed form.
     let triangle = D * (D + 1) / 2;
-    let closed = law.closed(&identity(), &Deformation::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
+    let closed = law.closed(&identity(), &MaterialState::new(Tensor::<f64, D>::zeros()), 1.0).ok_or("a closed form")?;
     let ClosedTangent { both, .. } = closed;
     let numbers = D * D + triangle + 2 + if both.is_some() { 2 * triangle } else { 0 };
     let bodies = [Body { name: "body".into(), law: law.clone(), density: 1.0, dilatation: Default::default() }];

@@ -12,20 +12,18 @@ pub use blocks::{BlockMatrix, Pattern, TooManyBlocks};
 pub use problem::Assembled;
 pub use voigt::Voigt;
 
-use bfree::material::{Law, Start, admissible};
+use bfree::material::{Law, MaterialState};
 use bfree::mechanics::residual::{Equilibrium, Inadmissible, compose};
-use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
+use bfree::tensor::{Tensor, Vector, identity, scaled};
 
 /// A formula for the D×D block of two nodes at one particle, geometric and material stiffness together.
 pub trait Stiffness<const D: usize> {
-    /// The blocks of all pairs of nodes of one particle. `volume` is its reference volume, `start` its state at tₙ and `at` its current
-    /// state. `gradients` holds the nodal gradients in the reference configuration. The result goes to `add(I, J, K_IJ)`, where I and J
+    /// The blocks of all pairs of nodes of one particle. `volume` is its reference volume and `at` its current state. `gradients` holds the nodal gradients in the reference configuration. The result goes to `add(I, J, K_IJ)`, where I and J
     /// index `gradients`.
     fn blocks<L: Law>(
         &self,
         law: &L,
-        at: &Deformation<f64, D>,
-        start: &Start<'_>,
+        at: &MaterialState<f64, D>,
         volume: f64,
         gradients: &[Vector<f64, D>],
         add: impl FnMut(usize, usize, Tensor<f64, D>),
@@ -49,10 +47,12 @@ pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
     }
     let (mut nodes, mut values, mut gradients) = (Vec::new(), Vec::new(), Vec::new());
     for p in 0..eq.supports.particles() {
-        let h_n = &eq.particles.displacement_gradient[p];
-        let at = admissible(compose(&eq.supports.gradient_at(p, dphi), h_n))
+        let at_n = eq.particles.state(p, eq.dt);
+        let at = at_n
+            .deformed(compose(&eq.supports.gradient_at(p, dphi), &at_n.h))
+            .admissible()
             .map_err(|source| Inadmissible { particle: eq.particles.id[p] as usize, source })?;
-        let f_n_t = (identity::<f64, D>() + h_n).transpose();
+        let f_n_t = at_n.f.transpose();
         nodes.clear();
         values.clear();
         gradients.clear();
@@ -63,8 +63,7 @@ pub fn assemble<'p, const D: usize, L: Law, S: Stiffness<D>>(
             gradients.push(f_n_t * grad_n);
         }
         let mass = eq.alphas.a1 * (1.0 - eq.lumping) * eq.particles.mass[p];
-        let (start, volume) = (eq.particles.start(p, eq.dt), eq.particles.volume[p]);
-        stiffness.blocks(eq.law(p), &at, &start, volume, &gradients, |i, j, block| {
+        stiffness.blocks(eq.law(p), &at, eq.particles.volume[p], &gradients, |i, j, block| {
             let inertia = mass * values[i] * values[j];
             matrix.add(nodes[i], nodes[j], &(block + scaled(&identity(), inertia)));
         });

@@ -1,8 +1,8 @@
 //! Blocks as BᵀDB in Voigt's notation, plus the geometric term: the textbook way (Belytschko, Liu, Moran, section 4.9).
 
 use super::Stiffness;
-use bfree::material::{Law, Start};
-use bfree::tensor::{Deformation, Tensor, Vector, identity, scaled};
+use bfree::material::{Law, MaterialState};
+use bfree::tensor::{Tensor, Vector, identity, scaled};
 use nalgebra::SMatrix;
 
 /// The number of components of a symmetric tensor in Voigt's order, in three dimensions.
@@ -33,19 +33,14 @@ fn strain_matrix<const D: usize>(f: &Tensor<f64, D>, grad: &Vector<f64, D>) -> S
 }
 
 /// V₀ D. Rows and columns beyond the dimension are zero and are never read.
-fn moduli<L: Law, const D: usize>(
-    law: &L,
-    at: &Deformation<f64, D>,
-    start: &Start<'_>,
-    volume: f64,
-) -> SMatrix<f64, MOST, MOST> {
+fn moduli<L: Law, const D: usize>(law: &L, at: &MaterialState<f64, D>, volume: f64) -> SMatrix<f64, MOST, MOST> {
     let mut moduli = SMatrix::zeros();
     for (column, &(a, c)) in pairs(D).iter().enumerate() {
         // A unit of the engineering shear is half a unit in each of E_ac and E_ca.
         let mut strain = Tensor::<f64, D>::zeros();
         strain[(a, c)] += 0.5;
         strain[(c, a)] += 0.5;
-        let stress = law.elasticity(at, start, &strain);
+        let stress = law.elasticity(at, &strain);
         for (row, &(i, k)) in pairs(D).iter().enumerate() {
             moduli[(row, column)] = volume * stress[(i, k)];
         }
@@ -58,14 +53,13 @@ impl<const D: usize> Stiffness<D> for Voigt {
     fn blocks<L: Law>(
         &self,
         law: &L,
-        at: &Deformation<f64, D>,
-        start: &Start<'_>,
+        at: &MaterialState<f64, D>,
         volume: f64,
         gradients: &[Vector<f64, D>],
         mut add: impl FnMut(usize, usize, Tensor<f64, D>),
     ) {
         let count = pairs(D).len();
-        let (moduli, stress) = (moduli(law, at, start, volume), scaled(&law.stress(at, start), volume));
+        let (moduli, stress) = (moduli(law, at, volume), scaled(&law.stress(at), volume));
         let b: Vec<_> = gradients.iter().map(|grad| strain_matrix(&at.f, grad)).collect();
         let d_b: Vec<_> = (b.iter())
             .map(|b| SMatrix::<f64, MOST, D>::from_fn(|row, i| (0..count).map(|k| moduli[(row, k)] * b[(k, i)]).sum()))

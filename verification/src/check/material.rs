@@ -3,8 +3,8 @@
 use super::regime::{Regime, condition, rotation, round_off};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{Law, NonPositiveJacobian, Start, admissible};
-use bfree::tensor::{Deformation, Tensor, contract, identity, inverse, outer, scaled};
+use bfree::material::{Law, MaterialState, NonPositiveJacobian};
+use bfree::tensor::{Tensor, contract, identity, inverse, outer, scaled};
 use num_dual::Dual64;
 
 /// Deformations tried in each regime.
@@ -17,61 +17,72 @@ const TRIES: usize = 8;
 /// is one, with P. The blocks of the closed form are compared with its product. S must not change under a rotation.
 /// Labels are (quantity, D, regime).
 pub fn check_material<L: Law>(law: &L) -> Report {
-    let memory: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
-    let start = Start { dt: 1.0, memory: &memory };
+    let internal: Vec<f64> = law.internal_variables().iter().map(|one| one.at_rest).collect();
+    let step = Step { dt: 1.0, internal: &internal };
     let mut report = Report::new("material law", &["quantity", "D", "regime"]);
-    at_rest::<L, 1>(law, &start, &mut report);
-    at_rest::<L, 2>(law, &start, &mut report);
-    at_rest::<L, 3>(law, &start, &mut report);
-    dimensions(law, &start, &mut report);
+    at_rest::<L, 1>(law, step, &mut report);
+    at_rest::<L, 2>(law, step, &mut report);
+    at_rest::<L, 3>(law, step, &mut report);
+    dimensions(law, step, &mut report);
     report
 }
 
-/// Like [`check_material`], for a law with internal variables in a step that starts with `start`. It omits the check that energy and stress
-/// vanish at rest.
+/// Like [`check_material`], for a law with internal variables in a step of length `dt` that starts with the values `internal`. It omits the
+/// check that energy and stress vanish at rest.
 ///
 /// ```
-/// use bfree::material::{Law, Remembered, Start};
+/// use bfree::material::{InternalVariable, Law, MaterialState};
 /// use bfree::scalar::Real;
-/// use bfree::tensor::{Deformation, Tensor, contract, symmetric};
+/// use bfree::tensor::{Tensor, contract, symmetric};
 ///
 /// /// S = 2G (1 − d) E with a damage d of the steps before.
 /// struct Damaged;
 ///
 /// impl Law for Damaged {
-///     fn memory(&self) -> &[Remembered] {
-///         &[Remembered { name: "damage", at_rest: 0.0 }]
+///     fn internal_variables(&self) -> &[InternalVariable] {
+///         &[InternalVariable { name: "damage", at_rest: 0.0 }]
 ///     }
-///     fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> T {
+///     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
 ///         let e = at.green_lagrange();
-///         contract(&e, &e) * T::lit(1.0 - start.memory[0])
+///         contract(&e, &e) * T::lit(1.0 - at.internal[0])
 ///     }
-///     fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>, start: &Start<'_>) -> Tensor<T, D> {
-///         at.green_lagrange().map(|e| e * T::lit(2.0 * (1.0 - start.memory[0])))
+///     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+///         at.green_lagrange().map(|e| e * T::lit(2.0 * (1.0 - at.internal[0])))
 ///     }
-///     fn elasticity<T: Real, const D: usize>(
-///         &self, _: &Deformation<T, D>, start: &Start<'_>, x: &Tensor<T, D>,
-///     ) -> Tensor<T, D> {
-///         symmetric(x).map(|x| x * T::lit(2.0 * (1.0 - start.memory[0])))
+///     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+///         symmetric(x) * (2.0 * (1.0 - at.internal[0]))
 ///     }
 /// }
 ///
-/// let report = verification::check_material_from(&Damaged, &Start { dt: 0.1, memory: &[0.25] });
+/// let report = verification::check_material_from(&Damaged, 0.1, &[0.25]);
 /// assert!(report.passed(), "{report}");
 /// ```
-pub fn check_material_from<L: Law>(law: &L, start: &Start<'_>) -> Report {
+pub fn check_material_from<L: Law>(law: &L, dt: f64, internal: &[f64]) -> Report {
     let mut report = Report::new("material law from a given start", &["quantity", "D", "regime"]);
-    dimensions(law, start, &mut report);
+    dimensions(law, Step { dt, internal }, &mut report);
     report
 }
 
-fn dimensions<L: Law>(law: &L, start: &Start<'_>, report: &mut Report) {
-    dimension::<L, 1>(law, start, report);
-    dimension::<L, 2>(law, start, report);
-    dimension::<L, 3>(law, start, report);
+/// The step whose end is checked: Δt, and the internal variables at t_n.
+#[derive(Clone, Copy)]
+struct Step<'a> {
+    dt: f64,
+    internal: &'a [f64],
 }
 
-fn dimension<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Report) {
+impl<'a> Step<'a> {
+    fn to<const D: usize>(self, h: Tensor<f64, D>) -> MaterialState<'a, f64, D> {
+        MaterialState::new(h).in_step(self.dt, self.internal)
+    }
+}
+
+fn dimensions<L: Law>(law: &L, step: Step<'_>, report: &mut Report) {
+    dimension::<L, 1>(law, step, report);
+    dimension::<L, 2>(law, step, report);
+    dimension::<L, 3>(law, step, report);
+}
+
+fn dimension<L: Law, const D: usize>(law: &L, step: Step<'_>, report: &mut Report) {
     let name = D.to_string();
     for regime in Regime::GENERAL {
         if !regime.exists(D) {
@@ -80,7 +91,7 @@ fn dimension<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Re
         let mut random = Random::new(41);
         let mut worst: [Option<Worst>; QUANTITIES.len()] = [None; QUANTITIES.len()];
         for _ in 0..TRIES {
-            match quantities::<L, D>(law, start, regime.displacement_gradient(&mut random), &mut random) {
+            match quantities::<L, D>(law, step.to(regime.displacement_gradient(&mut random)), &mut random) {
                 Ok((values, bound)) => {
                     for (worst, value) in worst.iter_mut().zip(values) {
                         if let Some(value) = value {
@@ -117,12 +128,12 @@ impl Worst {
 }
 
 /// No stress and no energy at F = I.
-fn at_rest<L: Law, const D: usize>(law: &L, start: &Start<'_>, report: &mut Report) {
-    let at = Deformation::<f64, D>::new(Tensor::zeros());
-    let stiffness = law.elasticity(&at, start, &identity()).norm();
+fn at_rest<L: Law, const D: usize>(law: &L, step: Step<'_>, report: &mut Report) {
+    let at = step.to::<D>(Tensor::zeros());
+    let stiffness = law.elasticity(&at, &identity()).norm();
     let bound = Bound::AtMost(round_off(1.0));
-    report.push(&["S = 0", &D.to_string(), "F=I"], law.stress(&at, start).norm() / stiffness, bound);
-    report.push(&["W = 0", &D.to_string(), "F=I"], law.energy(&at, start).abs() / stiffness, bound);
+    report.push(&["S = 0", &D.to_string(), "F=I"], law.stress(&at).norm() / stiffness, bound);
+    report.push(&["W = 0", &D.to_string(), "F=I"], law.energy(&at).abs() / stiffness, bound);
 }
 
 const QUANTITIES: [&str; 9] = [
@@ -140,32 +151,31 @@ const QUANTITIES: [&str; 9] = [
 /// Relative errors of all [`QUANTITIES`] that the law has at one deformation, and their common bound.
 fn quantities<L: Law, const D: usize>(
     law: &L,
-    start: &Start<'_>,
-    h: Tensor<f64, D>,
+    at: MaterialState<f64, D>,
     random: &mut Random,
 ) -> Result<([Option<f64>; QUANTITIES.len()], f64), NonPositiveJacobian> {
-    let at = admissible(h)?;
+    let at = at.admissible()?;
     let f = at.f;
-    let stress = law.stress(&at, start);
+    let stress = law.stress(&at);
     let (volume, l, m) = (random.between(0.5, 2.0), random.tensor::<D>(), random.tensor::<D>());
     let (a, v, b) = (random.vector::<D>(), random.vector::<D>(), random.vector::<D>());
 
     // F = ΔF F_n with a separate ΔF, so that a wrong pull-back by F_n shows.
     let f_n = inverse(&(identity::<f64, D>() + random.tensor() * (0.3 / D as f64))) * f;
     let delta_f = l * f_n;
-    let dual_at = admissible(h.zip_map(&delta_f, Dual64::new))?;
-    let dual_stress = law.stress(&dual_at, start);
+    let dual_at = at.deformed(at.h.zip_map(&delta_f, Dual64::new)).admissible()?;
+    let dual_stress = law.stress(&dual_at);
     let dual_piola = (dual_at.f * dual_stress).map(|s| s.eps);
     let dual_stress = dual_stress.map(|s| s.eps);
 
-    let elasticity = law.elasticity(&at, start, &(f.transpose() * delta_f));
+    let elasticity = law.elasticity(&at, &(f.transpose() * delta_f));
     // Round-off in F changes S by eps times this stiffness; near F = I that is more than eps times S.
-    let stiffness = law.elasticity(&at, start, &(f.transpose() * f)).norm();
+    let stiffness = law.elasticity(&at, &(f.transpose() * f)).norm();
 
-    let density = law.tangent_density(&at, start, &v, &b);
-    let by_elasticity = law.elasticity(&at, start, &outer(&a, &b)) * v;
+    let density = law.tangent_density(&at, &v, &b);
+    let by_elasticity = law.elasticity(&at, &outer(&a, &b)) * v;
 
-    let energy = (law.energy(&dual_at, start).eps - contract(&(f * stress), &delta_f)).abs();
+    let energy = (law.energy(&dual_at).eps - contract(&(f * stress), &delta_f)).abs();
     let work = (f * stress).norm() * delta_f.norm() + dual_piola.norm();
 
     let closed = law.closed(&f_n, &at, volume);
@@ -174,7 +184,7 @@ fn quantities<L: Law, const D: usize>(
         Some(closed) => closed.apply(l),
         None => {
             let delta_f = l * f_n;
-            let material = f * law.elasticity(&at, start, &(f.transpose() * delta_f));
+            let material = f * law.elasticity(&at, &(f.transpose() * delta_f));
             scaled(&((delta_f * stress + material) * f_n.transpose()), volume)
         }
     };
@@ -186,8 +196,8 @@ fn quantities<L: Law, const D: usize>(
     let (of_l, of_m) = (product(&l), product(&m));
     let asymmetry = (contract(&of_l, &m) - contract(&of_m, &l)).abs() / (of_l.norm() * m.norm());
 
-    let turned = law.stress(&Deformation::new(rotation::<D>(random) * f - identity::<f64, D>()), start);
-    let embedded = law.stress(&Deformation::new(upper_left::<D, 3>(&h)), start);
+    let turned = law.stress(&at.deformed(rotation::<D>(random) * f - identity::<f64, D>()));
+    let embedded = law.stress(&at.deformed(upper_left::<D, 3>(&at.h)));
 
     let values = [
         law.has_potential().then_some(energy / work),

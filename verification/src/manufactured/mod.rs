@@ -10,10 +10,10 @@ pub use axis_aligned::AxisAligned;
 pub use block::Block;
 pub use vortex::Vortex;
 
-use bfree::material::{Law, Start};
+use bfree::material::{Law, MaterialState};
 use bfree::mechanics::terms::ForceField;
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::{Dual, Dual2_64, Dual64};
 use std::sync::Arc;
 
@@ -70,8 +70,8 @@ pub fn body_force<M: Motion<D>, L: Law, const D: usize>(
     for k in 0..D {
         // (DIV P)_i = Σ_k ∂P_ik/∂X_k
         let seeded = Vector::<Dual64, D>::from_fn(|i, _| Dual64::new(x[i], f64::from(i == k)));
-        let at = Deformation::new(gradient(motion, &seeded, t));
-        let piola = (identity::<Dual64, D>() + at.h) * law.stress(&at, &Start::NONE);
+        let at = MaterialState::new(gradient(motion, &seeded, t));
+        let piola = (identity::<Dual64, D>() + at.h) * law.stress(&at);
         divergence += piola.column(k).map(|p| p.eps);
     }
     acceleration - divergence / density
@@ -124,8 +124,8 @@ mod tests {
         let (law, motion, density) = (NeoHookean::ciarlet(Lame::new(0.7, 0.4)?), Vortex::default(), 1.3);
         let (x, t, e) = (Vector::from([0.31, -0.44]), 0.61, 1e-5);
         let piola = |x: Vector<f64, 2>| {
-            let at = Deformation::new(state(&motion, &x, t).displacement_gradient);
-            at.f * law.stress(&at, &Start::NONE)
+            let at = MaterialState::new(state(&motion, &x, t).displacement_gradient);
+            at.f * law.stress(&at)
         };
         let mut divergence = Vector::<f64, 2>::zeros();
         for k in 0..2 {
@@ -145,10 +145,10 @@ mod tests {
     fn the_vortex_keeps_volume_and_turns_its_centre_as_a_rigid_body() {
         let motion = Vortex::default();
         for x in [[0.0, 0.0], [0.3, 0.5], [-0.6, 0.2]] {
-            let at = Deformation::new(state(&motion, &Vector::from(x), 1.0).displacement_gradient);
+            let at = MaterialState::new(state(&motion, &Vector::from(x), 1.0).displacement_gradient);
             assert!(at.j.abs() < 1e-14);
         }
-        let centre = Deformation::new(state(&motion, &Vector::zeros(), 1.0).displacement_gradient);
+        let centre = MaterialState::new(state(&motion, &Vector::zeros(), 1.0).displacement_gradient);
         assert!(centre.green_lagrange().amax() < 1e-15 && centre.h.amax() > 0.5);
     }
 }

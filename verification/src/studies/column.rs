@@ -7,7 +7,7 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
 use crate::shipped;
 use crate::table::Table;
-use bfree::material::{Law, Material, Start, admissible};
+use bfree::material::{Law, Material, MaterialState};
 use bfree::simulation::Simulation;
 use bfree::tensor::Tensor;
 
@@ -42,8 +42,8 @@ struct Errors {
 /// λ with P(λ) = `stress`, by bisection.
 fn stretch(law: &Material, stress: f64) -> f64 {
     let piola = |stretch: f64| {
-        let at = admissible(Tensor::<f64, 1>::new(stretch - 1.0));
-        at.map_or(f64::NAN, |at| stretch * law.stress(&at, &Start::NONE)[0])
+        let at = MaterialState::new(Tensor::<f64, 1>::new(stretch - 1.0)).admissible();
+        at.map_or(f64::NAN, |at| stretch * law.stress(&at)[0])
     };
     let (mut low, mut high) = (0.01, 10.0);
     while high - low > 1e-15 * high {
@@ -80,8 +80,8 @@ fn column(shape: &str, cells: u32, steps: u32) -> Result<Errors, StudyError> {
     let carried = |x: f64| -density * g * (height - x);
     let (mut squares, mut top) = (0.0, 0);
     for (p, x) in start.iter().enumerate() {
-        let at = admissible(particles.displacement_gradient[p])?;
-        let piola = at.f * law.stress(&at, &Start::NONE);
+        let at = particles.state(p, 0.0).admissible()?;
+        let piola = at.f * law.stress(&at);
         squares += ((piola[(1, 1)] - carried(x[1])) / (density * g * height)).powi(2);
         if x[1] > start[top][1] {
             top = p;

@@ -6,8 +6,8 @@
 use super::{Effort, Outcome, StudyError, short, worse};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{Lame, Law, Material, Start};
-use bfree::tensor::{Deformation, Tensor, contract, symmetric};
+use bfree::material::{Lame, Law, Material, MaterialState};
+use bfree::tensor::{Tensor, contract, symmetric};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "the laws keep their digits at strains of 1e-12";
@@ -35,15 +35,15 @@ pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
 
 fn linear<const D: usize>(name: &str, law: &Material, report: &mut Report) {
     let mut random = Random::new(37);
-    let at_rest = Deformation::<f64, D>::new(Tensor::zeros());
+    let at_rest = MaterialState::new(Tensor::<f64, D>::zeros());
     let (mut stress, mut energy): (f64, f64) = (0.0, 0.0);
     for _ in 0..20 {
-        let at = Deformation::new(random.tensor::<D>() * STRAIN);
+        let at = MaterialState::new(random.tensor::<D>() * STRAIN);
         let strain = symmetric(&at.h);
-        let expected = law.elasticity(&at_rest, &Start::NONE, &strain);
+        let expected = law.elasticity(&at_rest, &strain);
         let work = 0.5 * contract(&expected, &strain);
-        stress = worse(stress, (law.stress(&at, &Start::NONE) - expected).norm() / expected.norm());
-        energy = worse(energy, (law.energy(&at, &Start::NONE) - work).abs() / work);
+        stress = worse(stress, (law.stress(&at) - expected).norm() / expected.norm());
+        energy = worse(energy, (law.energy(&at) - work).abs() / work);
     }
     let dimension = D.to_string();
     report.push(&["S = C:E", name, &dimension], stress, Bound::AtMost(LINEAR));

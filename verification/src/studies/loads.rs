@@ -6,10 +6,10 @@
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
 use crate::table::Table;
-use bfree::material::{Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor, Vector, determinant};
+use bfree::tensor::{Tensor, Vector, determinant};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -137,8 +137,8 @@ fn law() -> Result<Material, StudyError> {
 
 /// P = F S
 fn piola(law: &Material, gradient: Tensor<f64, 2>) -> Tensor<f64, 2> {
-    let at = Deformation::new(gradient);
-    at.f * law.stress(&at, &Start::NONE)
+    let at = MaterialState::new(gradient);
+    at.f * law.stress(&at)
 }
 
 /// σ = P Fᵀ / J

@@ -6,8 +6,8 @@
 use super::{Effort, Outcome, StudyError, worse};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, Start, admissible};
-use bfree::tensor::{Deformation, Tensor, contract, identity, inverse};
+use bfree::material::{DISSIPATED, Lame, Law, Material, PLASTIC_STRAIN, MaterialState, internal_variable};
+use bfree::tensor::{Tensor, contract, identity, inverse};
 use num_dual::{Dual2_64, Dual64};
 
 /// The summary in the list of studies.
@@ -68,7 +68,7 @@ pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let title = "laws with memory: worst relative error of a regime";
     let mut report = Report::new(title, &["quantity", "law", "D", "regime"]);
     for (name, law) in Material::examples(Lame::from_young_poisson(1000.0, 0.3)?) {
-        if !law.memory().is_empty() {
+        if !law.internal_variables().is_empty() {
             dimension::<1>(name, &law, &mut report)?;
             dimension::<2>(name, &law, &mut report)?;
             dimension::<3>(name, &law, &mut report)?;
@@ -86,21 +86,21 @@ fn end<const D: usize>(regime: &Regime, random: &mut Random) -> Tensor<f64, D> {
 }
 
 fn dimension<const D: usize>(name: &str, law: &Material, report: &mut Report) -> Result<(), StudyError> {
-    let rest: Vec<f64> = law.memory().iter().map(|one| one.at_rest).collect();
-    let plastic = Start { dt: 0.0, memory: &rest }.recall(law, PLASTIC_STRAIN).is_some();
+    let rest: Vec<f64> = law.internal_variables().iter().map(|one| one.at_rest).collect();
+    let plastic = law.internal_variables().iter().any(|one| one.name == PLASTIC_STRAIN);
     for regime in REGIMES {
         let mut random = Random::new(17);
-        let (mut memory, mut f_0) = (rest.clone(), identity::<f64, D>());
+        let (mut internal, mut f_0) = (rest.clone(), identity::<f64, D>());
         if regime.flowed {
             f_0 = end(&regime_of_flow(), &mut random);
-            law.remember(&Deformation::new(f_0 - identity()), &Start { dt: 1.0, memory: &rest }, &mut memory);
+            internal = law.updated_variables(&MaterialState::new(f_0 - identity()).in_step(1.0, &rest));
         }
-        let start = Start { dt: regime.dt, memory: &memory };
         let mut worst = [0.0; QUANTITIES.len()];
         let mut flowed = 0;
         for _ in 0..TRIES {
             let f = end(regime, &mut random) * f_0;
-            let (errors, flows) = errors(law, &start, f - identity(), &mut random)?;
+            let at = MaterialState::new(f - identity()).in_step(regime.dt, &internal).admissible()?;
+            let (errors, flows) = errors(law, &at, &mut random);
             flowed += u32::from(flows);
             worst.iter_mut().zip(errors).for_each(|(worst, error)| *worst = worse(*worst, error));
         }
@@ -142,28 +142,26 @@ const QUANTITIES: [(&str, f64); 7] = [
 /// Errors of all [`QUANTITIES`], 0 for those that the law lacks, and whether the step had plastic flow.
 fn errors<const D: usize>(
     law: &Material,
-    start: &Start<'_>,
-    h: Tensor<f64, D>,
+    at: &MaterialState<f64, D>,
     random: &mut Random,
-) -> Result<([f64; QUANTITIES.len()], bool), StudyError> {
-    let at = admissible(h)?;
+) -> ([f64; QUANTITIES.len()], bool) {
     let (f, delta_f) = (at.f, random.tensor::<D>());
     let delta_f = delta_f * f;
-    let (stress, dual) = (law.stress(&at, start), Deformation::new(h.zip_map(&delta_f, Dual64::new)));
-    let dual_stress = law.stress(&dual, start);
+    let (stress, dual) = (law.stress(at), at.deformed(at.h.zip_map(&delta_f, Dual64::new)));
+    let dual_stress = law.stress(&dual);
     let piola = (dual.f * dual_stress).map(|x| x.eps);
     let dual_stress = dual_stress.map(|x| x.eps);
     let strain = f.transpose() * delta_f;
-    let elasticity = law.elasticity(&at, start, &strain);
-    let stiffness = law.elasticity(&at, start, &(f.transpose() * f)).norm();
+    let elasticity = law.elasticity(at, &strain);
+    let stiffness = law.elasticity(at, &(f.transpose() * f)).norm();
 
     let f_n = inverse(&(identity::<f64, D>() + random.tensor() * (0.3 / D as f64))) * f;
-    let blocks = law.tangent_blocks(&f_n, &at, start);
+    let blocks = law.tangent_blocks(&f_n, at);
     let mut block: f64 = 0.0;
     for k in 0..D {
         for l in 0..D {
             let unit = |k: usize| f_n.row(k).transpose();
-            let expected = f * law.tangent_density(&at, start, &unit(k), &unit(l)) * f.transpose();
+            let expected = f * law.tangent_density(at, &unit(k), &unit(l)) * f.transpose();
             block = worse(block, (blocks[k][l] - expected).norm() / stiffness);
         }
     }
@@ -171,24 +169,23 @@ fn errors<const D: usize>(
     let work = (f * stress).norm() * delta_f.norm() + piola.norm() * delta_f.norm();
     let (mut potential, mut curvature, mut asymmetry) = (0.0, 0.0, 0.0);
     if law.has_potential() {
-        potential = (law.energy(&dual, start).eps - contract(&(f * stress), &delta_f)).abs() / work;
-        let second = Deformation::new(h.zip_map(&delta_f, |h, d| Dual2_64::new(h, d, 0.0)));
-        curvature = (law.energy(&second, start).v2 - contract(&piola, &delta_f)).abs() / work;
+        potential = (law.energy(&dual).eps - contract(&(f * stress), &delta_f)).abs() / work;
+        let second = at.deformed(at.h.zip_map(&delta_f, |h, d| Dual2_64::new(h, d, 0.0)));
+        curvature = (law.energy(&second).v2 - contract(&piola, &delta_f)).abs() / work;
     }
     if law.is_symmetric() {
         let other = f.transpose() * random.tensor::<D>() * f;
-        let (one, two) = (contract(&elasticity, &other), contract(&law.elasticity(&at, start, &other), &strain));
+        let (one, two) = (contract(&elasticity, &other), contract(&law.elasticity(at, &other), &strain));
         asymmetry = (one - two).abs() / (elasticity.norm() * other.norm());
     }
 
-    let mut next = start.memory.to_vec();
-    law.remember(&at, start, &mut next);
-    let after = Start { dt: 0.0, memory: &next };
-    let kept = (law.stress(&at, &after) - stress).norm() / (stress.norm() + 1e-3 * stiffness);
-    let lost = |start: &Start<'_>| start.recall(law, DISSIPATED).unwrap_or(0.0);
-    let gained = (lost(start) - lost(&after)).max(0.0) / stiffness;
-    let strain = |start: &Start<'_>| start.recall(law, PLASTIC_STRAIN).unwrap_or(0.0);
-    let flows = strain(&after) > strain(start);
+    let next = law.updated_variables(at);
+    let after = at.in_step(0.0, &next);
+    let kept = (law.stress(&after) - stress).norm() / (stress.norm() + 1e-3 * stiffness);
+    let lost = |at: &MaterialState<f64, D>| internal_variable(law, at, DISSIPATED).unwrap_or(0.0);
+    let gained = (lost(at) - lost(&after)).max(0.0) / stiffness;
+    let strain = |at: &MaterialState<f64, D>| internal_variable(law, at, PLASTIC_STRAIN).unwrap_or(0.0);
+    let flows = strain(&after) > strain(at);
     let tangent = (elasticity - dual_stress).norm() / dual_stress.norm();
-    Ok(([tangent, block, potential, curvature, kept, gained, asymmetry], flows))
+    ([tangent, block, potential, curvature, kept, gained, asymmetry], flows)
 }

@@ -8,7 +8,7 @@ use crate::table::Table;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::sweep::Supports;
@@ -18,7 +18,7 @@ use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
-use bfree::tensor::{Deformation, Tensor, Vector, determinant, identity, inverse};
+use bfree::tensor::{Tensor, Vector, determinant, identity, inverse};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "affine motion, the patch test, rigid motion, momentum";
@@ -236,8 +236,8 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
     let volume = 0.5_f64.powi(D as i32);
     let law = Material::from(NeoHookean::ciarlet(Lame::new(150.0, 30.0)?));
     let h = Random::new(37).tensor::<D>() * 0.3;
-    let at = Deformation::new(h);
-    let stress = volume * (at.f * law.stress(&at, &Start::NONE) * at.f.transpose()).norm();
+    let at = MaterialState::new(h);
+    let stress = volume * (at.f * law.stress(&at) * at.f.transpose()).norm();
     let bodies = [Body { name: "patch".into(), law, density: 1.0, dilatation: Default::default() }];
     for (layout, label) in Layout::ALL {
         let mut particles = Particles::default();
@@ -275,14 +275,14 @@ fn superposed_rotation<const D: usize>(name: &str, law: &Material, report: &mut 
         }
         let (at, turned) = (deformation(&f), deformation(&(q * f)));
         // Round-off of F changes S by eps times this.
-        let stiffness = law.elasticity(&at, &Start::NONE, &(f.transpose() * f)).norm();
-        let (w, s) = (law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
-        energy = worse(energy, (law.energy(&turned, &Start::NONE) - w).abs() / (w.abs() + s.norm()));
-        stress = worse(stress, (law.stress(&turned, &Start::NONE) - s).norm() / (s.norm() + stiffness));
+        let stiffness = law.elasticity(&at, &(f.transpose() * f)).norm();
+        let (w, s) = (law.energy(&at), law.stress(&at));
+        energy = worse(energy, (law.energy(&turned) - w).abs() / (w.abs() + s.norm()));
+        stress = worse(stress, (law.stress(&turned) - s).norm() / (s.norm() + stiffness));
         let rigid = deformation(&q);
-        let stiffness = law.elasticity(&rigid, &Start::NONE, &identity()).norm();
-        resting_energy = worse(resting_energy, law.energy(&rigid, &Start::NONE).abs() / stiffness);
-        resting_stress = worse(resting_stress, law.stress(&rigid, &Start::NONE).norm() / stiffness);
+        let stiffness = law.elasticity(&rigid, &identity()).norm();
+        resting_energy = worse(resting_energy, law.energy(&rigid).abs() / stiffness);
+        resting_stress = worse(resting_stress, law.stress(&rigid).norm() / stiffness);
     }
     let dimension = D.to_string();
     let bound = Bound::AtMost(MOMENTUM);
@@ -292,8 +292,8 @@ fn superposed_rotation<const D: usize>(name: &str, law: &Material, report: &mut 
     report.push(&["S(Q)", name, &dimension], resting_stress, bound);
 }
 
-fn deformation<const D: usize>(f: &Tensor<f64, D>) -> Deformation<f64, D> {
-    Deformation::new(f - identity::<f64, D>())
+fn deformation<const D: usize>(f: &Tensor<f64, D>) -> MaterialState<'static, f64, D> {
+    MaterialState::new(f - identity::<f64, D>())
 }
 
 /// A random rotation, any angle: Cayley's transform of a random skew tensor, squared.

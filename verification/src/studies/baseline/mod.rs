@@ -11,13 +11,13 @@ use crate::settling;
 use crate::table::Table;
 use bfree::approximation::{Approximation, Linear, Lme};
 use bfree::clock::Clock;
-use bfree::material::{Law, Material};
+use bfree::material::{Law, Material, MaterialState};
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::tangent::frozen_bytes;
 use bfree::simulation::Simulation;
 use bfree::pooled::Pool;
 use bfree::solver::{BlockJacobi, GmresSettings, gmres};
-use bfree::tensor::{Deformation, Tensor, Vector, identity};
+use bfree::tensor::{Tensor, Vector, identity};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -59,7 +59,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         let (plane, space) = if large { (64, 10) } else { (16, 4) };
         // Blocks of a law without a closed form need one product each. LME has 4·10⁵ of them in 3D, which take up to three minutes and show
         // no more than linear functions.
-        let is_closed = law.closed::<3>(&identity(), &Deformation::new(Tensor::zeros()), 1.0).is_some();
+        let is_closed = law.closed::<3>(&identity(), &MaterialState::new(Tensor::zeros()), 1.0).is_some();
         for (name, shape) in shapes.iter().take(if is_closed { 2 } else { 1 }) {
             study.case::<2>(name, shape, law, law_name, plane)?;
             study.case::<3>(name, shape, law, law_name, space)?;

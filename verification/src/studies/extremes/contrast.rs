@@ -5,11 +5,11 @@ use super::{Report, StudyError, rows, solvable, worse};
 use bfree::approximation::{Approximation, Gimp, Linear, Lme};
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, Start};
+use bfree::material::{Lame, Law, Material, MaterialState};
 use bfree::mechanics::loads::{Curve, Motion};
 use bfree::particles::Particles;
 use bfree::simulation::{Simulation, StepError};
-use bfree::tensor::{Deformation, Tensor, Vector};
+use bfree::tensor::{Tensor, Vector};
 
 /// Round-off of a sum over the particles of a few nodes.
 const ROUNDINGS: f64 = 64.0;
@@ -61,8 +61,8 @@ fn confined<const D: usize>(poisson: f64, name: &str, shape: &Approximation, rep
     simulation.loads.prescribed[moving] = normal(D - 1, true, Motion::Displacement(curve));
     let mut exact = Tensor::<f64, D>::zeros();
     exact[(D - 1, D - 1)] = strain;
-    let at = Deformation::new(exact);
-    let piola = at.f * simulation.bodies[0].law.stress(&at, &Start::NONE);
+    let at = MaterialState::new(exact);
+    let piola = at.f * simulation.bodies[0].law.stress(&at);
     let force = piola[(D - 1, D - 1)] * f64::from(CELLS).powi(D as i32 - 1);
     let what = format!("confined compression, {name}, D = {D}");
     let case = format!("nu = {poisson}");
@@ -149,11 +149,11 @@ fn in_series(contrast: f64, stiff_last: bool, report: &mut Report) -> Result<(),
 /// The strains of a soft and a stiff bar that have the same nominal stress and together the strain `sum`.
 fn series(soft: &Material, stiff: &Material, sum: f64) -> (f64, f64) {
     let nominal = |law: &Material, strain: f64| {
-        let at = Deformation::<f64, 1>::new(Tensor::from_element(strain));
-        (at.f * law.stress(&at, &Start::NONE))[0]
+        let at = MaterialState::new(Tensor::<f64, 1>::from_element(strain));
+        (at.f * law.stress(&at))[0]
     };
-    let rest = Deformation::new(Tensor::<f64, 1>::zeros());
-    let modulus = |law: &Material| law.elasticity(&rest, &Start::NONE, &Tensor::from_element(1.0))[0];
+    let rest = MaterialState::new(Tensor::<f64, 1>::zeros());
+    let modulus = |law: &Material| law.elasticity(&rest, &Tensor::from_element(1.0))[0];
     let slope = modulus(soft) + modulus(stiff);
     let mut in_stiff = 0.0;
     // The iteration contracts by the relative change of the moduli, a few tenths.

@@ -6,7 +6,7 @@ use super::{Outcome, SOLVABLE, refused, rows};
 use crate::check::regime::rotation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{NonPositiveJacobian, admissible};
+use bfree::material::{NonPositiveJacobian, MaterialState};
 use bfree::tensor::{Tensor, determinant, identity};
 use std::f64::consts::PI;
 
@@ -114,7 +114,7 @@ pub(super) fn bad<const D: usize>() -> Vec<(&'static str, Vec<Tensor<f64, D>>)> 
 
 fn impossible<const D: usize>(report: &mut Report) {
     for (case, list) in bad::<D>() {
-        let answers = list.iter().map(|f| admissible(f - identity::<f64, D>()));
+        let answers = list.iter().map(|f| MaterialState::new(f - identity::<f64, D>()).admissible());
         let what = format!("one point, D = {D}");
         refused(report, &what, case, "NonPositiveJacobian", answers, |NonPositiveJacobian { det_f }| {
             // The error must state the cause: not positive, or not finite.

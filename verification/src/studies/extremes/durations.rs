@@ -4,11 +4,11 @@ use super::bodies::{self, PLAIN, fill, simulation, sliding, stir, sum_of_momenta
 use super::{Effort, Outcome, Report, StudyError, at_most, refused, rows, solvable, steps, worse};
 use bfree::approximation::{Approximation, Gimp, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{Lame, LameError, Law, Start};
+use bfree::material::{Lame, LameError, Law, MaterialState};
 use bfree::particles::Particles;
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor, Vector};
+use bfree::tensor::{Tensor, Vector};
 
 /// Round-off of sums over the particles of a few nodes.
 const ROUNDINGS: f64 = 64.0;
@@ -114,8 +114,8 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     let particles = simulation.particles.by_id();
     let speed = particles.velocity.iter().map(Vector::norm).fold(0.0, worse) / sound;
     let moved = particles.position.iter().zip(&start.position).map(|(x, x_0)| (x - x_0).norm()).fold(0.0, worse);
-    let at = Deformation::new(strain);
-    let stress = bodies::body(PLAIN, 1.0).law.stress(&at, &Start::NONE).norm() / PLAIN.p_wave_modulus();
+    let at = MaterialState::new(strain);
+    let stress = bodies::body(PLAIN, 1.0).law.stress(&at).norm() / PLAIN.p_wave_modulus();
     // Each step adds a random rounding of the stresses. Velocities grow with the root of the number of steps; displacements sum them once
     // more.
     let bound = ROUNDINGS * f64::EPSILON * stress * f64::from(steps).sqrt();

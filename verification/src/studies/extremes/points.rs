@@ -2,9 +2,9 @@
 
 use crate::double_double::DoubleDouble;
 use crate::studies::short;
-use bfree::material::{Lame, Law, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff, Start};
+use bfree::material::{Lame, Law, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff, MaterialState};
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
+use bfree::tensor::{Tensor, Vector, contract, determinant, identity, inverse, outer, scaled, trace};
 use num_traits::Signed;
 
 /// ν = 0.3. Laws in logarithmic strains have no textbook formula that double-double could evaluate, and are left out.
@@ -75,15 +75,15 @@ impl Errors {
 /// To first order in eps, rounding of the input changes S by ‖∂S/∂H‖ eps ‖H‖ and W by ‖P‖ eps ‖H‖. If W is of second order in a strain
 /// below eps, it also changes by ½ ‖∂P/∂H‖ (eps ‖H‖)².
 pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding: Rounding) -> Errors {
-    let at = Deformation::new(*h);
-    let exact_at = Deformation::new(h.map(DoubleDouble::from));
-    let (exact_w, exact_s) = (law.energy(&exact_at, &Start::NONE), law.stress(&exact_at, &Start::NONE));
+    let at = MaterialState::new(*h);
+    let exact_at = MaterialState::new(h.map(DoubleDouble::from));
+    let (exact_w, exact_s) = (law.energy(&exact_at), law.stress(&exact_at));
     let error = |w: f64, s: Tensor<f64, D>| {
         let w = (DoubleDouble::from(w) - exact_w).magnitude();
         let s = s.zip_map(&exact_s, |s, exact| (DoubleDouble::from(s) - exact).magnitude()).norm();
         (w, s)
     };
-    let (energy, stress) = error(law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
+    let (energy, stress) = error(law.energy(&at), law.stress(&at));
     let (naive_w, naive_s) = naive(law, h);
     let (naive_energy, naive_stress) = error(naive_w, naive_s);
 
@@ -92,7 +92,7 @@ pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding
     let unit = |k: usize| Vector::<f64, D>::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
     let response = |i: usize, k: usize| {
         let strain = at.f.transpose() * outer(&unit(i), &unit(k));
-        law.elasticity(&at, &Start::NONE, &strain).norm()
+        law.elasticity(&at, &strain).norm()
     };
     let pairs = || (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
     let stiffness = pairs().map(|(i, k)| response(i, k).powi(2)).sum::<f64>().sqrt();
@@ -101,7 +101,7 @@ pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding
         Rounding::Products => {
             // δF = F δJ/(D J) is a purely volumetric change.
             let volume = permanent(&at.f.abs()) / (D as f64 * at.jacobian);
-            let response = law.elasticity(&at, &Start::NONE, &(at.f.transpose() * at.f)).norm();
+            let response = law.elasticity(&at, &(at.f.transpose() * at.f)).norm();
             let change_w = piola.norm() * h.norm() + contract(&piola, &at.f).abs() * volume;
             (change_w, stiffness * h.norm() + response * volume)
         }
@@ -124,8 +124,8 @@ pub(super) fn judge<const D: usize>(law: &Material, h: &Tensor<f64, D>, rounding
 /// The generic formulas against the textbook formulas, both in double-double, relative to the result.
 pub(super) fn reference<const D: usize>(law: &Material, h: &Tensor<f64, D>) -> f64 {
     let h = h.map(DoubleDouble::from);
-    let at = Deformation::new(h);
-    let (w, s) = (law.energy(&at, &Start::NONE), law.stress(&at, &Start::NONE));
+    let at = MaterialState::new(h);
+    let (w, s) = (law.energy(&at), law.stress(&at));
     let (naive_w, naive_s) = naive(law, &h);
     let stress = s.zip_map(&naive_s, |a, b| (a - b).magnitude()).norm() / s.map(DoubleDouble::magnitude).norm();
     super::worse((w - naive_w).abs().magnitude() / w.magnitude(), stress)

@@ -8,9 +8,9 @@ use crate::studies::StudyError;
 use crate::studies::tangent::cloud;
 use crate::{check_material, check_tangent};
 use bfree::approximation::Bspline;
-use bfree::material::{ClosedTangent, Elastic, Lame, Law, Material, NeoHookean, StVenantKirchhoff, Start};
+use bfree::material::{ClosedTangent, Law, Lame, Material, NeoHookean, StVenantKirchhoff, MaterialState};
 use bfree::scalar::Real;
-use bfree::tensor::{Deformation, Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
+use bfree::tensor::{Tensor, Vector, contract, identity, outer, scaled, symmetric, trace};
 
 /// The fault of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,8 +62,8 @@ impl Wrong {
     }
 }
 
-fn transposed<T: Real, const D: usize>(at: &Deformation<T, D>) -> Deformation<T, D> {
-    Deformation::new(at.h.transpose())
+fn transposed<'a, T: Real, const D: usize>(at: &MaterialState<'a, T, D>) -> MaterialState<'a, T, D> {
+    at.deformed(at.h.transpose())
 }
 
 /// Λ tr(X) I + 2G X
@@ -77,9 +77,9 @@ fn along_one<T: Real, const D: usize>(lame: Lame, x: &Tensor<T, D>) -> Tensor<T,
     Tensor::from_fn(|i, k| if (i, k) == (0, 0) { trace } else { T::zero() })
 }
 
-impl Elastic for Wrong {
-    fn energy<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> T {
-        let right = self.law::<D>().energy(at, &Start::NONE);
+impl Law for Wrong {
+    fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
+        let right = self.law::<D>().energy(at);
         match self.fault {
             Fault::EnergyFactor => right * T::lit(1.01),
             Fault::StressAtRest => right + T::lit(SMALL * self.lame.shear) * trace(&at.green_lagrange()),
@@ -87,8 +87,8 @@ impl Elastic for Wrong {
         }
     }
 
-    fn stress<T: Real, const D: usize>(&self, at: &Deformation<T, D>) -> Tensor<T, D> {
-        let right = self.law::<D>().stress(at, &Start::NONE);
+    fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
+        let right = self.law::<D>().stress(at);
         let small = T::lit(SMALL * self.lame.shear);
         match self.fault {
             Fault::StressScaled => scaled(&right, T::lit(1.0 + SMALL)),
@@ -100,56 +100,48 @@ impl Elastic for Wrong {
         }
     }
 
-    fn elasticity<T: Real, const D: usize>(&self, at: &Deformation<T, D>, x: &Tensor<T, D>) -> Tensor<T, D> {
-        let right = self.law::<D>().elasticity(at, &Start::NONE, x);
+    fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
+        let right = self.law::<D>().elasticity(at, x);
         match self.fault {
-            Fault::ElasticityFactor => scaled(&right, T::lit(2.0)),
-            Fault::ElasticityScaled => scaled(&right, T::lit(1.0 + SMALL)),
+            Fault::ElasticityFactor => scaled(&right, 2.0),
+            Fault::ElasticityScaled => scaled(&right, 1.0 + SMALL),
             // St. Venant–Kirchhoff's law: X is treated as symmetric; G in place of 2G.
             Fault::ElasticityUnsymmetrised => hooke(self.lame, x),
-            Fault::ElasticityHalfShear => right - scaled(&symmetric(x), T::lit(self.lame.shear)),
+            Fault::ElasticityHalfShear => right - scaled(&symmetric(x), self.lame.shear),
             // Ciarlet's law: ΛJ in place of ΛJ².
             Fault::ElasticitySingleJacobian => {
                 let f_inv_t = at.inverse_transpose();
                 let c_inv = f_inv_t.transpose() * f_inv_t;
-                let less = T::lit(self.lame.lambda) * (at.jacobian * at.jacobian - at.jacobian);
+                let less = self.lame.lambda * (at.jacobian * at.jacobian - at.jacobian);
                 right - scaled(&c_inv, less * contract(&c_inv, x))
             }
             Fault::NoPotential => right + along_one(self.lame, x),
-            Fault::ElasticityTransposedF => self.right.elasticity(&transposed(at), &Start::NONE, x),
+            Fault::ElasticityTransposedF => self.right.elasticity(&transposed(at), x),
             _ => right,
         }
     }
 
-    fn tangent_density<T: Real, const D: usize>(
-        &self,
-        at: &Deformation<T, D>,
-        v: &Vector<T, D>,
-        b: &Vector<T, D>,
-    ) -> Tensor<T, D> {
-        let right = |v, b| self.law::<D>().tangent_density(at, &Start::NONE, v, b);
+    fn tangent_density<const D: usize>(&self, at: &MaterialState<f64, D>, v: &Vector<f64, D>, b: &Vector<f64, D>) -> Tensor<f64, D> {
+        let right = |v, b| self.law::<D>().tangent_density(at, v, b);
         match self.fault {
             Fault::DensitySwapped => right(b, v),
             // The last term of St. Venant–Kirchhoff's law, + G b⊗v, with the other sign.
-            Fault::DensitySign => right(v, b) - scaled(&outer(b, v), T::lit(2.0 * self.lame.shear)),
+            Fault::DensitySign => right(v, b) - scaled(&outer(b, v), 2.0 * self.lame.shear),
             // Λ (e₁·v) e₁ ⊗ b
             Fault::NoPotential => {
-                let e_1 = Vector::from_fn(|i, _| if i == 0 { T::one() } else { T::zero() });
-                right(v, b) + scaled(&outer(&e_1, b), T::lit(0.01 * self.lame.lambda) * v[0])
+                let e_1 = Vector::from_fn(|i, _| f64::from(i == 0));
+                right(v, b) + scaled(&outer(&e_1, b), 0.01 * self.lame.lambda * v[0])
             }
             // ℂmat from ℂ, if the fault is in ℂ.
             _ if self.general => Tensor::from_columns(&std::array::from_fn::<_, D, _>(|k| {
-                let e_k = Vector::from_fn(|i, _| if i == k { T::one() } else { T::zero() });
-                Elastic::elasticity(self, at, &outer(&e_k, b)) * v
+                let e_k = Vector::from_fn(|i, _| f64::from(i == k));
+                self.elasticity(at, &outer(&e_k, b)) * v
             })),
             _ => right(v, b),
         }
     }
 
-    fn closed<const D: usize>(
-        &self,
-        f_n: &Tensor<f64, D>,
-        at: &Deformation<f64, D>,
+    fn closed<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         if self.general {
@@ -163,7 +155,7 @@ impl Elastic for Wrong {
         }?;
         match self.fault {
             Fault::ClosedGeometricSign => {
-                let geometric = f_n * law.stress(at, &Start::NONE) * f_n.transpose() * volume;
+                let geometric = f_n * law.stress(at) * f_n.transpose() * volume;
                 for i in 0..D {
                     for k in 0..D {
                         closed.right[i][k] -= 2.0 * geometric[(i, k)];

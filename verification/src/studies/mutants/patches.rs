@@ -133,7 +133,6 @@ const KIRCHHOFF: &str = "src/material/st_venant_kirchhoff.rs";
 const CLOSED: &str = "src/material/closed_tangent.rs";
 const FROM_ENERGY: &str = "src/material/from_energy.rs";
 const LAW: &str = "src/material/law.rs";
-const PIOLA: &str = "src/material/piola.rs";
 const SPECTRAL: &str = "src/material/spectral.rs";
 const HENCKY: &str = "src/material/hencky.rs";
 const HARDENING: &str = "src/material/hardening.rs";
@@ -141,6 +140,7 @@ const PLASTIC: &str = "src/material/plastic.rs";
 const VON_MISES: &str = "src/material/von_mises.rs";
 const DRUCKER_PRAGER: &str = "src/material/drucker_prager.rs";
 const VISCOELASTIC: &str = "src/material/viscoelastic.rs";
+const VOLUME: &str = "src/material/volume.rs";
 const TENSOR: &str = "src/tensor.rs";
 const GMRES: &str = "src/solver/gmres/mod.rs";
 const CONJUGATE: &str = "src/solver/conjugate_gradient.rs";
@@ -329,28 +329,28 @@ pub(super) const PATCHES: &[Patch] = &[
         "Vector::from([self.particles.mass[p]])",
         Equivalent("only the preconditioner of the projection")),
     patch("B for F_n S F_n^T in the geometric part of a closed form", PARTICLE,
-        "f_n * law.stress(&at, start) * f_n.transpose()",
-        "law.stress(&at, start)",
+        "f_n * law.stress(&at) * f_n.transpose()",
+        "law.stress(&at)",
         Killed(&[TANGENT], &[POINTS])),
     patch("no geometric part without a closed form", PARTICLE,
         "scaled(&identity(), geometric[(k, l)])",
         "scaled(&identity(), 0.0 * geometric[(k, l)])",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("misprint (34): F for its transpose", LAW,
-        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
-        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f",
+        "at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("misprint (34): both gradients J", LAW,
-        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
-        "at.f * self.tangent_density(at, start, &unit(l), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(l), &unit(l)) * at.f.transpose()",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("misprint after (37): v and b swapped", LAW,
-        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
-        "at.f * self.tangent_density(at, start, &unit(l), &unit(k)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(l), &unit(k)) * at.f.transpose()",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("misprint after (37), both", LAW,
-        "at.f * self.tangent_density(at, start, &unit(k), &unit(l)) * at.f.transpose()",
-        "at.f * self.tangent_density(at, start, &unit(l), &unit(k)) * at.f",
+        "at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose()",
+        "at.f * self.tangent_density(at, &unit(l), &unit(k)) * at.f",
         Killed(&[TANGENT], &[POINTS, DYNAMICS])),
     patch("reactions left in Newton's residual", PRODUCT,
         "self.clear_prescribed(residual);",
@@ -596,11 +596,11 @@ pub(super) const PATCHES: &[Patch] = &[
         "scaled(&outer(&cb, &cv), q)",
         "scaled(&outer(&cv, &cb), q)",
         Killed(&[POINTS, TANGENT], &[DYNAMICS])),
-    patch("ln J for its square in W", NEO_HOOKEAN,
+    patch("ln J for its square in W", VOLUME,
         "at.log_jacobian() * at.log_jacobian()",
         "at.log_jacobian()",
         Killed(&[TANGENT, DIGITS], &[POINTS])),
-    patch("J for J^2 in the bulk stiffness", NEO_HOOKEAN,
+    patch("J for J^2 in the bulk stiffness", VOLUME,
         "T::lit(lambda) * at.jacobian * at.jacobian",
         "T::lit(lambda) * at.jacobian",
         Killed(&[TANGENT, POINTS, DYNAMICS], &[DIGITS])),
@@ -620,9 +620,9 @@ pub(super) const PATCHES: &[Patch] = &[
         "self.0.energy(&seeded(e, &direction(i, k))).eps",
         "self.0.energy(&seeded(e, &direction(i, k))).eps * T::lit(if i == k { 1.0 } else { 2.0 })",
         Killed(&[TANGENT], &[DYNAMICS, POINTS])),
-    patch("P = S F for F S", PIOLA,
-        "f_left * law.stress(at, start)",
-        "law.stress(at, start) * f_left",
+    patch("P = S F for F S", LAW,
+        "f_left * law.stress(at)",
+        "law.stress(at) * f_left",
         Killed(&[TANGENT, POINTS, DYNAMICS], &[DIGITS])),
     patch("no divided differences off the diagonal", SPECTRAL,
         "f.difference(d(i), d(j)) * a[(i, j)]",

@@ -17,12 +17,12 @@ use crate::table::Table;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
-use bfree::material::{Lame, Law, Material, NeoHookean, Start};
+use bfree::material::{Lame, Law, Material, NeoHookean, MaterialState};
 use bfree::mechanics::loads::{self, Curve, Loads, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint};
 use bfree::particles::{Body, Particles};
 use bfree::shape::{self, Ball, Block, Difference, Fill, Filling, Seed, Shape, fill};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
-use bfree::tensor::{Deformation, Tensor, Vector};
+use bfree::tensor::{Tensor, Vector};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str =
@@ -146,8 +146,8 @@ impl<M: Motion<D> + Copy + Send + 'static, const D: usize> Held<M, D> {
     fn stress(&self) -> f64 {
         let law = &self.simulation.bodies[0].law;
         let tau = |h: Tensor<f64, D>| {
-            let at = Deformation::new(h);
-            at.f * law.stress(&at, &Start::NONE) * at.f.transpose()
+            let at = MaterialState::new(h);
+            at.f * law.stress(&at) * at.f.transpose()
         };
         self.relative(|particles, p, exact| {
             let of_exact = tau(exact.displacement_gradient);
@@ -177,8 +177,8 @@ fn tractions<M: Motion<D>, const D: usize>(
             grid.origin[k] + at as f64 * edges[k]
         });
         for facet in body.surface_points(Some(&around), &lower, &edges, grid.spacing) {
-            let at = Deformation::new(state(motion, &facet.position, 1.0).displacement_gradient);
-            let traction = at.f * law.stress(&at, &Start::NONE) * facet.normal;
+            let at = MaterialState::new(state(motion, &facet.position, 1.0).displacement_gradient);
+            let traction = at.f * law.stress(&at) * facet.normal;
             let point = SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area };
             // The particle lies slightly inside, in the cell of the body.
             particles.push_without_inertia(facet.position - facet.normal * (1e-6 * grid.spacing), 0.0, 0.0, 0);

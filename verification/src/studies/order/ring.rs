@@ -5,9 +5,9 @@ use crate::report::{Bound, Report};
 use crate::shipped;
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
-use bfree::material::{Law, Start};
+use bfree::material::{Law, MaterialState};
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor};
+use bfree::tensor::{Tensor};
 
 /// Inner and outer radius, Λ and G of the scene; the pressure.
 const RADII: [f64; 2] = [1.0, 1.5];
@@ -100,8 +100,8 @@ fn ring(family: &str, cells: u32, hole: At) -> Result<([f64; 3], f64), StudyErro
         let exact = along * (r - radius);
         displacement[0] += volume * (moved - exact).norm_squared();
         displacement[1] += volume * exact.norm_squared();
-        let at = Deformation::new(particles.displacement_gradient[p]);
-        let tau = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+        let at = MaterialState::new(particles.displacement_gradient[p]);
+        let tau = at.f * law.stress(&at) * at.f.transpose();
         let (hoop, radial) = (r / radius, along * along.transpose());
         let exact: Tensor<f64, 2> = radial * (stretch * piola(stretch, hoop))
             + (Tensor::<f64, 2>::identity() - radial) * (hoop * piola(hoop, stretch));

@@ -4,10 +4,10 @@ use super::{NEAR, Refined};
 use crate::report::{Bound, Report};
 use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
-use bfree::material::{Law, Start};
+use bfree::material::{Law, MaterialState};
 use bfree::scene;
 use bfree::simulation::Simulation;
-use bfree::tensor::{Deformation, Tensor};
+use bfree::tensor::{Tensor};
 
 /// Inner and outer radius; Λ = G of the scene's E = 2500, ν = ¼. Squares of strains, 1e-6, are below all errors.
 const RADII: [f64; 2] = [1.0, 2.0];
@@ -62,8 +62,8 @@ fn shell(family: &str, cells: u32) -> Result<([f64; 2], f64), StudyError> {
         let exact = along * (a * radius + b / radius.powi(2));
         displacement[0] += volume * (particles.position[p] - x - exact).norm_squared();
         displacement[1] += volume * exact.norm_squared();
-        let at = Deformation::new(particles.displacement_gradient[p]);
-        let tau = at.f * law.stress(&at, &Start::NONE) * at.f.transpose();
+        let at = MaterialState::new(particles.displacement_gradient[p]);
+        let tau = at.f * law.stress(&at) * at.f.transpose();
         let radial = along * along.transpose();
         // σ_r = 5G A − 4G B/r³, σ_θ = 5G A + 2G B/r³
         let exact = Tensor::<f64, 3>::identity() * (LAME * (5.0 * a + 2.0 * b / radius.powi(3)))
