@@ -144,6 +144,9 @@ pub(crate) struct Place {
     pub above: f64,
 }
 
+/// Round-off of a position that many steps have added up, in spacings.
+const ACCUMULATED: f64 = 1e-12;
+
 impl Place {
     /// # Errors
     /// The point is outside the axis, or the axis has no cells.
@@ -167,6 +170,7 @@ impl Place {
     /// cell to the edges of supports in the cell, in spacings.
     #[inline(always)]
     pub fn at_edge(self, edge: f64, round_off: f64) -> Self {
+        let round_off = round_off + ACCUMULATED;
         if (self.below - edge).abs() <= round_off {
             Self { below: edge, above: 1.0 - edge, ..self }
         } else if (self.above - edge).abs() <= round_off {
