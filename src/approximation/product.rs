@@ -171,7 +171,10 @@ impl Place {
     #[inline(always)]
     pub fn at_edge(self, edge: f64, round_off: f64) -> Self {
         let round_off = round_off + ACCUMULATED;
-        if (self.below - edge).abs() <= round_off {
+        // At 0 supports end on faces of cells, and `Axis::spacings` has moved the point.
+        if edge == 0.0 {
+            self
+        } else if (self.below - edge).abs() <= round_off {
             Self { below: edge, above: 1.0 - edge, ..self }
         } else if (self.above - edge).abs() <= round_off {
             Self { below: 1.0 - edge, above: edge, ..self }

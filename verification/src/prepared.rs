@@ -29,7 +29,7 @@ pub struct Prepared<const D: usize> {
 }
 
 impl<const D: usize> Prepared<D> {
-    /// Does the work of a step before Newton's method.
+    /// Does the work of a step before Newton's method, for a simulation that resets its grid ([`Simulation::forget`]).
     ///
     /// # Errors
     /// A particle without shape functions, or a projection that overflows.

@@ -8,8 +8,6 @@ use crate::shipped;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::simulation::Simulation;
 use bfree::material::Material;
-use bfree::pooled::Pool;
-use bfree::solver::{BlockJacobi, newton};
 use bfree::tensor::Vector;
 use num_dual::Dual2_64;
 
@@ -43,7 +41,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         }
     }
     report.note(format!(
-        "After {steps} steps of the scene, or three quarters of its time; x is the converged increment of the next one plus a random deformation. A slope is the median of the last {LOCAL_SLOPES} local ones whose remainders are {ABOVE_FLOOR} times their round-off, eps times the magnitude of the contributions; `points` are those above it.",
+        "After {steps} steps of the scene, or three quarters of its time; x is the prescribed motion of the next step and a random deformation elsewhere. A slope is the median of the last {LOCAL_SLOPES} local ones whose remainders are {ABOVE_FLOOR} times their round-off, eps times the magnitude of the contributions; `points` are those above it.",
     ));
     report.note("Slope 2 of R - R(x) - s K u and slope 3 of Pi - ... - s^2/2 u.Ku hold only for the exact K; slope 3 of R uses its second derivative by dual numbers.");
     Ok(Outcome { reports: vec![report], ..Outcome::default() })
@@ -72,11 +70,14 @@ fn judge<const D: usize>(
         }
         simulation.advance()?;
     }
+    simulation.forget();
     let prepared = Prepared::new(&simulation)?;
     let equilibrium = prepared.equilibrium(&simulation);
     let mut random = Random::new(3);
     let size = 0.02 * simulation.grid.spacing;
-    let x = near_solution(&simulation, &prepared, size, &mut random)?;
+    // A random deformation of some percent, so that every term contributes.
+    let mut x: Vec<Vector<f64, D>> = random.field::<D>(prepared.nodes.len()).iter().map(|x| x * size).collect();
+    prepared.prescribe(&mut x);
     // A direction of similar size, a skew sawtooth. Stretches and compressions of equal shape would cancel in the third derivative of Π and
     // show the fourth.
     let sawtooth = |at: u32, random: &mut Random| SAWTOOTH[at as usize % SAWTOOTH.len()] + 0.2 * random.signed();
@@ -98,24 +99,6 @@ fn judge<const D: usize>(
         report.push(&[name, title, &above.len().to_string()], slope(&above).unwrap_or(f64::NAN), bound);
     }
     Ok(())
-}
-
-/// The increment of the next step plus a random deformation of some percent, so that every term contributes.
-fn near_solution<const D: usize>(
-    simulation: &Simulation<D>,
-    prepared: &Prepared<D>,
-    size: f64,
-    random: &mut Random,
-) -> Result<Vec<Vector<f64, D>>, StudyError> {
-    let equilibrium = prepared.equilibrium(simulation);
-    let mut x = vec![Vector::zeros(); prepared.nodes.len()];
-    prepared.prescribe(&mut x);
-    let (unknowns, settings) = (bytemuck::cast_slice_mut(&mut x), &simulation.settings.newton);
-    newton(&equilibrium, &mut BlockJacobi::<D>::default(), unknowns, settings, &Pool::default())?;
-    let mut shift = random.field::<D>(x.len());
-    equilibrium.clear_prescribed(&mut shift);
-    x.iter_mut().zip(&shift).for_each(|(x, shift)| *x += shift * size);
-    Ok(x)
 }
 
 /// A remainder, and its round-off.
