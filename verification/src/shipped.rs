@@ -38,7 +38,7 @@ pub fn scene(name: &str, overrides: &[impl AsRef<str>]) -> Result<Scene, StudyEr
 /// The simulation of the scene `name`, with keys replaced.
 ///
 /// # Errors
-/// As for [`scene`], or a scene that cannot be built.
+/// As for [`scene()`], or a scene that cannot be built.
 pub fn simulation<const D: usize>(name: &str, overrides: &[impl AsRef<str>]) -> Result<Simulation<D>, StudyError> {
     Ok(scene(name, overrides)?.build(&folder())?)
 }

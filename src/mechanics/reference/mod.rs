@@ -11,7 +11,7 @@
 //! [`Particles::reference`](crate::particles::Particles::reference) is x_k and F_k, and [`GridState`] is what the nodes keep.
 //!
 //! **Contact.** Bodies that share nodes stick, and on a grid that is not reset a body cannot leave a wall. The grid is therefore reset when
-//! a particle reaches a prescribed condition or another body ([`contact`]). Bodies that touch at the start are *bonded*: in load steps they
+//! a particle reaches a prescribed condition or another body (`contact.rs`). Bodies that touch at the start are *bonded*: in load steps they
 //! stay together, and do not cause resets.
 //!
 //! **Out-of-balance force.** In load steps, a state in balance on the old grid is not in balance on the new one. Its residual R₀ on the new
