@@ -49,9 +49,9 @@ impl SurfaceUse {
     ///
     /// let scene = bfree::scene::read_file("scenes/cantilever.json".as_ref(), &[])?;
     /// let surfaces = SurfaceUse::of(&scene.build::<2>("scenes".as_ref())?);
-    /// // The end of a beam of height 1, a point for each ⅛ of it.
+    /// // The end of a beam of height 1, four points for each ¼ of it.
     /// let [end] = surfaces.as_slice() else { return Err("one load".into()) };
-    /// assert_eq!((end.load, end.points), ("traction", 8));
+    /// assert_eq!((end.load, end.points), ("traction", 16));
     /// assert!((end.area - 1.0).abs() < 1e-14);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

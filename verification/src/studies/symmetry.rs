@@ -25,7 +25,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         &["transformation", "of", "scene"],
     )
     .as_matrix(&[1], 0, 2);
-    let mut left_out = Report::new("share of the scenes that could not be run", &["transformation"]);
+    let mut left_out = Report::new("share of the scenes, and of the images of other scenes, that could not be run", &["transformation", "of"]);
     for transformation in TRANSFORMATIONS {
         judge(transformation, scenes(*effort), &mut report, &mut left_out);
     }
@@ -40,7 +40,7 @@ fn judge(transformation: Transformation, scenes: u64, report: &mut Report, left_
             (format!("{seed}: {name}"), compare(&pair))
         })
         .collect();
-    let mut unsolved = 0_u32;
+    let mut unsolved = [0_u32; 2];
     for (name, found) in found {
         match found {
             Ok(found) => {
@@ -50,14 +50,16 @@ fn judge(transformation: Transformation, scenes: u64, report: &mut Report, left_
                     report.push(&[transformation.name(), one.quantity, &name], value, Bound::AtMost(bound));
                 }
             }
-            Err(SymmetryError::Scene(_)) => unsolved += 1,
+            Err(SymmetryError::Scene(_)) => unsolved[0] += 1,
             Err(error @ SymmetryError::Image(_)) => {
-                report.push(&[transformation.name(), "run", &name], f64::NAN, Bound::AtMost(0.0));
-                report.note(format!("{name}: {}", chain(&error)));
+                unsolved[1] += 1;
+                left_out.note(format!("{name}: {}", chain(&error)));
             }
         }
     }
-    left_out.push(&[transformation.name()], f64::from(unsolved) / scenes as f64, Bound::AtMost(LEFT_OUT));
+    for (of, unsolved, bound) in [("scene", unsolved[0], LEFT_OUT), ("image", unsolved[1], 0.0)] {
+        left_out.push(&[transformation.name(), of], f64::from(unsolved) / scenes as f64, Bound::AtMost(bound));
+    }
 }
 
 fn pair_of_bits(transformation: Transformation) -> bool {
