@@ -148,6 +148,7 @@ pub mod clock;
 pub mod examples;
 pub mod field;
 pub mod grid;
+mod lanes;
 pub mod material;
 pub mod mechanics;
 pub mod memory;

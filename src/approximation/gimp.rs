@@ -1,12 +1,11 @@
 //! Uniform generalized interpolation (uGIMP).
 
+use super::interior::{InCells, InLanes, Rows, evaluate};
 use super::kernel::{Kernel, folded};
-use super::lane::Lane;
-use super::{
-    Approximation, ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Shipped, Validate,
-};
+use super::{Approximation, ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
+use crate::lanes::Lane;
 use crate::problems::Problems;
 
 /// The hat averaged over a particle of constant width 2 l_p: Bardenhagen & Kober, CMES 5 (2004).
@@ -84,6 +83,20 @@ impl Kernel for Gimp {
     }
 }
 
+impl InLanes for Gimp {
+    fn radius(&self) -> f64 {
+        Kernel::radius(self)
+    }
+
+    fn edge(&self) -> f64 {
+        self.half_width
+    }
+
+    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
+        evaluate::<1>(self, Kernel::radius(self), points, out)
+    }
+}
+
 impl Separable for Gimp {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
@@ -91,8 +104,8 @@ impl Separable for Gimp {
         folded(self, axis, x, out)
     }
 
-    fn shipped(&self) -> Option<Shipped<'_>> {
-        self.validate(1).is_ok().then_some(Shipped::Gimp(self))
+    fn in_lanes(&self) -> Option<&dyn InLanes> {
+        self.validate(1).is_ok().then_some(self)
     }
 
     fn at_surface(&self) -> AtSurface<'_> {

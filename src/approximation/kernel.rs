@@ -2,9 +2,9 @@
 
 use super::error::ApproximationError;
 use super::interior::{Column, Interior, NODES, distance};
-use super::lane::Lane;
 use super::product::{AxisWeights, Place};
 use crate::grid::Axis;
+use crate::lanes::Lane;
 
 /// A kernel D ↦ (φ, φ'), with lengths in units of the spacing.
 pub(super) trait Kernel {

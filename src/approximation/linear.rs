@@ -1,11 +1,11 @@
 //! Linear functions (Q4 in the plane).
 
-use super::interior::{Column, Interior, NODES};
-use super::lane::Lane;
+use super::interior::{Column, InCells, InLanes, Interior, NODES, Rows, evaluate};
 use super::product::Place;
-use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Shipped, Validate};
+use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
+use crate::lanes::Lane;
 use crate::problems::Problems;
 
 /// Products of hat functions. On a cell face the gradient is that of the upper cell.
@@ -36,8 +36,8 @@ impl Separable for Linear {
         Ok(())
     }
 
-    fn shipped(&self) -> Option<Shipped<'_>> {
-        Some(Shipped::Linear)
+    fn in_lanes(&self) -> Option<&dyn InLanes> {
+        Some(self)
     }
 
     fn pieces(&self) -> Pieces {
@@ -46,6 +46,16 @@ impl Separable for Linear {
 
     fn width(&self) -> usize {
         2
+    }
+}
+
+impl InLanes for Linear {
+    fn radius(&self) -> f64 {
+        1.0
+    }
+
+    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
+        evaluate::<0>(self, 1.0, points, out)
     }
 }
 

@@ -1,7 +1,7 @@
 //! One-dimensional functions and their tensor product, which all separable families share.
 
 use super::error::{ApproximationError, Validate};
-use super::shipped::Shipped;
+use super::interior::InLanes;
 use super::support::Support;
 use crate::aggregation::Pieces;
 use crate::grid::{Axis, Grid, indices};
@@ -81,9 +81,9 @@ pub trait Separable: Validate + Send + Sync {
     /// The largest number of nodes that [`Self::axis`] lists on a long axis. The list always contains the nodes of the cell.
     fn width(&self) -> usize;
 
-    /// The shipped family that these functions belong to; `None` for any other. Away from walls, the transfer between particles and nodes
-    /// evaluates shipped families in vector lanes.
-    fn shipped(&self) -> Option<Shipped<'_>> {
+    /// The same functions away from walls, in vector lanes. Without them, the transfer between particles and nodes calls [`Self::axis`] for
+    /// every particle.
+    fn in_lanes(&self) -> Option<&dyn InLanes> {
         None
     }
 
@@ -100,7 +100,7 @@ pub trait Separable: Validate + Send + Sync {
     /// Whether the functions are B-splines away from walls. Block-Jacobi is more effective for B-splines than for other functions of equal
     /// width.
     fn is_spline(&self) -> bool {
-        matches!(self.shipped(), Some(Shipped::Bspline(_)))
+        false
     }
 }
 

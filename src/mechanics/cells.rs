@@ -1,6 +1,7 @@
 //! The linearised tangent on the grid: as a bilinear form on cells, from which multigrid makes coarser grids; and its sparsity pattern.
 
-use crate::mechanics::sweep::{At, LANES};
+use crate::lanes::LANES;
+use crate::mechanics::sweep::At;
 use crate::mechanics::tangent::Tangent;
 use crate::mechanics::unknowns::padded;
 use crate::solver::{LocalForm, Neighbours};

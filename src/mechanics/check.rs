@@ -2,7 +2,7 @@
 //! the residual by dual numbers.
 
 use crate::material::{Law, MaterialState};
-use crate::mechanics::point::{Part, compose};
+use crate::mechanics::constitutive::{Part, compose};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
 use crate::mechanics::terms::Piece;

@@ -5,8 +5,9 @@
 //! grid reset. Between two resets θ_n and H keep their values of the last reset.
 
 use crate::grid::{Grid, indices};
+use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::sweep::{LANES, Number, Supports};
+use crate::mechanics::sweep::{Number, Supports};
 use crate::particles::{Body, Particles};
 use crate::scalar::Real;
 use crate::tensor::{Deformation, Vector};

@@ -3,11 +3,11 @@
 mod affine;
 mod cells;
 pub mod check;
+pub mod constitutive;
 pub(crate) mod dilatation;
 pub mod loads;
 pub mod mass;
 pub mod path;
-mod point;
 pub mod reference;
 pub mod residual;
 pub mod rigid;

@@ -1,8 +1,8 @@
 //! The residual R(Δφ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
 
 use crate::material::Law;
+use crate::mechanics::constitutive::Part;
 use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
-use crate::mechanics::point::Part;
 use crate::mechanics::sweep::{Flow, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::unknowns::Unknowns;
@@ -11,7 +11,7 @@ use crate::pooled::Pooled;
 use crate::solver::Stop;
 use crate::tensor::Vector;
 
-pub use crate::mechanics::point::{Inadmissible, compose};
+pub use crate::mechanics::constitutive::{Inadmissible, compose};
 
 /// The reason why tangents are unsymmetric; `None` if they are symmetric.
 pub(crate) fn unsymmetric<const D: usize, L: Law>(bodies: &[Body<L>], loads: &Loads<D>) -> Option<&'static str> {

@@ -1,8 +1,10 @@
 //! The consistent tangent K(Δφ)·u, matrix-free: the terms are linearised at Δφ and applied, and K is never assembled (eqs. 30, 34, 38).
 
+use crate::lanes::LANES;
 use crate::material::Law;
+use crate::mechanics::constitutive::{Form, Laws};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{At, Flow, Form, Group, LANES, Laws, Quadratic, Supports};
+use crate::mechanics::sweep::{Flow, Group, Quadratic, Supports};
 use crate::mechanics::terms::{Frozen, Piece};
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
@@ -59,8 +61,7 @@ impl<const D: usize> Tangent<'_, D> {
         let (flows, all): (Vec<_>, Vec<_>) =
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
         if let Some(flow) = flows.into_iter().reduce(Flow::and) {
-            let (field, sums) = (bytemuck::cast_slice(u), bytemuck::cast_slice_mut(out));
-            self.supports.product(field, flow, sums, &|group, at: &At<f64, D, D>, sums: &mut At<f64, D, D>| {
+            self.supports.product(u, flow, out, |group, at, sums| {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }

@@ -1,11 +1,12 @@
 //! The large arrays of a run, and the bytes of each.
 
 use crate::approximation::ShapeFunction;
+use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::SurfacePoint;
 use crate::mechanics::reference::Renewal;
-use crate::mechanics::sweep::{LANES, Supports};
+use crate::mechanics::sweep::Supports;
 use crate::mechanics::tangent::frozen_bytes;
 use crate::mechanics::terms::frozen_rows;
 use crate::mechanics::transfer::Projection;

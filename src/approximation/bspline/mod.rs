@@ -5,7 +5,6 @@ mod uniform;
 
 pub use not_a_knot::NotAKnotBspline;
 pub use uniform::Bspline;
-pub(super) use uniform::{Cubic, Quadratic};
 
 use super::{Approximation, Cells, Listed};
 use crate::problems::Problems;

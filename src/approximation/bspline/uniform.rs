@@ -1,10 +1,11 @@
 //! Uniform B-splines centred on the nodes.
 
 use crate::aggregation::Pieces;
+use crate::approximation::interior::{InCells, InLanes, Rows, evaluate};
 use crate::approximation::kernel::{Kernel, folded};
-use crate::approximation::lane::Lane;
-use crate::approximation::{ApproximationError, AxisWeights, Separable, Shipped, Validate};
+use crate::approximation::{ApproximationError, AxisWeights, Separable, Validate};
 use crate::grid::Axis;
+use crate::lanes::Lane;
 
 /// A uniform B-spline of degree 2 or 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +59,26 @@ impl Kernel for Cubic {
     }
 }
 
+impl InLanes for Bspline {
+    fn radius(&self) -> f64 {
+        match self {
+            Self::Quadratic => Quadratic.radius(),
+            Self::Cubic => Cubic.radius(),
+        }
+    }
+
+    fn edge(&self) -> f64 {
+        self.radius().fract()
+    }
+
+    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
+        match self {
+            Self::Quadratic => evaluate::<1>(&Quadratic, self.radius(), points, out),
+            Self::Cubic => evaluate::<1>(&Cubic, self.radius(), points, out),
+        }
+    }
+}
+
 impl Separable for Bspline {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
@@ -67,8 +88,8 @@ impl Separable for Bspline {
         }
     }
 
-    fn shipped(&self) -> Option<Shipped<'_>> {
-        Some(Shipped::Bspline(*self))
+    fn in_lanes(&self) -> Option<&dyn InLanes> {
+        Some(self)
     }
 
     fn width(&self) -> usize {
@@ -80,5 +101,9 @@ impl Separable for Bspline {
 
     fn pieces(&self) -> Pieces {
         Pieces { degree: self.width() as u32 - 1, share: 0.75, ..Pieces::LINEAR }
+    }
+
+    fn is_spline(&self) -> bool {
+        true
     }
 }

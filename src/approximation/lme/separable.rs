@@ -2,11 +2,13 @@
 
 use super::locality::{radius, validate};
 use super::starts::Starts;
-use crate::approximation::interior::{Column, FURTHEST, Interior, NODES, SETTLED, distance};
-use crate::approximation::lane::Lane;
+use crate::approximation::interior::{
+    Column, FURTHEST, InCells, InLanes, Interior, NODES, Rows, SETTLED, distance, evaluate,
+};
 use crate::approximation::product::Place;
-use crate::approximation::{ApproximationError, AtSurface, AxisWeights, Separable, Shipped, Validate};
+use crate::approximation::{ApproximationError, AtSurface, AxisWeights, Separable, Validate};
 use crate::grid::Axis;
+use crate::lanes::Lane;
 use std::sync::Arc;
 
 /// LME on the nodes of the box |D_k| < R_a, R_a = h sqrt(−ln TOL₀ / γ̂).
@@ -81,11 +83,6 @@ impl Lme {
         let mut lme = Self { gamma, tolerance, radius, decay: (-2.0 * gamma).exp(), starts: None };
         lme.starts = Starts::new(gamma, radius, |place| lme.table_entry(place)).map(Arc::new);
         lme
-    }
-
-    /// R_a/h
-    pub(in crate::approximation) fn radius(&self) -> f64 {
-        self.radius
     }
 
     /// The locality γ̂.
@@ -246,6 +243,25 @@ impl Validate for Lme {
     }
 }
 
+impl InLanes for Lme {
+    /// R_a/h
+    fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    fn evaluate(&self, points: &InCells, out: Rows<'_>) -> usize {
+        if self.radius <= 2.0 {
+            evaluate::<1>(self, self.radius, points, out)
+        } else if self.radius <= 3.0 {
+            evaluate::<2>(self, self.radius, points, out)
+        } else if self.radius <= 4.0 {
+            evaluate::<3>(self, self.radius, points, out)
+        } else {
+            evaluate::<FURTHEST>(self, self.radius, points, out)
+        }
+    }
+}
+
 impl Separable for Lme {
     #[inline]
     fn axis(&self, axis: &Axis, x: f64, out: &mut AxisWeights) -> Result<(), ApproximationError> {
@@ -288,8 +304,8 @@ impl Separable for Lme {
         Ok(())
     }
 
-    fn shipped(&self) -> Option<Shipped<'_>> {
-        (self.starts.is_some() && self.validate(1).is_ok()).then_some(Shipped::Lme(self))
+    fn in_lanes(&self) -> Option<&dyn InLanes> {
+        (self.starts.is_some() && self.validate(1).is_ok()).then_some(self)
     }
 
     fn at_surface(&self) -> AtSurface<'_> {

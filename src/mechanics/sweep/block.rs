@@ -1,7 +1,7 @@
 //! A block of cells: its groups of particles, their shape-function values along each axis (weights), and its box of nodes.
 
 use super::kernel::Window;
-use super::lanes::LANES;
+use crate::lanes::LANES;
 use crate::tensor::Vector;
 
 /// A cube of cells: its groups, its box of nodes, and the active nodes of the box.

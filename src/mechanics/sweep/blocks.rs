@@ -1,7 +1,7 @@
 //! The nodal diagonal blocks of a quadratic form, B(∇N_I, ∇N_I) + m N_I² I, summed over one group of particles.
 
-use super::kernel::{In, Pairs, Window, each_tile, tile};
-use super::lanes::{LANES, Lanes, WithLanes};
+use super::kernel::{Pairs, Window, each_tile, tile};
+use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
 use crate::scalar::Arithmetic;
 use crate::tensor::{Tensor, Vector};
 
@@ -38,7 +38,7 @@ impl Quadratic {
 }
 
 /// The index of the pair (k, l) in [`Quadratic::bilinear`].
-pub(super) const fn pair(k: usize, l: usize) -> usize {
+pub(crate) const fn pair(k: usize, l: usize) -> usize {
     k + l * (l + 1) / 2
 }
 
@@ -117,4 +117,9 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
         }
     }
     pairs.add(lanes, sums.as_flattened().as_flattened(), start, D * D, out);
+}
+
+/// Adds the diagonal blocks of a group's quadratic form to a box of D×D blocks.
+pub(super) fn scatter_blocks(work: ScatterBlocks<'_>) {
+    in_dimension!(work.window.dimension, work);
 }

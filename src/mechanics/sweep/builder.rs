@@ -1,13 +1,13 @@
 //! The set-up of [`Tiled`](super::tiled::Tiled): the shape functions and groups of each block, and the numbers of the active nodes.
 
-use super::Points;
 use super::block::{Block, Groups, Span};
 use super::columns::{Along, Columns, Family};
 use super::kernel::WIDEST_TILE;
-use super::lanes::LANES;
 use super::order::{Key, follows};
+use super::points::Points;
 use crate::approximation::ApproximationError;
 use crate::grid::Grid;
+use crate::lanes::LANES;
 use crate::nodes::Nodes;
 use std::ops::Range;
 

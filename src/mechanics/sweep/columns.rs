@@ -3,17 +3,15 @@
 //! Away from walls the formulas of the shipped families are evaluated in vector lanes. Near a wall, and for any other family, the list
 //! of nodes and functions ([`AxisWeights`]) is evaluated for each particle.
 
-use super::Points;
-use super::lanes::{LANES, Lanes, WithLanes, widest};
 use super::order::Key;
-use super::supports::WIDEST;
+use super::points::Points;
 use crate::approximation::{
-    self, ApproximationError, AtSurface, AxisWeights, FURTHEST, Interior, InteriorVisitor, Lane, Place, SETTLED,
-    Separable, Shipped,
+    self, ApproximationError, AtSurface, AxisWeights, FURTHEST, InCells, InLanes, Place, Rows, SETTLED, Separable,
 };
 use crate::grid::Axis;
+use crate::lanes::{LANES, Lanes, WithLanes, widest};
 use std::collections::BTreeMap;
-use std::ops::{Add, Div, Mul, Range, Sub};
+use std::ops::Range;
 
 /// A family of product shape functions.
 #[derive(Clone, Copy)]
@@ -21,8 +19,8 @@ pub(super) struct Family<'a> {
     product: &'a dyn Separable,
     /// The family at points on a loaded surface.
     at_surface: &'a dyn Separable,
-    /// The formulas for vector lanes and their radius in spacings, if the family has them.
-    shipped: Option<(Shipped<'a>, f64)>,
+    /// The same functions in vector lanes, if the family has them.
+    in_lanes: Option<&'a dyn InLanes>,
 }
 
 /// The particles of a block along one axis.
@@ -55,9 +53,9 @@ impl Along {
 
 impl<'a> Family<'a> {
     pub(super) fn new(product: &'a dyn Separable) -> Self {
-        let shipped = product.shipped().map(|shipped| (shipped, shipped.radius()));
         let at_surface = if let AtSurface::Other(other) = product.at_surface() { other } else { product };
-        Self { product, at_surface, shipped: shipped.filter(|(_, radius)| *radius <= FURTHEST as f64 + 1.0) }
+        let in_lanes = product.in_lanes().filter(|functions| functions.radius() <= FURTHEST as f64 + 1.0);
+        Self { product, at_surface, in_lanes }
     }
 
     /// Finds the nodes of the particles at `along.x`, which lie on the axis.
@@ -66,8 +64,8 @@ impl<'a> Family<'a> {
     /// The error of the first particle whose functions cannot be evaluated.
     pub(super) fn spans(&self, axis: &Axis, along: &mut Along) -> Result<(), ApproximationError> {
         approximation::check(axis)?;
-        if let Some((shipped, radius)) = self.shipped {
-            widest(Places { axis, radius, edge: shipped.edge(), along });
+        if let Some(functions) = self.in_lanes {
+            widest(Places { axis, radius: functions.radius(), edge: functions.edge(), along });
         } else {
             along.spans.clear();
             for &x in &along.x {
@@ -94,15 +92,17 @@ impl<'a> Family<'a> {
         out: &mut Columns,
     ) -> Result<(), ApproximationError> {
         let mut listed = [true; LANES];
-        if let Some((shipped, radius)) = self.shipped {
-            let (mut below, mut above) = ([0.5; LANES], [0.5; LANES]);
+        if let Some(functions) = self.in_lanes {
+            let mut points = InCells { below: [0.5; LANES], above: [0.5; LANES], spacing: axis.spacing };
             for (lane, i) in range.clone().enumerate().take(LANES) {
-                (below[lane], above[lane]) = (along.below[i], along.above[i]);
+                (points.below[lane], points.above[lane]) = (along.below[i], along.above[i]);
             }
             let mut corrections = [0.0; LANES];
-            shipped.with(InLanes { below, above, spacing: axis.spacing, radius, corrections: &mut corrections, out });
+            let Columns { values, derivatives, smallest, .. } = out;
+            let rows = Rows { values, derivatives, smallest, corrections: &mut corrections };
+            let reach = functions.evaluate(&points, rows);
             for (lane, i) in range.clone().enumerate().take(LANES) {
-                out.first[lane] += i64::from(along.cells[i]);
+                out.first[lane] = i64::from(along.cells[i]) - reach as i64;
                 listed[lane] = along.cut[i] || corrections[lane].is_nan() || corrections[lane] > SETTLED;
             }
         }
@@ -131,7 +131,7 @@ fn span(list: &AxisWeights) -> [u32; 2] {
 struct Places<'a> {
     axis: &'a Axis,
     radius: f64,
-    /// See [`Shipped::edge`].
+    /// See [`InLanes::edge`].
     edge: f64,
     along: &'a mut Along,
 }
@@ -164,6 +164,9 @@ impl WithLanes for Places<'_> {
         }
     }
 }
+
+/// The largest number of nodes along an axis for which [`Columns`] have room.
+pub(super) const WIDEST: usize = 16;
 
 /// The functions along one axis at up to eight coordinates, a lane each.
 #[derive(Default)]
@@ -213,99 +216,5 @@ impl Columns {
                 derivatives[to][lane] = self.derivatives[rows + i][lane];
             }
         }
-    }
-}
-
-/// Evaluates the functions of one family in vector lanes.
-struct InLanes<'a> {
-    below: [f64; LANES],
-    above: [f64; LANES],
-    spacing: f64,
-    radius: f64,
-    corrections: &'a mut [f64; LANES],
-    /// The result, with `first` relative to the cell.
-    out: &'a mut Columns,
-}
-
-impl InteriorVisitor for InLanes<'_> {
-    fn visit<const M: usize>(self, interior: &impl Interior) {
-        self.out.first = [-(M as i64); LANES];
-        let starts = self.below.map(|below| interior.start(below));
-        widest(Evaluate::<_, M> { interior, starts, lanes: self });
-    }
-}
-
-struct Evaluate<'a, 'b, I, const M: usize> {
-    interior: &'a I,
-    starts: [f64; LANES],
-    lanes: InLanes<'b>,
-}
-
-impl<I: Interior, const M: usize> WithLanes for Evaluate<'_, '_, I, M> {
-    #[inline(always)]
-    fn run<S: Lanes>(self, s: S) {
-        let InLanes { below, above, spacing, radius, corrections, out } = self.lanes;
-        let wide = |x: &[f64; LANES]| Wide(s, s.load(x));
-        let (below, above) = (wide(&below), wide(&above));
-        let column = self.interior.column::<_, M>(below, above, wide(&self.starts), spacing);
-        let mut smallest = below.constant(f64::INFINITY);
-        for i in 0..2 * M + 2 {
-            let (n, dn) = (column.values[i], column.derivatives[i]);
-            s.store(n.1, &mut out.values[i]);
-            s.store(dn.1, &mut out.derivatives[i]);
-            let (distance, j) = if i <= M { (below, M - i) } else { (above, i - M - 1) };
-            let room = below.constant(radius) - distance;
-            let size = if j == 0 { n.abs() } else { room.constant(j as f64).where_less(room, n.abs(), smallest) };
-            smallest = size.where_less(smallest, size, smallest);
-        }
-        s.store(smallest.1, &mut out.smallest);
-        s.store(column.correction.1, corrections);
-    }
-}
-
-/// The lanes of a vector, with operators.
-struct Wide<S: Lanes>(S, S::N);
-
-impl<S: Lanes> Clone for Wide<S> {
-    #[inline(always)]
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<S: Lanes> Copy for Wide<S> {}
-
-macro_rules! operator {
-    ($operator:ident, $method:ident) => {
-        impl<S: Lanes> $operator for Wide<S> {
-            type Output = Self;
-
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                Self(self.0, self.0.$method(self.1, other.1))
-            }
-        }
-    };
-}
-
-operator!(Add, add);
-operator!(Sub, sub);
-operator!(Mul, mul);
-operator!(Div, div);
-
-impl<S: Lanes> Lane for Wide<S> {
-    #[inline(always)]
-    fn constant(self, x: f64) -> Self {
-        Self(self.0, self.0.splat(x))
-    }
-
-    #[inline(always)]
-    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
-        Self(self.0, self.0.where_less(self.1, other.1, then.1, otherwise.1))
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0, self.0.abs(self.1))
     }
 }

@@ -6,7 +6,7 @@
 //! - Scatter, one row (y, z) of the window a lane: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
 use super::Flow;
-use super::lanes::{LANES, Lanes, WithLanes};
+use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
 use crate::scalar::{Arithmetic, Real};
 use crate::tensor::Vector;
 use nalgebra::SMatrix;
@@ -92,9 +92,6 @@ macro_rules! each_tile {
 }
 
 pub(super) use each_tile;
-
-/// A kernel `W` on C components in D dimensions.
-pub(super) struct In<W, const C: usize, const D: usize>(pub W);
 
 /// Fills `value` and `gradient`, C and C·D rows, from the box `nodal`, which holds the C components of node after node.
 pub struct Gather<'a> {
@@ -368,10 +365,20 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     pairs.add(lanes, sums.as_flattened(), start, C, out);
 }
 
+/// Gathers values and gradients from a box with `components` numbers a node: 1, or as many as there are axes.
+pub(super) fn gather(components: usize, work: Gather<'_>) {
+    in_dimension!(work.window.dimension, components, work);
+}
+
+/// Scatters values and gradients into a box.
+pub(super) fn scatter(components: usize, work: Scatter<'_>) {
+    in_dimension!(work.window.dimension, components, work);
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::{PORTABLE, Registers, widest};
     use super::*;
+    use crate::lanes::{PORTABLE, Registers, widest};
 
     const WIDTH: [usize; 3] = [7, 3, 5];
     const BOX: [usize; 3] = [9, 4, 6];

@@ -1,21 +1,30 @@
-//! The loop over particles: gather nodal values (grid to particle), evaluate at the particle, scatter (particle to grid).
-//! Threads are used here and in the vectors of the solver. Vector instructions are used here alone.
+//! The transfer between particles and grid. This is the loop, for a field u_I at the nodes:
 //!
-//! The loop knows components, not their physical meaning. A field has C numbers a node. The gather gives a particle C values
-//! u = Σ u_I N_I and C gradients L = Σ u_I ⊗ ∇_n N_I. A point function turns u and L into q and σ. The scatter is
-//! f_I += q N_I + σ ∇_n N_I. A mass has one component, a motion has D.
+//! ```text
+//! for p in particles {
+//!     u = Σ_I u_I N_I(x_p)                            gather, grid to particle
+//!     L = Σ_I u_I ⊗ ∇N_I(x_p)
+//!     (q, σ) = point(p, u, L)                         evaluate, for example the stress of a law
+//!     for I in nodes(p) {
+//!         f_I += q N_I(x_p) + σ ∇N_I(x_p)             scatter, particle to grid
+//!     }
+//! }
+//! ```
 //!
-//! Gather and scatter are linear, so a dual number travels as two fields. Derivatives therefore go through the production kernels.
+//! One run of the loop over all particles is a *pass*. Gather or scatter may be missing. The loop knows components, not their physical
+//! meaning: a mass has one component a node, a motion has D. Gather and scatter are linear, so a dual number travels as two fields.
+//! Derivatives therefore go through the production kernels.
 //!
-//! - A *pass* is one run of gather, point function and scatter over all particles. Gather or scatter may be missing.
+//! [`plain`] is this loop, and serves shape functions that are not products. For products N = Π_k N_k, [`tiled`] has the shape functions
+//! of each axis, and [`waves`] runs the loop over them on all cores. Both give one answer:
+//!
 //! - A *lane* is one slot of a vector of eight numbers, and holds one particle.
 //! - A *group* is a batch of up to eight particles that share a window of nodes. They lie in one cell, or in neighbours along x.
 //! - A *block* is a cube of cells with a box of nodes. It gathers from its own nodes and scatters into its own buffer.
 //!   Blocks do not depend on the number of threads, and their buffers are added in the order of the blocks.
 //!   So the result has the same bits for any number of threads.
 //!
-//! Two implementations give one answer. `plain` is the specification, and serves shape functions that are not products.
-//! `tiled` is for products, N = Π_k N_k.
+//! Threads are used here and in the vectors of the solver.
 
 mod block;
 mod blocks;
@@ -23,28 +32,25 @@ mod builder;
 mod columns;
 mod flow;
 mod kernel;
-mod laned;
-mod lanes;
-mod laws;
 mod number;
 mod order;
 mod passes;
 mod plain;
+mod points;
 mod supports;
-mod tangents;
 mod tiled;
 mod waves;
 
 pub use block::Group;
 pub use blocks::Quadratic;
+pub(crate) use blocks::pair;
 pub use flow::{Flow, Weights};
 pub use kernel::At;
-pub(crate) use laned::{add_quadratic, product};
-pub use lanes::LANES;
-pub use laws::Laws;
 pub use number::Number;
-pub use supports::{Points, SupportError, Supports};
-pub(crate) use tangents::{AddTo, Form, Product};
+pub use points::{Points, SupportError};
+pub use supports::Supports;
+
+use crate::lanes::LANES;
 
 /// `(group, u and L, q and σ)` of every field: adds to q and σ, which begin with zero. A pass makes this function once.
 type Point<'a, const C: usize, const D: usize> = dyn Fn(Group<'_>, &[At<f64, C, D>], &mut [At<f64, C, D>]) + Sync + 'a;
@@ -54,6 +60,3 @@ type Visit<'a, R, const C: usize, const D: usize> = dyn Fn(usize, &[At<f64, C, D
 
 /// `(group, u and L, rows)`: fills the rows of a group.
 pub(crate) type Fill<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync + 'a;
-
-/// A [`Point`] function of one field.
-pub(crate) type Linear<'a, const D: usize> = dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a;

@@ -1,16 +1,14 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
 use super::kernel::At;
-use super::lanes::LANES;
-use super::laws::{Loop, What, shipped};
-use crate::material::Material;
+use crate::lanes::LANES;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use num_dual::{Dual2_64, Dual64};
 use std::borrow::Cow;
 
 /// A number made of one or more plain numbers. Each of them is a field of its own in the kernels.
-pub trait Number: Real + Send + Sync {
+pub trait Number: Real + Send + Sync + 'static {
     /// Number of plain numbers in it.
     const FIELDS: usize;
 
@@ -59,13 +57,6 @@ pub trait Number: Real + Send + Sync {
         result
     }
 
-    /// The loop over lanes that evaluates the stresses of a shipped law in vector instructions. It exists for plain numbers alone,
-    /// which carry no derivatives.
-    #[doc(hidden)]
-    fn stresses_of(_law: &Material, _dimension: usize) -> Option<Box<Loop<'static, Self>>> {
-        None
-    }
-
     /// Calls `add` with a nodal field as plain numbers, and writes them back.
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {
         let mut sums = Self::flat(nodal).into_owned();
@@ -99,10 +90,6 @@ impl Number for f64 {
         point: impl FnOnce(&At<Self, C, D>, &mut At<Self, C, D>) -> R,
     ) -> R {
         point(&fields[0], &mut sums[0])
-    }
-
-    fn stresses_of(law: &Material, dimension: usize) -> Option<Box<Loop<'static, Self>>> {
-        Some(shipped(law, dimension, What::Stresses))
     }
 
     fn add_flat<const C: usize>(nodal: &mut [Vector<Self, C>], add: impl FnOnce(&mut [f64])) {

@@ -2,10 +2,12 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Fill, Flow, Group, LANES, Linear, Number, Quadratic, Supports, Weights};
+use super::{Fill, Flow, Group, Number, Quadratic, Supports, Weights};
+use crate::lanes::LANES;
 use crate::parallel::First;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
+use std::convert::Infallible;
 
 impl<const D: usize> Supports<D> {
     /// `f_I += Σ_p q N_I + σ ∇_n N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -35,12 +37,19 @@ impl<const D: usize> Supports<D> {
         failure.check()
     }
 
-    /// [`Self::sweep`] for D plain numbers a node. It computes products with a tangent.
-    pub(crate) fn product(&self, field: &[f64], flow: Flow, out: &mut [f64], point: &Linear<'_, D>) {
-        self.pass();
-        let point =
-            |group: Group<'_>, at: &[At<f64, D, D>], sums: &mut [At<f64, D, D>]| point(group, &at[0], &mut sums[0]);
-        either!(self, way => way.sweep::<D>(1, Some(field), flow, out, &point));
+    /// [`Self::sweep`] of a linearised term, which always exists: a product with its tangent.
+    pub(crate) fn product(
+        &self,
+        u: &[Vector<f64, D>],
+        flow: Flow,
+        out: &mut [Vector<f64, D>],
+        point: impl Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync,
+    ) {
+        let point = |group: Group<'_>, at: &_, sums: &mut _| -> Result<(), (usize, Infallible)> {
+            point(group, at, sums);
+            Ok(())
+        };
+        let Ok(()) = self.sweep(Some(u), flow, out, point);
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.

@@ -1,25 +1,22 @@
 //! The shape functions of all particles, evaluated once, and their storage for the passes over the particles.
 
 use super::block::Group;
+use super::columns::WIDEST;
 use super::plain::Plain;
+use super::points::{Points, SupportError};
 use super::tiled::Tiled;
 use crate::aggregation::Extension;
-use crate::approximation::{ApproximationError, ShapeFunction};
+use crate::approximation::ShapeFunction;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::pooled::{Element, Pool, Pooled};
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector};
-use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Passes leap too often in memory if more than one in so many particles does not directly follow the particle before it.
 const LEAPS: usize = 8;
-
-/// Product shape functions with more nodes than this along an axis take [`Way::Plain`]: the box of a block would leave the cache.
-pub(super) const WIDEST: usize = 16;
 
 /// The shape-function values and the connectivity of all particles at the last converged positions, and the active nodes.
 ///
@@ -68,46 +65,11 @@ impl<const D: usize> Clone for Supports<D> {
     }
 }
 
-/// The points where shape functions are evaluated.
-#[derive(Clone, Debug)]
-pub struct Points<'a, const D: usize> {
-    /// x of all particles.
-    pub positions: Cow<'a, [Vector<f64, D>]>,
-    /// Ids of the particles. Without them the index in memory is the id.
-    pub ids: Option<&'a [u32]>,
-    /// The points on a loaded surface, by their index in memory. They take the
-    /// [functions of a surface](crate::approximation::Separable::at_surface), evaluated at x and continued linearly along each axis by
-    /// this vector.
-    pub continued: BTreeMap<u32, Vector<f64, D>>,
-}
-
-impl<'a, const D: usize> Points<'a, D> {
-    /// The particles at `positions`, none of which is on a loaded surface.
-    pub fn at(positions: &'a [Vector<f64, D>]) -> Self {
-        Self { positions: positions.into(), ids: None, continued: BTreeMap::new() }
-    }
-
-    /// The id of a particle, for messages.
-    pub(super) fn id(&self, particle: usize) -> usize {
-        self.ids.map_or(particle, |ids| ids[particle] as usize)
-    }
-}
-
 /// An implementation of the loop over the particles.
 #[derive(Clone, Debug)]
 pub(super) enum Way<const D: usize> {
     Plain(Plain<D>),
     Tiled(Tiled<D>),
-}
-
-/// The shape functions of a particle could not be evaluated.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("particle {particle} has no shape functions")]
-pub struct SupportError {
-    /// Id of the particle; its index in memory where no ids are given.
-    pub particle: usize,
-    /// The error of the shape functions.
-    pub source: ApproximationError,
 }
 
 /// Calls one method of whichever [`Way`] is stored.

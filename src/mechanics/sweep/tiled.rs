@@ -6,11 +6,11 @@
 use super::block::{Block, Group};
 use super::builder::{Row, block, number};
 use super::columns::Family;
-use super::lanes::LANES;
 use super::order::{self, Key};
-use super::{Points, SupportError};
+use super::points::{Points, SupportError};
 use crate::approximation::{ApproximationError, Scratch, Separable, ShapeFunction, Support};
 use crate::grid::Grid;
+use crate::lanes::LANES;
 use crate::nodes::Nodes;
 use crate::parallel;
 use crate::parallel::First;

@@ -5,12 +5,11 @@
 //! Neither the waves nor the order depend on the number of threads.
 
 use super::block::{Block, Group};
-use super::blocks::{Quadratic, ScatterBlocks};
-use super::kernel::{At, Gather, Scatter, Window};
-use super::laned;
-use super::lanes::LANES;
+use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
+use super::kernel::{self, At, Gather, Scatter, Window};
 use super::tiled::Tiled;
 use super::{Fill, Flow, Point, Visit};
+use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
 
@@ -67,7 +66,7 @@ impl<const D: usize> Tiled<D> {
                 }
                 for (sums, buffer) in sums.iter().zip(buffer.chunks_mut(length(block))) {
                     let (value, gradient) = (&sums.value, sums.gradient.as_flattened());
-                    laned::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
+                    kernel::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
                 }
             }
         };
@@ -92,7 +91,7 @@ impl<const D: usize> Tiled<D> {
                 let mut form = Quadratic::zero();
                 quadratic(block.groups.group(group), &mut form);
                 let window = block.groups.window(group);
-                laned::blocks(ScatterBlocks { window, from: &form, out: buffer });
+                scatter_blocks(ScatterBlocks { window, from: &form, out: buffer });
             }
         };
         let add = |block: &Block, buffer: &[f64], first: usize, out: &mut [f64]| {
@@ -234,7 +233,7 @@ fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nod
 /// Gathers u and L of a group from the boxes of the fields.
 fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], flow: Flow, at: &mut [At<f64, C, D>]) {
     for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
-        laned::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
+        kernel::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
     }
 }
 

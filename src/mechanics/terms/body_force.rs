@@ -1,7 +1,7 @@
 //! Body forces −Σ_p m b N_I: gravity, and fields b(x, t) given in code.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
-use crate::mechanics::point::Inadmissible;
+use crate::mechanics::constitutive::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;

@@ -2,7 +2,7 @@
 //! state was in balance on the old grid. Without R₀, each reset would add an error of its own to the stresses.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
-use crate::mechanics::point::Inadmissible;
+use crate::mechanics::constitutive::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::tensor::Vector;
 

@@ -5,7 +5,7 @@ use super::inertia::FrozenMass;
 use super::stress::FrozenStress;
 use super::{BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, summed};
 use crate::material::Law;
-use crate::mechanics::point::{Inadmissible, Part};
+use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Flow, Number};
 use crate::mechanics::transfer::Nodal;
@@ -67,8 +67,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
         if let Some((flow, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
-            let out = bytemuck::cast_slice_mut(&mut of_stiffness);
-            self.step.supports.product(bytemuck::cast_slice(v), flow, out, &add);
+            self.step.supports.product(v, flow, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
         }
         force

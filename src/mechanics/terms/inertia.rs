@@ -1,8 +1,8 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
 use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
+use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::mass::Mass;
-use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::{Flow, Number};
 use crate::mechanics::transfer::Nodal;

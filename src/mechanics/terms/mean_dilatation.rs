@@ -17,10 +17,12 @@
 use super::{
     AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, summed,
 };
+use crate::lanes::LANES;
 use crate::material::{Law, MaterialState, VolumeResponse};
+use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
+use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::dilatation::{Cells, Member, total};
-use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Number, Product, Supports, add_quadratic, product};
+use crate::mechanics::sweep::{Flow, Number, Supports};
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};

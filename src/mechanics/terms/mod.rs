@@ -29,9 +29,9 @@ pub use stress::Stress;
 pub use traction::Traction;
 
 use crate::material::Law;
+use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
-use crate::mechanics::point::{Inadmissible, Part};
 use crate::mechanics::schemes::{Alphas, Scheme};
 use crate::mechanics::sweep::{At, Flow, Group, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;

@@ -1,8 +1,8 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
 use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term};
+use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::loads::{Pressing, PressurePoint};
-use crate::mechanics::point::{Inadmissible, Part, compose};
 use crate::mechanics::sweep::{Number, Supports};
 use crate::particles::Particles;
 use crate::tensor::{Deformation, Tensor, Vector, cofactor, contract, identity};

@@ -1,9 +1,11 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
 use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
+use crate::lanes::LANES;
 use crate::material::Law;
-use crate::mechanics::point::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{AddTo, Flow, Form, LANES, Laws, Number, Product, Supports, add_quadratic, product};
+use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
+use crate::mechanics::constitutive::{Inadmissible, Part, compose};
+use crate::mechanics::sweep::{Flow, Number, Supports};
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};

@@ -1,8 +1,8 @@
 //! Nominal tractions −Σ_Γ T N_I A, dead loads on the particles of a surface.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
+use crate::mechanics::constitutive::Inadmissible;
 use crate::mechanics::loads::Pressing;
-use crate::mechanics::point::Inadmissible;
 use crate::mechanics::sweep::Number;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;

@@ -1,9 +1,8 @@
 //! Stored tangents of the linearisation, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
 
-use super::blocks::{Quadratic, pair};
-use super::kernel::In;
-use super::lanes::{LANES, Lanes, WithLanes};
+use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
 use crate::material::ClosedTangent;
+use crate::mechanics::sweep::{Quadratic, pair};
 
 /// The storage form of a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -161,4 +160,14 @@ fn entries<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], k: usize, l: u
         }
     }
     block
+}
+
+/// Adds the product 𝔸 : L of a group's tangents with its gradients.
+pub(crate) fn product(dimension: usize, work: Product<'_>) {
+    in_dimension!(dimension, work);
+}
+
+/// Adds the quadratic form of the tangents of a group.
+pub(crate) fn add_quadratic(dimension: usize, work: AddTo<'_>) {
+    in_dimension!(dimension, work);
 }

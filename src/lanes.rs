@@ -5,6 +5,7 @@
 
 use crate::scalar::Arithmetic;
 use pulp::{Scalar, Simd};
+use std::ops::{Add, Div, Mul, Sub};
 
 #[cfg(target_arch = "x86_64")]
 use pulp::x86::{V3, V4};
@@ -38,7 +39,7 @@ pub trait Lanes: Arithmetic {
 }
 
 /// An instruction set that transposes a square of numbers, one row a register.
-pub(super) trait Square: Simd {
+trait Square: Simd {
     #[inline(always)]
     fn transpose(self, rows: &mut [Self::f64s]) {
         let numbers: &mut [f64] = bytemuck::cast_slice_mut(rows);
@@ -71,6 +72,30 @@ pub fn widest(work: impl WithLanes) {
     work.run(PORTABLE);
 }
 
+/// A computation `W` on C components in D dimensions.
+pub(crate) struct In<W, const C: usize, const D: usize>(pub W);
+
+/// Runs a computation with the widest lanes, for one component or for as many as there are axes. No generic parameter of a caller enters,
+/// so that every computation is compiled once for each dimension and instruction set.
+macro_rules! in_dimension {
+    ($dimension:expr, $work:expr) => {
+        match $dimension {
+            1 => $crate::lanes::widest($crate::lanes::In::<_, 1, 1>($work)),
+            2 => $crate::lanes::widest($crate::lanes::In::<_, 2, 2>($work)),
+            _ => $crate::lanes::widest($crate::lanes::In::<_, 3, 3>($work)),
+        }
+    };
+    ($dimension:expr, $components:expr, $work:expr) => {
+        match ($dimension, $components) {
+            (2, 1) => $crate::lanes::widest($crate::lanes::In::<_, 1, 2>($work)),
+            (3, 1) => $crate::lanes::widest($crate::lanes::In::<_, 1, 3>($work)),
+            _ => $crate::lanes::in_dimension!($dimension, $work),
+        }
+    };
+}
+
+pub(crate) use in_dimension;
+
 /// The call in the form that `pulp` takes.
 #[cfg(target_arch = "x86_64")]
 struct Call<W, S>(W, S);
@@ -87,10 +112,10 @@ impl<W: WithLanes, S: Lanes> pulp::NullaryFnOnce for Call<W, S> {
 /// Eight numbers in `N` registers of the instruction set `I`. A vector of rows of nodes takes `R` registers. A value of `I` proves that the
 /// processor has the instructions.
 #[derive(Clone, Copy)]
-pub(super) struct Registers<I, const N: usize, const R: usize>(pub(super) I);
+pub(crate) struct Registers<I, const N: usize, const R: usize>(pub I);
 
 /// Plain numbers, one a register.
-pub(super) const PORTABLE: Registers<Scalar, LANES, LANES> = Registers(Scalar);
+pub(crate) const PORTABLE: Registers<Scalar, LANES, LANES> = Registers(Scalar);
 
 /// Defines operations on lanes, register by register.
 macro_rules! by_register {
@@ -251,6 +276,84 @@ mod x86 {
                 rows[6 + k] = cast(x._mm512_shuffle_f64x2::<ODD>(b, d));
             }
         }
+    }
+}
+
+/// A number, or the lanes of a vector. Every operation rounds, so numbers and lanes agree bitwise.
+pub(crate) trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The constant `x` in the type of `self`.
+    fn constant(self, x: f64) -> Self;
+
+    /// `then` where `self` < `other`, and `otherwise` elsewhere.
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self;
+
+    /// |x|
+    fn abs(self) -> Self;
+}
+
+impl Lane for f64 {
+    #[inline(always)]
+    fn constant(self, x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+        if self < other { then } else { otherwise }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+}
+
+/// The lanes of a vector, with operators.
+pub(crate) struct Wide<S: Lanes>(pub S, pub S::N);
+
+impl<S: Lanes> Clone for Wide<S> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S: Lanes> Copy for Wide<S> {}
+
+macro_rules! operator {
+    ($operator:ident, $method:ident) => {
+        impl<S: Lanes> $operator for Wide<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0, self.0.$method(self.1, other.1))
+            }
+        }
+    };
+}
+
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<S: Lanes> Lane for Wide<S> {
+    #[inline(always)]
+    fn constant(self, x: f64) -> Self {
+        Self(self.0, self.0.splat(x))
+    }
+
+    #[inline(always)]
+    fn where_less(self, other: Self, then: Self, otherwise: Self) -> Self {
+        Self(self.0, self.0.where_less(self.1, other.1, then.1, otherwise.1))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0, self.0.abs(self.1))
     }
 }
 

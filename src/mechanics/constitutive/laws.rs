@@ -4,14 +4,15 @@
 //! their loops into vector instructions with the same bits. These loops are compiled once, here. Any other law keeps a plain loop.
 //! The loop of each body is chosen once a pass over the particles.
 
-use super::lanes::{LANES, Lanes, WithLanes, widest};
+use super::point::{self, Inadmissible, Part};
 use super::tangents::{Form, general};
-use super::{At, Group, Number};
+use crate::lanes::{LANES, Lanes, WithLanes, widest};
 use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
-use crate::mechanics::point::{self, Inadmissible, Part};
+use crate::mechanics::sweep::{At, Group, Number};
 use crate::particles::{Body, Particles};
 use crate::scalar::{Real, Single};
 use crate::tensor::{Tensor, identity};
+use std::any::Any;
 
 /// The laws of all particles, and their states at t_n.
 #[derive(Clone, Copy)]
@@ -118,8 +119,13 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         &self,
         part: Part,
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(|law| match law.shipped().and_then(|material| T::stresses_of(material, D)) {
-            Some(shipped) => shipped,
+        // The loops of shipped laws are compiled for plain numbers. `downcast` finds out whether T is the plain number.
+        let in_lanes = |law: &L| {
+            let shipped: Box<dyn Any> = Box::new(shipped(law.shipped()?, D, What::Stresses));
+            shipped.downcast::<Box<Loop<'static, T>>>().ok()
+        };
+        let chosen = self.chosen(|law| match in_lanes(law) {
+            Some(shipped) => *shipped,
             None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
         });
         move |group, at, sums| {
@@ -269,14 +275,14 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], out: &mut ClosedRows, first: u
 
 /// The quantity that is evaluated of a law in every lane.
 #[derive(Clone, Copy)]
-pub(super) enum What {
+enum What {
     Stresses,
     Tangents(Form),
 }
 
 /// The loop of a shipped law. It is not generic, so it is compiled here and not by every crate that uses it.
 #[inline(never)]
-pub(super) fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
+fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
     law.with(Choose { dimension, what })
 }
 

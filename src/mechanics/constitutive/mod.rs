@@ -1,0 +1,12 @@
+//! The laws at the particles: stress, linearised tangent and its storage.
+//!
+//! [`point`] has one particle, in formulas. [`laws`] calls these formulas for the particles of a group side by side. [`tangents`] stores
+//! their linearised tangents, and applies them.
+
+mod laws;
+mod point;
+mod tangents;
+
+pub use laws::Laws;
+pub use point::{Inadmissible, Part, compose};
+pub(crate) use tangents::{AddTo, Form, Product, add_quadratic, product};
