@@ -39,7 +39,7 @@ pub trait Lanes: Arithmetic {
 }
 
 /// An instruction set that transposes a square of numbers, one row a register.
-trait Square: Simd {
+pub(crate) trait Square: Simd {
     #[inline(always)]
     fn transpose(self, rows: &mut [Self::f64s]) {
         let numbers: &mut [f64] = bytemuck::cast_slice_mut(rows);

@@ -3,6 +3,7 @@
 mod balance;
 mod coming;
 mod history;
+mod preconditioner;
 mod report;
 mod settings;
 mod start;
@@ -20,17 +21,17 @@ pub use touching::Sharing;
 use crate::approximation::{Approximation, ShapeFunction};
 use crate::clock::Clock;
 use crate::grid::Grid;
-use crate::material::{DISSIPATED, Law, Material, PLASTIC_STRAIN, internal_variable, p_wave_modulus};
+use crate::material::{DISSIPATED, Law, Material, internal_variable};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::path::Path;
 use crate::mechanics::residual::unsymmetric;
-use crate::mechanics::schemes::{Alphas, LONG_STEPS};
+use crate::mechanics::schemes::Alphas;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pool;
-use crate::solver::{Krylov, Preconditioned, Preconditioning};
+use crate::solver::Krylov;
 use crate::tensor::Vector;
 
 /// An implicit material point simulation in `D` dimensions.
@@ -80,10 +81,6 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
     /// Memory that the next step reuses. Results do not depend on this memory.
     pub workspace: Workspace<D>,
 }
-
-/// Above this ratio of the volumetric stiffness to Λ + 2G, a body is nearly incompressible, and multigrid is the default preconditioner.
-/// The ratio is about that of ν = 0.4998: at 0.4999, no step is found with block-Jacobi.
-const ISOCHORIC: f64 = 0.999;
 
 /// Memory that the next step reuses: the shape functions of the last step, and a pool of vectors. The next step overwrites the shape
 /// functions, and starts to sort particles from their last order. The workspace is no state: a clone has an empty one, and no checkpoint
@@ -223,35 +220,6 @@ impl<const D: usize, L: Law, A> Simulation<D, L, A> {
 }
 
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
-    /// The preconditioner of the linear systems, and the reason for the choice.
-    ///
-    /// ```
-    /// use bfree::solver::Preconditioning;
-    ///
-    /// let simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
-    /// assert_eq!(simulation.preconditioner(), (Preconditioning::BlockJacobi, "inertia dominates"));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn preconditioner(&self) -> (Preconditioning, &'static str) {
-        let across = self.clock.nominal() / self.grid.spacing;
-        let courant = |body: &Body<L>| (p_wave_modulus(&body.law) / body.density).sqrt() * across;
-        let long = !self.settings.scheme.has_inertia() || self.bodies.iter().any(|body| courant(body) > LONG_STEPS);
-        let isochoric = |body: &Body<L>| {
-            let volumetric = body.response::<f64>(0.0).map_or(0.0, |of| of.stiffness);
-            volumetric > ISOCHORIC * p_wave_modulus(&body.law)
-        };
-        let splines = self.approximation.separable().is_some_and(|functions| functions.is_spline());
-        self.settings.preconditioner.chosen::<D>(Preconditioned {
-            particles: self.particles.len(),
-            splines,
-            follow_cubics: self.settings.aggregation && self.approximation.pieces().degree == 3,
-            long,
-            on_path: self.settings.scheme.follows_path(),
-            flows: self.remembers(PLASTIC_STRAIN),
-            isochoric: self.bodies.iter().any(isochoric),
-        })
-    }
-
     /// The simulation with other laws, one for each body. Internal variables take their values at rest.
     ///
     /// ```

@@ -133,34 +133,24 @@ fn descend(
     let mut largest: f64 = 0.0;
     let (mut best, mut best_at) = (r_norm, 0);
     let mut run = Run { outcome: LinearOutcome::Converged, iterations: 0, products: 0 };
-    let stop = |outcome, run: Run| Ok(Run { outcome, ..run });
     loop {
         let at = run.iterations;
-        if run.iterations >= allowed {
-            return stop(LinearOutcome::IterationLimit, run);
-        }
-        if run.iterations - best_at > n + PATIENCE {
-            return stop(LinearOutcome::Stagnated, run);
-        }
-        if finite(rz, "r·z", at)? <= 0.0 {
-            return stop(LinearOutcome::NegativeCurvature, run);
+        if let Some(outcome) = ends(at, allowed, at - best_at > n + PATIENCE, finite(rz, "r·z", at)?) {
+            return Ok(Run { outcome, ..run });
         }
         operator.apply(&p, &mut q);
         run.products += 1;
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
-        let curvature = p_a_p / p_m_p;
-        largest = largest.max(curvature);
-        let unresolved = UNRESOLVED * f64::EPSILON * largest;
-        if curvature < -unresolved {
-            if x.iter().all(|x| *x == 0.0) {
-                // The step length for a curvature of the opposite sign.
-                axpy(-rz / p_a_p, &p, &mut x);
+        largest = largest.max(p_a_p / p_m_p);
+        if let Some(outcome) = unusable(p_a_p / p_m_p, largest) {
+            if outcome == LinearOutcome::NegativeCurvature {
+                if x.iter().all(|x| *x == 0.0) {
+                    // The step length for a curvature of the opposite sign.
+                    axpy(-rz / p_a_p, &p, &mut x);
+                }
+                solution.copy_from_slice(&x);
             }
-            solution.copy_from_slice(&x);
-            return stop(LinearOutcome::NegativeCurvature, run);
-        }
-        if curvature <= unresolved {
-            return stop(LinearOutcome::Stagnated, run);
+            return Ok(Run { outcome, ..run });
         }
         // α = r·z / p·Ap
         let length = rz / p_a_p;
@@ -181,6 +171,31 @@ fn descend(
         xpby(&z, β, &mut p);
         rz = rz_new;
         p_m_p = rz + β * β * p_m_p;
+    }
+}
+
+/// The outcome before a product, if the recurrence ends there.
+fn ends(iterations: usize, allowed: usize, no_progress: bool, rz: f64) -> Option<LinearOutcome> {
+    if iterations >= allowed {
+        Some(LinearOutcome::IterationLimit)
+    } else if no_progress {
+        Some(LinearOutcome::Stagnated)
+    } else if rz <= 0.0 {
+        Some(LinearOutcome::NegativeCurvature)
+    } else {
+        None
+    }
+}
+
+/// The outcome at a curvature p·Ap / p·Mp that gives no step: negative, or zero to round-off.
+fn unusable(curvature: f64, largest: f64) -> Option<LinearOutcome> {
+    let unresolved = UNRESOLVED * f64::EPSILON * largest;
+    if curvature < -unresolved {
+        Some(LinearOutcome::NegativeCurvature)
+    } else if curvature <= unresolved {
+        Some(LinearOutcome::Stagnated)
+    } else {
+        None
     }
 }
 

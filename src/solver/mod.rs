@@ -22,9 +22,7 @@ pub use newton::{
 pub(crate) use nonnegative::NonnegativeLeastSquares;
 #[cfg(feature = "direct")]
 pub use preconditioner::Direct;
-pub use preconditioner::{
-    BlockJacobi, Identity, LocalForm, Multigrid, Neighbours, Preconditioned, Preconditioner, Preconditioning,
-};
+pub use preconditioner::{BlockJacobi, Identity, LocalForm, Multigrid, Neighbours, Preconditioner, Preconditioning};
 pub(crate) use preconditioner::{direct_bytes, multigrid_bytes};
 pub use stop::Stop;
 

@@ -4,17 +4,15 @@
 #[test]
 fn a_program_without_it_says_so() {
     use bfree::scene;
-    use bfree::solver::{Preconditioned, Preconditioning};
+    use bfree::solver::Preconditioning;
 
     let direct = r#"solver.krylov.preconditioner="direct""#.parse().unwrap();
     let refused = scene::read_file("scenes/elastica.json".as_ref(), &[direct]).unwrap_err().to_string();
     assert!(refused.contains("solver.krylov.preconditioner") && refused.contains("--features direct"), "{refused}");
-    let (chosen, why) = Preconditioning::Direct.chosen::<2>(Preconditioned {
-        particles: 1000,
-        splines: true,
-        long: true,
-        ..Default::default()
-    });
+    let mut simulation =
+        scene::read_file("scenes/elastica.json".as_ref(), &[]).unwrap().build::<2>("scenes".as_ref()).unwrap();
+    simulation.settings.preconditioner = Preconditioning::Direct;
+    let (chosen, why) = simulation.preconditioner();
     assert!(chosen == Preconditioning::BlockJacobi && why.contains("`direct`"), "{why}");
 }
 

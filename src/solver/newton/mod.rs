@@ -15,7 +15,7 @@ pub use settings::{Krylov, NewtonSettings};
 use super::forcing::Progress;
 use super::vector::{dot, norm};
 use super::{NonlinearProblem, Preconditioner};
-use crate::pooled::Pool;
+use crate::pooled::{Pool, Pooled};
 use linear::{Solved, System, solve};
 use search::{Search, Step, search};
 
@@ -69,6 +69,25 @@ pub fn newton<E: std::error::Error + 'static>(
     }
 }
 
+/// The iterate and its residual, with room for the next ones.
+struct Iterate<'a> {
+    x: &'a mut [f64],
+    r: Pooled<f64>,
+    /// ‖r‖
+    residual: f64,
+    trial: Pooled<f64>,
+    r_trial: Pooled<f64>,
+}
+
+/// The residuals with which later ones are compared.
+struct Scale {
+    first: f64,
+    target: f64,
+    /// Round-off of the residual, relative to its magnitude.
+    floor: f64,
+    first_magnitude: f64,
+}
+
 fn iterate<E: std::error::Error + 'static>(
     problem: &dyn NonlinearProblem<Inadmissible = E>,
     preconditioner: &mut dyn Preconditioner,
@@ -78,95 +97,130 @@ fn iterate<E: std::error::Error + 'static>(
     history: &mut NewtonHistory,
 ) -> Result<Convergence, NewtonFailure<E>> {
     settings.check()?;
-    let n = x.len();
-    let [mut r, mut trial, mut r_trial] = std::array::from_fn(|_| workspace.filled(n, 0.0));
-
-    history.counts.residuals += 1;
-    problem.residual(x, &mut r).map_err(|source| NewtonFailure::Inadmissible { iteration: 0, source })?;
-    let first = norm(&r);
-    if !first.is_finite() {
-        return Err(NewtonFailure::NotFinite { what: "the residual", iteration: 0 });
-    }
-    history.first_residual = Some(first);
-    let floor = settings.floor * f64::EPSILON;
-    let first_magnitude = measured(problem.magnitude(x), 0, history)?;
-    let target = (settings.relative_tolerance * first).max(floor * first_magnitude);
-    let too_large = DIVERGED * first.max(first_magnitude);
-
-    let mut residual = first;
+    let [r, trial, r_trial] = std::array::from_fn(|_| workspace.filled(x.len(), 0.0));
+    let mut at = Iterate { x, r, residual: 0.0, trial, r_trial };
+    let scale = begin(problem, &mut at, settings, history)?;
     let mut progress = None;
     let mut stalled = 0;
-    let method = settings.krylov.chosen(problem.is_symmetric());
-    loop {
-        if residual <= target {
-            return Ok(Convergence::Tolerance);
-        }
+    while at.residual > scale.target {
         let iteration = history.iterations.len() + 1;
         if problem.is_stopped() {
             return Err(NewtonFailure::Stopped { iteration });
         }
         if iteration > settings.max_iterations {
-            return Err(NewtonFailure::MaxIterations { allowed: settings.max_iterations, residual, target });
+            let Scale { target, .. } = scale;
+            return Err(NewtonFailure::MaxIterations {
+                allowed: settings.max_iterations,
+                residual: at.residual,
+                target,
+            });
         }
-        let forcing = settings.forcing.next(progress, target / residual);
-        history.counts.linearizations += 1;
-        let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
-        let has_potential = &|| problem.potential(x).is_some();
-        let system = System { r: &r, method, relative_tolerance: forcing, has_potential };
-        let solved = {
-            let tangent = problem.linearize(x).map_err(inadmissible)?;
-            let inverse = preconditioner.prepare(&*tangent);
-            solve(&*tangent, &*inverse, &system, settings, &mut history.counts)
-        };
-        let Solved { step, krylov, negative_curvature } = match solved {
-            Ok(solved) => solved,
-            Err(source) => {
-                // The remaining R may be round-off, which need not lie in the range of K.
-                if residual <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)? {
-                    return Ok(Convergence::RoundOff);
-                }
-                return Err(NewtonFailure::LinearSolverFailed { iteration, residual, source });
+        let forcing = settings.forcing.next(progress, scale.target / at.residual);
+        let taken = match step(problem, preconditioner, &mut at, forcing, &scale, settings, history) {
+            Ok(Some(taken)) => taken,
+            Ok(None) => return Ok(Convergence::RoundOff),
+            Err(cause @ NewtonFailure::Inadmissible { .. }) => return Err(cause),
+            // The remaining R may be round-off, which need not lie in the range of K.
+            Err(cause) => {
+                let round_off = round_off(problem, &at, &scale, history)?;
+                return if at.residual <= round_off { Ok(Convergence::RoundOff) } else { Err(cause) };
             }
         };
-        let at = Step { x, d: &step, residual, slope: dot(&r, &step), linear: krylov.relative_residual };
-        let round_off = ROUND_OFF_MULTIPLE * floor * first_magnitude;
-        let searched = search(problem, &at, settings, round_off, &mut trial, &mut r_trial, &mut history.counts);
-        let accepted = match searched {
-            Search::Accepted(accepted) => accepted,
-            Search::RoundOff => return Ok(Convergence::RoundOff),
-            Search::Failed(failed) => {
-                if residual <= ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration - 1, history)? {
-                    return Ok(Convergence::RoundOff);
-                }
-                return Err(failed.into_failure(iteration, residual));
-            }
-        };
-        x.copy_from_slice(&trial);
-        std::mem::swap(&mut r, &mut r_trial);
-        let ratio = accepted.residual / residual;
-        residual = accepted.residual;
-        progress = Some(Progress { forcing, ratio });
-        history.iterations.push(NewtonIteration {
-            residual,
-            ratio,
-            step_length: accepted.length,
-            merit: accepted.merit,
-            forcing,
-            krylov,
-            negative_curvature,
-        });
-        if residual > too_large {
-            return Err(NewtonFailure::Diverged { iteration, residual, first });
+        progress = Some(Progress { forcing, ratio: taken.ratio });
+        stalled = if taken.merit == Merit::Residual && taken.ratio > STALL_RATIO { stalled + 1 } else { 0 };
+        history.iterations.push(taken);
+        let Iterate { residual, .. } = at;
+        if residual > DIVERGED * scale.first.max(scale.first_magnitude) {
+            return Err(NewtonFailure::Diverged { iteration, residual, first: scale.first });
         }
-        stalled = if accepted.merit == Merit::Residual && ratio > STALL_RATIO { stalled + 1 } else { 0 };
-        if stalled >= STALL_LENGTH && residual > target {
-            let round_off = ROUND_OFF_MULTIPLE * floor * measured(problem.sensitivity(x), iteration, history)?;
+        if stalled >= STALL_LENGTH && residual > scale.target {
+            let round_off = round_off(problem, &at, &scale, history)?;
             if residual <= round_off {
                 return Ok(Convergence::RoundOff);
             }
-            return Err(NewtonFailure::Stagnated { iteration, residual, target, round_off });
+            return Err(NewtonFailure::Stagnated { iteration, residual, target: scale.target, round_off });
         }
     }
+    Ok(Convergence::Tolerance)
+}
+
+/// Step 1 at the initial guess: its residual, and the residual to reach.
+fn begin<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
+    at: &mut Iterate<'_>,
+    settings: &NewtonSettings,
+    history: &mut NewtonHistory,
+) -> Result<Scale, NewtonFailure<E>> {
+    history.counts.residuals += 1;
+    problem.residual(at.x, &mut at.r).map_err(|source| NewtonFailure::Inadmissible { iteration: 0, source })?;
+    let first = norm(&at.r);
+    if !first.is_finite() {
+        return Err(NewtonFailure::NotFinite { what: "the residual", iteration: 0 });
+    }
+    at.residual = first;
+    history.first_residual = Some(first);
+    let floor = settings.floor * f64::EPSILON;
+    let first_magnitude = measured(problem.magnitude(at.x), 0, history)?;
+    let target = (settings.relative_tolerance * first).max(floor * first_magnitude);
+    Ok(Scale { first, target, floor, first_magnitude })
+}
+
+/// Steps 2 to 6, and 8. `None` if the residual is round-off, and the full step does not lower it.
+fn step<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
+    preconditioner: &mut dyn Preconditioner,
+    at: &mut Iterate<'_>,
+    forcing: f64,
+    scale: &Scale,
+    settings: &NewtonSettings,
+    history: &mut NewtonHistory,
+) -> Result<Option<NewtonIteration>, NewtonFailure<E>> {
+    let iteration = history.iterations.len() + 1;
+    let counts = &mut history.counts;
+    let Iterate { x, r, residual, trial, r_trial } = at;
+    let has_potential = &|| problem.potential(x).is_some();
+    let method = settings.krylov.chosen(problem.is_symmetric());
+    let system = System { r, method, relative_tolerance: forcing, has_potential };
+    counts.linearizations += 1;
+    let solved = {
+        let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
+        let tangent = problem.linearize(x).map_err(inadmissible)?;
+        let inverse = preconditioner.prepare(&*tangent);
+        solve(&*tangent, &*inverse, &system, settings, counts)
+    };
+    let failed = |source| NewtonFailure::LinearSolverFailed { iteration, residual: *residual, source };
+    let Solved { step, krylov, negative_curvature } = solved.map_err(failed)?;
+    let from = Step { x, d: &step, residual: *residual, slope: dot(r, &step), linear: krylov.relative_residual };
+    let round_off = ROUND_OFF_MULTIPLE * scale.floor * scale.first_magnitude;
+    let accepted = match search(problem, &from, settings, round_off, trial, r_trial, counts) {
+        Search::Accepted(accepted) => accepted,
+        Search::RoundOff => return Ok(None),
+        Search::Failed(failed) => return Err(failed.into_failure(iteration, *residual)),
+    };
+    x.copy_from_slice(trial);
+    std::mem::swap(r, r_trial);
+    let ratio = accepted.residual / *residual;
+    *residual = accepted.residual;
+    Ok(Some(NewtonIteration {
+        residual: accepted.residual,
+        ratio,
+        step_length: accepted.length,
+        merit: accepted.merit,
+        forcing,
+        krylov,
+        negative_curvature,
+    }))
+}
+
+/// The round-off of the residual at x, from its sensitivity (step 7).
+fn round_off<E: std::error::Error + 'static>(
+    problem: &dyn NonlinearProblem<Inadmissible = E>,
+    at: &Iterate<'_>,
+    scale: &Scale,
+    history: &mut NewtonHistory,
+) -> Result<f64, NewtonFailure<E>> {
+    let sensitivity = measured(problem.sensitivity(at.x), history.iterations.len(), history)?;
+    Ok(ROUND_OFF_MULTIPLE * scale.floor * sensitivity)
 }
 
 /// Counts and stores the magnitude or sensitivity at an accepted iterate.

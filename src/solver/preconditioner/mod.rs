@@ -84,87 +84,9 @@ pub enum Preconditioning {
     None,
 }
 
-/// The properties of a problem that decide the choice of its preconditioner.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Preconditioned {
-    /// Number of particles.
-    pub particles: usize,
-    /// Whether the shape functions are B-splines.
-    pub splines: bool,
-    /// Whether the splines are cubic and outer coefficients follow others. In 3D block-Jacobi then takes up to 30 times the iterations of
-    /// multigrid (`scenes/block_static.json`).
-    pub follow_cubics: bool,
-    /// Whether inertia does not dominate the steps.
-    pub long: bool,
-    /// Whether steps follow an equilibrium path, solved by GMRES.
-    pub on_path: bool,
-    /// Whether a law has plastic strain. Near a limit load, multigrid takes a fourth to a sixtieth of the iterations of block-Jacobi
-    /// (`docs/src/tutorial/plasticity.md`).
-    pub flows: bool,
-    /// Whether a body changes its volume so little that block-Jacobi finds no step (`docs/src/choosing.md`).
-    pub isochoric: bool,
-}
-
-/// Numbers of particles in 1D, 2D and 3D from which on multigrid was faster than block-Jacobi. Block-Jacobi serves splines better: in 3D
-/// multigrid was not faster with half a million particles (`docs/src/choosing.md`).
-const MANY: [usize; 3] = [500, 10_000, 50_000];
-const MANY_OF_SPLINES: [usize; 3] = [500, 20_000, usize::MAX];
-
-/// Numbers of particles in 1D, 2D and 3D up to which a direct solve is taken, in programs that have it. It was the fastest in beams, and no
-/// slower than the alternative in blocks. In 3D it never was (`docs/src/choosing.md`).
-const FEW: [usize; 3] = [usize::MAX, 20_000, 0];
-const FEW_OF_SPLINES: [usize; 3] = [usize::MAX, 50_000, 0];
-
 impl Preconditioning {
     /// Whether this program can factorise.
     pub const HAS_DIRECT: bool = cfg!(feature = "direct");
-
-    /// The preconditioner used for a body in `D` dimensions, and the reason.
-    ///
-    /// ```
-    /// use bfree::solver::Preconditioning::{Automatic, BlockJacobi, Multigrid};
-    /// use bfree::solver::Preconditioned;
-    ///
-    /// let (small, large) = (Preconditioned { particles: 1_000, ..Default::default() }, 1_000_000);
-    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { particles: large, long: true, ..small }).0, Multigrid);
-    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { particles: large, ..small }), (BlockJacobi, "inertia dominates"));
-    /// let long = Preconditioned { long: true, ..small };
-    /// assert_eq!(Automatic.chosen::<3>(long).1, "faster for so many particles and these functions");
-    /// assert_eq!(Automatic.chosen::<3>(Preconditioned { flows: true, ..long }), (Multigrid, "the body may flow"));
-    /// let isochoric = Preconditioned { isochoric: true, ..long };
-    /// assert_eq!(Automatic.chosen::<3>(isochoric), (Multigrid, "a body hardly changes its volume"));
-    /// let cubic = Preconditioned { splines: true, follow_cubics: true, ..long };
-    /// assert_eq!(Automatic.chosen::<3>(cubic), (Multigrid, "outer coefficients follow cubic polynomials"));
-    /// let on_path = Preconditioned { on_path: true, ..long };
-    /// assert_eq!(Automatic.chosen::<3>(on_path), (Multigrid, "restarts lose what few iterations keep"));
-    /// // A preconditioner that is asked for is used.
-    /// assert_eq!(Multigrid.chosen::<3>(small), (Multigrid, "it was asked for"));
-    /// ```
-    pub fn chosen<const D: usize>(self, of: Preconditioned) -> (Self, &'static str) {
-        let Preconditioned { particles, splines, follow_cubics, long, on_path, flows, isochoric } = of;
-        let (few, many) = if splines { (FEW_OF_SPLINES, MANY_OF_SPLINES) } else { (FEW, MANY) };
-        let axes = (D - 1).min(2);
-        match self {
-            Self::Direct if !Self::HAS_DIRECT => {
-                (Self::BlockJacobi, "this program was built without the feature `direct`")
-            }
-            Self::Automatic if on_path => (Self::Multigrid, "restarts lose what few iterations keep"),
-            Self::Automatic if long && flows => (Self::Multigrid, "the body may flow"),
-            Self::Automatic if long && Self::HAS_DIRECT && particles <= few[axes] => {
-                (Self::Direct, "few particles, and inertia does not dominate")
-            }
-            Self::Automatic if long && isochoric => (Self::Multigrid, "a body hardly changes its volume"),
-            Self::Automatic if long && follow_cubics && D == 3 => {
-                (Self::Multigrid, "outer coefficients follow cubic polynomials")
-            }
-            Self::Automatic if long && particles >= many[axes] => {
-                (Self::Multigrid, "many particles, and inertia does not dominate")
-            }
-            Self::Automatic if long => (Self::BlockJacobi, "faster for so many particles and these functions"),
-            Self::Automatic => (Self::BlockJacobi, "inertia dominates"),
-            asked => (asked, "it was asked for"),
-        }
-    }
 
     /// A new preconditioner of this kind for `D` unknowns a node, not yet prepared with a tangent.
     ///
