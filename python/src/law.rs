@@ -72,7 +72,7 @@ pub enum BodyLaw {
 impl bfree::material::Law for BodyLaw {
     bfree::law_of_variants!(Self: Shipped, Energy);
 
-    fn shipped(&self) -> Option<&Material> {
+    fn shipped(&self) -> Option<&dyn std::any::Any> {
         match self {
             Self::Shipped(law) => law.shipped(),
             Self::Energy(_) => None,

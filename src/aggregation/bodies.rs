@@ -1,7 +1,20 @@
 //! Knot cells of the bodies: the search for good cells, and the good cells whose polynomials an outer node follows.
 
-use super::{Occupied, Pieces};
+use super::pieces::Pieces;
 use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// The part of the grid that a body occupies. Indices have three components; an axis beyond D has no cells, and index 0.
+#[derive(Clone, Debug)]
+pub struct Occupied<'a> {
+    /// The number of dimensions D.
+    pub dimension: usize,
+    /// Cells along each axis.
+    pub grid: [u32; 3],
+    /// The active nodes.
+    pub nodes: &'a [[u32; 3]],
+    /// The occupied knot cells, each with its filled fraction.
+    pub cells: Vec<([u32; 3], f64)>,
+}
 
 /// Relative tolerance of comparisons between filled fractions: round-off must not choose a cell.
 const SAME: f64 = 1e-6;

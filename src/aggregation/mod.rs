@@ -22,6 +22,7 @@ mod bodies;
 mod followers;
 mod pieces;
 
+pub use bodies::Occupied;
 pub use followers::Followers;
 pub use pieces::Pieces;
 
@@ -40,19 +41,6 @@ pub struct Extension {
     starts: Vec<u32>,
     leaders: Vec<u32>,
     weights: Vec<f64>,
-}
-
-/// The part of the grid that a body occupies. Indices have three components; an axis beyond D has no cells, and index 0.
-#[derive(Clone, Debug)]
-pub struct Occupied<'a> {
-    /// The number of dimensions D.
-    pub dimension: usize,
-    /// Cells along each axis.
-    pub grid: [u32; 3],
-    /// The active nodes.
-    pub nodes: &'a [[u32; 3]],
-    /// The occupied knot cells, each with its filled fraction.
-    pub cells: Vec<([u32; 3], f64)>,
 }
 
 impl Extension {

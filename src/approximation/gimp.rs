@@ -2,7 +2,7 @@
 
 use super::interior::{InCells, InLanes, Rows, evaluate};
 use super::kernel::{Kernel, folded};
-use super::{Approximation, ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Validate};
+use super::{ApproximationError, AtSurface, AxisWeights, Cells, Linear, Listed, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::lanes::Lane;
@@ -37,13 +37,14 @@ impl Gimp {
 
 impl Listed for Gimp {
     type Parameters = ();
+    type Other = Self;
     const ONE_HALF_WIDTH: bool = true;
 
-    fn build(_: &(), cells: Cells, _: &mut Problems, _: &str) -> Option<Approximation> {
+    fn build<A: From<Self> + From<Self::Other>>(_: &(), cells: Cells, _: &mut Problems, _: &str) -> Option<A> {
         Some(Self::particles_per_axis(cells.particles_per_axis).into())
     }
 
-    fn examples() -> Vec<(&'static str, Approximation)> {
+    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
         vec![("gimp", Self::particles_per_axis(2).into())]
     }
 }

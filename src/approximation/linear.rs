@@ -2,7 +2,7 @@
 
 use super::interior::{Column, InCells, InLanes, Interior, NODES, Rows, evaluate};
 use super::product::Place;
-use super::{Approximation, ApproximationError, AxisWeights, Cells, Listed, Separable, Validate};
+use super::{ApproximationError, AxisWeights, Cells, Listed, Separable, Validate};
 use crate::aggregation::Pieces;
 use crate::grid::Axis;
 use crate::lanes::Lane;
@@ -14,12 +14,13 @@ pub struct Linear;
 
 impl Listed for Linear {
     type Parameters = ();
+    type Other = Self;
 
-    fn build(_: &(), _: Cells, _: &mut Problems, _: &str) -> Option<Approximation> {
+    fn build<A: From<Self> + From<Self::Other>>(_: &(), _: Cells, _: &mut Problems, _: &str) -> Option<A> {
         Some(Self.into())
     }
 
-    fn examples() -> Vec<(&'static str, Approximation)> {
+    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
         vec![("linear", Self.into())]
     }
 }

@@ -4,6 +4,7 @@ use super::bspline::{Bspline, BsplineParameters, NotAKnotBspline};
 use super::error::{ApproximationError, Validate};
 use super::gimp::Gimp;
 use super::linear::Linear;
+use super::listed::{Cells, Listed};
 use super::lme::{Lme, LmeCircle, LmeParameters};
 use super::product::Separable;
 use super::shape_function::{Scratch, ShapeFunction};
@@ -13,32 +14,6 @@ use crate::problems::Problems;
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// The parts of a listed family besides its functions: its keys, constructor and examples.
-pub trait Listed: ShapeFunction {
-    /// The keys of the family in a scene; `()` if it has only its name. The doc comments of the fields are the manual.
-    type Parameters;
-
-    /// Whether the functions depend on the width of particles. If so, all bodies must have particles of one width.
-    const ONE_HALF_WIDTH: bool = false;
-
-    /// Makes the functions. If keys below `path` are wrong, the result is `None` and `problems` lists them.
-    fn build(given: &Self::Parameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation>;
-
-    /// Named members of the family, for tests and studies.
-    fn examples() -> Vec<(&'static str, Approximation)>;
-}
-
-/// The data of a scene on which shape functions depend, besides their own parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cells {
-    /// The number of dimensions D.
-    pub dimension: usize,
-    /// Particles along each axis of a cell.
-    pub particles_per_axis: u32,
-    /// Whether the particles are Gauss points, so that sums over particles are integrals, and no mass is lumped.
-    pub integrated: bool,
-}
 
 /// Makes the types that contain every family from the list of families.
 macro_rules! approximations {

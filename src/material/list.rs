@@ -7,6 +7,7 @@ use super::{
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::any::Any;
 
 /// A generic operation on a law of any type.
 pub(crate) trait LawVisitor {
@@ -56,7 +57,7 @@ macro_rules! materials {
         impl Law for Material {
             $crate::law_of_variants!(Self: $($law),*);
 
-            fn shipped(&self) -> Option<&Material> {
+            fn shipped(&self) -> Option<&dyn Any> {
                 Some(self)
             }
         }

@@ -6,10 +6,10 @@ use super::filling::Means;
 use super::load::Loaded;
 use super::{BuildError, Scene};
 use crate::grid::Grid;
+use crate::mechanics::loads::ForceField;
 use crate::mechanics::loads::{
     self, Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
-use crate::mechanics::terms::ForceField;
 use crate::particles::Particles;
 use crate::shape;
 use crate::tensor::Vector;

@@ -168,7 +168,7 @@ impl Law for Asked {
         self.law.closed(f_n, at, volume)
     }
 
-    fn shipped(&self) -> Option<&Material> {
+    fn shipped(&self) -> Option<&dyn std::any::Any> {
         self.times.fetch_add(1, Ordering::Relaxed);
         Some(&self.law)
     }

@@ -6,7 +6,7 @@ mod uniform;
 pub use not_a_knot::NotAKnotBspline;
 pub use uniform::Bspline;
 
-use super::{Approximation, Cells, Listed};
+use super::{Cells, Listed};
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,8 +29,14 @@ impl Default for BsplineParameters {
 
 impl Listed for Bspline {
     type Parameters = BsplineParameters;
+    type Other = NotAKnotBspline;
 
-    fn build(given: &BsplineParameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+    fn build<A: From<Self> + From<Self::Other>>(
+        given: &BsplineParameters,
+        cells: Cells,
+        problems: &mut Problems,
+        path: &str,
+    ) -> Option<A> {
         problems.whole(&format!("{path}.degree"), given.degree, 2, 3);
         let spline = match given.degree {
             2 => Self::Quadratic,
@@ -40,8 +46,8 @@ impl Listed for Bspline {
         Some(if cells.integrated { NotAKnotBspline(spline).into() } else { spline.into() })
     }
 
-    fn examples() -> Vec<(&'static str, Approximation)> {
-        let not_a_knot = |spline| NotAKnotBspline(spline).into();
+    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
+        let not_a_knot = |spline| A::from(NotAKnotBspline(spline));
         vec![
             ("quadratic", Self::Quadratic.into()),
             ("cubic", Self::Cubic.into()),

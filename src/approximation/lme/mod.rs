@@ -11,7 +11,7 @@ pub use circle::LmeCircle;
 pub use locality::SMALLEST_TOLERANCE;
 pub use separable::Lme;
 
-use super::{Approximation, Cells, Listed};
+use super::{Cells, Listed};
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,8 +54,14 @@ impl Default for LmeParameters {
 
 impl Listed for Lme {
     type Parameters = LmeParameters;
+    type Other = LmeCircle;
 
-    fn build(given: &LmeParameters, cells: Cells, problems: &mut Problems, path: &str) -> Option<Approximation> {
+    fn build<A: From<Self> + From<Self::Other>>(
+        given: &LmeParameters,
+        cells: Cells,
+        problems: &mut Problems,
+        path: &str,
+    ) -> Option<A> {
         let LmeParameters { gamma, tolerance, support } = *given;
         let tolerance_ok = problems.between(&format!("{path}.tolerance"), tolerance, 1e-16, 1e-2);
         let ok = problems.between(&format!("{path}.gamma"), gamma, 0.1, 1000.0) && tolerance_ok;
@@ -72,7 +78,7 @@ impl Listed for Lme {
     }
 
     /// Members on the box and on the circle. The widest functions, with γ̂ = 0.8, are on the box alone.
-    fn examples() -> Vec<(&'static str, Approximation)> {
+    fn examples<A: From<Self> + From<Self::Other>>() -> Vec<(&'static str, A)> {
         vec![
             ("lme 0.8", Self::new(0.8, 1e-6).into()),
             ("lme 1.8", Self::new(1.8, 1e-6).into()),

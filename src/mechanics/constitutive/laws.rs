@@ -121,7 +121,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
         // The loops of shipped laws are compiled for plain numbers. `downcast` finds out whether T is the plain number.
         let in_lanes = |law: &L| {
-            let shipped: Box<dyn Any> = Box::new(shipped(law.shipped()?, D, What::Stresses));
+            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, What::Stresses));
             shipped.downcast::<Box<Loop<'static, T>>>().ok()
         };
         let chosen = self.chosen(|law| match in_lanes(law) {
@@ -150,7 +150,7 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         part: Part,
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(move |law| match law.shipped() {
+        let chosen = self.chosen(move |law| match material(law) {
             Some(material) if part == Part::Whole && form != Form::General => {
                 shipped(material, D, What::Tangents(form))
             }
@@ -167,6 +167,11 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         let Particles { body, id, .. } = self.particles;
         Chosen { body, ids: id, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
     }
+}
+
+/// The shipped law that `law` is.
+fn material<L: Law>(law: &L) -> Option<&Material> {
+    law.shipped()?.downcast_ref()
 }
 
 /// The form of the tangents of a law.

@@ -2,15 +2,20 @@
 
 mod at_surface;
 mod curve;
+mod force_field;
+mod motion_step;
 mod prescribed;
+mod rayleigh;
 mod rotation;
 
 pub(crate) use at_surface::at_surface_points;
 pub use curve::{Curve, CurveError};
-pub use prescribed::{Motion, MotionStep, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
+pub use force_field::{Field, ForceField};
+pub use motion_step::MotionStep;
+pub use prescribed::{Motion, Prescribed, PrescribedDof, Reaction, Selection, prescribed_dofs};
+pub use rayleigh::Rayleigh;
 pub use rotation::Rotation;
 
-use crate::mechanics::terms::{ForceField, Rayleigh};
 use crate::tensor::Vector;
 use std::collections::HashSet;
 

@@ -1,6 +1,8 @@
 //! Prescribed motion: the nodes, and their motion.
 
-use super::{Curve, Rotation};
+use super::curve::Curve;
+use super::motion_step::MotionStep;
+use super::rotation::Rotation;
 use crate::grid::Grid;
 use crate::nodes::Nodes;
 use crate::shape::Shape;
@@ -32,21 +34,6 @@ impl<const D: usize> Reaction<D> {
     /// No reaction.
     pub(crate) const NONE: Self =
         Self { force: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])), torque: 0.0 };
-}
-
-/// The motion of a prescribed component over one step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MotionStep {
-    /// g(t_{n+1}) − g(t_n)
-    pub increment: f64,
-    /// ġ, g̈ at the start of the step (from the right, where the curve has a kink).
-    pub velocity_start: f64,
-    /// See [`Self::velocity_start`].
-    pub acceleration_start: f64,
-    /// ġ, g̈ at the end of the step (from the left, where the curve has a kink).
-    pub velocity_end: f64,
-    /// See [`Self::velocity_end`].
-    pub acceleration_end: f64,
 }
 
 impl<const D: usize> Motion<D> {

@@ -1,6 +1,7 @@
 //! Rotation of all nodes of a condition.
 
-use super::{Curve, MotionStep};
+use super::curve::Curve;
+use super::motion_step::MotionStep;
 use crate::tensor::Vector;
 use nalgebra::Vector3;
 

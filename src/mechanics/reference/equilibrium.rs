@@ -1,9 +1,10 @@
 //! The out-of-balance force R₀ after a grid reset in load steps: the residual of the last equilibrium on the new grid.
 
 use crate::material::Law;
+use crate::mechanics::loads::ForceField;
 use crate::mechanics::loads::{Loads, PrescribedDof, Reaction};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::terms::{ForceField, Step};
+use crate::mechanics::terms::Step;
 use crate::pooled::Pooled;
 use crate::tensor::Vector;
 use std::sync::Arc;

@@ -18,9 +18,9 @@ mod pressure;
 mod stress;
 mod traction;
 
-pub use body_force::{BodyForce, ForceField};
+pub use body_force::BodyForce;
 pub use carried_over::CarriedOver;
-pub use damping::{Damping, Rayleigh};
+pub use damping::Damping;
 pub use inertia::Inertia;
 pub use mean_dilatation::MeanDilatation;
 pub(crate) use mean_dilatation::frozen_rows;

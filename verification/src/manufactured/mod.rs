@@ -11,7 +11,7 @@ pub use block::Block;
 pub use vortex::Vortex;
 
 use bfree::material::{Law, MaterialState};
-use bfree::mechanics::terms::ForceField;
+use bfree::mechanics::loads::ForceField;
 use bfree::scalar::Real;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::{Dual, Dual2_64, Dual64};

@@ -15,7 +15,7 @@ use bfree::mechanics::loads::{
     Curve, Gravity, Loads, Motion, Prescribed, Pressing, Selection, SurfaceLoad, SurfacePoint,
 };
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::terms::Rayleigh;
+use bfree::mechanics::loads::Rayleigh;
 use bfree::particles::{Body, Dilatation, Particles};
 use bfree::scalar::Real;
 use bfree::simulation::{Settings, Simulation};

@@ -7,7 +7,7 @@ use crate::processor::Thread;
 use crate::studies::StudyError;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::mechanics::terms::ForceField;
+use bfree::mechanics::loads::ForceField;
 use bfree::phases::Phase;
 use bfree::plan::Plan;
 use bfree::pooled::Pool;
