@@ -7,7 +7,7 @@ use super::{AdvanceError, FailedAttempt, Simulation, StepError, StepReport};
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::sweep::Supports;
-use crate::mechanics::transfer::Update;
+use crate::mechanics::transfer::{Nodal, Update};
 use crate::mechanics::unknowns::Unknowns;
 use crate::phases::Phase;
 use crate::solver::NewtonReport;
@@ -59,16 +59,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         let (mut dphi, theta) = (phi, scheme.instant());
         dphi.iter_mut().zip(nodal.moved(nodes.len())).for_each(|(dphi, before)| *dphi = (*dphi - before) / theta);
 
-        let (end, walls) = (scheme.end(dt), self.settings.wall_update);
-        let update = Update::new(&end, &projected, &nodal, &prescribed, walls, &dphi);
+        let update = Update::new(&scheme.end(dt), &projected, &nodal, &prescribed, self.settings.wall_update, &dphi);
         let mut update = update.extended(&nodal, &equilibrium.unknowns);
         let error = self.local_error(&update, &supports, dt, &newton)?;
-        if let Some(smoothing) = &self.settings.smoothing {
-            update.smooth(smoothing, &self.particles, &supports, &nodal.mass, dt);
-        }
-        if let Some((particle, position)) = update.leaving(&self.particles, &supports, &self.grid) {
-            return Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() });
-        }
+        self.smooth_and_check(&mut update, &supports, &nodal)?;
         let (reactions, work, dissipated) = self.reactions_and_work(&equilibrium, from, dt, &dphi, &update)?;
 
         // Nothing fails from here on.
@@ -98,6 +92,27 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             seconds: *watch,
             failed: Vec::new(),
         })
+    }
+
+    /// Smooths the update, if the settings ask for it.
+    ///
+    /// # Errors
+    /// A particle leaves the grid.
+    fn smooth_and_check(
+        &self,
+        update: &mut Update<'_, D>,
+        supports: &Supports<D>,
+        nodal: &Nodal<D>,
+    ) -> Result<(), StepError> {
+        if let Some(smoothing) = &self.settings.smoothing {
+            update.smooth(smoothing, &self.particles, supports, &nodal.mass, self.clock.step());
+        }
+        match update.leaving(&self.particles, supports, &self.grid) {
+            None => Ok(()),
+            Some((particle, position)) => {
+                Err(StepError::LeftGrid { particle, position: position.iter().copied().collect() })
+            }
+        }
     }
 
     /// Stores the shape functions for the next step, or their memory alone if it cannot use them. Reorders the particles if passes over the
