@@ -149,6 +149,7 @@ fn descend(
         run.products += 1;
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
         let curvature = p_a_p / p_m_p;
+        mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
         largest = largest.max(curvature);
         let unresolved = UNRESOLVED * f64::EPSILON * largest;
         if curvature < -unresolved {
@@ -178,6 +179,7 @@ fn descend(
         preconditioner.apply(r, &mut z);
         let rz_new = dot(r, &z);
         let β = rz_new / rz;
+        mutant!("solver: the inverse of β in conjugate gradients": β = 1.0 / β);
         xpby(&z, β, &mut p);
         rz = rz_new;
         p_m_p = rz + β * β * p_m_p;

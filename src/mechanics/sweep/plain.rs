@@ -114,6 +114,7 @@ impl<const D: usize> Plain<D> {
             for (lane, (place, n, grad_n)) in block.entries_of(group) {
                 let changed = flow.weights.changed().unwrap_or(|n| n);
                 let (n, grad_n) = (changed(n), grad_n.map(changed));
+                mutant!("sweep: the plain loop scatters stresses by one slope": grad_n = Vector::<f64, D>::repeat(grad_n[0]));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
                         let to = &mut buffer[place * numbers + f * C + c];
