@@ -156,6 +156,8 @@ fn attempt(programs: &Programs, check: Check, fault: Option<&str>) -> Result<Ver
     command.args(arguments).current_dir(root());
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.env_remove(VARIABLE).envs(fault.map(|fault| (VARIABLE, fault)));
+    // Inputs that a fault fails on are no regressions, and do not belong beside the sources.
+    command.env("PROPTEST_DISABLE_FAILURE_PERSISTENCE", "true");
     let failed = |source| ShippedFaultError::Start { command: format!("{}", program.display()), source };
     let mut child = command.spawn().map_err(failed)?;
     let start = Instant::now();

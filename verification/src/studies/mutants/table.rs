@@ -99,7 +99,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("transfer: loads at t = 0 push the wrong way", LOADS, DYNAMICS),
     fault("transfer: moving walls count as resting ones", LOADS, DYNAMICS),
     fault("transfer: the blow of a wall contains the forces", LOADS, DYNAMICS),
-    fault("transfer: the end of a step forgets the motion on a kept grid", KEPT, DYNAMICS),
+    fault("transfer: the end of a step forgets the motion on a kept grid", KEPT, POINTS),
     fault("transfer: smoothing takes the velocity for the acceleration", SMOOTH, DYNAMICS),
     fault("transfer: no strain resets the grid", KEPT, DYNAMICS),
     fault("transfer: affine fits lack their slope", TRANSFERS, DYNAMICS),
