@@ -139,6 +139,10 @@
 //! | follow the loop over particles | [`mechanics::sweep`] |
 //! | use the solver for something else | [`solver::NonlinearProblem`], [`solver::LinearOperator`] |
 
+// First, because a macro is known only below its module.
+#[macro_use]
+mod mutant;
+
 pub mod aggregation;
 pub mod approximation;
 pub mod causes;

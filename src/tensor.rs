@@ -305,6 +305,7 @@ impl<T: Real, const D: usize> Deformation<T, D> {
         let scale = f64::from_bits(((2046 - biased).clamp(0, 2046) as u64) << 52);
         let k = biased - 1023;
         let m_minus_one = if k == 0 { self.j } else { self.jacobian * T::lit(scale) - T::one() };
+        mutant!("tensor: ln J of small j by its difference": m_minus_one = self.jacobian * T::lit(scale) - T::one());
         let s = m_minus_one / (T::lit(2.0) + m_minus_one);
         let s2 = s * s;
         let mut series = T::zero();

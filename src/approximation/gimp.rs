@@ -77,6 +77,7 @@ impl Kernel for Gimp {
         let sign = distance.where_less(c(0.0), c(-1.0), c(1.0));
         let rest = (c(1.0 + l) - d).where_less(c(0.0), c(0.0), c(1.0 + l) - d);
         let far = (rest * rest / c(4.0 * l), c(0.0) - sign * rest / c(2.0 * l));
+        mutant!("shapes: the edge of the GIMP function is twice as high": far = (far.0 + far.0, far.1));
         let middle = (c(1.0) - d, c(0.0) - sign);
         let near = (c(1.0) - (d * d + c(l * l)) / c(2.0 * l), c(0.0) - distance / c(l));
         let beyond = (d.where_less(c(1.0 - l), middle.0, far.0), d.where_less(c(1.0 - l), middle.1, far.1));

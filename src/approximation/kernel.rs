@@ -49,6 +49,7 @@ pub(super) fn folded(
         let at = kernel.at(distance);
         if node < 0 {
             add(0, 2.0, at);
+            mutant!("shapes: ghosts beyond a wall are folded back once": { add(0, -1.0, at); });
             add(-node, -1.0, at);
         } else if node > last {
             add(last, 2.0, at);

@@ -171,6 +171,7 @@ impl Place {
     #[inline(always)]
     pub fn at_edge(self, edge: f64, round_off: f64) -> Self {
         let round_off = round_off + ACCUMULATED;
+        mutant!("shapes: round-off decides which nodes are active": round_off = -1.0);
         // At 0 supports end on faces of cells, and `Axis::spacings` has moved the point.
         if edge == 0.0 {
             self
@@ -226,6 +227,7 @@ pub(super) fn product<const D: usize>(axes: &[AxisWeights; 3], out: &mut Support
         let gradient: [f64; D] = std::array::from_fn(|k| {
             (0..D).map(|m| if m == k { axes[m].derivatives[at[m]] } else { axes[m].values[at[m]] }).product()
         });
+        mutant!("shapes: nodes with N = 0 are left out": { if value == 0.0 { continue; } });
         if value != 0.0 || gradient.iter().any(|&g| g != 0.0) {
             out.push(std::array::from_fn(|k| axes[k].first + at[k] as u32), value, gradient);
         }

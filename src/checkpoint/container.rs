@@ -152,6 +152,7 @@ pub(super) fn read<H: DeserializeOwned>(mut input: impl Read, found: u64) -> Res
         let sum = bytes.and_then(|bytes| expected.checked_add(bytes));
         expected = sum.ok_or_else(|| Damage::Content(format!("{} numbers of {}", shape.length, shape.name)))?;
     }
+    mutant!("checkpoint: a file may be longer than its arrays": expected = expected.max(found));
     if found != expected {
         return Err(Damage::Length { found, expected });
     }
@@ -176,6 +177,7 @@ fn array(input: &mut impl Read, Shape { name, r#type: Type::F64, length }: Shape
         sum.update(chunk);
         values.extend(chunk.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)));
     }
+    mutant!("checkpoint: checksums of arrays are not compared": { return word(input).map(|_| Array { name, values }).map_err(Damage::Io); });
     if word(input)? == sum.finalize() {
         Ok(Array { name, values })
     } else {

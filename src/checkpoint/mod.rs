@@ -249,6 +249,7 @@ impl Checkpoints {
             return Ok(());
         }
         let slot = self.last.map_or(0, |(last, _)| 1 - last);
+        mutant!("checkpoint: every checkpoint overwrites the last one": slot = 0);
         let path = self.directory.join(NAMES[slot]);
         // The result files must be on disk before the checkpoint that refers to them.
         let written = recorder.mark().and_then(|mark| {

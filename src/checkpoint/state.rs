@@ -223,13 +223,16 @@ pub(super) fn restore<const D: usize, L, A>(
     simulation.rearrange(&order);
     simulation.particles.reference = reference;
     simulation.history.grid = grid;
+    mutant!("checkpoint: a restart resets the grid": { (simulation.history.grid, simulation.particles.reference) = (None, None); });
     let pairs = numbers(arrays, BONDED).chunks_exact(2);
+    mutant!("checkpoint: bonded bodies are forgotten": pairs = numbers(arrays, "").chunks_exact(2));
     simulation.history.bonded = pairs.map(|pair| [pair[0] as u32, pair[1] as u32]).collect();
     let constrained = numbers(arrays, CONSTRAINED).iter().enumerate();
     simulation.history.constrained = constrained.filter(|(_, flag)| **flag > 0.0).map(|(one, _)| one).collect();
     let path = &mut simulation.path;
     let stored = [&mut path.load, &mut path.increment, &mut path.speed, &mut path.weight];
     for (number, &value) in stored.into_iter().zip(numbers(arrays, "path")) {
+        mutant!("checkpoint: the length of the step along a path is forgotten": { continue; });
         *number = value;
     }
     let particles = &mut simulation.particles;
@@ -245,6 +248,7 @@ pub(super) fn restore<const D: usize, L, A>(
             "external_work" => std::slice::from_mut(&mut simulation.external_work),
             _ => continue,
         };
+        mutant!("checkpoint: accelerations are not restored": { if name == "acceleration" { continue; } });
         into.copy_from_slice(values);
     }
     Ok(())

@@ -66,6 +66,7 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
                 for j in 0..D {
                     sum = with.mul_add(l[i][j], self.right[j][k], sum);
                     sum = with.mul_sub(q_a_lt[j], a[j][k], sum);
+                    mutant!("laws: the closed product lacks q": { sum = with.mul_add(q_a_lt[j], a[j][k], sum); });
                 }
                 out[i][k] = sum;
             }

@@ -156,6 +156,7 @@ impl Criterion for DruckerPrager {
         let left = root_j2 - gamma * lit(shear);
         if left.value() >= 0.0 {
             let p = elastic.p - gamma * lit(bulk * eta_bar);
+            mutant!("laws: friction for dilatancy in the flow": p = elastic.p - gamma * lit(bulk * eta));
             let g = elastic.g * left / root_j2;
             let radial = Radial {
                 p,

@@ -134,6 +134,7 @@ impl Principal {
             normal[(i, i)] -= tau[i] + tau[i];
             for j in (0..3).filter(|&j| j != i) {
                 shear[(i, j)] = secant(i, j) * artanh_over(self.x[i], self.x[j]) - tau[i] - tau[j];
+                mutant!("laws: Δ for Δ coth Δ in the moduli": { shear[(i, j)] = secant(i, j) - tau[i] - tau[j]; });
             }
         }
         Moduli { f_inv_t: self.at.inverse_transpose(), axes: self.axes, normal, shear }
@@ -153,6 +154,7 @@ impl Principal {
 
     /// Writes the six numbers of G − I after a flow with the principal strains `flow`: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
     pub fn flow(&self, flow: [f64; 3], flowed: &[f64], next: &mut [f64]) {
+        mutant!("laws: plastic flow of half the size": flow = flow.map(|flow| 0.5 * flow));
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
         let back = self.at.inverse_transpose().transpose() * self.axes;
         let after = six(flowed) + back * lost * back.transpose();

@@ -147,6 +147,7 @@ pub trait Law: Send + Sync {
     fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let unit = |k: usize| f_n.row(k).transpose();
         let block = |k, l| at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose();
+        mutant!("laws: v and b are swapped in ℂmat": { return std::array::from_fn(|k| std::array::from_fn(|l| block(l, k))); });
         std::array::from_fn(|k| std::array::from_fn(|l| block(k, l)))
     }
 
@@ -278,5 +279,6 @@ pub fn first_piola<L: Law, T: Real, const D: usize>(
     f_left: &Tensor<T, D>,
     at: &MaterialState<T, D>,
 ) -> Tensor<T, D> {
+    mutant!("laws: P = S F for F S": { return law.stress(at) * f_left; });
     f_left * law.stress(at)
 }

@@ -176,6 +176,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
             *lost += dissipated;
             // Δε = ε_trial − ε
             let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
+            mutant!("laws: the plastic change of volume is forgotten": volume = 0.0);
             let share = 1.0 - radial.g / (2.0 * self.solid.shear);
             principal.flow(principal.deviator().map(|x| share * x + volume), flowed, plastic);
         }

@@ -99,6 +99,7 @@ impl<B: Law> Viscoelastic<B> {
         let (dt, internal) = (at.dt, at.internal);
         self.branches.iter().enumerate().map(move |(i, branch)| {
             let first = 1 + SIX * i;
+            mutant!("laws: Euler's step for the relaxation": { return (branch, internal.get(first..first + SIX).unwrap_or(&[]), 1.0 / (1.0 + dt / branch.relaxation_time)); });
             (branch, internal.get(first..first + SIX).unwrap_or(&[]), (-dt / branch.relaxation_time).exp())
         })
     }

@@ -55,6 +55,7 @@ impl Volumetric for Ciarlet {
     /// ΛJ²
     #[inline(always)]
     fn stiffness<T: Real, const D: usize>(lambda: f64, at: &Deformation<T, D>) -> T {
+        mutant!("laws: J for J² in the bulk stiffness": { return T::lit(lambda) * at.jacobian; });
         T::lit(lambda) * at.jacobian * at.jacobian
     }
 }

@@ -58,6 +58,7 @@ pub(super) fn affine<const D: usize>(
         let mut fitted = mean(&|p| field[p] - gradient[p] * x(p));
         for k in 0..D {
             let slope = mean(&|p| gradient[p].column(k).into_owned());
+            mutant!("transfer: affine fits lack their slope": { continue; });
             let places = supports.active().positions(grid).map(|(_, place)| place[k] - origin[k]);
             fitted.iter_mut().zip(&slope).zip(places).for_each(|((fitted, slope), x)| *fitted += slope * x);
         }

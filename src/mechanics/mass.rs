@@ -40,6 +40,7 @@ pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) 
 /// Whether a nodal mass is too small for a projected velocity. Δφ of such a light node comes from the stiffness.
 pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64) -> bool + use<D> {
     let light = LIGHT * particles.mass.iter().fold(0.0, |max: f64, &m| max.max(m));
+    mutant!("mass: nodes without mass have a velocity": light = 0.0);
     move |mass| mass < light
 }
 
@@ -59,6 +60,7 @@ impl<const D: usize> Mass<'_, D> {
             let mut at_particles = self.supports.pool().filled(self.particles.len(), Vector::zeros());
             self.supports.each_value(u, |p, value| at_particles[p] = value);
             let weight = factor * (1.0 - self.lumping);
+            mutant!("mass: the product takes ε for 1 − ε": weight = factor * self.lumping);
             self.supports.spread(out, |p| at_particles[p] * (weight * self.particles.mass[p]));
         }
     }

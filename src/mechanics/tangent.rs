@@ -65,6 +65,7 @@ impl<const D: usize> Tangent<'_, D> {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }
+        mutant!("unknowns: forces stay at nodes that follow": { return self.unknowns.clear_prescribed(out); });
         self.unknowns.followers.restrict(out);
         self.unknowns.clear_prescribed(out);
     }
@@ -88,6 +89,7 @@ impl<const D: usize> Tangent<'_, D> {
 
     /// Corrects the blocks of inner nodes for the outer nodes that follow them.
     fn add_followers(&self, quadratic: &dyn Fn(Group<'_>, &mut Quadratic), blocks: &mut [Tensor<f64, D>]) {
+        mutant!("unknowns: the diagonal blocks lack the nodes that follow": { return; });
         if self.unknowns.followers.is_empty() {
             return;
         }

@@ -100,6 +100,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
 
     /// Sets the prescribed entries to zero.
     pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
+        mutant!("unknowns: prescribed values are not cleared": { return; });
         for dof in self.prescribed {
             field[dof.node][dof.component] = T::zero();
         }

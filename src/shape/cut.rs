@@ -291,6 +291,7 @@ impl<const D: usize> Shape<D> {
         let round_off = EDGE * spacing;
         let planes = distinct(planes, radius, round_off);
         let is_flat = departure <= flat * spacing && !may_be_confused(&planes, departure) && planes.len() <= MAX_PLANES;
+        mutant!("solids: a curved surface by one plane a box": is_flat = planes.len() <= MAX_PLANES);
         if !is_flat && radius > flat * spacing {
             for (lower, edges) in halves(lower, edges) {
                 self.pieces(region, &lower, &edges, spacing, flat, visit);

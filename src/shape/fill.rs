@@ -374,6 +374,7 @@ impl<'a, const D: usize> Filler<'a, D> {
             if share > 1.0 - VOLUME_ROUND_OFF {
                 self.fill_box(cell, i, &parts, seeds);
             } else if share > VOLUME_ROUND_OFF {
+                mutant!("solids: slivers are left alone": { seeds.add_part(id, part, false); continue; });
                 seeds.add_part(id, part, share < parts.sliver);
             }
         }

@@ -40,6 +40,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             end.residual_into::<f64>(phi, &mut residual)?;
             for (dof, impulse) in end.prescribed.iter().zip(update.impulses()) {
                 let (reaction, blow) = (residual[dof.node][dof.component], impulse / dt);
+                mutant!("step: reactions and work lack the blow of a wall": blow = 0.0);
                 reactions[dof.owner].force[dof.component] += reaction + blow;
                 if let Some(rotation) = conditions[dof.owner].rotation() {
                     let x = self.grid.position(self.grid.index(supports.active().ids()[dof.node])) + phi[dof.node];

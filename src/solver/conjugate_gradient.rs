@@ -141,8 +141,10 @@ fn descend(
         operator.apply(&p, &mut q);
         run.products += 1;
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
-        largest = largest.max(p_a_p / p_m_p);
-        if let Some(outcome) = unusable(p_a_p / p_m_p, largest) {
+        let curvature = p_a_p / p_m_p;
+        mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
+        largest = largest.max(curvature);
+        if let Some(outcome) = unusable(curvature, largest) {
             if outcome == LinearOutcome::NegativeCurvature {
                 if x.iter().all(|x| *x == 0.0) {
                     // The step length for a curvature of the opposite sign.
@@ -168,6 +170,7 @@ fn descend(
         preconditioner.apply(r, &mut z);
         let rz_new = dot(r, &z);
         let β = rz_new / rz;
+        mutant!("solver: the inverse of β in conjugate gradients": β = 1.0 / β);
         xpby(&z, β, &mut p);
         rz = rz_new;
         p_m_p = rz + β * β * p_m_p;

@@ -61,6 +61,7 @@ impl Forcing {
                 let choice = last.map_or(FIRST, |last| {
                     let limit = GAMMA * last.forcing * last.forcing;
                     let η = GAMMA * last.ratio * last.ratio;
+                    mutant!("solver: forcing by the ratio of residuals, not its square": η = GAMMA * last.ratio);
                     if limit > SAFEGUARD { η.max(limit) } else { η }
                 });
                 // Half of the remaining reduction is enough (Kelley 1995, eq. 6.20).

@@ -105,6 +105,7 @@ impl NonnegativeLeastSquares {
             let step = self.step();
             let falls = |(i, (x, step)): (usize, (&f64, &f64))| (x + step <= 0.0).then(|| (i, -x / step));
             let first = self.x.iter().zip(&step).enumerate().filter_map(falls).min_by(|a, b| a.1.total_cmp(&b.1));
+            mutant!("solver: non-negative least squares step below zero": first = first.filter(|_| false));
             let length = first.map_or(1.0, |(_, length)| length);
             for ((x, step), &column) in self.x.iter_mut().zip(&step).zip(&self.free) {
                 *x += length * step;

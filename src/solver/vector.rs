@@ -37,6 +37,7 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
         x.chunks(CHUNK).zip(y.chunks(CHUNK)).map(|(x, y)| dot_chunk(x, y)).sum()
     } else {
         let part = |k| Some(dot_chunk(x.chunks(CHUNK).nth(k)?, y.chunks(CHUNK).nth(k)?));
+        mutant!("solver: several threads leave out the first chunk of a dot product": { return parallel::map(x.len().div_ceil(CHUNK), &part).iter().flatten().skip(1).sum(); });
         parallel::map(x.len().div_ceil(CHUNK), &part).iter().flatten().sum()
     }
 }

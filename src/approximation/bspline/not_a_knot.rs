@@ -65,6 +65,7 @@ impl End {
     fn at(&self, s: f64) -> impl DoubleEndedIterator<Item = (f64, f64)> {
         self.coefficients.iter().enumerate().map(move |(node, [b, c, e])| {
             let own = if node == 0 { 1.0 } else { 0.0 };
+            mutant!("shapes: functions at a wall are a thousandth of s³ off": own = own + 1e-3 * s * s * s);
             (own + s * (b + s * (c + s * e)), b + s * (2.0 * c + s * 3.0 * e))
         })
     }

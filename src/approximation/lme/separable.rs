@@ -336,6 +336,7 @@ fn normalise<T: Lane>(values: &mut [T], derivatives: &mut [T], spacing: f64) {
         j = j + *value * *distance * *distance;
     }
     let scale = c(-1.0) / (j * c(spacing));
+    mutant!("shapes: max-ent gradients have the other sign": scale = c(1.0) / (j * c(spacing)));
     for (value, distance) in values.iter().zip(derivatives) {
         *distance = *distance * (*value * scale);
     }

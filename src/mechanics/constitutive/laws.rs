@@ -99,6 +99,7 @@ impl<T: Real> Chosen<'_, T> {
             }
             let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
             self.loops[body(lane) as usize](states, &mut other, &mut other_det_f);
+            mutant!("sweep: a second body in a group takes the law of the first": { self.loops[body(0) as usize](states, &mut other, &mut other_det_f); });
             for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
                 det_f[same] = other_det_f[same];
                 out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);

@@ -50,6 +50,7 @@ fn carried<T: Real>(x: T, carries: bool) -> T {
 #[inline(always)]
 pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) -> Tensor<T, D> {
     let h_n = h_n.map(T::lit);
+    mutant!("deformation: F without G H_n": { return g + h_n; });
     g + h_n + g * h_n
 }
 
@@ -68,6 +69,7 @@ pub(super) fn internal<L: Law, T: Real, const D: usize>(
     let (at, det_f) = at_n.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
     let piola = first_piola(law, &f_left, &at);
     let f_n_t = at_n.f.transpose().map(T::lit);
+    mutant!("stress: F_n is transposed": f_n_t = f_n_t.transpose());
     (scaled(&(piola * f_n_t), T::lit(volume)), det_f)
 }
 
@@ -101,6 +103,7 @@ pub(super) fn freeze<L: Law, const D: usize>(
             };
             if part != Part::Material {
                 let geometric = geometric();
+                mutant!("stress: no geometric part without a closed form": geometric = Tensor::<f64, D>::zeros());
                 for k in 0..D {
                     for l in 0..D {
                         blocks[k][l] += scaled(&identity(), geometric[(k, l)]);

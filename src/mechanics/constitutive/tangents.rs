@@ -140,6 +140,7 @@ impl<const D: usize> WithLanes for In<AddTo<'_>, D, D> {
                 for i in 0..D {
                     for j in 0..D {
                         let sum = if k < l { s.add(one[i][j], other[i][j]) } else { one[i][j] };
+                        mutant!("sweep: blocks without the other half of a pair": sum = one[i][j]);
                         let slot = &mut into.bilinear[pair(k, l)][i][j];
                         let sum = s.mul_add(factor, sum, s.load(slot));
                         s.store(sum, slot);
@@ -157,6 +158,7 @@ fn entries<S: Lanes, const D: usize>(s: S, rows: &[[f64; LANES]], k: usize, l: u
     for i in 0..D {
         for j in 0..D {
             block[i][j] = s.load(&rows[general::<D>(k, l, i, j)]);
+            mutant!("sweep: a general tangent is transposed": { block[i][j] = s.load(&rows[general::<D>(k, l, j, i)]); });
         }
     }
     block

@@ -31,6 +31,7 @@ pub(crate) fn reached_conditions<const D: usize>(
             new.extend(holders(index).map(|one| (cell, one)));
         }
     }
+    mutant!("reference: no wall that is met resets the grid": { return Vec::new(); });
     if new.is_empty() {
         return Vec::new();
     }
@@ -52,6 +53,7 @@ pub(crate) fn reached_body<const D: usize>(
     bonded: &BTreeSet<[u32; 2]>,
     grid: &Grid<D>,
 ) -> bool {
+    mutant!("reference: no body that is met resets the grid": { return false; });
     let body = &particles.body;
     let at_reset = particles.reference().position;
     let [now, before] = [&particles.position[..], at_reset].map(|position| seen(position, body, grid));

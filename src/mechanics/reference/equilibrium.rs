@@ -45,6 +45,7 @@ impl<const D: usize> LastEquilibrium<D> {
 
     /// Whether a condition that held a body in this equilibrium has no node among `prescribed`.
     pub(crate) fn lost_support(&self, prescribed: &[PrescribedDof]) -> bool {
+        mutant!("reference: a support that is lost still holds": { return false; });
         let is_lost = |&condition: &usize| {
             self.reactions[condition] != Reaction::NONE && prescribed.iter().all(|dof| dof.owner != condition)
         };
@@ -65,6 +66,7 @@ impl<const D: usize> LastEquilibrium<D> {
         let supports = step.supports;
         // With dt = 0, laws give the stress at t_n, without a change of internal variables.
         let at_start = Equilibrium::new(Step { loads: &self.loads, dt: 0.0, ..step }, prescribed);
+        mutant!("reference: relaxation within a step is carried over": at_start = Equilibrium::new(Step { loads: &self.loads, ..step }, prescribed));
         let still: Pooled<Vector<f64, D>> = supports.field();
         let mut force: Pooled<Vector<f64, D>> = supports.field();
         at_start.residual_into::<f64>(&still, &mut force)?;

@@ -62,6 +62,7 @@ impl Scheme for GeneralizedAlpha {
     fn balance(&self, dt: f64) -> Alphas {
         let (inertia, force) = self.weights();
         let Alphas { a1, a2, a3, a4, a6, .. } = self.end(dt);
+        mutant!("schemes: the balance of generalised α has Newmark's α₃": a3 = (a3 + 1.0) / inertia - 1.0);
         Alphas {
             dt: force * dt,
             a1: a1 * inertia / force,

@@ -35,6 +35,7 @@ impl Newmark {
     /// ```
     pub fn alphas(&self, dt: f64) -> Alphas {
         let Self { beta, gamma } = *self;
+        mutant!("schemes: 1 for γ": gamma = 1.0);
         Alphas {
             dt,
             a1: 1.0 / (beta * dt * dt),

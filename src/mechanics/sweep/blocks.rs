@@ -90,6 +90,7 @@ fn blocks_tile<S: Lanes, const D: usize, const W: usize>(
             for l in 0..D {
                 for k in 0..=l {
                     let power = usize::from(k > 0) + usize::from(l > 0);
+                    mutant!("sweep: blocks by the wrong power of N_x": power = 2 * usize::from(l > 0));
                     let product = s.mul(pairs.products[k][p], pairs.products[l][p]);
                     for j in 0..D {
                         let coefficient = lanes.splat_rows(from.bilinear[pair(k, l)][i][j][p]);

@@ -104,6 +104,7 @@ impl<'a> Family<'a> {
             for (lane, i) in range.clone().enumerate().take(LANES) {
                 out.first[lane] = i64::from(along.cells[i]) - reach as i64;
                 listed[lane] = along.cut[i] || corrections[lane].is_nan() || corrections[lane] > SETTLED;
+                mutant!("sweep: functions beside a wall as if it were far": { listed[lane] = false; });
             }
         }
         for (lane, i) in range.clone().enumerate() {

@@ -147,6 +147,7 @@ fn row<S: Lanes, const C: usize, const W: usize>(
     for x in 0..width.min(W) {
         for c in 0..C {
             let u = s.splat(row[x * C + c]);
+            mutant!("sweep: component 0 gathered for all": u = s.splat(row[x * C]));
             sums[0][c] = s.mul_add(u, weights[0][x], sums[0][c]);
             sums[1][c] = s.mul_add(u, weights[1][x], sums[1][c]);
         }
@@ -270,6 +271,7 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         let (mut y, mut z) = (start % wy, start / wy);
         for lane in 0..count {
             places[lane] = window.first + y * window.stride[0] + z * window.stride[1];
+            mutant!("sweep: a plane of the scatter one node early": { places[lane] -= z; });
             if D == 1 {
                 products[0][lane] = s.splat(1.0);
             } else {
@@ -330,6 +332,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     let mut sums = [[zero; C]; W];
     let sums = &mut sums[..width.min(W)];
     for p in 0..window.lanes.min(LANES) {
+        mutant!("sweep: the last lane of a full group is not scattered": { if p + 1 == LANES { continue; } });
         // across = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  along = σ_x N_y N_z. The mode is tested outside the inner loops.
         let (mut across, mut along) = ([zero; C], [zero; C]);
         if flow.gradient {
@@ -356,6 +359,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
         }
         for x in 0..sums.len() {
             let (nx, dx) = (lanes.splat_rows(n[x][p]), lanes.splat_rows(dn[x][p]));
+            mutant!("sweep: stresses along x scattered by N for its slope": dx = nx);
             for c in 0..C {
                 sums[x][c] = s.mul_add(across[c], nx, sums[x][c]);
                 sums[x][c] = s.mul_add(along[c], dx, sums[x][c]);

@@ -115,6 +115,7 @@ impl<const D: usize> Plain<D> {
             for (lane, (node, n, grad_n)) in self.entries_of(group) {
                 let changed = flow.weights.changed().unwrap_or(|n| n);
                 let (n, grad_n) = (changed(n), grad_n.map(changed));
+                mutant!("sweep: the plain loop scatters stresses by one slope": grad_n = Vector::<f64, D>::repeat(grad_n[0]));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
                         let to = &mut out[(node * fields + f) * C + c];

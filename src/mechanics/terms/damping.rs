@@ -100,6 +100,7 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
     fn freeze(&self, _: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
+        mutant!("damping: the product has the factor of the acceleration": a4 = self.step.alphas.a1);
         let mut of_stress = None;
         if stiffness > 0.0 {
             of_stress = Some(Self::stiffness(&self.step)?.times(a4 * stiffness));

@@ -64,6 +64,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize).unwrap_or(0.0));
+                mutant!("inertia: the residual lacks the consistent part": weight = T::zero());
                 for c in 0..D {
                     sums.value[c][lane] += weight * (at.value[c][lane] - T::lit(self.predicted[p as usize][c]));
                 }

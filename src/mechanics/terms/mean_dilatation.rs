@@ -224,6 +224,7 @@ impl<const D: usize> Frozen<D> for FrozenMean<'_, D> {
                 let mut pulls = [0.0; LANES];
                 for (lane, &p) in group.particles.iter().enumerate() {
                     pulls[lane] = self.cells.cell(p).map_or(0.0, |cell| coupling[cell] * weight[lane]);
+                    mutant!("mean dilatation: the product lacks the coupling within a cell": { pulls[lane] = 0.0; });
                 }
                 product(D, Product { form: Form::Closed, rows, l, out });
                 for (out, a) in sums.gradient.as_flattened_mut().iter_mut().zip(rows) {

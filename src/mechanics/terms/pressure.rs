@@ -85,6 +85,7 @@ impl<const D: usize> Frozen<D> for FrozenPressure<'_, D> {
         for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
             let l = self.supports.gradient_at(*particle, u);
             let delta = w * contract(a, &l) - a * (l.transpose() * w);
+            mutant!("loads: the tangent of a pressure has a wrong sign": delta = w * contract(a, &l) + a * (l.transpose() * w));
             for (node, n, _) in self.supports.of(*particle) {
                 out[node] += delta * n;
             }

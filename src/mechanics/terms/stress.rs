@@ -69,6 +69,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
             let h_n = &particles.reference().displacement_gradient[p];
             let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
             let at = at.map_err(|source| Inadmissible { particle: id, source })?;
+            mutant!("stress: the energy lacks V_0": { return Ok(self.law(p).energy(&at)); });
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
         });
         Some(energies.map(summed))

@@ -17,6 +17,7 @@ impl<const D: usize> Traction<D> {
             let Pressing::Traction(traction) = load.pressing else { continue };
             let force = force.get_or_insert_with(|| step.supports.field::<Vector<f64, D>>());
             let traction = traction * load.curve.value(step.time);
+            mutant!("loads: a traction has the other sign": traction = -traction);
             for point in &load.points {
                 for (node, n, _) in step.supports.of(point.particle) {
                     force[node] += traction * (point.area * n);

@@ -156,6 +156,7 @@ impl<const D: usize> Nodal<D> {
     /// ```
     pub fn accelerate(&mut self, particles: &Particles<D>, supports: &Supports<D>, unbalanced: &[Vector<f64, D>]) {
         self.acceleration.iter_mut().zip(unbalanced).for_each(|(a, r)| *a = -r);
+        mutant!("transfer: loads at t = 0 push the wrong way": { self.acceleration.iter_mut().for_each(|a| *a = -*a); });
         let followers = followers(supports);
         divide(particles, &followers, &self.mass, &mut self.acceleration);
     }

@@ -102,7 +102,9 @@ impl<'a, const D: usize> Update<'a, D> {
             let (node, i) = (dof.node, dof.component);
             let (delta_v, delta_a) = (&mut delta_velocity[node][i], &mut delta_acceleration[node][i]);
             let by_forces = *delta_v;
+            mutant!("transfer: the blow of a wall contains the forces": by_forces = 0.0);
             let literal = !dof.moving && walls == WallUpdate::Literal;
+            mutant!("transfer: moving walls count as resting ones": literal = walls == WallUpdate::Literal);
             (*delta_v, *delta_a) = if literal {
                 (0.0, 0.0)
             } else {
@@ -117,6 +119,7 @@ impl<'a, const D: usize> Update<'a, D> {
         if !nodal.motion.is_empty() {
             let sums = nodal.motion.iter().zip(dphi).map(|(motion, dphi)| motion + dphi);
             kept = Some(nodal.motion.pool().collect(sums));
+            mutant!("transfer: the end of a step forgets the motion on a kept grid": { kept = Some(nodal.motion.pool().collect(dphi.iter().copied())); });
         }
         Self { dphi, kept, delta_velocity, delta_acceleration, impulses, smoothed: None }
     }
@@ -186,6 +189,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let at_kinks = smoothing.shares_at_kinks(particles, supports, mass, dt);
         let change = |field| smoothing.change(particles, supports, mass, at_kinks.as_deref(), field, dt);
         self.smoothed = Some([&particles.velocity, &particles.acceleration].map(|field| change(field)));
+        mutant!("transfer: smoothing takes the velocity for the acceleration": { self.smoothed = Some([&particles.velocity; 2].map(|field| change(field))); });
     }
 
     /// m_I (Δv − Δv_Newmark) at every prescribed degree of freedom. A wall gives this momentum, beyond the reactions, to nodes that do not
@@ -252,6 +256,7 @@ impl<'a, const D: usize> Update<'a, D> {
             |_, delta_x, g| (delta_x, g),
             |p, (delta_x, g)| {
                 largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
+                mutant!("transfer: no strain resets the grid": { largest = 0.0; });
                 let (x, h_n) = match reference {
                     Some(reference) => (reference.position[p], reference.displacement_gradient[p]),
                     None => (position[p], displacement_gradient[p]),

@@ -108,6 +108,7 @@ pub fn gmres(
         report.iterations += taken;
         report.products += taken + 1;
         trial.copy_from_slice(solution);
+        mutant!("solver: a restart of GMRES forgets the solution so far": { trial.fill(0.0); });
         axpy(1.0, &correction, &mut trial);
         finite(norm(&trial), "the norm of the solution", report.iterations)?;
         let trial_norm =
@@ -220,6 +221,7 @@ impl Triangle {
         for (i, (c, s)) in self.rotations.iter().enumerate() {
             let next = column[i + 1];
             column[i] = c * diagonal + s * next;
+            mutant!("solver: a Givens rotation has a wrong sign": { column[i] = c * diagonal - s * next; });
             diagonal = c * next - s * diagonal;
         }
         let length = (diagonal * diagonal + below * below).sqrt();

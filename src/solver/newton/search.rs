@@ -83,6 +83,7 @@ pub(super) fn search<E: std::error::Error + 'static>(
             }
             Ok(()) => {
                 let residual = norm(r_trial);
+                mutant!("solver: any fall of the residual is accepted": { if residual < at.residual { return Search::Accepted(Accepted { length, residual, merit: Merit::Residual }); } });
                 if !residual.is_finite() {
                     failed.not_finite += 1;
                 } else if at.linear < 1.0

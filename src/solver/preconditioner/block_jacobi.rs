@@ -28,6 +28,7 @@ impl<const D: usize> BlockJacobi<D> {
 
     /// Takes and inverts the blocks of `tangent`, unless it has blocks already.
     pub fn take(&mut self, tangent: &dyn Linearization) {
+        mutant!("solver: every tangent has new diagonal blocks": { self.inverse = Pooled::default(); });
         if self.inverse.is_empty() {
             self.inverse = tangent.diagonal_blocks();
             let blocks: &mut [Tensor<f64, D>] = bytemuck::cast_slice_mut(&mut self.inverse);

@@ -64,6 +64,7 @@ impl LocalForm {
             next.filled[at] += share;
             next.masses[at] += self.masses[cell];
             (0..D).for_each(|k| next.centres[at][k] += share * 0.5 * self.centres[cell][k]);
+            mutant!("multigrid: centroids of coarse cells are a tenth off": { (0..D).for_each(|k| next.centres[at][k] += share * 0.05 * self.centres[cell][k]); });
             (0..tiles).for_each(|t| next.tangents[at * tiles + t] += 0.25 * self.tangents[cell * tiles + t]);
         }
         next.finish_centres();

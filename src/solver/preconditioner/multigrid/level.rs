@@ -138,6 +138,7 @@ impl<const D: usize> Level<D> {
             if let [(coarse, _)] = list[..] {
                 same[coarse as usize] = true;
                 (0..D).for_each(|i| held[coarse as usize * D + i] = form.prescribed[fine * D + i]);
+                mutant!("multigrid: coarse nodes that are held move": { (0..D).for_each(|i| held[coarse as usize * D + i] = false); });
             }
         }
         for (fine, list) in above.iter().enumerate() {
@@ -282,6 +283,7 @@ impl<const D: usize> Level<D> {
         let mut unit = vec![0.0; size];
         for (k, mut column) in matrix.column_iter_mut().enumerate() {
             // A held value is no unknown, so the nodes that follow it must not put entries into its column.
+            mutant!("multigrid: held values lead others in the matrix of the bottom level": { unit[k] = 1.0; self.apply(&unit, column.as_mut_slice()); unit[k] = 0.0; });
             if !self.held[k] {
                 unit[k] = 1.0;
                 self.apply(&unit, column.as_mut_slice());

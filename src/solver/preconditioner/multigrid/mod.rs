@@ -117,7 +117,9 @@ impl<const D: usize> LinearOperator for Cycle<'_, D> {
         let jacobi = |r: &[f64], z: &mut [f64]| levels.smooth(r, z);
         z.fill(0.0);
         chebyshev(tangent, &jacobi, levels.largest, r, z, true);
+        mutant!("multigrid: no coarse levels": { return chebyshev(tangent, &jacobi, levels.largest, r, z, false); });
         levels.correct(0, tangent, r, z);
+        mutant!("multigrid: no smoothing after the coarse levels": { return; });
         chebyshev(tangent, &jacobi, levels.largest, r, z, false);
     }
 }

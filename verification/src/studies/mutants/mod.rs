@@ -1,15 +1,14 @@
 //! Deliberate faults: each must turn red exactly the cells that are written down beside it.
 //!
-//! Wrong laws and wrong shape functions are built here, and the public checks judge them cell by cell. Full effort also patches files under
-//! `src/`, including the terms and the transfer, in a copy of the workspace, and runs the copy's own checks (see [`schemata`]).
-//! the copy's own checks (see [`schemata`]).
+//! Wrong laws and wrong shape functions are built here, and the public checks judge them cell by cell. The shipped files have faults, too,
+//! which a normal build leaves out (`src/mutant.rs`). Full effort builds the library with these faults and switches them on one by one.
 
 mod forecast;
 mod laws;
-mod patches;
-mod schemata;
 mod shapes;
 mod shipped;
+mod sources;
+mod table;
 
 use super::{Effort, Outcome, StudyError};
 
@@ -21,11 +20,11 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     laws::judge(&mut report)?;
     shapes::judge(&mut report);
     let mut outcome = Outcome { reports: vec![report], ..Outcome::default() };
+    let places = sources::places(&shipped::root())?;
     if *effort == Effort::Full {
-        shipped::run(&mut outcome)?;
+        shipped::run(&places, &mut outcome)?;
     } else {
-        shipped::fit()?;
-        outcome.remarks.push(format!("Full effort patches the shipped files too: {} faults, which still fit their files.", patches::PATCHES.len()));
+        outcome.remarks.push(format!("Full effort also tries the {} faults in the shipped files.", places.len()));
     }
     Ok(outcome)
 }

@@ -9,7 +9,6 @@ use bfree::grid::Axis;
 /// The fault of a shape function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
-    GradientUnscaled,
     GradientSign,
     Unity,
     Consistency,
@@ -33,7 +32,6 @@ impl Separable for Wrong {
         }
         Linear.axis(axis, x, out)?;
         match self.0 {
-            Fault::GradientUnscaled => out.derivatives.iter_mut().for_each(|slope| *slope *= axis.spacing),
             Fault::GradientSign => out.derivatives.iter_mut().for_each(|slope| *slope = -*slope),
             Fault::Unity => {
                 out.values.iter_mut().chain(&mut out.derivatives).for_each(|x| *x *= 1.0 + 1e-6);
@@ -100,7 +98,6 @@ const OFF_NODES: &[&str] = &["inside a cell", "near a wall"];
 const OFF_WALLS: &[&str] = OFF_NODES;
 
 const MUTANTS: &[(&str, Fault, &[Red])] = &[
-    ("gradients per cell, not per length", Fault::GradientUnscaled, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES), red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE)]),
     ("gradients with the other sign", Fault::GradientSign, &[red(FIRST_GRADIENT, ALL), red(DIFFERENCES, PLANE_AND_SPACE).except(ON_NODES), red(DIFFERENCES, LINE).except(ON_NODES_OF_A_LINE)]),
     ("no partition of unity, by 1e-6", Fault::Unity, &[red(UNITY, ALL), red(FIRST_GRADIENT, ALL)]),
     ("no first-order consistency", Fault::Consistency, &[red(FIRST, PLANE_AND_SPACE).except(ON_NODES), red(FIRST, LINE).except(ON_NODES_OF_A_LINE), red(FIRST_GRADIENT, ALL)]),
