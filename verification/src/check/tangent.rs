@@ -107,31 +107,7 @@ pub(crate) fn measure<const D: usize, L: Law>(
             u
         })
         .collect();
-    let mut measured = Vec::new();
-    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
-    let mut sizes = vec![0.0; dphi.len()];
-    let pieces = equilibrium.terms.pieces();
-    for &piece in &pieces {
-        let frozen = equilibrium.tangent_of(piece, dphi)?;
-        if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
-            sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
-        }
-        let mut worst: f64 = 0.0;
-        let mut products = Vec::new();
-        for u in &directions {
-            let mut dual = equilibrium.derivative(piece, dphi, u)?;
-            equilibrium.clear_prescribed(&mut dual);
-            let analytic = product(&frozen, u);
-            let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
-            worst = worse(worst, relative(&analytic, &dual, scale));
-            products.push(analytic);
-        }
-        measured.push(Measured::new(piece.name, worst, bound));
-        if piece.name == PRESSURE && D > 1 {
-            measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(&directions, &products), Bound::Reported));
-        }
-    }
-
+    let (mut measured, sizes) = measure_pieces(equilibrium, dphi, &directions, spacing, bound)?;
     let tangent = equilibrium.tangent(dphi)?;
     let mut worst: f64 = 0.0;
     for u in &directions {
@@ -161,6 +137,41 @@ pub(crate) fn measure<const D: usize, L: Law>(
     }
     measured.extend(value.map(|value| Measured::new(POTENTIAL, value, bound)));
     Ok(measured)
+}
+
+/// Each piece alone against the derivative of its residual, and the sizes of the diagonal blocks of all pieces.
+fn measure_pieces<const D: usize, L: Law>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    dphi: &[Vector<f64, D>],
+    directions: &[Field<D>],
+    spacing: f64,
+    bound: Bound,
+) -> Result<(Vec<Measured>, Vec<f64>), Inadmissible> {
+    let mut measured = Vec::new();
+    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
+    let mut sizes = vec![0.0; dphi.len()];
+    let pieces = equilibrium.terms.pieces();
+    for &piece in &pieces {
+        let frozen = equilibrium.tangent_of(piece, dphi)?;
+        if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
+            sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
+        }
+        let mut worst: f64 = 0.0;
+        let mut products = Vec::new();
+        for u in directions {
+            let mut dual = equilibrium.derivative(piece, dphi, u)?;
+            equilibrium.clear_prescribed(&mut dual);
+            let analytic = product(&frozen, u);
+            let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
+            worst = worse(worst, relative(&analytic, &dual, scale));
+            products.push(analytic);
+        }
+        measured.push(Measured::new(piece.name, worst, bound));
+        if piece.name == PRESSURE && D > 1 {
+            measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(directions, &products), Bound::Reported));
+        }
+    }
+    Ok((measured, sizes))
 }
 
 type Field<const D: usize> = Vec<Vector<f64, D>>;
