@@ -12,6 +12,7 @@ use bfree::mechanics::terms::Piece;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
+use std::collections::HashSet;
 
 /// Random directions at each state.
 const DIRECTIONS: usize = 3;
@@ -204,8 +205,12 @@ fn columns<const D: usize, L>(
     nodes: usize,
 ) -> Vec<(usize, usize, Vector<f64, D>)> {
     let held = |node, k| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == k);
+    // A node that follows others is no unknown: its block is the identity, and its product vanishes.
+    let extension = equilibrium.step.supports.extension();
+    let followers: HashSet<usize> = extension.into_iter().flat_map(|all| all.rows().map(|(outer, _)| outer)).collect();
+    let unknown = |node: &usize| !followers.contains(node);
     let mut columns = Vec::new();
-    for node in (0..nodes).step_by(nodes.div_ceil(BLOCKS).max(1)) {
+    for node in (0..nodes).step_by(nodes.div_ceil(BLOCKS).max(1)).filter(unknown) {
         for k in (0..D).filter(|&k| !held(node, k)) {
             let mut unit = vec![Vector::zeros(); nodes];
             unit[node][k] = 1.0;
