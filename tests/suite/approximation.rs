@@ -114,37 +114,6 @@ fn value<const D: usize>(found: &Support<D>, node: [u32; D]) -> f64 {
     found.nodes.iter().position(|&other| other == node).map_or(0.0, |i| found.values[i])
 }
 
-fn gradients_are_differences<const D: usize>() {
-    let grid = Grid::<D> { origin: Vector::repeat(-0.2), spacing: H, cells: [6; D] };
-    let places: [Vec<f64>; D] = std::array::from_fn(|_| [0.07, 0.38, 2.61, 3.17, 5.93].map(|s| s * H - 0.2).to_vec());
-    for family in families(D) {
-        for x in combinations(places.clone()) {
-            let found = support(&family, &grid, &x).expect("inside the box");
-            for k in 0..D {
-                let step = 1e-5 * H;
-                let moved = |step: f64| {
-                    let mut at = x;
-                    at[k] += step;
-                    support(&family, &grid, &at).expect("inside the box")
-                };
-                let (after, before) = (moved(step), moved(-step));
-                for (node, gradient) in found.nodes.iter().zip(&found.gradients) {
-                    let difference = (value(&after, *node) - value(&before, *node)) / (2.0 * step);
-                    let error = H * (difference - gradient[k]).abs();
-                    assert!(error < 1e-6, "{D}D {family:?} at {x:?}, node {node:?}, axis {k}: {error:e}");
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn gradients_are_those_of_the_values() {
-    gradients_are_differences::<1>();
-    gradients_are_differences::<2>();
-    gradients_are_differences::<3>();
-}
-
 fn walls_are_nodal<const D: usize>() {
     let grid = Grid::<D> { origin: Vector::zeros(), spacing: H, cells: [4; D] };
     for family in families(D) {
@@ -240,21 +209,6 @@ fn round_off_does_not_decide_which_nodes_are_active() -> Result<(), Box<dyn std:
 }
 
 #[test]
-fn scaling_lengths_by_a_power_of_two_keeps_the_bits() {
-    let x = Vector::from([0.813, 1.377]);
-    let grid = Grid { origin: Vector::from([-0.1, 0.2]), spacing: 0.3, cells: [5, 6] };
-    for family in families(2) {
-        let found = support(&family, &grid, &x).expect("inside the box");
-        let scale = 1024.0;
-        let large = Grid { origin: grid.origin * scale, spacing: grid.spacing * scale, cells: grid.cells };
-        let scaled = support(&family, &large, &(x * scale)).expect("inside the box");
-        assert_eq!(found.values, scaled.values, "{family:?}");
-        let gradients: Vec<_> = scaled.gradients.iter().map(|g| g.map(|g| g * scale)).collect();
-        assert_eq!(found.gradients, gradients, "{family:?}");
-    }
-}
-
-#[test]
 fn box_and_circle_differ_by_the_truncation() {
     let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [12, 12] };
     for (gamma, bound) in [(0.8, 1e-6), (1.8, 5e-6), (4.0, 4e-5)] {
@@ -269,37 +223,6 @@ fn box_and_circle_differ_by_the_truncation() {
         }
         println!("γ {gamma}: {largest:.1e}");
         assert!(largest < bound && largest > 0.05 * bound, "γ {gamma}: {largest:e}");
-    }
-}
-
-#[test]
-fn in_one_dimension_the_circle_is_the_box() {
-    let grid = Grid { origin: Vector::from([0.0]), spacing: H, cells: [9] };
-    for gamma in [0.5, 3.0, 13.0] {
-        for i in 0..=100 {
-            let x = Vector::from([f64::from(i) * 0.045]);
-            let on_box = support(&Lme::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
-            let on_circle = support(&LmeCircle::new(gamma, 1e-6).into(), &grid, &x).expect("inside the box");
-            for (node, n) in on_circle.nodes.iter().zip(&on_circle.values) {
-                assert!((n - value(&on_box, *node)).abs() < 2e-14, "γ {gamma} at {x:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn for_large_gamma_the_separable_functions_are_the_linear_ones() {
-    let grid = Grid { origin: Vector::from([0.0, 0.0]), spacing: H, cells: [4, 4] };
-    for x in [[0.61, 1.27], [H, 0.9], [0.0, 2.0], [2.0, 2.0], [1e-300, H]] {
-        let max_ent = support(&Lme::new(1e4, 1e-6).into(), &grid, &Vector::from(x)).expect("inside the box");
-        let linear = support(&Linear.into(), &grid, &Vector::from(x)).expect("inside the box");
-        assert_eq!(max_ent.nodes, linear.nodes, "at {x:?}");
-        for i in 0..linear.nodes.len() {
-            assert!((max_ent.values[i] - linear.values[i]).abs() < 1e-14, "at {x:?}");
-            for k in 0..2 {
-                assert!(H * (max_ent.gradients[i][k] - linear.gradients[i][k]).abs() < 1e-12, "at {x:?}");
-            }
-        }
     }
 }
 

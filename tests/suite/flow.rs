@@ -361,55 +361,57 @@ fn conjugate_gradients_are_refused_where_a_law_makes_the_tangent_unsymmetric() -
     Ok(())
 }
 
+/// (constants of a law, the key to be named, words of the message)
+const NO_SOLID: &[(&str, &str, &str)] = &[
+    (
+        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":0}}}"#,
+        "yield_stress.initial",
+        "> 0",
+    ),
+    (
+        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-2}}}"#,
+        "yield_stress.saturation",
+        "-initial = -1",
+    ),
+    (
+        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-0.5,"rate":10}}}"#,
+        "yield_stress.rate",
+        "softens faster",
+    ),
+    (
+        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":1}}}"#,
+        "yield_stress.rate",
+        "> 0 with a saturation",
+    ),
+    (
+        r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"rate":1}}}"#,
+        "yield_stress.rate",
+        "needs a saturation",
+    ),
+    (
+        r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}}"#,
+        "friction",
+        "< 90",
+    ),
+    (
+        r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":20,"dilatancy":30,"cohesion":{"initial":1}}}"#,
+        "dilatancy",
+        "between 0 and the friction, 20",
+    ),
+    (r#"{"viscoelastic":{"base":{"neo_hookean":{"young":1,"poisson":0.3}},"branches":[]}}"#, "branches", "1 to 8"),
+    (
+        r#"{"viscoelastic":{"base":{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1}}},"branches":[{"shear":1,"relaxation_time":1}]}}"#,
+        "base",
+        "elastic",
+    ),
+    (r#"{"mooney_rivlin":{"c1":1,"c2":1,"bulk":6}}"#, "bulk", "greater than"),
+    (r#"{"ogden":{"terms":[{"modulus":1,"exponent":-2}],"bulk":6}}"#, "terms[0].modulus", "sign"),
+    (r#"{"ogden":{"terms":[{"modulus":1,"exponent":2}],"bulk":0.5}}"#, "bulk", "greater than"),
+];
+
 #[test]
 fn constants_that_no_solid_has_are_refused() -> Result<(), Failure> {
-    let wrong = [
-        (
-            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":0}}}"#,
-            "yield_stress.initial",
-            "> 0",
-        ),
-        (
-            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-2}}}"#,
-            "yield_stress.saturation",
-            "-initial = -1",
-        ),
-        (
-            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":-0.5,"rate":10}}}"#,
-            "yield_stress.rate",
-            "softens faster",
-        ),
-        (
-            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"saturation":1}}}"#,
-            "yield_stress.rate",
-            "> 0 with a saturation",
-        ),
-        (
-            r#"{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1,"rate":1}}}"#,
-            "yield_stress.rate",
-            "needs a saturation",
-        ),
-        (
-            r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":90,"cohesion":{"initial":1}}}"#,
-            "friction",
-            "< 90",
-        ),
-        (
-            r#"{"drucker_prager":{"elastic":{"young":1,"poisson":0.3},"friction":20,"dilatancy":30,"cohesion":{"initial":1}}}"#,
-            "dilatancy",
-            "between 0 and the friction, 20",
-        ),
-        (r#"{"viscoelastic":{"base":{"neo_hookean":{"young":1,"poisson":0.3}},"branches":[]}}"#, "branches", "1 to 8"),
-        (
-            r#"{"viscoelastic":{"base":{"von_mises":{"elastic":{"young":1,"poisson":0.3},"yield_stress":{"initial":1}}},"branches":[{"shear":1,"relaxation_time":1}]}}"#,
-            "base",
-            "elastic",
-        ),
-        (r#"{"mooney_rivlin":{"c1":1,"c2":1,"bulk":6}}"#, "bulk", "greater than"),
-        (r#"{"ogden":{"terms":[{"modulus":1,"exponent":-2}],"bulk":6}}"#, "terms[0].modulus", "sign"),
-        (r#"{"ogden":{"terms":[{"modulus":1,"exponent":2}],"bulk":0.5}}"#, "bulk", "greater than"),
-    ];
-    for (text, key, words) in wrong {
+    for (text, key, words) in NO_SOLID {
         let (mut problems, given) = (Problems::default(), serde_json::from_str::<Parameters>(text)?);
         assert!(given.law(&mut problems, "material").is_none(), "{text}");
         let message = problems.to_string();

@@ -249,15 +249,13 @@ fn files_that_give_no_shape_are_refused_with_what_is_allowed() -> Result<(), Fai
     write("text.png", b"not a picture")?;
     write("short.raw", &[1; 7])?;
     // The header promises 10⁸ pixels, but the file has 70 bytes.
-    let mut huge = good.clone();
-    huge[16..24].copy_from_slice(&[0, 0, 39, 16, 0, 0, 39, 16]);
-    let crc = crc32fast::hash(&huge[12..29]).to_be_bytes();
-    huge[29..33].copy_from_slice(&crc);
-    write("huge.png", &huge)?;
-    huge[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
-    let crc = crc32fast::hash(&huge[12..29]).to_be_bytes();
-    huge[29..33].copy_from_slice(&crc);
-    write("larger.png", &huge)?;
+    for (name, size) in [("huge.png", [0, 0, 39, 16, 0, 0, 39, 16]), ("larger.png", [0, 1, 0, 0, 0, 1, 0, 0])] {
+        let mut header = good.clone();
+        header[16..24].copy_from_slice(&size);
+        let crc = crc32fast::hash(&header[12..29]).to_be_bytes();
+        header[29..33].copy_from_slice(&crc);
+        write(name, &header)?;
+    }
     let flat = |file: &str, values: [u8; 2]| {
         let image = json!({"file": file, "min": [1, 1], "max": [3, 3], "values": values});
         refusal::<2>(&scene_of(&[4, 4], &[body("a", &image)], json!({})), folder.path())
@@ -281,8 +279,8 @@ fn files_that_give_no_shape_are_refused_with_what_is_allowed() -> Result<(), Fai
         assert!(message.contains(words), "{file}: {message}");
         assert!(message.contains(path) || message.contains("bodies[0].shape.image.values"), "{file}: {message}");
     }
-    let deep = |file: &str, size: Value| {
-        let image = json!({"file": file, "min": [1, 1, 1], "max": [3, 3, 3], "values": [1, 1], "size": size});
+    let deep = |size: Value| {
+        let image = json!({"file": "short.raw", "min": [1, 1, 1], "max": [3, 3, 3], "values": [1, 1], "size": size});
         refusal::<3>(&scene_of(&[4, 4, 4], &[body("a", &image)], json!({})), folder.path())
     };
     for (size, words) in [
@@ -291,42 +289,11 @@ fn files_that_give_no_shape_are_refused_with_what_is_allowed() -> Result<(), Fai
         (json!([4_000_000_000_u32, 4_000_000_000_u32, 4_000_000_000_u32]), "whose product is at most 134217728"),
         (Value::Null, "must give the voxels along x, y and z"),
     ] {
-        let message = deep("short.raw", size)?;
+        let message = deep(size)?;
         assert!(message.contains(words), "{message}");
     }
     // The program does not wait for a pipe and does not read a folder.
     std::fs::create_dir(folder.path().join("folder.png"))?;
     assert!(flat("folder.png", [7, 7])?.contains("is no regular file"));
-    Ok(())
-}
-
-#[test]
-fn damaged_pictures_are_refused_or_read_and_nothing_worse() -> Result<(), Failure> {
-    let folder = tempfile::tempdir()?;
-    let bytes: Vec<u8> = (0..600_u32).map(|i| (i * 7 % 256) as u8).collect();
-    let good = grey([30, 20], &bytes)?;
-    let mut random = Random(8);
-    let image = json!({"file": "damaged.png", "min": [1, 1], "max": [3, 3], "values": [0, 100]});
-    let text = scene_of(&[4, 4], &[body("a", &image)], json!({}));
-    let mut refused = 0;
-    for _ in 0..2000 {
-        let mut damaged = good.clone();
-        for _ in 0..=random.below(3) {
-            let at = random.below(damaged.len() as u64) as usize;
-            match random.below(4) {
-                0 => damaged.truncate(at.max(1)),
-                1 => drop(damaged.splice(at..at, [0_u8; 5])),
-                _ => damaged[at] = random.below(256) as u8,
-            }
-        }
-        // The checksum of the header is corrected, so that the reader accepts the damaged header.
-        if damaged.len() > 33 && random.below(2) == 0 {
-            let crc = crc32fast::hash(&damaged[12..29]).to_be_bytes();
-            damaged[29..33].copy_from_slice(&crc);
-        }
-        std::fs::write(folder.path().join("damaged.png"), damaged)?;
-        refused += usize::from(scene::read(&text, &[])?.build::<2>(folder.path()).is_err());
-    }
-    assert!((1000..2000).contains(&refused), "{refused}");
     Ok(())
 }

@@ -341,39 +341,6 @@ fn bodies_that_meet_do_not_pass_through_each_other() -> Result<(), Failure> {
     Ok(())
 }
 
-/// With a consistent mass, Σ m x × v of the particles equals that of the nodes. The internal forces are in balance halfway through the
-/// step, and have no moment there. The midpoint rule conserves every quadratic invariant of its equations.
-#[test]
-fn a_body_that_spins_keeps_its_angular_momentum() -> Result<(), Failure> {
-    let angular = |simulation: &Simulation<2>| -> f64 {
-        let particles = &simulation.particles;
-        let of = |p: usize| particles.mass[p] * particles.position[p].perp(&particles.velocity[p]);
-        (0..particles.len()).map(of).sum()
-    };
-    let overrides = [
-        r#"bodies.0.shape={"box":{"min":[1.5,1.5],"max":[3.5,3.5]}}"#,
-        r#"time.scheme={"generalized_alpha":{"spectral_radius":1}}"#,
-        r#"grid.renewed="never""#,
-        r#"approximation="linear""#,
-        "time.lumping=0",
-        "solver.newton.tolerance=1e-13",
-        NO_BETA,
-        NO_GAMMA,
-    ];
-    let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
-    let centre = Vector::from([2.5, 2.5]);
-    simulation.set_velocity_on_nodes(|x| Vector::from([-(x - centre)[1], (x - centre)[0]]))?;
-    let start = angular(&simulation);
-    for step in 0..300 {
-        assert_eq!(simulation.step()?.renewed, step == 0);
-        let change = angular(&simulation) / start - 1.0;
-        assert!(change.abs() < 1e-10, "step {step}: {change:e}");
-    }
-    // More than two revolutions.
-    assert!(simulation.clock.time() > 4.0 * std::f64::consts::PI);
-    Ok(())
-}
-
 /// One block stands on the floor, another one falls beside it. The floor is a contact from the impact on, and the grid is reset, so that a
 /// block may leave the floor again.
 #[test]

@@ -5,7 +5,6 @@ mod adaptive;
 mod aggregation;
 mod approximation;
 mod carried;
-mod compaction;
 mod contact;
 mod damping;
 mod dilatation;
@@ -28,9 +27,6 @@ mod path;
 mod plasticity;
 mod points;
 mod program;
-#[path = "../../verification/src/random.rs"]
-#[allow(dead_code, reason = "the studies need more of it")]
-mod random;
 mod rebound;
 mod restart;
 mod runs;
@@ -43,7 +39,6 @@ mod storage;
 mod support;
 mod surfaces;
 mod sweep;
-mod symmetry;
 mod transfer;
 mod tutorial;
 mod warnings;

@@ -94,22 +94,6 @@ fn cubic_splines_take_few_iterations_too() -> Result<(), Failure> {
     Ok(())
 }
 
-#[test]
-fn bodies_and_laws_are_all_the_same_to_it() -> Result<(), Failure> {
-    let body = |name: &str, low: f64, high: f64, young: f64| {
-        json!({
-            "name": name, "shape": {"box": {"min": [0.3, low], "max": [1.4, high]}}, "density": 1,
-            "material": {"st_venant_kirchhoff": {"young": young, "poisson": 0.3}}, "particles_per_cell": 3
-        })
-    };
-    let more = json!({"bodies": [body("soft", 0.0, 0.52, 1e3), body("stiff", 0.52, 1.1, 1e5)]});
-    let scene = || block::<2>(&json!({"bspline": {}}), 10, "none", more.clone());
-    let (by_blocks, one) = iterations(scene()?, Preconditioning::BlockJacobi)?;
-    let (by_levels, other) = iterations(scene()?, Preconditioning::Multigrid)?;
-    assert!(same(&one, &other) && by_levels < 0.7 * by_blocks, "{by_levels} after {by_blocks}");
-    Ok(())
-}
-
 /// z = M⁻¹ r for a direction that leaves prescribed nodes alone.
 fn applied<const D: usize>(
     inverse: &dyn LinearOperator,

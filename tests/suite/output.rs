@@ -120,32 +120,52 @@ fn column(path: &Path, name: &str) -> Result<Vec<f64>, Failure> {
     lines.map(|line| Ok(line.split(',').nth(place).ok_or("short row")?.parse()?)).collect()
 }
 
-#[test]
-fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
+/// A run of twenty steps with its files, and what the simulation itself said after each step.
+struct Recorded {
+    directory: tempfile::TempDir,
+    initial: Simulation<2>,
+    simulation: Simulation<2>,
+    summary: bfree::output::Summary,
+    energies: Vec<f64>,
+    newton: Vec<usize>,
+    /// The vertical force on the floor.
+    floor: Vec<f64>,
+    /// The vertical displacement of the last particle, and how much its deformation adds at a point beside it.
+    tops: Vec<f64>,
+    carried: Vec<f64>,
+}
+
+impl Recorded {
+    fn file(&self, name: &str) -> std::path::PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn column(&self, file: &str, name: &str) -> Result<Vec<f64>, Failure> {
+        column(&self.file(file), name)
+    }
+}
+
+fn recorded() -> Result<Recorded, Failure> {
     let directory = tempfile::tempdir()?;
-    let file = |name: &str| directory.path().join(name);
-    std::fs::write(file("particles_000099.vtu"), "of an earlier run")?;
+    std::fs::write(directory.path().join("particles_000099.vtu"), "of an earlier run")?;
     let mut simulation = falling()?;
     let initial = simulation.clone();
-    let reference = Reference::of(&simulation);
     // The nearest particle starts at (0.71875, 0.46875).
     let corner = Vector::from([1.0, 0.875]);
     let at_point = |within| Place::Nearest { point: corner, body: None, within };
+    let beside = || Place::Carried { particle: 63, offset: ASIDE };
+    let probe = |name: &str, field, place| Probe { name: name.into(), field, place };
     let probes = vec![
-        Probe { name: "top".into(), field: Field::Displacement, place: Place::Particle(63) },
-        Probe { name: "near".into(), field: Field::Jacobian, place: at_point(2.0) },
-        Probe {
-            name: "beside".into(),
-            field: Field::Displacement,
-            place: Place::Carried { particle: 63, offset: ASIDE },
-        },
-        Probe { name: "there".into(), field: Field::Position, place: Place::Carried { particle: 63, offset: ASIDE } },
-        Probe { name: "far".into(), field: Field::Velocity, place: at_point(0.4) },
+        probe("top", Field::Displacement, Place::Particle(63)),
+        probe("near", Field::Jacobian, at_point(2.0)),
+        probe("beside", Field::Displacement, beside()),
+        probe("there", Field::Position, beside()),
+        probe("far", Field::Velocity, at_point(0.4)),
     ];
-    let mut recorder =
-        Recorder::start(OutputSettings { probes, ..settings(directory.path()) }, &simulation, reference.clone())?;
-    let (mut energies, mut newton, mut floor, mut tops) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut carried = Vec::new();
+    let settings = OutputSettings { probes, ..settings(directory.path()) };
+    let mut recorder = Recorder::start(settings, &simulation, Reference::of(&initial))?;
+    let (mut energies, mut newton, mut floor) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut tops, mut carried) = (Vec::new(), Vec::new());
     for _ in 0..20 {
         let step = simulation.advance()?;
         recorder.record(&simulation, &step)?;
@@ -156,69 +176,86 @@ fn the_files_of_a_run_agree_with_it() -> Result<(), Failure> {
         tops.push(simulation.particles.position[top][1] - initial.particles.position[63][1]);
         carried.push((simulation.particles.displacement_gradient[top] * ASIDE)[1]);
     }
-    let summary = recorder.finish(
-        &simulation,
-        &Map::from_iter([("settings".into(), json!({"scene": "falling"}))]),
-        Outcome::Finished,
-    )?;
+    let scene = Map::from_iter([("settings".into(), json!({"scene": "falling"}))]);
+    let summary = recorder.finish(&simulation, &scene, Outcome::Finished)?;
+    Ok(Recorded { directory, initial, simulation, summary, energies, newton, floor, tops, carried })
+}
 
-    let history = file("history.csv");
+#[test]
+fn the_tables_of_a_run_agree_with_it() -> Result<(), Failure> {
+    let run = recorded()?;
     let header = "step,time,dt,kinetic,strain,external,total,balance,momentum_x,momentum_y,newton,krylov";
-    assert_eq!(std::fs::read_to_string(&history)?.lines().next(), Some(header));
-    let (total, external) = (column(&history, "total")?, column(&history, "external")?);
-    assert_eq!(total[1..], energies, "the same bits");
-    assert_eq!(column(&history, "time")?.last(), Some(&simulation.clock.time()));
-    assert_eq!(external.last(), Some(&simulation.external_work));
-    for (k, balance) in column(&history, "balance")?.into_iter().enumerate() {
+    assert_eq!(std::fs::read_to_string(run.file("history.csv"))?.lines().next(), Some(header));
+    let history = |name: &str| run.column("history.csv", name);
+    let (total, external) = (history("total")?, history("external")?);
+    assert_eq!(total[1..], run.energies, "the same bits");
+    assert_eq!(history("time")?.last(), Some(&run.simulation.clock.time()));
+    assert_eq!(external.last(), Some(&run.simulation.external_work));
+    for (k, balance) in history("balance")?.into_iter().enumerate() {
         assert_eq!(balance, total[k] - total[0] - external[k]);
     }
-    assert_eq!((column(&history, "dt")?[0], column(&history, "newton")?[0]), (0.0, 0.0));
-    let newton_column: Vec<usize> = column(&history, "newton")?.iter().map(|&x| x as usize).collect();
-    assert_eq!(newton_column[1..], newton);
-    assert_eq!(column(&file("reactions.csv"), "floor_y")?, floor);
-    assert_eq!(column(&file("probes.csv"), "top_y")?[1..], tops);
-    let [beside, there] = ["beside_y", "there_y"].map(|name| column(&file("probes.csv"), name));
-    let (beside, there, start) = (beside?, there?, initial.particles.position[63][1]);
-    assert!(carried.iter().any(|add| add.abs() > 1e-6), "a body that deforms");
-    for (k, (top, add)) in tops.iter().zip(carried).enumerate() {
+    assert_eq!((history("dt")?[0], history("newton")?[0]), (0.0, 0.0));
+    let newton: Vec<usize> = history("newton")?.iter().map(|&x| x as usize).collect();
+    assert_eq!(newton[1..], run.newton);
+    assert_eq!(run.column("reactions.csv", "floor_y")?, run.floor);
+
+    let probe = |name: &str| run.column("probes.csv", name);
+    assert_eq!(probe("top_y")?[1..], run.tops);
+    let (beside, there, start) = (probe("beside_y")?, probe("there_y")?, run.initial.particles.position[63][1]);
+    assert!(run.carried.iter().any(|add| add.abs() > 1e-6), "a body that deforms");
+    for (k, (top, add)) in run.tops.iter().zip(&run.carried).enumerate() {
         assert_eq!(beside[k + 1], top + add);
         assert!((there[k + 1] - (start + ASIDE[1] + top + add)).abs() < 1e-14);
     }
-    let near = column(&file("probes.csv"), "near")?;
+    let near = probe("near")?;
     assert!(near.len() == 21 && near.iter().all(|x| x.is_finite()), "{near:?}");
-    assert!(column(&file("probes.csv"), "far_y")?.iter().all(|x| x.is_nan()), "no particle is that near");
+    assert!(probe("far_y")?.iter().all(|x| x.is_nan()), "no particle is that near");
+    Ok(())
+}
 
-    let report: Value = serde_json::from_slice(&std::fs::read(file("report.json"))?)?;
+#[test]
+fn the_report_of_a_run_agrees_with_it() -> Result<(), Failure> {
+    let run = recorded()?;
+    let report: Value = serde_json::from_slice(&std::fs::read(run.file("report.json"))?)?;
     let steps = report["steps"].as_array().ok_or("no steps")?;
     let lengths = |key: &str| steps.iter().map(|step| step[key].as_array().map_or(0, Vec::len)).collect::<Vec<_>>();
-    assert_eq!(lengths("newton_residuals"), newton.iter().map(|n| n + 1).collect::<Vec<_>>());
-    assert_eq!((lengths("krylov_iterations"), lengths("krylov_residuals")), (newton.clone(), newton.clone()));
+    assert_eq!(lengths("newton_residuals"), run.newton.iter().map(|n| n + 1).collect::<Vec<_>>());
+    assert_eq!(lengths("krylov_iterations"), run.newton);
+    assert_eq!(lengths("krylov_residuals"), run.newton);
+    let [time, krylov] = ["time", "krylov"].map(|name| run.column("history.csv", name));
+    let (time, krylov) = (time?, krylov?);
     for (k, step) in steps.iter().enumerate() {
-        assert_eq!((&step["time"], &step["dt"]), (&json!(column(&history, "time")?[k + 1]), &json!(0.01)));
-        let krylov: u64 = step["krylov_iterations"].as_array().into_iter().flatten().filter_map(Value::as_u64).sum();
-        assert_eq!((json!(krylov), column(&history, "krylov")?[k + 1]), (step["krylov_total"].clone(), krylov as f64));
+        assert_eq!((&step["time"], &step["dt"]), (&json!(time[k + 1]), &json!(0.01)));
+        let sum: u64 = step["krylov_iterations"].as_array().into_iter().flatten().filter_map(Value::as_u64).sum();
+        assert_eq!((json!(sum), krylov[k + 1]), (step["krylov_total"].clone(), sum as f64));
         let reached = step["krylov_residuals"].as_array().into_iter().flatten().filter_map(Value::as_f64);
         assert!(reached.into_iter().all(|x| x <= 1e-8), "{step}");
     }
-    assert_eq!(report["counts"]["newton_iterations"], newton.iter().sum::<usize>());
+    assert_eq!(report["counts"]["newton_iterations"], run.newton.iter().sum::<usize>());
     assert_eq!(report["counts"]["steps"], 20);
     assert_eq!(report["settings"]["scene"], "falling");
-    assert_eq!(summary.counts.steps, 20);
-    assert!(!file("newton.jsonl").exists() && !file("particles_000099.vtu").exists());
+    assert_eq!(run.summary.counts.steps, 20);
+    assert!(!run.file("newton.jsonl").exists() && !run.file("particles_000099.vtu").exists());
+    Ok(())
+}
 
+#[test]
+fn the_snapshots_of_a_run_agree_with_it() -> Result<(), Failure> {
+    let run = recorded()?;
+    let reference = Reference::of(&run.initial);
     // t = 0, 0.05, 0.1, 0.15, 0.2. At the last time an output is due and the run ends; the snapshot is written once.
-    let series = std::fs::read_to_string(file("particles.pvd"))?;
+    let series = std::fs::read_to_string(run.file("particles.pvd"))?;
     assert_eq!(series.matches("<DataSet").count(), 5);
-    let last = Snapshot::read(&file("particles_000004.vtu"))?;
-    assert_eq!(last.time, simulation.clock.time());
-    assert_eq!(last.points.len(), simulation.particles.len());
-    for (point, x) in last.points.iter().zip(&simulation.particles.by_id().position) {
+    let last = Snapshot::read(&run.file("particles_000004.vtu"))?;
+    assert_eq!(last.time, run.simulation.clock.time());
+    assert_eq!(last.points.len(), run.simulation.particles.len());
+    for (point, x) in last.points.iter().zip(&run.simulation.particles.by_id().position) {
         assert_eq!(*point, [x[0], x[1], 0.0]);
     }
     let names: Vec<_> = last.arrays.iter().map(|array| array.name.as_str()).collect();
     assert_eq!(names, ["stress", "body", "displacement"], "what was asked for, and nothing else");
-    assert_eq!(last.arrays[0].values, Values::Float(Field::Stress.values(&simulation, &reference)?));
-    assert_eq!(last.arrays[2].values, Values::Float(Field::Displacement.values(&simulation, &reference)?));
+    assert_eq!(last.arrays[0].values, Values::Float(Field::Stress.values(&run.simulation, &reference)?));
+    assert_eq!(last.arrays[2].values, Values::Float(Field::Displacement.values(&run.simulation, &reference)?));
     Ok(())
 }
 

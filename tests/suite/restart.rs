@@ -92,77 +92,57 @@ fn a_shortened_last_step_is_taken_back_by_a_restart() -> Result<(), Failure> {
     Ok(())
 }
 
+/// (scene, keys that are set, further arguments)
+const IN_PARTS: [(&str, &[&str], &[&str]); 8] = [
+    // Walls and smoothing.
+    ("rebound.json", &[SMOOTHED[1], SMOOTHED[3], SMOOTHED[5]], &["--until", "12"]),
+    // A prescribed motion with work and a load.
+    ("compaction.json", &["output.checkpoint=0.1"], &["--until", "0.5", "--threads", "2"]),
+    // Halved steps among whole ones.
+    (
+        "rebound_fast.json",
+        &["time.step=0.2", "solver.newton.max_iterations=3", "output.checkpoint=0.5"],
+        &["--until", "6"],
+    ),
+    // Along an equilibrium path, whose loads fall.
+    (
+        "elastica.json",
+        &[
+            r#"time={"step":0.02,"end":0.3,"scheme":"arc_length"}"#,
+            "grid.spacing=0.5",
+            "output.every=0.1",
+            "output.checkpoint=0.1",
+        ],
+        &[],
+    ),
+    // Inertia with one reference configuration, reset when the body meets a wall.
+    ("rebound.json", &[r#"grid.renewed="never""#, "output.checkpoint=1"], &["--until", "12"]),
+    // Load steps without a grid reset.
+    ("column_static.json", &["output.checkpoint=0.2", "time.step=0.04"], &[]),
+    // Steps of adaptive length.
+    (
+        "rebound_fast.json",
+        &["time.step=0.4", r#"time.adaptive={"tolerance":1e-3}"#, "output.checkpoint=0.5"],
+        &["--until", "10"],
+    ),
+    // Load steps with occasional grid resets, which carry over the out-of-balance force.
+    (
+        "elastica.json",
+        &[r#"grid.renewed={"strain":0.05}"#, "grid.spacing=0.5", "time.step=0.02", "output.checkpoint=0.1"],
+        &[],
+    ),
+];
+
 #[test]
 fn a_run_in_three_parts_has_the_bits_of_one() -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
-    // Walls and smoothing; a prescribed motion with work and a load; halved steps among whole ones.
-    let scenes: [(&str, &[&str]); 8] = [
-        ("rebound.json", &SMOOTHED),
-        ("compaction.json", &["--set", "output.checkpoint=0.1", "--until", "0.5", "--threads", "2"]),
-        (
-            "rebound_fast.json",
-            &[
-                "--set",
-                "time.step=0.2",
-                "--set",
-                "solver.newton.max_iterations=3",
-                "--set",
-                "output.checkpoint=0.5",
-                "--until",
-                "6",
-            ],
-        ),
-        // Along an equilibrium path, whose loads fall.
-        (
-            "elastica.json",
-            &[
-                "--set",
-                r#"time={"step":0.02,"end":0.3,"scheme":"arc_length"}"#,
-                "--set",
-                "grid.spacing=0.5",
-                "--set",
-                "output.every=0.1",
-                "--set",
-                "output.checkpoint=0.1",
-            ],
-        ),
-        // Inertia with one reference configuration, reset when the body meets a wall.
-        ("rebound.json", &["--set", r#"grid.renewed="never""#, "--set", "output.checkpoint=1", "--until", "12"]),
-        // Load steps without a grid reset; and steps of adaptive length.
-        ("column_static.json", &["--set", "output.checkpoint=0.2", "--set", "time.step=0.04"]),
-        (
-            "rebound_fast.json",
-            &[
-                "--set",
-                "time.step=0.4",
-                "--set",
-                r#"time.adaptive={"tolerance":1e-3}"#,
-                "--set",
-                "output.checkpoint=0.5",
-                "--until",
-                "10",
-            ],
-        ),
-        // Load steps with occasional grid resets, which carry over the out-of-balance force.
-        (
-            "elastica.json",
-            &[
-                "--set",
-                r#"grid.renewed={"strain":0.05}"#,
-                "--set",
-                "grid.spacing=0.5",
-                "--set",
-                "time.step=0.02",
-                "--set",
-                "output.checkpoint=0.1",
-            ],
-        ),
-    ];
-    for (k, (scene, arguments)) in scenes.into_iter().enumerate() {
+    for (k, (scene, sets, more)) in IN_PARTS.into_iter().enumerate() {
+        let set = sets.iter().flat_map(|set| ["--set", *set]);
+        let arguments: Vec<&str> = set.chain(more.iter().copied()).collect();
         let (whole, parts) = (folder.path().join(format!("whole{k}")), folder.path().join(format!("parts{k}")));
-        assert!(run(scene, &whole, &[arguments])?.status.success());
+        assert!(run(scene, &whole, &[&arguments])?.status.success());
         for part in [&["--steps", "7"][..], &["--steps", "23", "--restart"], &["--restart"]] {
-            let output = run(scene, &parts, &[arguments, part])?;
+            let output = run(scene, &parts, &[&arguments, part])?;
             assert!(output.status.success(), "{}", message(&output));
             assert!(part.len() == 2 || message(&output).contains("continues at t = "), "{}", message(&output));
         }

@@ -220,30 +220,6 @@ fn the_fast_sweep_gives_the_answer_of_the_plain_one() {
     compare::<3>();
 }
 
-#[test]
-fn any_number_of_threads_sums_the_same_bits() {
-    let (grid, positions) = case::<3>();
-    for shape in [Approximation::from(Linear), Lme::new(3.0, 1e-6).into()] {
-        let sums = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let (supports, nodes) = Supports::new(&shape, &grid, &positions).unwrap();
-                let u = field::<3>(&nodes);
-                let mut out = vec![Vector::zeros(); u.len()];
-                supports.assemble(&u, &mut out, point).unwrap();
-                out
-            })
-        };
-        let one = sums(1);
-        for threads in [2, 5] {
-            let many = sums(threads);
-            let same =
-                one.iter().zip(&many).all(|(a, b)| a.iter().zip(b.iter()).all(|(a, b)| a.to_bits() == b.to_bits()));
-            assert!(same, "{threads} threads");
-        }
-    }
-}
-
 /// Cells of edge 1, `per_axis` particles along each axis of the cells `cells`, counted from the corner.
 fn regular<const D: usize>(cells: [u32; D], per_axis: u32) -> (Grid<D>, Vec<Vector<f64, D>>) {
     let side = cells.map(|n| n * per_axis);

@@ -11,13 +11,9 @@
 
 #[cfg(feature = "studies")]
 pub mod axis;
-#[cfg(feature = "studies")]
-pub mod baseline;
 mod check;
 #[cfg(feature = "studies")]
 pub mod double_double;
-#[cfg(feature = "studies")]
-pub mod elements;
 #[cfg(feature = "studies")]
 pub mod known;
 #[cfg(feature = "studies")]

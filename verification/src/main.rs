@@ -139,8 +139,7 @@ fn run(studies: &[(&Study, Effort)], arguments: &Arguments) -> Result<bool, Fail
         if let (Ok(outcome), true) = (&result, asked_for(arguments, "results")) {
             draw(&kept_folder("results"), outcome)?;
         }
-        if let (Ok(outcome), "tradeoff", Effort::Full) = (&result, study.name, effort) {
-            draw(&kept_folder("tradeoff"), outcome)?;
+        if let (Ok(_), "tradeoff", Effort::Full) = (&result, study.name, effort) {
             keep_tradeoff(&chapter(study, &result, seconds, "tradeoff"))?;
         }
         let finding = Finding::of(study.name, &result, seconds);

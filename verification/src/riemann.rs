@@ -150,21 +150,6 @@ impl PSystem {
 }
 
 impl Riemann {
-    /// Energy that the shocks dissipate per time and area: Σ (|s| [½ρv² + W] ∓ [P v]) in the frame of the middle state; 0 for fans.
-    pub fn dissipation(&self) -> f64 {
-        let (system, star) = (&self.system, self.states[1]);
-        let of = |outer: State, wave: Wave| match wave {
-            Wave::Fan(..) => 0.0,
-            Wave::Shock(speed) => {
-                let v = outer.velocity - star.velocity;
-                let energy = 0.5 * system.density * v * v + system.energy(outer.stretch) - system.energy(star.stretch);
-                // The inflow with the outer state minus the energy left behind, minus the work of the outer stress.
-                speed.abs() * energy - system.stress(outer.stretch) * v * -speed.signum()
-            }
-        };
-        of(self.states[0], self.waves[0]) + of(self.states[2], self.waves[1])
-    }
-
     /// The state at ξ = X/t; on a shock, the state behind it.
     pub fn at(&self, xi: f64) -> State {
         let [left, star, right] = self.states;
@@ -246,25 +231,6 @@ mod tests {
     }
 
     #[test]
-    fn shocks_satisfy_rankine_hugoniot_and_lax() {
-        for problem in problems() {
-            for (outer, sign, wave) in sides(&problem) {
-                let Wave::Shock(speed) = wave else { continue };
-                let (system, star) = (problem.system, problem.states[1]);
-                let (jump_f, jump_v) = (star.stretch - outer.stretch, star.velocity - outer.velocity);
-                let jump_p = system.stress(star.stretch) - system.stress(outer.stretch);
-                // −s [F] = [v],  −s ρ [v] = [P]
-                assert!((speed * jump_f + jump_v).abs() < 1e-10 * jump_v.abs(), "{wave:?}");
-                assert!((speed * system.density * jump_v + jump_p).abs() < 1e-10 * jump_p.abs(), "{wave:?}");
-                // The shock is supersonic ahead and subsonic behind, and only compression jumps.
-                let ahead = system.speed(outer.stretch);
-                assert!(sign * speed > ahead && sign * speed < system.speed(star.stretch), "{wave:?}");
-                assert!(jump_f < 0.0);
-            }
-        }
-    }
-
-    #[test]
     fn fans_keep_their_riemann_invariant_and_spread() {
         for problem in problems() {
             for (outer, sign, wave) in sides(&problem) {
@@ -328,34 +294,12 @@ mod tests {
                 error(&|at| 0.5 * system.density * at.velocity * at.velocity + system.energy(at.stretch), &|at| {
                     system.stress(at.stretch) * at.velocity
                 });
-            if problem.waves.iter().any(|wave| matches!(wave, Wave::Shock(_))) {
-                assert!(energy < 0.0 && problem.dissipation() > 0.0, "{energy:e}");
-                // The same dissipation, in the frame of the middle state, from the fluxes through the shocks.
-                let v_star = problem.states[1].velocity;
-                let moving =
-                    |at: State| 0.5 * system.density * (at.velocity - v_star).powi(2) + system.energy(at.stretch);
-                let flux = |at: State| system.stress(at.stretch) * (at.velocity - v_star);
-                let change = integral(&problem, reach, moving) - reach * (moving(left) + moving(right));
-                let lost = flux(right) - flux(left) - change;
-                assert!((lost / problem.dissipation() - 1.0).abs() < 1e-6, "{lost:e} {:e}", problem.dissipation());
-            } else {
-                assert_eq!(problem.dissipation(), 0.0);
-                assert!(energy.abs() < 1e-10, "{energy:e}");
-            }
+            let shock = problem.waves.iter().any(|wave| matches!(wave, Wave::Shock(_)));
+            assert!(if shock { energy < 0.0 } else { energy.abs() < 1e-10 }, "{energy:e}");
         }
     }
-
     #[test]
-    fn the_mirrored_problem_has_the_mirrored_solution_and_nothing_happens_to_equal_states() {
-        for problem in problems() {
-            let [left, star, right] = problem.states;
-            let mirror = |at: State| state(at.stretch, -at.velocity);
-            let mirrored = problem.system.solve(mirror(right), mirror(left)).unwrap();
-            assert!((mirrored.states[1].stretch - star.stretch).abs() < 1e-14 * star.stretch);
-            assert!((mirrored.states[1].velocity + star.velocity).abs() < 1e-9);
-            let same = problem.system.solve(left, left).unwrap();
-            assert_eq!(same.states[1].stretch, left.stretch);
-        }
+    fn states_of_no_bar_are_refused() {
         assert_eq!(system(1.0).solve(state(0.0, 0.0), state(1.0, 0.0)), Err(NoState));
         assert_eq!(system(1.0).solve(state(1.0, f64::NAN), state(1.0, 0.0)), Err(NoState));
     }

@@ -168,40 +168,7 @@ impl Ranged for Scale {
 }
 
 impl Panel {
-    /// A panel with only the names of `curves`: a key for several charts, which covers none of them.
-    pub fn key(curves: Vec<Curve>) -> Self {
-        let curves = curves.into_iter().map(|curve| Curve { points: Vec::new(), ..curve }).collect();
-        let [x, y] = [Axis::linear(""), Axis::linear("")];
-        Self { title: String::new(), x, y, window: None, curves, legend: None }
-    }
-
-    /// The names, one below the other.
-    fn draw_key(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), PlottingError> {
-        let fine = FINE as i32;
-        for (k, curve) in self.curves.iter().enumerate() {
-            let color = curve.color();
-            let height = (60 + 26 * k as i32) * fine;
-            let pieces: &[(i32, i32)] = match curve.mark {
-                Mark::Dots => &[],
-                Mark::Dashed => &[(40, 48), (52, 60), (64, 72)],
-                Mark::Line | Mark::Joined => &[(40, 72)],
-            };
-            for (start, end) in pieces {
-                let line = vec![(start * fine, height), (end * fine, height)];
-                area.draw(&PathElement::new(line, color.stroke_width(3 * FINE / 2)))?;
-            }
-            if matches!(curve.mark, Mark::Dots | Mark::Joined) {
-                area.draw(&Circle::new((56 * fine, height), 3 * FINE, color.filled()))?;
-            }
-            area.draw(&Text::new(curve.name.clone(), (82 * fine, height - 7 * fine), LABEL))?;
-        }
-        Ok(())
-    }
-
     fn draw(&self, area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), PlottingError> {
-        if self.curves.iter().all(|curve| curve.points.is_empty()) {
-            return self.draw_key(area);
-        }
         let placed: Vec<_> = self.curves.iter().map(|curve| self.placed(curve)).collect();
         let [x, y] = self.ranges(&placed);
         let length = (area.dim_in_pixel().0 / FINE).saturating_sub(MARGINS.0 + MARGINS.1 + NUMBERS);

@@ -3,8 +3,8 @@
 use super::regime::{Regime, condition, rotation, round_off};
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use bfree::material::{Law, MaterialState, NonPositiveJacobian};
-use bfree::tensor::{Tensor, contract, identity, inverse, outer, scaled};
+use bfree::material::{ClosedTangent, Law, MaterialState, NonPositiveJacobian};
+use bfree::tensor::{Tensor, Vector, contract, identity, inverse, outer, scaled};
 use num_dual::Dual64;
 
 /// Deformations tried in each regime.
@@ -189,29 +189,45 @@ fn quantities<L: Law, const D: usize>(
         }
     };
     let expected = dual_piola * f_n.transpose() * volume;
-    let by_blocks = closed.as_ref().map(|closed| {
-        let (block, by_product) = (closed.block(&v, &b), closed.apply(&outer(&a, &b)) * v);
-        (block * a - by_product).norm() / (block.norm() * a.norm())
-    });
+    let by_blocks = closed.as_ref().map(|closed| blocks_against_product(closed, [&a, &v, &b]));
     let (of_l, of_m) = (product(&l), product(&m));
     let asymmetry = (contract(&of_l, &m) - contract(&of_m, &l)).abs() / (of_l.norm() * m.norm());
 
-    let turned = law.stress(&at.deformed(rotation::<D>(random) * f - identity::<f64, D>()));
-    let embedded = law.stress(&at.deformed(upper_left::<D, 3>(&at.h)));
-
+    let [symmetry, turned, embedded] = of_stress(law, &at, stiffness, random);
     let values = [
         law.has_potential().then_some(energy / work),
         Some((elasticity - dual_stress).norm() / dual_stress.norm()),
         Some((density * a - by_elasticity).norm() / (density.norm() * a.norm())),
         closed.as_ref().map(|_| (of_l - expected).norm() / expected.norm()),
         by_blocks,
-        Some((stress - stress.transpose()).norm() / (stress.norm() + stiffness)),
+        Some(symmetry),
         law.is_symmetric().then_some(asymmetry),
-        Some((turned - stress).norm() / (stress.norm() + stiffness)),
-        Some((upper_left::<3, D>(&embedded) - stress).norm() / (stress.norm() + stiffness)),
+        Some(turned),
+        Some(embedded),
     ];
     // The pull-back adds the condition of F_n.
     Ok((values, round_off(condition(&f).max(condition(&f_n)))))
+}
+
+/// The block of the vectors v and b applied to a, against the product with a ⊗ b applied to v.
+fn blocks_against_product<const D: usize>(closed: &ClosedTangent<f64, D>, [a, v, b]: [&Vector<f64, D>; 3]) -> f64 {
+    let block = closed.block(v, b);
+    let by_product = closed.apply(&outer(a, b)) * v;
+    (block * a - by_product).norm() / (block.norm() * a.norm())
+}
+
+/// The errors of S: its symmetry, its change under a rotation, and its change as embedded in 3D.
+fn of_stress<L: Law, const D: usize>(
+    law: &L,
+    at: &MaterialState<f64, D>,
+    stiffness: f64,
+    random: &mut Random,
+) -> [f64; 3] {
+    let stress = law.stress(at);
+    let turned = law.stress(&at.deformed(rotation::<D>(random) * at.f - identity::<f64, D>()));
+    let embedded = law.stress(&at.deformed(upper_left::<D, 3>(&at.h)));
+    let errors = [stress - stress.transpose(), turned - stress, upper_left::<3, D>(&embedded) - stress];
+    errors.map(|error| error.norm() / (stress.norm() + stiffness))
 }
 
 /// A tensor truncated, or padded with zeros, to another dimension.

@@ -12,6 +12,7 @@ use bfree::mechanics::terms::Piece;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector, identity};
 use num_dual::Dual64;
+use std::collections::HashSet;
 
 /// Random directions at each state.
 const DIRECTIONS: usize = 3;
@@ -107,31 +108,7 @@ pub(crate) fn measure<const D: usize, L: Law>(
             u
         })
         .collect();
-    let mut measured = Vec::new();
-    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
-    let mut sizes = vec![0.0; dphi.len()];
-    let pieces = equilibrium.terms.pieces();
-    for &piece in &pieces {
-        let frozen = equilibrium.tangent_of(piece, dphi)?;
-        if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
-            sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
-        }
-        let mut worst: f64 = 0.0;
-        let mut products = Vec::new();
-        for u in &directions {
-            let mut dual = equilibrium.derivative(piece, dphi, u)?;
-            equilibrium.clear_prescribed(&mut dual);
-            let analytic = product(&frozen, u);
-            let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
-            worst = worse(worst, relative(&analytic, &dual, scale));
-            products.push(analytic);
-        }
-        measured.push(Measured::new(piece.name, worst, bound));
-        if piece.name == PRESSURE && D > 1 {
-            measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(&directions, &products), Bound::Reported));
-        }
-    }
-
+    let (mut measured, sizes) = measure_pieces(equilibrium, dphi, &directions, spacing, bound)?;
     let tangent = equilibrium.tangent(dphi)?;
     let mut worst: f64 = 0.0;
     for u in &directions {
@@ -161,6 +138,41 @@ pub(crate) fn measure<const D: usize, L: Law>(
     }
     measured.extend(value.map(|value| Measured::new(POTENTIAL, value, bound)));
     Ok(measured)
+}
+
+/// Each piece alone against the derivative of its residual, and the sizes of the diagonal blocks of all pieces.
+fn measure_pieces<const D: usize, L: Law>(
+    equilibrium: &Equilibrium<'_, D, L>,
+    dphi: &[Vector<f64, D>],
+    directions: &[Field<D>],
+    spacing: f64,
+    bound: Bound,
+) -> Result<(Vec<Measured>, Vec<f64>), Inadmissible> {
+    let mut measured = Vec::new();
+    // The size of each diagonal block. Its parts may cancel, so round-off scales with the sum of their norms.
+    let mut sizes = vec![0.0; dphi.len()];
+    let pieces = equilibrium.terms.pieces();
+    for &piece in &pieces {
+        let frozen = equilibrium.tangent_of(piece, dphi)?;
+        if piece.name != piece.term || pieces.iter().filter(|other| other.term == piece.term).count() == 1 {
+            sizes.iter_mut().zip(frozen.diagonal_blocks().iter()).for_each(|(size, block)| *size += block.norm());
+        }
+        let mut worst: f64 = 0.0;
+        let mut products = Vec::new();
+        for u in directions {
+            let mut dual = equilibrium.derivative(piece, dphi, u)?;
+            equilibrium.clear_prescribed(&mut dual);
+            let analytic = product(&frozen, u);
+            let scale = scale(equilibrium, piece, dphi, norm(&analytic), norm(u) / spacing)?;
+            worst = worse(worst, relative(&analytic, &dual, scale));
+            products.push(analytic);
+        }
+        measured.push(Measured::new(piece.name, worst, bound));
+        if piece.name == PRESSURE && D > 1 {
+            measured.push(Measured::new(PRESSURE_ASYMMETRY, asymmetry(directions, &products), Bound::Reported));
+        }
+    }
+    Ok((measured, sizes))
 }
 
 type Field<const D: usize> = Vec<Vector<f64, D>>;
@@ -193,8 +205,12 @@ fn columns<const D: usize, L>(
     nodes: usize,
 ) -> Vec<(usize, usize, Vector<f64, D>)> {
     let held = |node, k| equilibrium.prescribed.iter().any(|dof| dof.node == node && dof.component == k);
+    // A node that follows others is no unknown: its block is the identity, and its product vanishes.
+    let extension = equilibrium.step.supports.extension();
+    let followers: HashSet<usize> = extension.into_iter().flat_map(|all| all.rows().map(|(outer, _)| outer)).collect();
+    let unknown = |node: &usize| !followers.contains(node);
     let mut columns = Vec::new();
-    for node in (0..nodes).step_by(nodes.div_ceil(BLOCKS).max(1)) {
+    for node in (0..nodes).step_by(nodes.div_ceil(BLOCKS).max(1)).filter(unknown) {
         for k in (0..D).filter(|&k| !held(node, k)) {
             let mut unit = vec![Vector::zeros(); nodes];
             unit[node][k] = 1.0;

@@ -8,12 +8,9 @@ use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report, chain};
 use crate::shipped;
 use crate::table::Table;
-use bfree::field::Field;
-use bfree::output::Reference;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str = "Cook's membrane near incompressibility, with and without the mean dilatation of cells";
@@ -29,8 +26,6 @@ const SHAPES: [(&str, &str); 2] = [("linear", "\"linear\""), ("cubic B-splines",
 /// The results of a run.
 struct End {
     tip: f64,
-    /// The part of the pressure that alternates between neighbouring cells, over its scatter.
-    checkerboard: f64,
     newton: usize,
     krylov: usize,
 }
@@ -48,7 +43,6 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
         "output={}".to_owned(),
     ];
     let mut simulation: Simulation<2> = shipped::simulation("cook", &overrides)?;
-    let reference = Reference::of(&simulation);
     let start = simulation.particles.clone();
     let (mut newton, mut krylov) = (0, 0);
     while simulation.clock.time() < 1.0 - 1e-9 {
@@ -59,38 +53,11 @@ fn membrane(shape: &str, poisson: f64, cells: u32, averaged: bool) -> Result<End
     let now = simulation.particles.by_id();
     let away = |p: usize| (start.position[p] - Vector::from([48.0, 52.0])).norm();
     let tip = (0..start.len()).min_by(|&a, &b| away(a).total_cmp(&away(b))).ok_or("no particles")?;
-    // Means over the cells of the initial particle positions.
-    let pressure = Field::Pressure.values(&simulation, &reference)?;
-    let mut cells: HashMap<[u32; 2], (f64, f64)> = HashMap::new();
-    for (p, x) in (0..start.len()).filter(|&p| start.is_solid(p)).zip(&pressure) {
-        let cell = simulation.grid.cell(&start.position[p]).ok_or("out of the grid")?;
-        let sum = cells.entry(cell).or_default();
-        (sum.0, sum.1) = (sum.0 + start.volume[p] * x, sum.1 + start.volume[p]);
-    }
-    let full = simulation.grid.spacing.powi(2) * (1.0 - 1e-9);
-    let mean = |cell: [u32; 2]| cells.get(&cell).filter(|sum| sum.1 >= full).map(|sum| sum.0 / sum.1);
-    let (mut waves, mut scatter) = (Vec::new(), Vec::new());
-    for &[i, k] in cells.keys() {
-        let corners = [[i, k], [i + 1, k], [i, k + 1], [i + 1, k + 1]].map(mean);
-        if let [Some(a), Some(b), Some(c), Some(d)] = corners {
-            waves.push(0.25 * (a - b - c + d));
-            scatter.push(a);
-        }
-    }
-    let middle = scatter.iter().sum::<f64>() / scatter.len() as f64;
-    scatter.iter_mut().for_each(|x| *x -= middle);
     Ok(End {
         tip: now.position[tip][1] - start.position[tip][1],
-        checkerboard: root_mean_square(waves) / root_mean_square(scatter),
         newton,
         krylov,
     })
-}
-
-/// The values are sorted, so that the sum does not depend on the order of a map.
-fn root_mean_square(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
 pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
@@ -102,7 +69,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         "Cook's membrane: error of the displacement of the free edge",
         &["volume", "shape", "cells an edge", "Poisson's ratio"],
     );
-    let header = ["shape", "volume", "Poisson's ratio", "cells an edge", "displacement", "error", "checkerboard", "Newton", "Krylov"];
+    let header = ["shape", "volume", "Poisson's ratio", "cells an edge", "displacement", "error", "Newton", "Krylov"];
     let mut table = Table::new("Cook's membrane, beside elements of the same law", header);
     let of_shape = |shape| [false, true].into_iter().flat_map(move |averaged| known.iter().map(move |of| (shape, averaged, of)));
     let cases: Vec<_> = SHAPES.iter().flat_map(of_shape).flat_map(|case| cells.iter().map(move |&n| (case, n))).collect();
@@ -111,7 +78,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         (case, n, membrane(shape, *poisson, n, averaged).map_err(|error| chain(&*error)))
     });
     for ((&(name, _), averaged, &(poisson, known)), n, end) in ends.collect::<Vec<_>>() {
-        let End { tip, checkerboard, newton, krylov } = end?;
+        let End { tip, newton, krylov } = end?;
         let volume = if averaged { "mean of cells" } else { "pointwise" };
         let error = (tip / known - 1.0).abs();
         let bound = match n {
@@ -127,14 +94,9 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
             n.to_string(),
             format!("{tip:.3}"),
             format!("{:.2} %", 100.0 * error),
-            format!("{checkerboard:.3}"),
             newton.to_string(),
             krylov.to_string(),
         ]);
     }
-    report.note(NOTE);
     Ok(Outcome { reports: vec![report], tables: vec![table], ..Outcome::default() })
 }
-
-const NOTE: &str = "Checkerboard: the alternating part of the mean pressures of 2 x 2 neighbouring cells, over the scatter of all, in the mean square. Of a \
-     smooth field it falls with h².";

@@ -90,7 +90,7 @@ macro_rules! studies {
 
 studies!(
     tangent,
-    taylor,
+    scenes,
     newton,
     baseline,
     operator,
@@ -104,7 +104,6 @@ studies!(
     order,
     riemann,
     compaction,
-    column,
     loads,
     locking,
     expansion,

@@ -1,10 +1,9 @@
-//! Properties that hold for any layout of particles: affine motion, rigid motion, momentum; and properties that do not.
+//! Properties that hold for any layout of particles: affine motion and the patch test. Other studies take its body that spins.
 
 use super::{Effort, Outcome, StudyError, worse};
 use crate::check_approximation;
 use crate::random::Random;
 use crate::report::{Bound, Report};
-use crate::table::Table;
 use bfree::approximation::Approximation;
 use bfree::clock::Clock;
 use bfree::grid::Grid;
@@ -18,10 +17,10 @@ use bfree::mechanics::transfer::{Nodal, Update, WallUpdate};
 use bfree::particles::{Body, Particles};
 use bfree::simulation::{InitialGuess, Settings, Simulation};
 use bfree::solver::{Forcing, NewtonSettings};
-use bfree::tensor::{Tensor, Vector, determinant, identity, inverse};
+use bfree::tensor::{Tensor, Vector, identity};
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "affine motion, the patch test, rigid motion, momentum";
+pub(super) const ABOUT: &str = "affine motion, the patch test, and the shape functions themselves";
 
 /// The error of sums of a few dozen products of size one, times the few cells of the patch.
 const EXACT: f64 = 1e-12;
@@ -29,9 +28,6 @@ const EXACT: f64 = 1e-12;
 /// Balance of a homogeneous state, relative to the summed magnitudes. N and ∇N have the round-off of positions, some ten spacings from the
 /// origin; max-ent also has that of its multipliers.
 const BALANCE: f64 = 1e-13;
-
-/// Linear momentum over whole steps, relative to Σ m |v|.
-const MOMENTUM: f64 = 1e-13;
 
 /// Cells along each axis of the patch.
 const CELLS: u32 = 6;
@@ -41,7 +37,7 @@ fn families() -> Vec<(&'static str, Approximation)> {
     Approximation::examples().into_iter().filter(|(name, _)| !matches!(*name, "lme 1.8" | "lme circle 1.8")).collect()
 }
 
-pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
+pub(super) fn run(_effort: &Effort) -> Result<Outcome, StudyError> {
     let mut affine = Report::new("affine motion, random layouts with points on nodes, faces, walls and corners", &["quantity", "shape", "D"]);
     let mut shapes = Report::new("shape functions, worst place", &["quantity", "D", "place", "shape"]).as_matrix(&[0, 1], 3, 2);
     for (name, shape) in &families() {
@@ -62,31 +58,10 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         patch_test::<2>(name, shape, &mut imbalance)?;
         patch_test::<3>(name, shape, &mut imbalance)?;
     }
-    let mut rigid = Report::new("superposed rotation", &["quantity", "law", "D"]);
-    for (name, law) in &Material::examples(Lame::new(150.0, 30.0)?) {
-        superposed_rotation::<2>(name, law, &mut rigid);
-        superposed_rotation::<3>(name, law, &mut rigid);
-    }
-    let mut momentum = Report::new("free flight of a spinning, vibrating body", &["quantity", "shape", "eps"]);
-    let mut angular = Table::new(
-        "free flight: drift of the angular momentum at t = 2, over its start",
-        ["shape", "eps", "dt = 0.1", "dt = 0.05", "dt = 0.025", "orders"],
-    );
-    for (name, shape) in &families() {
-        for lumping in [1.0, 0.1, 0.01] {
-            if *effort == Effort::Short && lumping < 1.0 && *name != "lme 3" {
-                continue;
-            }
-            free_flight(name, shape, lumping, &mut momentum, &mut angular)?;
-        }
-    }
     let remarks = vec![
         "Where the patch test does not hold, its imbalance is the quadrature error of particles: functions of x_n are summed, not integrated.".into(),
-        "The spin changes by eps sum_I (X_I - x_I) x m_I dv_I, X_I being the centre of the mass that node I lumps: an error of order 0 in dt, \
-         in proportion to eps (none by first-order consistency if eps = 0). What else there is, is of order 0 too, and two orders smaller."
-            .into(),
     ];
-    Ok(Outcome { reports: vec![shapes, affine, imbalance, rigid, momentum], tables: vec![angular], remarks, ..Outcome::default() })
+    Ok(Outcome { reports: vec![shapes, affine, imbalance], remarks, ..Outcome::default() })
 }
 
 /// The grid of the patch; its spacing is a power of two so that points on nodes are exact.
@@ -263,47 +238,6 @@ fn patch_test<const D: usize>(name: &str, shape: &Approximation, report: &mut Re
     Ok(())
 }
 
-/// W(QF) = W(F), S(QF) = S(F), and neither energy nor stress at F = Q.
-fn superposed_rotation<const D: usize>(name: &str, law: &Material, report: &mut Report) {
-    let mut random = Random::new(29);
-    let (mut energy, mut stress, mut resting_energy, mut resting_stress): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
-    for _ in 0..50 {
-        let q = rotation::<D>(&mut random);
-        let f = identity::<f64, D>() + random.tensor() * (0.6 / D as f64);
-        if determinant(&f) < 0.1 {
-            continue;
-        }
-        let (at, turned) = (deformation(&f), deformation(&(q * f)));
-        // Round-off of F changes S by eps times this.
-        let stiffness = law.elasticity(&at, &(f.transpose() * f)).norm();
-        let (w, s) = (law.energy(&at), law.stress(&at));
-        energy = worse(energy, (law.energy(&turned) - w).abs() / (w.abs() + s.norm()));
-        stress = worse(stress, (law.stress(&turned) - s).norm() / (s.norm() + stiffness));
-        let rigid = deformation(&q);
-        let stiffness = law.elasticity(&rigid, &identity()).norm();
-        resting_energy = worse(resting_energy, law.energy(&rigid).abs() / stiffness);
-        resting_stress = worse(resting_stress, law.stress(&rigid).norm() / stiffness);
-    }
-    let dimension = D.to_string();
-    let bound = Bound::AtMost(MOMENTUM);
-    report.push(&["W(QF) - W(F)", name, &dimension], energy, bound);
-    report.push(&["S(QF) - S(F)", name, &dimension], stress, bound);
-    report.push(&["W(Q)", name, &dimension], resting_energy, bound);
-    report.push(&["S(Q)", name, &dimension], resting_stress, bound);
-}
-
-fn deformation<const D: usize>(f: &Tensor<f64, D>) -> MaterialState<'static, f64, D> {
-    MaterialState::new(f - identity::<f64, D>())
-}
-
-/// A random rotation, any angle: Cayley's transform of a random skew tensor, squared.
-fn rotation<const D: usize>(random: &mut Random) -> Tensor<f64, D> {
-    let any = random.tensor::<D>() * 2.0;
-    let skew = any - any.transpose();
-    let half = inverse(&(identity::<f64, D>() - skew)) * (identity::<f64, D>() + skew);
-    half * half
-}
-
 /// A square with jittered particles that spins and vibrates in the middle of a large box.
 pub(super) fn spinning(shape: &Approximation, lumping: f64, dt: f64) -> Result<Simulation<2>, StudyError> {
     let mut random = Random::new(31);
@@ -343,35 +277,4 @@ pub(super) fn angular_momentum(particles: &Particles<2>) -> f64 {
             particles.mass[p] * (x[0] * v[1] - x[1] * v[0])
         })
         .sum()
-}
-
-fn free_flight(
-    name: &str,
-    shape: &Approximation,
-    lumping: f64,
-    report: &mut Report,
-    table: &mut Table,
-) -> Result<(), StudyError> {
-    let label = lumping.to_string();
-    let mut drifts = Vec::new();
-    for steps in [20_u32, 40, 80] {
-        let mut simulation = spinning(shape, lumping, 2.0 / f64::from(steps))?;
-        let start = simulation.particles.momentum();
-        let spin = angular_momentum(&simulation.particles);
-        let scale: f64 = simulation.particles.velocity.iter().zip(&simulation.particles.mass).map(|(v, m)| v.norm() * m).sum();
-        let mut worst = 0.0;
-        for _ in 0..steps {
-            simulation.step()?;
-            worst = worse(worst, (simulation.particles.momentum() - start).norm() / scale);
-        }
-        report.push(&[&format!("linear momentum, {steps} steps"), name, &label], worst, Bound::AtMost(MOMENTUM));
-        drifts.push((angular_momentum(&simulation.particles) - spin) / spin);
-    }
-    let order = |k: usize| (drifts[k] / drifts[k + 1]).abs().log2();
-    let mut row = vec![name.to_string(), label.clone()];
-    row.extend(drifts.iter().map(|drift| format!("{drift:.2e}")));
-    row.push(format!("{:.2}, {:.2}", order(0), order(1)));
-    table.push(row);
-    report.push(&["angular momentum, order in dt", name, &label], order(1), Bound::Reported);
-    Ok(())
 }

@@ -1,5 +1,5 @@
 //! Iterations of linear solves for hard systems: statics against refinement, cut cells, near incompressibility and contrast; long time
-//! steps. Then the load steps that a bending beam takes, and an equilibrium path with turning points.
+//! steps. Then an equilibrium path with turning points.
 //!
 //! A body of size one stands on fixed nodes and carries its weight in one load step. Each linear system is solved to 1e-8. Iterations are
 //! counts, so they are judged. The bounds suit a method whose work grows with the unknowns, and give users numbers for planning.
@@ -8,19 +8,15 @@ mod snap;
 
 use super::{Effort, Outcome, StudyError};
 use crate::report::{Bound, Report};
-use crate::shipped;
-use bfree::mechanics::sweep::Supports;
-use bfree::pooled::Pool;
 use bfree::scene;
 use bfree::simulation::{Simulation, StepError};
-use bfree::solver::vector::norm;
-use bfree::solver::{BlockJacobi, GmresSettings, NonlinearProblem, Preconditioner, Preconditioning, gmres};
+use bfree::solver::Preconditioning;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use snap::snap_through;
 
 /// The summary in the list of studies.
-pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; load steps of a beam, and a path that turns";
+pub(super) const ABOUT: &str = "linear iterations against refinement, cuts, time steps, ν and contrast, with multigrid; and a path that turns";
 
 /// The most linear iterations per Newton iteration in 2D and in 3D, and the largest growth by the last refinement.
 const MOST: [f64; 2] = [20.0, 30.0];
@@ -159,68 +155,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         cuts(name, &family, *effort, &mut others)?;
         materials(name, &family, &mut others)?;
     }
-    Ok(Outcome { reports: vec![refined, others, long_steps()?, snap_through(*effort)?], ..Outcome::default() })
-}
-
-/// The least ratio of load-step lengths: the program's over plain Newton's.
-const LONGER: f64 = 10.0;
-
-/// The fewest equal load steps that bend the elastica to PL²/EI = 30: with the program's line search and truncated steps, and with plain
-/// Newton, which takes full steps.
-fn long_steps() -> Result<Report, StudyError> {
-    let mut report = Report::new("load steps of the elastica to PL²/EI = 30", &["quantity"]);
-    let few = |plain: bool| -> Result<f64, StudyError> {
-        for steps in [1_u32, 2, 5, 10, 20, 50, 100] {
-            let step = format!("time.step={}", 1.0 / f64::from(steps));
-            let overrides = [&step, "tractions.0.traction=[0,-7.5]", "output.probes=[]", "output.every=null"];
-            let simulation = shipped::simulation::<2>("elastica", &overrides)?;
-            if reaches(simulation, steps, plain)? {
-                return Ok(f64::from(steps));
-            }
-        }
-        Ok(f64::INFINITY)
-    };
-    let (own, plain) = (few(false)?, few(true)?);
-    report.push(&["load steps"], own, Bound::AtMost(20.0));
-    report.push(&["those of plain Newton over them"], plain.min(1e3) / own, Bound::AtLeast(LONGER));
-    report.note("1, 2, 5, 10, 20, 50 and 100 steps are tried; plain Newton that fails in 100 counts as 1000.");
-    Ok(report)
-}
-
-/// Whether all `steps` load steps converge; for `plain`, plain Newton must also converge from each of them to the next.
-fn reaches<const D: usize>(mut simulation: Simulation<D>, steps: u32, plain: bool) -> Result<bool, StudyError> {
-    for _ in 0..steps {
-        if (plain && !plainly(&simulation)?) || simulation.step().is_err() {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-/// Newton's method without a line search, from Δφ = 0.
-fn plainly<const D: usize>(simulation: &Simulation<D>) -> Result<bool, StudyError> {
-    let (supports, nodes) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    let (nodal, prescribed) = (simulation.project(&supports)?, simulation.prescribed(&nodes));
-    let (dt, pool) = (simulation.clock.step(), Pool::default());
-    let end = simulation.settings.scheme.end(dt);
-    let problem = simulation.equilibrium(&supports, &nodal, &prescribed, end, simulation.clock.time() + dt);
-    let size = D * nodes.len();
-    let (mut x, mut r, mut first) = (vec![0.0; size], vec![0.0; size], None);
-    for _ in 0..simulation.settings.newton.max_iterations {
-        if NonlinearProblem::residual(&problem, &x, &mut r).is_err() {
-            return Ok(false);
-        }
-        let left = norm(&r);
-        if left <= simulation.settings.newton.relative_tolerance * *first.get_or_insert(left) {
-            return Ok(true);
-        }
-        let tangent = NonlinearProblem::linearize(&problem, &x)?;
-        let mut blocks = BlockJacobi::<D>::default();
-        let (mut d, settings) = (vec![0.0; size], GmresSettings { relative_tolerance: 1e-6, ..GmresSettings::default() });
-        gmres(&*tangent, &*blocks.prepare(&*tangent), &r, &mut d, &settings, &pool)?;
-        x.iter_mut().zip(&d).for_each(|(x, d)| *x -= d);
-    }
-    Ok(false)
+    Ok(Outcome { reports: vec![refined, others, snap_through(*effort)?], ..Outcome::default() })
 }
 
 fn refinement<const D: usize>(

@@ -1,12 +1,11 @@
 //! Steps from 1e-12 to 1e6 times the time a wave needs for a cell; a body without motion and loads; a body at rest under stress.
 
 use super::bodies::{self, PLAIN, fill, simulation, sliding, stir, sum_of_momenta};
-use super::{Effort, Outcome, Report, StudyError, at_most, refused, rows, solvable, steps, worse};
+use super::{Effort, Outcome, Report, StudyError, at_most, rows, solvable, steps, worse};
 use bfree::approximation::{Approximation, Gimp, Linear, Lme};
 use bfree::grid::Grid;
-use bfree::material::{Lame, LameError, Law, MaterialState};
+use bfree::material::{Law, MaterialState};
 use bfree::particles::Particles;
-use bfree::scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::{Tensor, Vector};
 
@@ -42,7 +41,6 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) -> Result<(), StudyErr
         pressed::<2>(name, &shape, counts[1], &mut report);
         pressed::<3>(name, &shape, counts[2], &mut report);
     }
-    no_stiffness(&mut report);
     outcome.reports.push(report);
     Ok(())
 }
@@ -121,29 +119,4 @@ fn pressed<const D: usize>(name: &str, shape: &Approximation, steps: u32, report
     let bound = ROUNDINGS * f64::EPSILON * stress * f64::from(steps).sqrt();
     solvable(report, &what, "speed over that of sound", rested.map(|()| speed), bound);
     solvable(report, &what, "displacement over spacing", Ok::<_, StudyError>(moved), bound * f64::from(steps));
-}
-
-/// No law accepts a body without stiffness.
-fn no_stiffness(report: &mut Report) {
-    let answers = [Lame::new(0.0, 0.0), Lame::from_bulk_shear(1.0, 0.0)];
-    refused(report, "zero stiffness", "Lame::new", "Shear", answers, |error| matches!(error, LameError::Shear(_)));
-    let answers = [Lame::from_young_poisson(0.0, 0.3)];
-    refused(report, "zero stiffness", "Lame::from_young_poisson", "Young", answers, |error| matches!(error, LameError::Young(_)));
-    let answers = [0.5, 0.500_000_1, -1.0].map(|poisson| Lame::from_young_poisson(1.0, poisson));
-    refused(report, "incompressible", "nu = 0.5, 0.5000001, -1", "Poisson", answers, |error| matches!(error, LameError::Poisson(_)));
-    for (case, constants) in [
-        ("shear 0", r#""bulk": 1, "shear": 0"#),
-        ("Young 0", r#""young": 0, "poisson": 0.3"#),
-        ("nu 0.5", r#""young": 1, "poisson": 0.5"#),
-    ] {
-        let text = format!(
-            r#"{{"grid": {{"size": [4], "spacing": 1}}, "time": {{"step": 1, "end": 1}}, "bodies": [{{"name": "a",
-            "shape": {{"box": {{"min": [1], "max": [2]}}}}, "material": {{"neo_hookean": {{{constants}}}}}, "density": 1}}]}}"#
-        );
-        let answers = [scene::read(&text, &[])];
-        let key = "bodies[0].material";
-        refused(report, "zero stiffness in a scene", case, "Values", answers, |error| {
-            matches!(error, scene::SceneError::Values(_)) && error.to_string().contains(key)
-        });
-    }
 }

@@ -3,14 +3,10 @@
 use super::points::{Errors, Rounding, judge, laws, reference};
 use super::{Effort, Outcome, SOLVABLE};
 use crate::check::regime::rotation;
-use crate::axis::Axis;
 use crate::random::Random;
 use crate::report::{Bound, Report, short};
-use crate::sheet::{Curve, Mark, Panel, Sheet};
-use crate::table::Table;
 use bfree::material::Material;
 use bfree::tensor::{Tensor, determinant, identity};
-use plotters::prelude::SeriesLabelPosition;
 
 /// Roundings on the longest path from H to S in 3D: 8 in j, 5 in a cofactor, 3 in C⁻¹, 5 in E, 5 in their product; each is half an eps.
 pub(super) const ROUNDINGS: f64 = 13.0;
@@ -73,27 +69,22 @@ pub(super) fn run(effort: &Effort, outcome: &mut Outcome) {
     let mut report = Report::new("strains 1e-15 to 10: roundings, in eps, that the errors of W and S amount to", &columns)
         .as_matrix(&[0, 1], 4, 5);
     let mut judge_of_judge = super::rows("the reference against textbook formulas in double-double, strains 1e-3 to 10");
-    let mut series = Vec::new();
     let mut worst_reference: f64 = 0.0;
     for &size in &sizes {
-        let mut here = Errors::NONE;
         for (name, law) in &laws() {
             let mut cell = Cells { name, law, size, report: &mut report };
-            cell.all(&mut here);
+            cell.all();
             if size >= RESOLVED {
                 for error in [check::<1>(law, size), check::<2>(law, size), check::<3>(law, size)] {
                     worst_reference = super::worse(worst_reference, error);
                 }
             }
         }
-        series.push((size, here));
     }
     report.note("An error is judged by what rounding H changes, eps |H| |dS/dH|, beside eps |S|: a strain of 1e-15 in a");
     report.note("body turned by 2 rad is below the last digit of H itself, and no formula can know it.");
     super::solvable(&mut judge_of_judge, "W and S", "random", Ok::<_, std::convert::Infallible>(worst_reference), REFERENCE);
     outcome.reports.extend([judge_of_judge, report]);
-    outcome.tables.push(table(&series));
-    outcome.sheets.push(sheet(&series));
 }
 
 /// The generic code in double-double against the textbook formulas.
@@ -114,18 +105,16 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// All kinds in all dimensions; `random` collects the largest errors of the kinds without rotation.
-    fn all(&mut self, random: &mut Errors) {
+    /// All kinds in all dimensions. A kind that does not exist in a dimension is left out.
+    fn all(&mut self) {
         for kind in Kind::ALL {
-            for errors in [self.one::<1>(kind), self.one::<2>(kind), self.one::<3>(kind)].into_iter().flatten() {
-                if kind == Kind::Random {
-                    *random = random.worse(errors);
-                }
-            }
+            self.one::<1>(kind);
+            self.one::<2>(kind);
+            self.one::<3>(kind);
         }
     }
 
-    fn one<const D: usize>(&mut self, kind: Kind) -> Option<Errors> {
+    fn one<const D: usize>(&mut self, kind: Kind) -> Option<()> {
         let mut random = Random::new(47);
         let tried = (0..TRIES).map(|_| {
             let h = kind.displacement::<D>(self.size, &mut random)?;
@@ -137,53 +126,6 @@ impl Cells<'_> {
             let labels = [quantity, SOLVABLE, self.name, &dimension, &size, kind.name()];
             self.report.push(&labels, value, Bound::AtMost(ROUNDINGS));
         }
-        Some(worst)
-    }
-}
-
-type Series = [(f64, Errors)];
-
-/// A column of a table of errors: its name and its value.
-type Shown = (&'static str, fn(&Errors) -> f64);
-
-const SHOWN: [[Shown; 2]; 2] = [
-    [("W", |e| e.relative_energy), ("W, textbook", |e| e.naive_energy)],
-    [("S", |e| e.relative_stress), ("S, textbook", |e| e.naive_stress)],
-];
-
-fn table(series: &Series) -> Table {
-    let header = std::iter::once("quantity".into()).chain(series.iter().map(|(size, _)| short(*size)));
-    let mut table =
-        Table::new("relative errors at random strains, all laws and dimensions; by textbook: C = F^T F, ln det C, tr C - 3", header);
-    for (name, value) in SHOWN.into_iter().flatten() {
-        let values = series.iter().map(|(_, errors)| short(value(errors)));
-        table.push(std::iter::once(name.into()).chain(values));
-    }
-    table
-}
-
-fn sheet(series: &Series) -> Sheet {
-    let panels = SHOWN.into_iter().zip(["energy W", "stress S"]).map(|(shown, title)| {
-        let curves = shown.into_iter().zip([Mark::Joined, Mark::Dashed]).map(|((name, value), mark)| {
-            let points = series.iter().map(|(size, errors)| (*size, value(errors))).collect();
-            Curve::new(name, 1, mark, points)
-        });
-        Panel {
-            title: title.into(),
-            x: Axis::logarithmic("strain"),
-            y: Axis::logarithmic("relative error"),
-            window: Some([(3e-16, 30.0), (1e-17, 1e16)]),
-            curves: curves.collect(),
-            legend: Some(SeriesLabelPosition::UpperRight),
-        }
-    });
-    Sheet {
-        name: "extremes_strain",
-        caption: "Relative error of energy and stress at random strains, the worst of all laws and dimensions, against double-double; \
-                  broken: the formulas of textbooks, by way of C, ln det C and tr C − 3."
-            .into(),
-        columns: 2,
-        size: (520, 380),
-        panels: panels.collect(),
+        Some(())
     }
 }

@@ -1,21 +1,14 @@
-//! One run of the bar, with particles or with elements, and its measured results.
+//! One run of the bar, and its measured results.
 
-use crate::elements::Elements;
 use crate::riemann::{PSystem, Riemann, State};
 use crate::shipped;
 use crate::start::velocity_by_masses;
 use crate::studies::StudyError;
-use bfree::clock::Clock;
-use bfree::material::{Lame, Material, NeoHookean};
+use bfree::material::Lame;
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::schemes::Newmark;
 use bfree::mechanics::transfer::Nodal;
-use bfree::particles::Body;
 use bfree::simulation::Simulation;
-use bfree::solver::Forcing;
 use bfree::tensor::Vector;
-use std::time::Instant;
-use std::sync::Arc;
 
 const DENSITY: f64 = 2600.0;
 const POISSON: f64 = 0.3;
@@ -86,26 +79,16 @@ pub struct Method {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Transfer {
     Flip,
-    Pic(u32),
-    /// Order k, a and e of the rate κ = a (c/h) (h/L)^e, with c the speed of sound and L the distance it travels.
-    Blend(u32, f64, f64),
-    /// a of κ = a c/h.
+    /// a of κ = a c/h, with the speed of sound c.
     Limited(f64),
 }
 
 impl Transfer {
-    /// The weakest uniform blend without any ringing. It acts like a viscosity κ h². To keep pace with dispersion, a linear front needs the
-    /// exponent 1/3 and a steady shock 0; 1/4 serves both.
-    pub const MONOTONE: Self = Self::Blend(1, 1.2, 0.25);
-
     /// The transfer in the form of a scene.
     fn json(self, speed: f64, h: f64) -> String {
-        let rate = |factor: f64, exponent: f64| factor * speed / h * (h / (speed * END)).powf(exponent);
         match self {
             Self::Flip => r#""flip""#.to_owned(),
-            Self::Pic(order) => format!(r#"{{"pic":{{"order":{order}}}}}"#),
-            Self::Blend(order, a, e) => format!(r#"{{"blend":{{"order":{order},"rate":{}}}}}"#, rate(a, e)),
-            Self::Limited(a) => format!(r#"{{"limited":{{"rate":{}}}}}"#, rate(a, 0.0)),
+            Self::Limited(a) => format!(r#"{{"limited":{{"rate":{}}}}}"#, a * speed / h),
         }
     }
 }
@@ -141,7 +124,7 @@ pub struct Mesh {
 /// The measured results of a profile at 3 ms.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// (Σ V₀ (v_p − v)²)^½ over the particles (Gauss points).
+    /// (Σ V₀ (v_p − v)²)^½ over the particles.
     pub particles: f64,
     /// (Σ h (v_I − v)²)^½ over the nodes.
     pub nodes: f64,
@@ -151,12 +134,6 @@ pub struct Measured {
     pub plateau: f64,
     /// The distance from 10 % to 90 % of the front to the right, in metres.
     pub width: f64,
-    /// Energy lost in the frame of the middle state, over the initial energy.
-    pub lost: f64,
-    /// Energy that the exact solution dissipates in its shocks, over the same initial energy.
-    pub lost_by_shocks: f64,
-    pub seconds: f64,
-    pub steps: u64,
     /// (X, v)
     pub profile: Vec<(f64, f64)>,
 }
@@ -201,12 +178,9 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     let mut simulation: Simulation<1> = shipped::simulation("riemann", &overrides)?;
     start_with(&mut simulation, jump)?;
     let reference: Vec<f64> = simulation.particles.position.iter().map(|x| x[0]).collect();
-    let before = energy(&simulation, exact.states[1].velocity);
-    let start = Instant::now();
     for _ in 0..steps {
         simulation.advance()?;
     }
-    let seconds = start.elapsed().as_secs_f64();
 
     // The nodal profile: the projected velocity at the projected X.
     let particles = simulation.particles.by_id();
@@ -222,44 +196,7 @@ pub fn run(method: &Method, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyE
     let profile: Vec<(f64, f64)> =
         reference.iter().zip(&particles.velocity).filter(|at| inside(*at.0)).map(|(&x, v)| (x, v[0])).collect();
     let volume = particles.volume.first().copied().unwrap_or(0.0);
-    let lost = 1.0 - energy(&simulation, exact.states[1].velocity) / before;
-    Ok(measure(jump, &exact, profile, volume, nodal, lost, seconds, steps))
-}
-
-/// Runs Lagrangian elements of edge h, three nodes each, up to 3 ms.
-pub fn run_elements(gamma: f64, jump: &Jump, mesh: &Mesh) -> Result<Measured, StudyError> {
-    let exact = jump.exact()?;
-    let count = (half_length(&exact) / mesh.h).round();
-    let law = Material::from(NeoHookean::ciarlet(jump.lame()?));
-    let body = Body { name: "bar".into(), law, density: DENSITY, dilatation: Default::default() };
-    let steps = steps(jump, mesh);
-    let clock = Clock::new(END / steps as f64, 0);
-    let origin = Vector::from([MIDDLE - count * mesh.h]);
-    let mut bar = Elements::new(origin, mesh.h, [2 * count as u32], body, clock)?;
-    bar.scheme = Arc::new(Newmark { beta: 0.25 * (gamma + 0.5).powi(2), gamma });
-    bar.newton.relative_tolerance = 1e-8;
-    bar.newton.forcing = Forcing::EisenstatWalker;
-    bar.set_velocity(|x| x.map(|x| if x <= MIDDLE + 1e-6 * mesh.h { jump.left } else { jump.right }));
-    let middle = exact.states[1].velocity;
-    let before = bar.energy(&Vector::from([middle]))?;
-    let start = Instant::now();
-    for _ in 0..steps {
-        bar.step()?;
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    let inside = |x: f64| (x - MIDDLE).abs() < count * mesh.h - ENDS;
-    let at_nodes = bar.node_positions().into_iter().zip(&bar.velocity).map(|(x, v)| (x[0], 0.5 * mesh.h, v[0]));
-    let nodal = distance(&exact, at_nodes.filter(|node| inside(node.0)));
-    let velocity = bar.point_velocity();
-    let profile: Vec<(f64, f64)> =
-        (bar.points().position.iter().zip(&velocity)).filter(|(x, _)| inside(x[0])).map(|(x, v)| (x[0], v[0])).collect();
-    let lost = 1.0 - bar.energy(&Vector::from([middle]))? / before;
-    let mean = 2.0 * count * mesh.h / bar.points().len() as f64;
-    let mut measured = measure(jump, &exact, profile, mean, nodal, lost, seconds, steps);
-    // Gauss points have different weights.
-    let weighted = (bar.points().position.iter().zip(&bar.points().volume).zip(&velocity)).map(|((x, &w), v)| (x[0], w, v[0]));
-    measured.particles = distance(&exact, weighted.filter(|point| inside(point.0)));
-    Ok(measured)
+    Ok(measure(jump, &exact, profile, volume, nodal))
 }
 
 /// The jump at X = 50 m.
@@ -268,29 +205,12 @@ fn start_with(simulation: &mut Simulation<1>, jump: &Jump) -> Result<(), StudyEr
     Ok(velocity_by_masses(simulation, |x| x.map(side))?)
 }
 
-/// Kinetic energy in the frame that moves with `middle`, and strain energy.
-fn energy(simulation: &Simulation<1>, middle: f64) -> f64 {
-    let particles = &simulation.particles;
-    let kinetic = particles.mass.iter().zip(&particles.velocity).map(|(m, v)| 0.5 * m * (v[0] - middle).powi(2));
-    kinetic.sum::<f64>() + simulation.strain_energy()
-}
-
 /// (Σ w (v − v_exact)²)^½ over points (X, w, v).
 fn distance(exact: &Riemann, points: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     points.map(|(x, w, v)| w * (v - exact.at((x - MIDDLE) / END).velocity).powi(2)).sum::<f64>().sqrt()
 }
 
-#[allow(clippy::too_many_arguments)] // the results of one run
-fn measure(
-    jump: &Jump,
-    exact: &Riemann,
-    profile: Vec<(f64, f64)>,
-    volume: f64,
-    nodes: f64,
-    lost: f64,
-    seconds: f64,
-    steps: u64,
-) -> Measured {
+fn measure(jump: &Jump, exact: &Riemann, profile: Vec<(f64, f64)>, volume: f64, nodes: f64) -> Measured {
     let [left, star, right] = exact.states.map(|state| state.velocity);
     let (mut overshoot, mut plateau): (f64, f64) = (0.0, 0.0);
     let inner_edge = exact.waves[1].edges().0 * END;
@@ -314,6 +234,5 @@ fn measure(
     };
     let width = crossing(0.1) - crossing(0.9);
     let particles = distance(exact, profile.iter().map(|&(x, v)| (x, volume, v)));
-    let lost_by_shocks = exact.dissipation() * END / (2.0 * half_length(exact) * DENSITY * 0.125 * jump.size().powi(2));
-    Measured { particles, nodes, overshoot, plateau, width, lost, lost_by_shocks, seconds, steps, profile }
+    Measured { particles, nodes, overshoot, plateau, width, profile }
 }

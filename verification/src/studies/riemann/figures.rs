@@ -8,37 +8,28 @@ use plotters::prelude::SeriesLabelPosition;
 /// The spacing at which the paper's scheme for strong jumps is shown.
 const STRONG_SPACING: f64 = 0.05;
 
-/// A name, and a function from a number (γ, h or Δt) to its case.
-type Family = (&'static str, fn(f64) -> Case);
+/// The methods of Fig. 5.
+const OF_FIGURE_5: [Method; 3] = [LINEAR, GIMP, LME];
 
-/// The discretisations of Fig. 5, as functions of γ.
-pub(super) fn discretisations() -> [Family; 4] {
-    const MESH: Mesh = Mesh { h: 0.1, courant: 1.0 };
-    [
-        ("Q8 elements", |gamma| Case::Elements(gamma, Jump::PAPER, MESH)),
-        ("linear", |gamma| Case::Particles(Method { gamma, ..LINEAR }, Jump::PAPER, MESH)),
-        ("uGIMP", |gamma| Case::Particles(Method { gamma, ..GIMP }, Jump::PAPER, MESH)),
-        ("LME 4", |gamma| Case::Particles(Method { gamma, ..LME }, Jump::PAPER, MESH)),
-    ]
-}
+/// The velocity at the Gauss points of three-node elements for each γ, h = 0.1 m, Courant 1; see `ELEMENTS`.
+const OF_ELEMENTS: &str = include_str!("../../../reference/riemann_fem_q8.csv");
 
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (_, case) in discretisations() {
-        cases.extend(GAMMAS.map(case));
+    for method in OF_FIGURE_5 {
+        cases.extend(GAMMAS.map(|gamma| Case::new(Method { gamma, ..method }, Jump::PAPER, 0.1, 1.0)));
     }
     for h in SPACINGS {
-        cases.extend([LINEAR, GIMP, LME].map(|method| Case::particles(method, Jump::PAPER, h, 1.0)));
-        cases.push(Case::Elements(0.5, Jump::PAPER, Mesh { h, courant: 1.0 }));
+        cases.extend([LINEAR, GIMP, LME].map(|method| Case::new(method, Jump::PAPER, h, 1.0)));
     }
     for courant in COURANTS {
-        cases.extend([LINEAR, LME, Method::RECOMMENDED].map(|method| Case::particles(method, Jump::PAPER, 0.1, courant)));
+        cases.extend([LINEAR, LME, Method::RECOMMENDED].map(|method| Case::new(method, Jump::PAPER, 0.1, courant)));
     }
     cases
 }
 
 pub(super) fn all(runs: &Runs) -> Result<Vec<Sheet>, StudyError> {
-    Ok(vec![profiles(runs)?, convergence(runs)?, time_steps(runs)?, strong(runs)?, trade(runs)?])
+    Ok(vec![profiles(runs)?, convergence(runs)?, time_steps(runs)?, strong(runs)?])
 }
 
 /// The exact velocity at 3 ms between two positions.
@@ -52,23 +43,15 @@ fn exact(jump: Jump, from: f64, to: f64) -> Result<Curve, StudyError> {
 }
 
 fn profiles(runs: &Runs) -> Result<Sheet, StudyError> {
-    let window = [(40.7, 59.3), (-2.0, 12.0)];
-    let mut panels = Vec::new();
-    for (k, (name, case)) in discretisations().into_iter().enumerate() {
-        let mut curves = vec![exact(Jump::PAPER, 40.7, 59.3)?];
-        for (color, gamma) in GAMMAS.into_iter().enumerate() {
-            let profile = runs.of(case(gamma))?.profile.clone();
-            curves.push(Curve::new(format!("γ = {gamma}"), color + 1, Mark::Line, profile));
-        }
-        panels.push(Panel {
-            title: name.into(),
-            x: Axis::linear("X (m)"),
-            y: Axis::linear("v (m/s)"),
-            window: Some(window),
-            curves,
-            legend: (k == 0).then_some(SeriesLabelPosition::UpperRight),
-        });
+    let mut panels = vec![panel_of_profiles("Q8 elements", |k| Ok(of_elements(k)))?];
+    for method in OF_FIGURE_5 {
+        let profile = |k: usize| {
+            let of_gamma = Method { gamma: GAMMAS[k], ..method };
+            Ok(runs.of(of_gamma, Jump::PAPER, 0.1, 1.0)?.profile.clone())
+        };
+        panels.push(panel_of_profiles(method.name, profile)?);
     }
+    panels[0].legend = Some(SeriesLabelPosition::UpperRight);
     Ok(Sheet {
         name: "riemann_profiles",
         caption: "Fig. 5: velocity along the bar at 3 ms, at particles (Gauss points), h = 0.1 m, Courant 1, eps = 0.8 (consistent for elements).".into(),
@@ -78,24 +61,51 @@ fn profiles(runs: &Runs) -> Result<Sheet, StudyError> {
     })
 }
 
+/// The profile of the elements for a γ by its number.
+fn of_elements(number: usize) -> Vec<(f64, f64)> {
+    let row = |line: &str| -> Option<(f64, f64)> {
+        let numbers: Vec<f64> = line.split(',').filter_map(|cell| cell.parse().ok()).collect();
+        Some((*numbers.first()?, *numbers.get(number + 1)?))
+    };
+    OF_ELEMENTS.lines().filter_map(row).collect()
+}
+
+/// The profiles for all γ, beside the exact one.
+fn panel_of_profiles(
+    title: &str,
+    profile: impl Fn(usize) -> Result<Vec<(f64, f64)>, StudyError>,
+) -> Result<Panel, StudyError> {
+    let mut curves = vec![exact(Jump::PAPER, 40.7, 59.3)?];
+    for (k, gamma) in GAMMAS.into_iter().enumerate() {
+        curves.push(Curve::new(format!("γ = {gamma}"), k + 1, Mark::Line, profile(k)?));
+    }
+    Ok(Panel {
+        title: title.into(),
+        x: Axis::linear("X (m)"),
+        y: Axis::linear("v (m/s)"),
+        window: Some([(40.7, 59.3), (-2.0, 12.0)]),
+        curves,
+        legend: None,
+    })
+}
+
 fn convergence(runs: &Runs) -> Result<Sheet, StudyError> {
     type Value = fn(&Measured) -> f64;
-    let errors = |case: fn(f64) -> Case, value: Value| -> Result<Vec<(f64, f64)>, StudyError> {
-        SPACINGS.iter().map(|&h| Ok((h, value(runs.of(case(h))?)))).collect()
-    };
-    let lines: [(Family, usize); 5] = [
-        (("linear", |h| Case::particles(LINEAR, Jump::PAPER, h, 1.0)), 2),
-        (("uGIMP", |h| Case::particles(GIMP, Jump::PAPER, h, 1.0)), 3),
-        (("LME 4", |h| Case::particles(LME, Jump::PAPER, h, 1.0)), 1),
-        (("Q8 elements", |h| Case::Elements(0.5, Jump::PAPER, Mesh { h, courant: 1.0 })), 0),
-        (("recommended", |h| Case::particles(Method::RECOMMENDED, Jump::PAPER, h, COURANT)), 4),
+    let lines = [
+        ("linear", LINEAR, 1.0, 2),
+        ("uGIMP", GIMP, 1.0, 3),
+        ("LME 4", LME, 1.0, 1),
+        ("recommended", Method::RECOMMENDED, COURANT, 4),
     ];
     let values: [(&str, Value); 2] = [("at particles", |found| found.particles), ("at nodes", |found| found.nodes)];
     let mut panels = Vec::new();
     for (k, (title, value)) in values.into_iter().enumerate() {
-        let mut curves = Vec::new();
-        for ((name, case), color) in lines {
-            curves.push(Curve::new(name, color, Mark::Joined, errors(case, value)?));
+        let of_elements = ELEMENTS.map(|(h, at_points, at_nodes)| (h, [at_points, at_nodes][k]));
+        let mut curves = vec![Curve::new("Q8 elements", 0, Mark::Joined, of_elements.into())];
+        for (name, method, courant, color) in lines {
+            let error = |&h: &f64| Ok((h, value(runs.of(method, Jump::PAPER, h, courant)?)));
+            let errors = SPACINGS.iter().map(error).collect::<Result<Vec<_>, StudyError>>()?;
+            curves.push(Curve::new(name, color, Mark::Joined, errors));
         }
         panels.push(Panel {
             title: format!("L2 error {title}"),
@@ -109,7 +119,7 @@ fn convergence(runs: &Runs) -> Result<Sheet, StudyError> {
     let h = 0.01;
     let mut curves = vec![exact(Jump::PAPER, 42.0, 58.0)?];
     for (method, courant, color) in [(LINEAR, 1.0, 2), (LME, 1.0, 1), (Method::RECOMMENDED, COURANT, 4)] {
-        let profile = runs.particles(method, Jump::PAPER, h, courant)?.profile.clone();
+        let profile = runs.of(method, Jump::PAPER, h, courant)?.profile.clone();
         curves.push(Curve::new(method.name, color, Mark::Line, profile));
     }
     panels.push(Panel {
@@ -134,7 +144,7 @@ fn time_steps(runs: &Runs) -> Result<Sheet, StudyError> {
     for (method, color) in [(LINEAR, 2), (LME, 1), (Method::RECOMMENDED, 4)] {
         let points: Result<Vec<_>, StudyError> = COURANTS
             .iter()
-            .map(|&courant| Ok((5e-5 * courant, runs.particles(method, Jump::PAPER, 0.1, courant)?.particles)))
+            .map(|&courant| Ok((5e-5 * courant, runs.of(method, Jump::PAPER, 0.1, courant)?.particles)))
             .collect();
         curves.push(Curve::new(method.name, color, Mark::Joined, points?));
     }
@@ -160,7 +170,7 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
         let jump = Jump::of(size);
         let mut curves = vec![exact(jump, 32.0, 68.0)?];
         for (method, courant, color) in [(LME, 1.0, 1), (Method::UNDISSIPATED, COURANT, 5), (Method::RECOMMENDED, COURANT, 4)] {
-            if let Ok(found) = runs.particles(method, jump, STRONG_SPACING, courant) {
+            if let Ok(found) = runs.of(method, jump, STRONG_SPACING, courant) {
                 curves.push(Curve::new(method.name, color, Mark::Line, found.profile.clone()));
             }
         }
@@ -186,7 +196,7 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
             (Method::UNDISSIPATED, COURANT, 5, &SPACINGS),
             (Method::RECOMMENDED, COURANT, 4, &SPACINGS),
         ] {
-            let points = spacings.iter().filter_map(|&h| Some((h, runs.particles(method, jump, h, courant).ok()?.particles)));
+            let points = spacings.iter().filter_map(|&h| Some((h, runs.of(method, jump, h, courant).ok()?.particles)));
             curves.push(Curve::new(method.name, color, Mark::Joined, points.collect()));
         }
         panels.push(Panel {
@@ -203,38 +213,6 @@ fn strong(runs: &Runs) -> Result<Sheet, StudyError> {
         caption: "Strong jumps, E = 5e10 Pa: the paper's scheme (linear, LME 4, LME 1.4), and the recommended setting without and with its smoothing.".into(),
         columns: 3,
         size: (430, 340),
-        panels,
-    })
-}
-
-fn trade(runs: &Runs) -> Result<Sheet, StudyError> {
-    let mut panels = Vec::new();
-    for (k, size) in [100.0, 1000.0].into_iter().enumerate() {
-        let jump = Jump::of(size);
-        let mut curves = vec![
-            Curve::new("asked for", 0, Mark::Dashed, vec![(0.8, 2.0), (1.5, 2.0)]),
-            Curve::new("", 0, Mark::Dashed, vec![(1.5, 2.0), (1.5, 0.0)]),
-        ];
-        for ((name, strengths), color) in tables::TRADE.into_iter().zip([1, 2, 4]) {
-            let points: Result<Vec<_>, StudyError> = (strengths.iter())
-                .map(|&transfer| tables::trade(runs, transfer, jump).map(|(width, overshoot, _)| (width, 100.0 * overshoot)))
-                .collect();
-            curves.push(Curve::new(name, color, Mark::Joined, points?));
-        }
-        panels.push(Panel {
-            title: format!("{size} m/s, h = 0.1 m, Courant 0.5"),
-            x: Axis::linear("width of the front / undissipated"),
-            y: Axis::linear("overshoot (% of the jump)"),
-            window: Some([(0.8, 3.0), (-0.5, 20.0)]),
-            curves,
-            legend: (k == 0).then_some(SeriesLabelPosition::UpperRight),
-        });
-    }
-    Ok(Sheet {
-        name: "riemann_trade",
-        caption: "Overshoot against width as the smoothing grows, in three ways: a blend of order 1, one of order 2, and the limited one.".into(),
-        columns: 2,
-        size: (520, 380),
         panels,
     })
 }

@@ -1,25 +1,18 @@
 //! A run of a simulation, and its cost.
 
-use super::setting::Setting;
-use crate::baseline::{Assembled, BFree, Pattern, assemble};
 use crate::prepared::{Prepared, arranged};
 use crate::processor::Thread;
 use crate::studies::StudyError;
+use bfree::mechanics::loads::ForceField;
 use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
-use bfree::mechanics::loads::ForceField;
-use bfree::phases::Phase;
 use bfree::plan::Plan;
-use bfree::pooled::Pool;
 use bfree::simulation::Simulation;
-use bfree::solver::{BlockJacobi, NewtonHistory, newton};
+use bfree::solver::NewtonHistory;
 use bfree::tensor::Vector;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The largest number of assembled blocks: 0.4 GB in 3D.
-const MOST_BLOCKS: usize = 5_000_000;
 
 /// An iteration is quadratic if the linear solver leaves at most this share of the new residual: the rest is the second-order error of
 /// Newton's own step.
@@ -104,34 +97,20 @@ impl Cost {
 /// Takes `steps` steps of the nominal length, and shows the simulation to `watch` after each.
 pub(super) fn drive<const D: usize>(
     simulation: &mut Simulation<D>,
-    setting: &Setting,
     steps: u64,
     mut watch: impl FnMut(&Simulation<D>) -> Result<(), StudyError>,
 ) -> Result<Cost, StudyError> {
-    let (units, bytes) = Units::of(simulation, setting.assembled)?;
+    let (units, bytes) = Units::of(simulation)?;
     let mut tally = Tally::default();
     let mut seconds = 0.0;
     let field = simulation.loads.field.take();
     while simulation.clock.nominal_steps() < steps {
         simulation.loads.field = field.as_ref().map(|field| tabulated(field, simulation));
-        let assembled = if setting.assembled { Some(assembled(simulation)?) } else { None };
         let start = Thread::now();
-        let report = if assembled.is_some() { simulation.step()? } else { simulation.advance()? };
-        let elapsed = start.elapsed();
+        let report = simulation.advance()?;
+        seconds += start.elapsed();
         report.failed.iter().for_each(|attempt| tally.add_newton(&attempt.newton));
-        match assembled {
-            // The seconds of the run, with those of its Newton's method replaced by the assembled solution.
-            Some((newton, by_matrix)) => {
-                let phases = report.seconds.seconds();
-                let own = phases[Phase::Newton as usize] / phases.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-                seconds += elapsed * (1.0 - own) + by_matrix;
-                tally.add(&newton, report.projection_iterations);
-            }
-            None => {
-                seconds += elapsed;
-                tally.add(&report.newton.history, report.projection_iterations);
-            }
-        }
+        tally.add(&report.newton.history, report.projection_iterations);
         watch(simulation)?;
     }
     simulation.loads.field = field;
@@ -150,26 +129,6 @@ fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) 
         Some((_, table)) => table[id],
         None => field.0(id, x, t),
     }))
-}
-
-/// Solves the equilibrium of the next step once more, beside the run, with an assembled tangent. Returns the history of Newton's method and
-/// its seconds. Both solutions meet the same tolerance; the run continues from its own.
-fn assembled<const D: usize>(simulation: &Simulation<D>) -> Result<(NewtonHistory, f64), StudyError> {
-    let prepared = Prepared::new(simulation)?;
-    let equilibrium = prepared.equilibrium(simulation);
-    let mut dphi = prepared.initial_guess(simulation);
-    let x = bytemuck::cast_slice_mut(&mut dphi);
-    let settings = &simulation.settings.newton;
-    let start = Thread::now();
-    // A moving body may exceed the limit of blocks that it met at the start; it then continues matrix-free.
-    let (mut blocks, pool) = (BlockJacobi::<D>::default(), Pool::default());
-    let report = match Pattern::new(&prepared.supports, prepared.nodes.len(), MOST_BLOCKS) {
-        Ok(pattern) => {
-            newton(&Assembled { equilibrium: &equilibrium, pattern: &pattern }, &mut blocks, x, settings, &pool)?
-        }
-        Err(_) => newton(&equilibrium, &mut blocks, x, settings, &pool)?,
-    };
-    Ok((report.history, start.elapsed()))
 }
 
 /// Seconds of one evaluation of each kind, at the start of a run.
@@ -199,7 +158,7 @@ impl Units {
     }
 
     /// Measures the evaluations, and asks the plan for the peak number of bytes.
-    pub fn of<const D: usize>(simulation: &Simulation<D>, assembled: bool) -> Result<(Self, u64), StudyError> {
+    pub fn of<const D: usize>(simulation: &Simulation<D>) -> Result<(Self, u64), StudyError> {
         let simulation = &arranged(simulation.clone())?;
         let prepared = Prepared::new(simulation)?;
         let equilibrium = prepared.equilibrium(simulation);
@@ -212,23 +171,10 @@ impl Units {
         let shapes = best(|| Supports::new(&simulation.approximation, &simulation.grid, positions).map(drop));
         let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, lumping).map(drop));
         let residual = best(|| equilibrium.residual::<f64>(&dphi).map(drop));
-        let mut bytes = Plan::of(simulation)?.bytes();
-        let (linearization, product) = if assembled {
-            let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
-            let matrix = assemble(&equilibrium, &dphi, &pattern, &BFree)?;
-            let matrix_free = Plan::of(simulation)?.arrays.iter().find(|array| array.name == "frozen tangent").map_or(0, |a| a.bytes);
-            bytes += matrix.bytes() as u64 - matrix_free.min(matrix.bytes() as u64);
-            let made = best(|| {
-                let pattern = Pattern::new(&prepared.supports, count, MOST_BLOCKS)?;
-                black_box(assemble(&equilibrium, &dphi, &pattern, &BFree)?);
-                Ok::<_, StudyError>(())
-            });
-            (made, best(|| matrix.product(&u, &mut out)))
-        } else {
-            let made = best(|| equilibrium.tangent(&dphi).map(drop));
-            let tangent = equilibrium.tangent(&dphi)?;
-            (made, best(|| tangent.product(&u, &mut out)))
-        };
+        let bytes = Plan::of(simulation)?.bytes();
+        let linearization = best(|| equilibrium.tangent(&dphi).map(drop));
+        let tangent = equilibrium.tangent(&dphi)?;
+        let product = best(|| tangent.product(&u, &mut out));
         let projection = projection / prepared.nodal.iterations.max(1) as f64;
         let product_of_one = product / simulation.particles.len() as f64;
         Ok((Self { shapes, projection, residual, linearization, product, product_of_one }, bytes))

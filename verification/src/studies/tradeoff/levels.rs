@@ -24,7 +24,7 @@ pub(super) fn settings(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
         .map(|(accuracy, level)| {
             let mut keys = vec![format!("accuracy={accuracy}")];
             keys.extend(problem.spacing_of(level.cells).map(|spacing| format!("grid.spacing={spacing}")));
-            Setting { origin: Origin::Accuracy(accuracy.to_string()), keys, level: None, courant: None, assembled: false }
+            Setting { origin: Origin::Accuracy(accuracy.to_string()), keys, level: None, courant: None }
         })
         .collect()
 }

@@ -127,11 +127,6 @@ impl Measured {
     pub fn front(&self) -> Vec<&Point> {
         front(self.points.iter().collect(), |point| point.work)
     }
-
-    /// The front by bytes in place of work.
-    pub fn front_in_bytes(&self) -> Vec<&Point> {
-        front(self.points.iter().collect(), |point| point.cost.bytes as f64)
-    }
 }
 
 /// The points for which no other is both cheaper and more accurate, by rising price.

@@ -3,7 +3,6 @@
 mod cost;
 mod levels;
 mod measured;
-mod pictures;
 mod problem;
 mod ratios;
 mod setting;
@@ -24,13 +23,13 @@ fn problems(effort: Effort) -> Result<Vec<Box<dyn Problem>>, StudyError> {
         Effort::Short => vec![
             Box::new(Manufactured::<2> { name: "manufactured 2D", cells: plane, end: 1.0 }),
             Box::new(Bar { end: 1e-3 }),
-            Box::new(Compaction::new(0.4, 6)?),
+            Box::new(Compaction::new(0.4, 16)?),
             Box::new(Manufactured::<3> { name: "manufactured 3D", cells: space, end: 1.0 }),
         ],
         Effort::Full => vec![
             Box::new(Manufactured::<2> { name: "manufactured 2D", cells: plane, end: 1.0 }),
             Box::new(Bar { end: 3e-3 }),
-            Box::new(Compaction::new(1.5, 12)?),
+            Box::new(Compaction::new(1.5, 32)?),
             Box::new(Manufactured::<3> { name: "manufactured 3D", cells: space, end: 1.0 }),
         ],
     })
@@ -52,7 +51,6 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     outcome.tables.extend(all.iter().map(front));
     outcome.tables.extend(defaults.iter().map(|(knob, default)| ratios::table(&all, knob, default)));
     outcome.tables.extend(all.iter().map(everything));
-    outcome.sheets = if effort == Effort::Full { pictures::sheets(&all, &defaults) } else { Vec::new() };
     Ok(outcome)
 }
 

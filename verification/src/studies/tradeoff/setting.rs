@@ -33,13 +33,11 @@ pub(super) struct Setting {
     pub level: Option<usize>,
     /// cΔt/h; the key `accuracy` may choose it instead.
     pub courant: Option<f64>,
-    /// Whether the tangent is assembled.
-    pub assembled: bool,
 }
 
 impl Setting {
     pub fn base() -> Self {
-        Self { origin: Origin::Default, keys: Vec::new(), level: Some(BASE_LEVEL), courant: Some(COURANT), assembled: false }
+        Self { origin: Origin::Default, keys: Vec::new(), level: Some(BASE_LEVEL), courant: Some(COURANT) }
     }
 
     fn turned(knob: &'static str, value: impl Into<String>) -> Self {
@@ -143,9 +141,6 @@ pub(super) const KNOBS: &[Knob] = &[
 /// Names of the knobs that are not keys with a default.
 pub(super) const SPACING: &str = "grid.spacing";
 pub(super) const STEP: &str = "time.step";
-pub(super) const TANGENT: &str = "tangent";
-
-const ASSEMBLED: &str = "assembled";
 
 /// The shape functions with a knob that the base lacks. The defaults of these functions are the reference for its values.
 fn family(knob: &str) -> Option<&'static str> {
@@ -176,7 +171,6 @@ pub(super) fn knobs(problem: &dyn Problem) -> Vec<(&'static str, String)> {
     };
     let mut knobs = vec![(SPACING, "× 1".to_owned()), (STEP, "× 1".to_owned())];
     knobs.extend(KNOBS.iter().map(of_key));
-    knobs.push((TANGENT, "matrix-free".to_owned()));
     knobs
 }
 
@@ -217,10 +211,6 @@ pub(super) fn one_at_a_time(problem: &dyn Problem, effort: Effort) -> Vec<Settin
             }
             settings.push(setting);
         }
-    }
-    // In three dimensions whole runs take minutes, so the study `baseline` compares them.
-    if problem.dimension() < 3 || !full {
-        settings.push(Setting { assembled: true, ..Setting::turned(TANGENT, ASSEMBLED) });
     }
     settings
 }
@@ -266,7 +256,6 @@ pub(super) fn design(problem: &dyn Problem, effort: Effort) -> Vec<Setting> {
                         keys: vec![format!("approximation={json}"), format!("time.lumping={lumping}")],
                         level: Some(level),
                         courant: Some(courant),
-                        assembled: false,
                     });
                 }
             }

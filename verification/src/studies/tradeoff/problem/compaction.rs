@@ -1,59 +1,68 @@
-//! The block compacted by its own weight (section 4.2), against a fine run of Q8 finite elements with the same residual.
+//! The block compacted by its own weight (section 4.2), against a fine run on a grid that is kept.
 
 use super::{LEVELS, Problem, steps, whole_steps};
-use crate::elements::Elements;
 use crate::studies::StudyError;
 use crate::studies::tradeoff::cost::{Cost, Units, drive};
-use crate::studies::tradeoff::setting::Setting;
-use bfree::clock::Clock;
-use bfree::material::{Lame, Material};
+use bfree::material::Lame;
+use bfree::particles::Particles;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::path::Path;
-use std::sync::Mutex;
 
 const LAME: Lame = Lame { lambda: 5e4, shear: 3e4 };
 const DENSITY: f64 = 2700.0;
 /// Times at which the displacements are compared.
 const SAMPLES: u64 = 10;
-/// cΔt over the edge of an element.
+
+/// cΔt over the spacing of the reference.
 const FINE_COURANT: f64 = 0.5;
 
 /// The error is the relative error of the displacement of all particles at ten times.
 pub(in crate::studies::tradeoff) struct Compaction {
     pub end: f64,
-    reference: Mutex<Reference>,
-}
-
-/// The elements, and the displacement of their nodes at the ten times.
-struct Reference {
-    block: Elements<2, Material>,
-    samples: Vec<Vec<Vector<f64, 2>>>,
+    /// The particles of the reference at the start.
+    start: Vec<Vector<f64, 2>>,
+    /// The particles of the reference at the ten times.
+    samples: Vec<Particles<2>>,
 }
 
 impl Compaction {
-    /// The problem up to the time `end`, with `elements`² elements as reference.
-    pub fn new(end: f64, elements: u32) -> Result<Self, StudyError> {
-        let size = f64::from(elements).recip();
+    /// The problem up to the time `end`. The reference has `cells`² cells, a grid that is kept, and a consistent mass.
+    pub fn new(end: f64, cells: u32) -> Result<Self, StudyError> {
+        let spacing = f64::from(cells).recip();
         let mut scene = scene();
-        let step = whole_steps(end, FINE_COURANT * size / speed(), SAMPLES);
-        (scene["grid"]["spacing"], scene["time"]) = (0.25.into(), json!({ "end": end, "step": step }));
-        let of_particles: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(Path::new("."))?;
-        let body = of_particles.bodies.into_iter().next().ok_or("a scene without a body")?;
-        let mut block = Elements::new(Vector::zeros(), size, [elements; 2], body, Clock::new(step, 0))?;
-        block.loads = of_particles.loads;
+        let step = whole_steps(end, FINE_COURANT * spacing / speed(), SAMPLES);
+        scene["grid"]["spacing"] = spacing.into();
+        scene["grid"]["renewed"] = "never".into();
+        scene["approximation"] = json!({ "bspline": { "degree": 3 } });
+        scene["bodies"][0]["layout"] = "regular".into();
+        scene["time"] = json!({ "end": end, "step": step, "lumping": 0 });
+        let mut simulation: Simulation<2> = bfree::scene::read(&scene.to_string(), &[])?.build(Path::new("."))?;
+        let start = simulation.particles.by_id().position;
         let every = (end / step).round() as u64 / SAMPLES;
         let mut samples = Vec::new();
-        for _ in 0..SAMPLES {
-            for _ in 0..every {
-                block.step()?;
+        while samples.len() < SAMPLES as usize {
+            simulation.advance()?;
+            if simulation.clock.on_nominal() && simulation.clock.nominal_steps().is_multiple_of(every) {
+                samples.push(simulation.particles.by_id());
             }
-            samples.push(block.displacement.clone());
         }
-        Ok(Self { end, reference: Mutex::new(Reference { block, samples }) })
+        Ok(Self { end, start, samples })
+    }
+
+    /// The particle of the reference that was nearest to `x` at the start.
+    fn nearest(&self, x: &Vector<f64, 2>) -> usize {
+        let distance = |&p: &usize| (self.start[p] - x).norm_squared();
+        (0..self.start.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    }
+
+    /// The displacement of the point `x` of the reference configuration, to second order in the distance from the particle `near`.
+    fn displacement(&self, sample: &Particles<2>, near: usize, x: &Vector<f64, 2>) -> Vector<f64, 2> {
+        let start = &self.start[near];
+        sample.position[near] - start + sample.displacement_gradient[near] * (x - start)
     }
 }
 
@@ -102,29 +111,26 @@ impl Problem for Compaction {
         scene()
     }
 
-    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
-        Ok(Units::of(&scene.build::<2>(Path::new("."))?, setting.assembled)?.0)
+    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
+        Ok(Units::of(&scene.build::<2>(Path::new("."))?)?.0)
     }
 
-    fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
+    fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {
         let mut simulation: Simulation<2> = scene.build(Path::new("."))?;
         let start = simulation.particles.position.clone();
+        let nearest: Vec<usize> = start.iter().map(|x| self.nearest(x)).collect();
         let steps = steps(scene);
         let every = (steps / SAMPLES).max(1);
         let sums = RefCell::new((0.0, 0.0));
-        let cost = drive(&mut simulation, setting, steps, |now| {
+        let cost = drive(&mut simulation, steps, |now| {
             let done = now.clock.nominal_steps();
             if !(now.clock.on_nominal() && done.is_multiple_of(every)) {
                 return Ok(());
             }
-            // The lock is lost only if a run panicked while holding the reference, which would have ended the study.
-            let mut reference = self.reference.lock().map_err(|_| "the reference is lost")?;
-            let Reference { block, samples } = &mut *reference;
-            let Some(sample) = samples.get((done / every - 1) as usize) else { return Ok(()) };
-            block.displacement.clone_from(sample);
+            let Some(sample) = self.samples.get((done / every - 1) as usize) else { return Ok(()) };
             let (error, size) = &mut *sums.borrow_mut();
-            for (x, found) in start.iter().zip(&now.particles.by_id().position) {
-                let exact = block.displacement_at(x)?;
+            for ((x, found), &near) in start.iter().zip(&now.particles.by_id().position).zip(&nearest) {
+                let exact = self.displacement(sample, near, x);
                 *error += (found - x - exact).norm_squared();
                 *size += exact.norm_squared();
             }

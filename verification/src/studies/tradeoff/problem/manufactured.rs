@@ -4,7 +4,6 @@ use super::{LEVELS, Problem, steps};
 use crate::manufactured::{AxisAligned, force_field, state};
 use crate::studies::StudyError;
 use crate::studies::tradeoff::cost::{Cost, Units, drive};
-use crate::studies::tradeoff::setting::Setting;
 use bfree::material::Lame;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
@@ -72,17 +71,17 @@ impl<const D: usize> Problem for Manufactured<D> {
         })
     }
 
-    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
-        Ok(Units::of(&self.start(scene)?, setting.assembled)?.0)
+    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
+        Ok(Units::of(&self.start(scene)?)?.0)
     }
 
-    fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
+    fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {
         let motion = AxisAligned::default();
         let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
         let law = simulation.bodies.first().ok_or("a scene without a body")?.law.clone();
         simulation.loads.field = Some(force_field(motion, law, 1.0, reference.clone()));
-        let cost = drive(&mut simulation, setting, steps(scene), |_| Ok(()))?;
+        let cost = drive(&mut simulation, steps(scene), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
         for (x, found) in reference.iter().zip(&simulation.particles.by_id().position) {
             let exact = state(&motion, x, simulation.clock.time()).position;

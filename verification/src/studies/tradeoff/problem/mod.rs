@@ -46,14 +46,14 @@ pub(super) trait Problem: Sync {
         None
     }
     /// Runs a prepared scene. Returns the relative error and the cost.
-    fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError>;
+    fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError>;
 
     /// The times of the evaluations at the start of a run.
-    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError>;
+    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError>;
 
     /// The times of the evaluations for a setting.
     fn units(&self, setting: &Setting) -> Result<Units, StudyError> {
-        self.units_of(&self.set(setting)?, setting)
+        self.units_of(&self.set(setting)?)
     }
 
     /// h of a level.
@@ -63,7 +63,7 @@ pub(super) trait Problem: Sync {
 
     /// Runs a setting.
     fn run(&self, setting: &Setting) -> Result<(f64, Cost), StudyError> {
-        self.solve(&self.set(setting)?, setting)
+        self.solve(&self.set(setting)?)
     }
 
     /// The scene of a setting.

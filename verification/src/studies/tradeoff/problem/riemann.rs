@@ -5,7 +5,6 @@ use crate::riemann::{PSystem, State};
 use crate::start::velocity_by_masses;
 use crate::studies::StudyError;
 use crate::studies::tradeoff::cost::{Cost, Units, drive};
-use crate::studies::tradeoff::setting::Setting;
 use bfree::material::Lame;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
@@ -82,18 +81,18 @@ impl Problem for Bar {
         Some(common / (common * cells / between_fronts).ceil())
     }
 
-    fn units_of(&self, scene: &Scene, setting: &Setting) -> Result<Units, StudyError> {
-        Ok(Units::of(&self.start(scene)?, setting.assembled)?.0)
+    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
+        Ok(Units::of(&self.start(scene)?)?.0)
     }
 
-    fn solve(&self, scene: &Scene, setting: &Setting) -> Result<(f64, Cost), StudyError> {
+    fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {
         let lame = lame()?;
         let system = PSystem { modulus: 0.5 * lame.lambda + lame.shear, density: DENSITY };
         let side = |velocity| State { stretch: 1.0, velocity };
         let exact = system.solve(side(JUMP), side(0.0))?;
         let mut simulation = self.start(scene)?;
         let reference = simulation.particles.position.clone();
-        let cost = drive(&mut simulation, setting, steps(scene), |_| Ok(()))?;
+        let cost = drive(&mut simulation, steps(scene), |_| Ok(()))?;
         let (mut error, mut size) = (0.0, 0.0);
         for (x, v) in reference.iter().zip(&simulation.particles.by_id().velocity) {
             let place = x[0] - MIDDLE;

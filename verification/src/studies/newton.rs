@@ -1,11 +1,8 @@
 //! The convergence of Newton's method on steps of the rebound. The study `rebound` compares with the paper's Table 3.
 
-mod difference;
-mod mass;
-
 use super::{Effort, Outcome, StudyError};
 use crate::prepared::Prepared;
-use crate::report::{Bound, Report, chain, short};
+use crate::report::{Bound, Report, short};
 use crate::shipped;
 use crate::table::Table;
 use bfree::mechanics::residual::Equilibrium;
@@ -16,7 +13,6 @@ use bfree::solver::{
     BlockJacobi, Forcing, GmresSettings, Krylov, NewtonHistory, NewtonSettings, NonlinearProblem, gmres, newton,
 };
 use bfree::tensor::Vector;
-use difference::Difference;
 
 pub(super) const ABOUT: &str = "observed orders of Newton's method on steps of the rebound";
 
@@ -92,16 +88,13 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
                 at.settings.lumping = lumping;
                 study.case(case, label, &at, effort)?;
             }
-            if lumping == 0.0 && *effort == Effort::Full {
-                study.consistent_alone(scene, label)?;
-            }
         }
     }
     Ok(study.outcome())
 }
 
 /// The ε of the run up to a step with ε = 0. With ε = 0 throughout, the tangent is singular to round-off, and the run does not reach the
-/// step (full effort shows how far it comes).
+/// step.
 const LEAST_LUMPING: f64 = 0.01;
 
 impl Case {
@@ -127,7 +120,6 @@ fn reach(simulation: &mut Simulation<2, Material>, step: u64) -> Result<(), Adva
 
 struct Study {
     iterations: Table,
-    masses: Table,
     runs: Report,
     converged: Report,
     orders: Report,
@@ -140,13 +132,6 @@ impl Study {
                 "Newton's iterations: residual, ratio to the one before, ratio to its square, observed order",
                 ["step", "eps", "method", "k", "|R|", "ratio", "|R|/|R before|^2", "order", "Krylov", "|R|/(u mag)"],
             ),
-            masses: Table::new(
-                "condition and null modes of the mass (1-eps) M + eps lumped(M) on all active nodes, and of the tangent K on the free ones; scaled: diagonal 1",
-                [
-                    "step", "eps", "nodes", "largest", "smallest", "cond M", "null", "cond M scaled", "null",
-                    "cond K scaled", "null",
-                ],
-            ),
             runs: Report::new(
                 "a run with the same eps throughout: time it reaches, over that at the start of the step",
                 &["run", "eps"],
@@ -157,7 +142,7 @@ impl Study {
             ),
             orders: Report::new(
                 "order p of one Newton step from x* + s (x0 - x*): |R after| ~ |R before|^p",
-                &["step", "eps", "product", "residuals from", "to"],
+                &["step", "eps", "residuals from", "to"],
             ),
         }
     }
@@ -173,7 +158,6 @@ impl Study {
         let equilibrium = prepared.equilibrium(simulation);
         let mut start = vec![Vector::zeros(); prepared.nodes.len()];
         prepared.prescribe(&mut start);
-        self.spectra(case.name, label, simulation, &prepared, &start)?;
         let start: &[f64] = bytemuck::cast_slice(&start);
         let mut solution = None;
         for method in &METHODS {
@@ -194,26 +178,7 @@ impl Study {
             }
         }
         if let Some(solution) = solution {
-            self.single_steps(case, label, simulation.grid.spacing, &equilibrium, start, &solution, effort)?;
-        }
-        Ok(())
-    }
-
-    /// Shows the progress of a run with ε = 0 throughout.
-    fn consistent_alone(&mut self, scene: &'static str, label: &str) -> Result<(), StudyError> {
-        let mut simulation = rebound(scene, 0.0)?;
-        let Some(case) = CASES.iter().rfind(|case| case.scene == scene) else { return Ok(()) };
-        let start = case.start(&simulation);
-        let result = reach(&mut simulation, start);
-        self.reached(case, label, &simulation);
-        let time = simulation.clock.time();
-        let name = format!("{scene}, alone, t={time:.3}");
-        let prepared = Prepared::new(&simulation)?;
-        let mut start = vec![Vector::zeros(); prepared.nodes.len()];
-        prepared.prescribe(&mut start);
-        self.spectra(&name, label, &simulation, &prepared, &start)?;
-        if let Err(error) = result {
-            self.runs.note(format!("{scene}, eps = {label} throughout: ends at t = {time:.3}, {}", chain(&error)));
+            self.single_steps(case, label, &equilibrium, start, &solution, effort)?;
         }
         Ok(())
     }
@@ -223,33 +188,6 @@ impl Study {
         let asked = case.start(simulation) as f64 * simulation.clock.nominal();
         let run = format!("{}, t={asked:.2}", case.scene);
         self.runs.push(&[&run, label], simulation.clock.time() / asked, Bound::AtLeast(1.0 - 1e-9));
-    }
-
-    /// A row of condition numbers, at the start of a step.
-    fn spectra(
-        &mut self,
-        name: &str,
-        label: &str,
-        simulation: &Simulation<2, Material>,
-        prepared: &Prepared<2>,
-        dphi: &[Vector<f64, 2>],
-    ) -> Result<(), StudyError> {
-        let mass = mass::spectrum(&simulation.particles, prepared, simulation.settings.lumping);
-        let (condition, null_modes) = mass::tangent(&prepared.equilibrium(simulation), dphi)?;
-        self.masses.push([
-            name.into(),
-            label.into(),
-            prepared.nodes.len().to_string(),
-            short(mass.largest),
-            short(mass.smallest),
-            short(mass.condition),
-            mass.null_modes.to_string(),
-            short(mass.scaled_condition),
-            mass.scaled_null_modes.to_string(),
-            short(condition),
-            null_modes.to_string(),
-        ]);
-        Ok(())
     }
 
     fn list(&mut self, case: &Case, label: &str, method: &str, residuals: &[f64], krylov: &[usize], magnitude: f64) {
@@ -273,12 +211,10 @@ impl Study {
 
     /// One Newton step from many distances to the solution. The order shows over all decades above round-off, even if the whole solution
     /// takes few iterations.
-    #[allow(clippy::too_many_arguments)] // the ingredients of one experiment
     fn single_steps(
         &mut self,
         case: &Case,
         label: &str,
-        spacing: f64,
         equilibrium: &Equilibrium<'_, 2, Material>,
         start: &[f64],
         solution: &[f64],
@@ -287,27 +223,20 @@ impl Study {
         let magnitude = NonlinearProblem::magnitude(equilibrium, solution)?;
         let floor = ROUND_OFF * f64::EPSILON * magnitude;
         let points = if *effort == Effort::Full { 48 } else { 24 };
-        // Products by differences are the control: their error leaves a part of the residual, and the order falls to 1.
-        let sides = [("exact", None, Bound::Between(1.9, 2.1)), ("difference 1e-3", Some(1e-3), Bound::AtMost(1.5))];
-        for (name, difference, bound) in sides {
-            let mut pairs = Vec::new();
-            for k in 0..points {
-                let s = 10.0_f64.powf(-10.0 * f64::from(k) / f64::from(points));
-                let x: Vec<f64> = solution.iter().zip(start).map(|(x, x0)| x + s * (x0 - x)).collect();
-                let (before, after) = match difference {
-                    None => step(equilibrium, x)?,
-                    Some(length) => step(&Difference { problem: equilibrium, length: length * spacing }, x)?,
-                };
-                if after > floor {
-                    pairs.push((before, after));
-                }
+        let mut pairs = Vec::new();
+        for k in 0..points {
+            let s = 10.0_f64.powf(-10.0 * f64::from(k) / f64::from(points));
+            let x: Vec<f64> = solution.iter().zip(start).map(|(x, x0)| x + s * (x0 - x)).collect();
+            let (before, after) = step(equilibrium, x)?;
+            if after > floor {
+                pairs.push((before, after));
             }
-            // The far end is not in the neighbourhood of the solution; only the nearer half counts.
-            let near = &pairs[pairs.len() / 2..];
-            let ends = |k: Option<&(f64, f64)>| k.map_or_else(|| "-".into(), |pair| format!("{:.1e}", pair.0));
-            let labels = [case.name, label, name, &ends(near.first()), &ends(near.last())].map(String::from);
-            self.orders.push(&labels.each_ref().map(String::as_str), order(near).unwrap_or(f64::NAN), bound);
         }
+        // The far end is not in the neighbourhood of the solution; only the nearer half counts.
+        let near = &pairs[pairs.len() / 2..];
+        let ends = |k: Option<&(f64, f64)>| k.map_or_else(|| "-".into(), |pair| format!("{:.1e}", pair.0));
+        let labels = [case.name, label, &ends(near.first()), &ends(near.last())];
+        self.orders.push(&labels, order(near).unwrap_or(f64::NAN), Bound::Between(1.9, 2.1));
         Ok(())
     }
 
@@ -318,10 +247,10 @@ impl Study {
             "Quadratic: every step shown with the exact tangent and a tight linear solve. A single Newton step has order 2 wherever its result is above round-off, for every eps.".into(),
             "Between the iterations of one solve the order is less: from zero, most of the first residual is inertia, which is linear and vanishes at once, and the third iteration ends in round-off. |R|/|R before|^2 is the constant to look at, until round-off.".into(),
             "Not quadratic, by intention: Eisenstat-Walker. It solves each linear system only as far as it pays: more iterations, fewer products, superlinear.".into(),
-            "The mass: a mixed mass keeps the order 2 and costs Krylov iterations. With eps = 0 the mass has null modes and the tangent nearly so (columns `null`). The exact tangent with tight solves still converges, with order 2 near the solution but more iterations from zero; loose solves (Eisenstat-Walker) leave the near-null modes unsolved and do not: that is the convergence trouble the paper reports. Those steps start from the state reached with eps = 0.01; `full` runs eps = 0 from the start and says where it ends.".into(),
+            "The mass: a mixed mass keeps the order 2 and costs Krylov iterations. With eps = 0 the mass has null modes and the tangent nearly so. The exact tangent with tight solves still converges, with order 2 near the solution but more iterations from zero; loose solves (Eisenstat-Walker) leave the near-null modes unsolved and do not: that is the convergence trouble the paper reports. Those steps start from the state reached with eps = 0.01.".into(),
         ];
         Outcome {
-            tables: vec![self.iterations, self.masses],
+            tables: vec![self.iterations],
             reports: vec![self.runs, self.converged, self.orders],
             remarks,
             ..Outcome::default()
@@ -333,12 +262,12 @@ impl Study {
 const ROUND_OFF: f64 = 64.0;
 
 /// ‖R‖ before and after one full Newton step from `x`, its linear system solved as tightly as possible.
-fn step<E: std::error::Error + 'static>(problem: &dyn NonlinearProblem<Inadmissible = E>, mut x: Vec<f64>) -> Result<(f64, f64), StudyError> {
+fn step(problem: &Equilibrium<'_, 2, Material>, mut x: Vec<f64>) -> Result<(f64, f64), StudyError> {
     let mut r = vec![0.0; x.len()];
-    problem.residual(&x, &mut r)?;
+    NonlinearProblem::residual(problem, &x, &mut r)?;
     let before = norm(&r);
     {
-        let tangent = problem.linearize(&x)?;
+        let tangent = NonlinearProblem::linearize(problem, &x)?;
         let rhs: Vec<f64> = r.iter().map(|r| -r).collect();
         let mut d = vec![0.0; x.len()];
         let settings = GmresSettings { relative_tolerance: 1e-13, restart: 200, max_iterations: 400 };
@@ -347,7 +276,7 @@ fn step<E: std::error::Error + 'static>(problem: &dyn NonlinearProblem<Inadmissi
         gmres(&*tangent, &blocks, &rhs, &mut d, &settings, &Pool::default())?;
         x.iter_mut().zip(d).for_each(|(x, d)| *x += d);
     }
-    problem.residual(&x, &mut r)?;
+    NonlinearProblem::residual(problem, &x, &mut r)?;
     Ok((before, norm(&r)))
 }
 

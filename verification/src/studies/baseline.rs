@@ -1,6 +1,6 @@
 //! One linear system of the static block, solved in three ways: the cost of assembly and factorisation against iteration.
 
-use super::{Effort, StudyError};
+use super::{Effort, Outcome, StudyError};
 use crate::prepared::Prepared;
 use crate::processor::Thread;
 use crate::report::{Bound, Report};
@@ -13,6 +13,9 @@ use bfree::solver::{
     ConjugateGradientSettings, LinearReport, Preconditioner, Preconditioning, conjugate_gradient,
 };
 
+/// The summary in the list of studies.
+pub(super) const ABOUT: &str = "one linear system by conjugate gradients with each preconditioner, and by a direct solve";
+
 /// The required relative residual.
 const SOLVE: f64 = 1e-8;
 
@@ -24,10 +27,14 @@ const FAMILIES: [(&str, &str); 3] =
     [("linear", "\"linear\""), ("cubic", "{\"bspline\": {\"degree\": 3}}"), ("LME 3", "{\"lme\": {\"gamma\": 3}}")];
 
 /// K d = −R at the first state of Newton's method, with half of the load, on one thread.
-pub(super) fn run(effort: Effort) -> Result<(Report, Table), StudyError> {
+pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let run = || measured(effort).map_err(|error| error.to_string());
-    Ok(pool.install(run)?)
+    let (report, table) = pool.install(|| measured(*effort).map_err(|error| error.to_string()))?;
+    let mut remarks = Vec::new();
+    if !Preconditioning::HAS_DIRECT {
+        remarks.push("The direct solve needs `--features direct` (faer takes a minute to build).".into());
+    }
+    Ok(Outcome { reports: vec![report], tables: vec![table], remarks, ..Outcome::default() })
 }
 
 fn measured(effort: Effort) -> Result<(Report, Table), StudyError> {
