@@ -75,12 +75,10 @@ impl Body {
         match (&self.shape, &self.particles) {
             (Some(shape), None) => {
                 let path = format!("{path}.shape");
-                if shape.check(problems, &path, dimension) {
-                    match dimension {
-                        1 => check_inside::<1>(shape, problems, &path, grid),
-                        2 => check_inside::<2>(shape, problems, &path, grid),
-                        _ => check_inside::<3>(shape, problems, &path, grid),
-                    }
+                match dimension {
+                    1 => check_inside::<1>(shape, problems, &path, grid),
+                    2 => check_inside::<2>(shape, problems, &path, grid),
+                    _ => check_inside::<3>(shape, problems, &path, grid),
                 }
             }
             (None, Some(particles)) => {
@@ -110,7 +108,7 @@ impl Body {
 /// Refuses a shape that is empty or whose finite part reaches beyond the box: that part would be lost silently. Only infinite shapes are
 /// clipped.
 fn check_inside<const D: usize>(shape: &Shape, problems: &mut Problems, path: &str, grid: &GridBox) {
-    let (Some(grid), Some(shape)) = (grid.build::<D>(), shape.build::<D>()) else { return };
+    let (Some(shape), Some(grid)) = (shape.checked::<D>(problems, path), grid.build::<D>()) else { return };
     let (min, max) = shape.bounding_box();
     if (0..D).any(|k| max[k] < min[k]) {
         problems.refuse(

@@ -222,12 +222,6 @@ impl Rotation {
             problems.refuse(&format!("{path}[0]"), format!("[{}, {}]", Number(*t), Number(*angle)), allowed);
         }
     }
-
-    /// The largest |θ'|.
-    pub(super) fn fastest(&self) -> f64 {
-        let pieces = self.angle.0.windows(2).map(|rows| (rows[1][1] - rows[0][1]) / (rows[1][0] - rows[0][0]));
-        pieces.fold(0.0, |most: f64, slope| most.max(slope.abs()))
-    }
 }
 
 impl Table {

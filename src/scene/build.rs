@@ -1,10 +1,9 @@
 //! Builds a simulation from a checked scene. Here and nowhere else, the dimension becomes a type: see [`Scene::dimension`].
 
-use super::build_error::vector;
 use super::filling::Means;
-use super::shape_file::ShapeFile;
 use super::transfer::Transfer;
-use super::{BuildError, Problems, Scene, scale, shape};
+use super::vector::vector;
+use super::{BuildError, Problems, Scene, shape};
 use crate::approximation::{Approximation, Cells};
 use crate::clock::Clock;
 use crate::grid::Grid;
@@ -61,48 +60,32 @@ impl Scene {
     /// # Errors
     /// The errors of [`Self::build`], and particles that certainly need more memory, before room is made for them.
     pub fn build_within<const D: usize>(&self, folder: &Path, memory: u64) -> Result<Simulation<D>, BuildError> {
-        let grid: Grid<D> =
-            self.grid.build().ok_or_else(|| BuildError::Dimension { path: "grid".into(), dimension: D })?;
+        let other = || BuildError::at("grid", format!("does not fit {D} dimensions"));
+        let grid: Grid<D> = self.grid.build().ok_or_else(other)?;
+        self.shapes().iter().try_for_each(|(path, shape)| shape.read_files(path, folder))?;
+        let mut problems = self.check();
+        let approximation = self.shape_functions(&mut Problems::default()).filter(|_| problems.is_empty());
+        let approximation = approximation.ok_or_else(|| BuildError::Values(std::mem::take(&mut problems)))?;
         let means = Means { folder, memory };
-        let mut problems = self.read_shapes(folder)?;
-        if !problems.is_empty() {
-            return Err(BuildError::Values(problems));
-        }
         let mut particles = Particles::default();
         let mut bodies = Vec::new();
-        for (i, body) in self.bodies.iter().enumerate() {
-            let path = format!("bodies[{i}]");
-            self.fill(body, &path, &means, &grid, i as u32, &mut particles)?;
-            if let Some(law) = body.material.law(&mut problems, &format!("{path}.material")) {
-                bodies.push(particles::Body {
-                    name: body.name.clone(),
-                    law,
-                    density: body.density,
-                    dilatation: body.volumetric,
-                });
-            }
+        for (i, (body, law)) in self.bodies.iter().zip(self.laws()).enumerate() {
+            self.fill(body, &format!("bodies[{i}]"), &means, &grid, i as u32, &mut particles)?;
+            let (name, density, dilatation) = (body.name.clone(), body.density, body.volumetric);
+            bodies.push(particles::Body { name, law, density, dilatation });
         }
-        let Some(approximation) = self.shape_functions(&mut problems).filter(|_| problems.is_empty()) else {
-            return Err(BuildError::Values(problems));
-        };
         let loads = self.loads(&means, &grid, &mut particles)?;
         particles.remember_rest(&bodies);
+        let clock = Clock::new(self.time.step, self.time.max_halvings);
         let mut simulation = Simulation {
             loads,
             settings: self.settings(),
-            ..Simulation::new(
-                grid,
-                approximation,
-                bodies,
-                particles,
-                Clock::new(self.time.step, self.time.max_halvings),
-            )
+            ..Simulation::new(grid, approximation, bodies, particles, clock)
         };
         self.set_initial_velocity(&mut simulation)?;
-        scale::check(self, &simulation)?;
         simulation
             .set_initial_acceleration()
-            .map_err(|source| BuildError::InitialAcceleration { source: Box::new(source) })?;
+            .map_err(|source| BuildError::at("the acceleration at t = 0 cannot be computed", source))?;
         Ok(simulation)
     }
 
@@ -113,36 +96,17 @@ impl Scene {
         self.approximation.functions(cells, problems, "approximation")
     }
 
-    /// Reads the files of all shapes, then returns the problems of the scene with these shapes.
-    fn read_shapes(&self, folder: &Path) -> Result<Problems, BuildError> {
-        let mut any = false;
-        let mut read = |path: &str, shape: ShapeFile<'_>| {
-            any = true;
-            shape.read(folder).map_err(|source| BuildError::ShapeFile {
-                path: path.to_owned(),
-                file: folder.join(shape.file()).display().to_string(),
-                source: Box::new(source),
-            })
-        };
-        for (path, shape) in self.shapes() {
-            shape.each_file(&path, &mut read)?;
-        }
-        Ok(if any { self.check() } else { Problems::default() })
-    }
-
     /// All shapes, with their paths.
     fn shapes(&self) -> Vec<(String, &shape::Shape)> {
         let bodies = self.bodies.iter().enumerate();
         let bodies = bodies.filter_map(|(i, body)| Some((format!("bodies[{i}].shape"), body.shape.as_ref()?)));
         let prescribed = self.prescribed.iter().enumerate();
         let prescribed = prescribed.map(|(i, one)| (format!("prescribed[{i}].region"), &one.region));
-        let tractions = self.tractions.iter().map(|one| one.region.as_ref()).enumerate();
-        let tractions = tractions.filter_map(|(i, region)| Some((format!("tractions[{i}].region"), region?)));
-        let pressures = self.pressures.iter().map(|one| one.region.as_ref()).enumerate();
-        let pressures = pressures.filter_map(|(i, region)| Some((format!("pressures[{i}].region"), region?)));
+        let loads = self.surface_loads();
+        let loads = loads.filter_map(|(path, load)| Some((format!("{path}.region"), load.region.as_ref()?)));
         let initial = self.initial_velocity.iter().flat_map(|initial| &initial.nodes).enumerate();
         let initial = initial.map(|(i, one)| (format!("initial_velocity.nodes[{i}].region"), &one.region));
-        bodies.chain(prescribed).chain(tractions).chain(pressures).chain(initial).collect()
+        bodies.chain(prescribed).chain(loads).chain(initial).collect()
     }
 
     fn settings(&self) -> Settings {
@@ -180,9 +144,8 @@ impl Scene {
         let Some(initial) = &self.initial_velocity else { return Ok(()) };
         let mut regions: Vec<(Shape<D>, Vector<f64, D>)> = Vec::new();
         for (i, node) in initial.nodes.iter().enumerate() {
-            let path = format!("initial_velocity.nodes[{i}]");
-            let region = node.region.build().ok_or_else(|| BuildError::dimension::<D>(&path))?;
-            regions.push((region, vector(&format!("{path}.velocity"), &node.velocity)?));
+            let region = node.region.built(&format!("initial_velocity.nodes[{i}]"))?;
+            regions.push((region, vector(&node.velocity)));
         }
         let spacing = simulation.grid.spacing;
         simulation
@@ -190,6 +153,6 @@ impl Scene {
                 let last = regions.iter().rev().find(|(region, _)| region.holds(x, spacing));
                 last.map_or_else(Vector::zeros, |(_, velocity)| *velocity)
             })
-            .map_err(|source| BuildError::InitialVelocity { source: Box::new(source) })
+            .map_err(|source| BuildError::at("initial_velocity", source))
     }
 }

@@ -2,8 +2,8 @@
 
 use super::body::Body;
 use super::boundary::Face;
-use super::build_error::vector;
 use super::particle_file;
+use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
 use crate::mechanics::reference::Renewal;
@@ -11,6 +11,7 @@ use crate::particles::Particles;
 use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
 use crate::simulation::Simulation;
 use crate::tensor::Vector;
+use indicatif::BinaryBytes;
 use std::fmt::{Display, Formatter};
 use std::path::Path;
 
@@ -60,7 +61,15 @@ impl Means<'_> {
         let count = particles.len() + more;
         let (needed, memory) = (3 * (count * Particles::<D>::BYTES) as u64, self.memory);
         if needed > memory {
-            return Err(BuildError::Memory { path: path.to_owned(), particles: count, needed, memory });
+            return Err(BuildError::at(
+                path,
+                format!(
+                    "{count} particles so far need at least {} of memory, and {} can be had: use a coarser grid, fewer particles per \
+                     cell or a smaller body",
+                    BinaryBytes(needed),
+                    BinaryBytes(memory)
+                ),
+            ));
         }
         particles.reserve(more);
         Ok(())
@@ -78,21 +87,21 @@ impl Scene {
         number: u32,
         particles: &mut Particles<D>,
     ) -> Result<(), BuildError> {
+        let has_inertia = self.time.scheme().has_inertia();
         let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
             let mass = body.density * volume;
-            if self.time.scheme().has_inertia() {
+            if has_inertia {
                 particles.push(x, velocity, volume, mass, number)
             } else {
                 particles.push_without_inertia(x, volume, mass, number)
             }
         };
-        let common = body.velocity.as_ref().map(|v| vector::<D>(&format!("{path}.velocity"), v)).transpose()?;
+        let common = body.velocity.as_ref().map(|v| vector::<D>(v));
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
-            let shape = shape.build::<D>().ok_or_else(|| BuildError::dimension::<D>(&path))?;
             let velocity = common.unwrap_or_else(Vector::zeros);
-            let seeds = fill(grid, &shape, self.filling(body))
-                .map_err(|source| BuildError::Fill { path: path.clone(), source })?;
+            let seeds = fill(grid, &shape.built(&path)?, self.filling(body));
+            let seeds = seeds.map_err(|source| BuildError::at(&path, source))?;
             means.make_room(&path, particles, seeds.len())?;
             for seed in seeds {
                 push(particles, seed.position, velocity, seed.volume);
@@ -100,27 +109,17 @@ impl Scene {
         } else if let Some(file) = &body.particles {
             let path = format!("{path}.particles.file");
             let place = means.folder.join(&file.file);
-            let read = particle_file::read_file::<D>(&place).map_err(|source| BuildError::ParticleFile {
-                path: path.clone(),
-                file: place.display().to_string(),
-                source: Box::new(source),
-            })?;
-            if read.velocities.is_some() {
-                let why = if !self.time.scheme().has_inertia() {
-                    Some("there is no inertia; remove its columns vx, … or the key time.scheme")
-                } else {
-                    let twice = "so does initial_velocity; remove its columns vx, … or the key initial_velocity";
-                    self.initial_velocity.as_ref().map(|_| twice)
-                };
-                if let Some(why) = why {
-                    return Err(BuildError::Velocities { path, file: place.display().to_string(), why });
-                }
+            let fail = |what: String| BuildError::at(&path, format!("{}{what}", place.display()));
+            let read = particle_file::read_file::<D>(&place).map_err(|error| fail(format!(": {error}")))?;
+            if let Some(why) = self.refuses_velocities().filter(|_| read.velocities.is_some()) {
+                return Err(fail(format!(" gives velocities, and {why}")));
             }
             means.make_room(&path, particles, read.positions.len())?;
             for (k, (x, &volume)) in read.positions.iter().zip(&read.volumes).enumerate() {
                 if !grid.contains(x) {
-                    let position = x.iter().copied().collect();
-                    return Err(BuildError::Outside { path, particle: k + 1, position });
+                    let (number, place) = (k + 1, x.as_slice());
+                    let what = format!("particle {number} of the file, at {place:?}, lies outside the grid");
+                    return Err(BuildError::at(&path, what));
                 }
                 let own = read.velocities.as_ref().map(|velocities| velocities[k]);
                 let velocity = common.or(own).unwrap_or_else(Vector::zeros);
@@ -128,6 +127,17 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// The reason why a file of particles must give no velocities, and what to remove.
+    fn refuses_velocities(&self) -> Option<&'static str> {
+        if !self.time.scheme().has_inertia() {
+            Some("there is no inertia; remove its columns vx, … or the key time.scheme")
+        } else if self.initial_velocity.is_some() {
+            Some("so does initial_velocity; remove its columns vx, … or the key initial_velocity")
+        } else {
+            None
+        }
     }
 
     /// The rule by which the shape of a body is filled.

@@ -1,10 +1,12 @@
 //! Pictures (PNG, in 2D) and scans (raw voxels, in 3D) as shapes.
 
-use crate::problems::{Number, Problems};
+use super::file::{ShapeFileError, open};
+use super::vector::corners;
+use crate::problems::Problems;
 use crate::shape::{Mask, Pixels};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -38,69 +40,22 @@ pub struct ImageFile {
     read: OnceLock<Mask>,
 }
 
-/// A file that gives no shape.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageFileError {
-    /// The file cannot be read.
-    #[error("cannot be read: {0}")]
-    Io(#[from] io::Error),
-    /// The file is not a PNG file, or is broken.
-    #[error("cannot be read: {0}")]
-    Png(#[from] png::DecodingError),
-    /// The path is a folder, a device or a pipe.
-    #[error("is no regular file")]
-    NoFile,
-    /// The colours are not grey values of at most 8 bits without transparency.
-    #[error("is a PNG of {0}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency")]
-    NotGrey(String),
-    /// The picture has too many pixels, or none.
-    #[error("has {} × {} pixels; 1 to {MAX_PIXELS} in all are allowed", .0[0], .0[1])]
-    Size([u32; 2]),
-    /// The file is shorter or longer than its number of pixels requires.
-    #[error("has {found} bytes, and {asked} pixels")]
-    Length {
-        /// Bytes of the file.
-        found: u64,
-        /// Expected number of pixels.
-        asked: u64,
-    },
-    /// No pixel belongs to the shape.
-    #[error("has no pixel of a value from {} to {}: its values are from {} to {}", .asked[0], .asked[1], .found[0], .found[1])]
-    NoPixel {
-        /// The smallest and the largest value asked for.
-        asked: [u8; 2],
-        /// The smallest and the largest value in the file.
-        found: [u8; 2],
-    },
-}
-
 impl ImageFile {
-    /// The solid; `None` before the file has been read, and unless `min` and `max` have `D` components.
-    pub(super) fn solid<const D: usize>(&self) -> Option<Pixels<D>> {
-        let [min, max] = [&self.min, &self.max].map(|x| super::vector::vector(x));
-        Pixels::new(min?, max?, self.read.get()?.clone())
-    }
-
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
-        let before = problems.list.len();
-        let ending = match dimension {
+    /// The solid; `None` if it is not allowed, with the reasons in `problems`, and before the file has been read.
+    pub(super) fn build<const D: usize>(&self, problems: &mut Problems, path: &str) -> Option<Pixels<D>> {
+        let ending = match D {
             2 => "png",
             3 => "raw",
             _ => {
                 problems.refuse(path, "an image", "needs a grid of 2 or 3 dimensions");
-                return false;
+                return None;
             }
         };
         let found = self.file.extension().and_then(|ending| ending.to_str());
         let named = found.is_some_and(|found| found.eq_ignore_ascii_case(ending));
-        let allowed = format!("must end in .{ending} in {dimension} dimensions");
+        let allowed = format!("must end in .{ending} in {D} dimensions");
         problems.require(named, &format!("{path}.file"), format_args!("{:?}", self.file), allowed);
-        let ok = problems.vector(&format!("{path}.min"), &self.min, dimension)
-            && problems.vector(&format!("{path}.max"), &self.max, dimension);
-        for (k, (&min, &max)) in self.min.iter().zip(&self.max).enumerate().filter(|_| ok) {
-            let allowed = format!("must be greater than min[{k}] = {}", Number(min));
-            problems.require(max > min, &format!("{path}.max[{k}]"), Number(max), allowed);
-        }
+        let corners = corners::<D>(problems, path, &self.min, &self.max);
         let [least, most] = self.values;
         let values = format_args!("[{least}, {most}]");
         problems.require(
@@ -111,8 +66,8 @@ impl ImageFile {
         );
         let path = format!("{path}.size");
         match self.size {
-            None => problems.require(dimension == 2, &path, "nothing", "must give the voxels along x, y and z"),
-            Some(size) if dimension == 2 => {
+            None => problems.require(D == 2, &path, "nothing", "must give the voxels along x, y and z"),
+            Some(size) if D == 2 => {
                 problems.refuse(&path, format_args!("{size:?}"), "must not be given: the picture knows its size");
             }
             Some(size) => {
@@ -121,33 +76,30 @@ impl ImageFile {
                 problems.require(all.is_some(), &path, format_args!("{size:?}"), allowed);
             }
         }
-        problems.list.len() == before
+        let [min, max] = corners?;
+        Pixels::new(min, max, self.read.get()?.clone())
     }
 
     /// Reads the file, unless it has been read.
     ///
     /// # Errors
     /// The file cannot be read, is of another kind or size, or has no pixel in the range of values.
-    pub(super) fn read(&self, folder: &Path) -> Result<(), ImageFileError> {
+    pub(super) fn read(&self, folder: &Path) -> Result<(), ShapeFileError> {
         if self.read.get().is_some() {
             return Ok(());
         }
-        let path = folder.join(&self.file);
-        let about = fs::metadata(&path)?;
-        // Reading a pipe may block for ever.
-        if !about.is_file() {
-            return Err(ImageFileError::NoFile);
-        }
-        let file = BufReader::new(File::open(&path)?);
+        let (file, length) = open(&folder.join(&self.file))?;
         let (count, bytes) = match self.size {
-            Some(size) => (size, raw(file, &size, about.len())?),
-            None => grey(file, about.len())?,
+            Some(size) => (size, raw(file, &size, length)?),
+            None => grey(file, length)?,
         };
         let [least, most] = self.values;
         let inside = bytes.iter().map(|value| (least..=most).contains(value));
         let mask = Mask::new(count.map(|n| n as usize), inside).ok_or_else(|| {
             let (low, high) = bytes.iter().fold((u8::MAX, 0), |(low, high), &value| (low.min(value), high.max(value)));
-            ImageFileError::NoPixel { asked: self.values, found: [low, high] }
+            ShapeFileError(format!(
+                "has no pixel of a value from {least} to {most}: its values are from {low} to {high}"
+            ))
         })?;
         let _ = self.read.set(mask);
         Ok(())
@@ -158,11 +110,15 @@ fn product(size: &[u32]) -> Option<u64> {
     size.iter().try_fold(1_u64, |all, &n| all.checked_mul(n.into()))
 }
 
+fn wrong_length(found: u64, asked: u64) -> ShapeFileError {
+    ShapeFileError(format!("has {found} bytes, and {asked} pixels"))
+}
+
 /// The voxels of a raw file.
-fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>, ImageFileError> {
+fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>, ShapeFileError> {
     let asked = product(size).unwrap_or(u64::MAX);
     if found != asked || asked > MAX_PIXELS {
-        return Err(ImageFileError::Length { found, asked });
+        return Err(wrong_length(found, asked));
     }
     let mut bytes = vec![0; asked as usize];
     file.read_exact(&mut bytes)?;
@@ -170,24 +126,29 @@ fn raw(mut file: BufReader<File>, size: &[u32; 3], found: u64) -> Result<Vec<u8>
 }
 
 /// The pixels of a PNG file, the last row first, so that y increases upwards.
-fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ImageFileError> {
+fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), ShapeFileError> {
     let mut decoder = png::Decoder::new(file);
     decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info()?;
+    let mut reader = decoder.read_info().map_err(io::Error::from)?;
     let info = reader.info();
     let (width, height) = info.size();
     let kind = (info.color_type, info.bit_depth, info.trns.is_some());
     if kind.0 != png::ColorType::Grayscale || kind.1 == png::BitDepth::Sixteen || kind.2 {
         let transparent = if kind.2 { ", transparent" } else { "" };
-        return Err(ImageFileError::NotGrey(format!("{:?} and {} bits{transparent}", kind.0, kind.1 as u8)));
+        return Err(ShapeFileError(format!(
+            "is a PNG of {:?} and {} bits{transparent}; grey ones of 1, 2, 4 or 8 bits are allowed, without transparency",
+            kind.0, kind.1 as u8
+        )));
     }
     let pixels = product(&[width, height]).filter(|pixels| (1..=MAX_PIXELS).contains(pixels));
-    let asked = pixels.ok_or(ImageFileError::Size([width, height]))?;
+    let asked = pixels.ok_or_else(|| {
+        ShapeFileError(format!("has {width} × {height} pixels; 1 to {MAX_PIXELS} in all are allowed"))
+    })?;
     if asked * kind.1 as u64 / 8 > MAX_COMPRESSION * found {
-        return Err(ImageFileError::Length { found, asked });
+        return Err(wrong_length(found, asked));
     }
     let mut bytes = vec![0; asked as usize];
-    reader.next_frame(&mut bytes)?;
+    reader.next_frame(&mut bytes).map_err(io::Error::from)?;
     let rows = bytes.chunks_exact(width as usize).rev();
     Ok(([width, height, 1], rows.flatten().copied().collect()))
 }

@@ -3,6 +3,7 @@
 //! serde stops at the first key or type that does not fit. The schema then finds the others.
 
 use super::place::Step;
+use super::suggest::nearest;
 use serde_json::{Map, Value};
 use std::sync::LazyLock;
 
@@ -75,10 +76,6 @@ fn variant_name(one: &Value) -> Option<&str> {
     one["const"].as_str().or(key.map(String::as_str))
 }
 
-fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
 /// A walk through a scene and its schema, side by side.
 #[derive(Default)]
 struct Audit {
@@ -105,6 +102,7 @@ impl Audit {
         if let Some(variants) = variants(schema) {
             return self.variant(&variants, value);
         }
+        let most = if schema["format"] == "uint8" { u8::MAX.into() } else { u32::MAX.into() };
         match (types(schema).first().copied(), value) {
             (Some("object"), Value::Object(object)) => self.object(schema, object),
             (Some("array"), Value::Array(list)) => {
@@ -113,11 +111,13 @@ impl Audit {
                 }
             }
             (Some("object"), _) => self.mismatch("an object", value),
-            (Some("array"), _) => self.mismatch("a sequence", value),
-            (Some("number"), value) if !value.is_number() => self.mismatch("f64", value),
-            (Some("integer"), value) if !value.is_u64() => self.mismatch("u32", value),
+            (Some("array"), _) => self.mismatch("a list", value),
+            (Some("number"), value) if !value.is_number() => self.mismatch("a number", value),
+            (Some("integer"), value) if value.as_u64().is_none_or(|n| n > most) => {
+                self.mismatch(&format!("a whole number from 0 to {most}"), value);
+            }
             (Some("string"), value) if !value.is_string() => self.mismatch("a string", value),
-            (Some("boolean"), value) if !value.is_boolean() => self.mismatch("a boolean", value),
+            (Some("boolean"), value) if !value.is_boolean() => self.mismatch("true or false", value),
             _ => {}
         }
     }
@@ -130,8 +130,7 @@ impl Audit {
                 Some(schema) => self.within(step, schema, value),
                 None => {
                     self.steps.push(step);
-                    let allowed = quoted(known.keys().map(String::as_str));
-                    self.say(format!("unknown field `{key}`, expected one of {allowed}"));
+                    self.unknown("field", key, &known.keys().map(String::as_str).collect::<Vec<_>>());
                     self.steps.pop();
                 }
             }
@@ -147,21 +146,25 @@ impl Audit {
             Value::String(word) => (word, None),
             Value::Object(object) => match (object.iter().next(), object.len()) {
                 (Some((word, inner)), 1) => (word, Some(inner)),
-                _ => return self.mismatch("map with a single key", value),
+                _ => return self.mismatch("an object with exactly one key", value),
             },
-            _ => return self.mismatch("string or map", value),
+            _ => return self.mismatch("a word or an object with one key", value),
         };
-        match (variants.iter().find(|(name, _)| name == word), inner) {
-            (Some((_, variant)), Some(inner)) if variant["properties"].is_object() => {
-                self.within(Step::Key(word.clone()), &variant["properties"][word], inner);
-            }
-            // serde reports a word without its value, and an object where a word is enough.
-            (Some(_), _) => {}
-            (None, _) => {
-                let allowed = quoted(variants.iter().map(|(name, _)| *name));
-                self.say(format!("unknown variant `{word}`, expected one of {allowed}"));
-            }
+        let Some((_, variant)) = variants.iter().find(|(name, _)| name == word) else {
+            return self.unknown("variant", word, &variants.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+        };
+        match (variant["properties"].get(word), inner) {
+            (Some(schema), Some(inner)) => self.within(Step::Key(word.clone()), schema, inner),
+            (Some(_), None) => self.mismatch(&format!("an object with the key `{word}`"), value),
+            (None, Some(_)) => self.mismatch("a word", value),
+            (None, None) => {}
         }
+    }
+
+    fn unknown(&mut self, kind: &str, word: &str, allowed: &[&str]) {
+        let meant = nearest(word, allowed).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+        let allowed: Vec<String> = allowed.iter().map(|name| format!("`{name}`")).collect();
+        self.say(format!("unknown {kind} `{word}`, expected one of {}{meant}", allowed.join(", ")));
     }
 
     fn mismatch(&mut self, expected: &str, value: &Value) {

@@ -97,37 +97,39 @@ impl Gravity {
 }
 
 impl Traction {
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
-        problems.vector(&format!("{path}.traction"), &self.traction, dimension);
-        self.loaded().check(problems, path, bodies, dimension);
-    }
-
     pub(super) fn loaded(&self) -> Loaded<'_> {
-        Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface }
+        let Self { body, region, traction, curve, surface } = self;
+        Loaded { body, region, stress: Stress::Traction(traction), curve, surface }
     }
 }
 
 impl Pressure {
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
-        problems.number(&format!("{path}.pressure"), self.pressure);
-        self.loaded().check(problems, path, bodies, dimension);
-    }
-
     pub(super) fn loaded(&self) -> Loaded<'_> {
-        Loaded { body: &self.body, region: &self.region, curve: &self.curve, surface: &self.surface }
+        let Self { body, region, pressure, curve, surface } = self;
+        Loaded { body, region, stress: Stress::Pressure(*pressure), curve, surface }
     }
 }
 
-/// The keys that tractions and pressures have in common.
+/// A load on a surface: a traction or a pressure.
 pub(super) struct Loaded<'a> {
     pub body: &'a str,
     pub region: &'a Option<Shape>,
+    pub stress: Stress<'a>,
     pub curve: &'a Option<Curve>,
     pub surface: &'a Option<Surface>,
 }
 
+pub(super) enum Stress<'a> {
+    Traction(&'a [f64]),
+    Pressure(f64),
+}
+
 impl Loaded<'_> {
-    fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, bodies: &[Body], dimension: usize) {
+        match self.stress {
+            Stress::Traction(traction) => problems.vector(&format!("{path}.traction"), traction, dimension),
+            Stress::Pressure(pressure) => problems.number(&format!("{path}.pressure"), pressure),
+        };
         check_body(problems, &format!("{path}.body"), self.body, bodies);
         if let Some(region) = self.region {
             region.check(problems, &format!("{path}.region"), dimension);

@@ -1,9 +1,9 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
 use super::boundary::{Driving, Face, Rotation, Table};
-use super::build_error::vector;
 use super::filling::Means;
-use super::load::Loaded;
+use super::load::{Loaded, Pressure, Stress, Traction};
+use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::grid::Grid;
 use crate::mechanics::loads::ForceField;
@@ -25,10 +25,10 @@ impl Scene {
     ) -> Result<Loads<D>, BuildError> {
         let mut loads = self.given_as_they_are();
         if let Some(gravity) = &self.gravity {
-            let acceleration = vector("gravity.acceleration", &gravity.acceleration)?;
+            let acceleration = vector(&gravity.acceleration);
             let curve_in_time = curve("gravity.curve", gravity.curve.as_ref())?;
             if let Some(profile) = &gravity.profile {
-                let along = vector::<D>("gravity.profile.along", &profile.along)?.normalize();
+                let along = vector::<D>(&profile.along).normalize();
                 let factor = curve("gravity.profile.factor", Some(&profile.factor))?;
                 let field = move |_, x: &Vector<f64, D>, t| {
                     acceleration * (curve_in_time.value(t) * factor.value(along.dot(x)))
@@ -47,24 +47,26 @@ impl Scene {
         }
         for (i, prescribed) in self.prescribed.iter().enumerate() {
             let path = format!("prescribed[{i}]");
-            let region = prescribed.region.build::<D>().ok_or_else(|| BuildError::dimension::<D>(&path))?;
+            let region = prescribed.region.built(&path)?;
             let mut motion = std::array::from_fn(|_| None);
             if let Some(driving) = prescribed.given().next() {
                 motion = driving.motion(&path)?;
             }
             loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });
         }
-        for (i, traction) in self.tractions.iter().enumerate() {
-            let path = format!("tractions[{i}]");
-            let pressing = Pressing::Traction(vector(&format!("{path}.traction"), &traction.traction)?);
-            loads.surface.push(self.surface(&path, pressing, &traction.loaded(), means, grid, particles)?);
-        }
-        for (i, pressure) in self.pressures.iter().enumerate() {
-            let pressing = Pressing::Pressure(pressure.pressure);
-            let path = format!("pressures[{i}]");
-            loads.surface.push(self.surface(&path, pressing, &pressure.loaded(), means, grid, particles)?);
+        for (path, load) in self.surface_loads() {
+            loads.surface.push(self.surface(&path, &load, means, grid, particles)?);
         }
         Ok(loads)
+    }
+
+    /// All loads on surfaces with their paths, tractions first.
+    pub(super) fn surface_loads(&self) -> impl Iterator<Item = (String, Loaded<'_>)> {
+        let tractions = self.tractions.iter().map(Traction::loaded).enumerate();
+        let pressures = self.pressures.iter().map(Pressure::loaded).enumerate();
+        tractions
+            .map(|(i, load)| (format!("tractions[{i}]"), load))
+            .chain(pressures.map(|(i, load)| (format!("pressures[{i}]"), load)))
     }
 
     /// The points of a loaded surface. With the key `surface`, these are particles of the body; otherwise, new points on the surface of the
@@ -72,22 +74,25 @@ impl Scene {
     fn surface<const D: usize>(
         &self,
         path: &str,
-        pressing: Pressing<D>,
         on: &Loaded<'_>,
         means: &Means<'_>,
         grid: &Grid<D>,
         particles: &mut Particles<D>,
     ) -> Result<SurfaceLoad<D>, BuildError> {
         let curve = curve(&format!("{path}.curve"), on.curve.as_ref())?;
-        let built = |region: &super::shape::Shape| region.build::<D>().ok_or_else(|| BuildError::dimension::<D>(path));
-        let region = on.region.as_ref().map(built).transpose()?;
-        let Some((number, body)) = self.bodies.iter().enumerate().find(|(_, body)| body.name == on.body) else {
-            return Err(BuildError::dimension::<D>(path));
+        let pressing = match on.stress {
+            Stress::Traction(traction) => Pressing::Traction(vector(traction)),
+            Stress::Pressure(pressure) => Pressing::Pressure(pressure),
+        };
+        let region = on.region.as_ref().map(|region| region.built(path)).transpose()?;
+        let mut bodies = self.bodies.iter().enumerate();
+        let Some((number, body)) = bodies.find(|(_, body)| body.name == on.body) else {
+            return Err(nothing_loaded(path, on.body));
         };
         let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
         let points = match (&on.surface, &shape) {
             (Some(given), _) => {
-                let normal = vector::<D>(&format!("{path}.surface.normal"), &given.normal)?.normalize();
+                let normal = vector::<D>(&given.normal).normalize();
                 let spacing = grid.spacing / f64::from(body.particles_per_cell);
                 let loaded = |&p: &usize| {
                     let x = &particles.position[p];
@@ -103,7 +108,7 @@ impl Scene {
             (None, Some(shape)) => {
                 let facets = self.facets(body, shape, region.as_ref(), grid);
                 means.make_room(path, particles, facets.len())?;
-                let velocity = body.velocity.as_ref().map(|v| vector::<D>(path, v)).transpose()?;
+                let velocity = body.velocity.as_ref().map(|v| vector::<D>(v));
                 let mut points = Vec::new();
                 for facet in facets {
                     points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
@@ -120,7 +125,7 @@ impl Scene {
             (None, None) => Vec::new(),
         };
         if points.is_empty() {
-            return Err(BuildError::NoSurface { path: path.into(), body: on.body.into() });
+            return Err(nothing_loaded(path, on.body));
         }
         Ok(SurfaceLoad { pressing, curve, points })
     }
@@ -160,10 +165,10 @@ impl Driving<'_> {
 impl Rotation {
     fn built<const D: usize>(&self, path: &str) -> Result<loads::Rotation<D>, BuildError> {
         let axis = match &self.axis {
-            Some(axis) => vector::<3>(path, axis)?.into(),
+            Some(axis) => vector::<3>(axis).into(),
             None => [0.0, 0.0, 1.0],
         };
-        Ok(loads::Rotation::new(vector(path, &self.center)?, axis, curve(path, Some(&self.angle))?))
+        Ok(loads::Rotation::new(vector(&self.center), axis, curve(path, Some(&self.angle))?))
     }
 }
 
@@ -178,8 +183,7 @@ impl Table {
         for (i, motion) in motion.iter_mut().enumerate() {
             let points: Vec<[f64; 2]> = self.0.iter().filter_map(|row| Some([row.0, (*row.1.get(i)?)?])).collect();
             if !points.is_empty() {
-                *motion =
-                    Some(kind(Curve::new(points).map_err(|source| BuildError::Curve { path: path.into(), source })?));
+                *motion = Some(kind(Curve::new(points).map_err(|source| BuildError::at(path, source))?));
             }
         }
         Ok(motion)
@@ -189,7 +193,12 @@ impl Table {
 /// The factor of a load in time; 1 without a curve.
 fn curve(path: &str, given: Option<&super::curve::Curve>) -> Result<Curve, BuildError> {
     match given {
-        Some(curve) => Curve::new(curve.0.clone()).map_err(|source| BuildError::Curve { path: path.into(), source }),
+        Some(curve) => Curve::new(curve.0.clone()).map_err(|source| BuildError::at(path, source)),
         None => Ok(Curve::constant(1.0)),
     }
+}
+
+fn nothing_loaded(path: &str, body: &str) -> BuildError {
+    let what = format!("nothing of the surface of body {body:?} is loaded; enlarge the region or remove the load");
+    BuildError::at(path, what)
 }

@@ -15,7 +15,6 @@ pub mod load;
 pub mod output;
 pub mod particle_file;
 pub mod shape;
-pub mod shape_file;
 pub mod solver;
 pub mod surface_file;
 pub mod time;
@@ -23,19 +22,20 @@ pub mod transfer;
 
 mod build;
 mod build_error;
+mod file;
 mod filling;
 mod json;
 mod loading;
 mod overrides;
 mod place;
 mod read;
-mod scale;
 mod suggest;
 mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
 pub use build_error::BuildError;
+pub use file::ShapeFileError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
 pub use read::{MAX_BYTES, SceneError, read, read_file};
@@ -223,11 +223,10 @@ impl Scene {
     /// Whether nodes with little support from a body follow other nodes. In short steps a lumped mass holds such nodes, except where a node
     /// has more of a loaded surface than of the particles below. Adaptive steps become short at impacts.
     fn aggregates(&self) -> bool {
-        let loads =
-            self.tractions.iter().map(load::Traction::loaded).chain(self.pressures.iter().map(load::Pressure::loaded));
+        let computed = self.surface_loads().any(|(_, load)| load.surface.is_none());
         let long_steps = self.time.adaptive.is_none() && self.courant() > LONG_STEPS;
         let consistent = self.time.scheme().has_inertia() && self.time.lumping() == 0.0;
-        let needed = long_steps || consistent || loads.into_iter().any(|load| load.surface.is_none());
+        let needed = long_steps || consistent || computed;
         self.aggregation.or(self.ghost_stiffness.map(|factor| factor > 0.0)).unwrap_or(needed)
     }
 
@@ -371,11 +370,10 @@ impl Scene {
         if let Some(damping) = &self.damping {
             damping.check(problems);
         }
-        for (i, traction) in problems.few("tractions", &self.tractions).iter().enumerate() {
-            traction.check(problems, &format!("tractions[{i}]"), &self.bodies, dimension);
-        }
-        for (i, pressure) in problems.few("pressures", &self.pressures).iter().enumerate() {
-            pressure.check(problems, &format!("pressures[{i}]"), &self.bodies, dimension);
+        problems.few("tractions", &self.tractions);
+        problems.few("pressures", &self.pressures);
+        for (path, load) in self.surface_loads() {
+            load.check(problems, &path, &self.bodies, dimension);
         }
     }
 

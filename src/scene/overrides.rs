@@ -25,37 +25,20 @@ pub struct Override {
     value: Value,
 }
 
-/// An override that cannot be applied.
+/// An override that cannot be applied, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum OverrideError {
-    /// The argument is not of the form `KEY.PATH=JSON`.
-    #[error("the override {0:?} is not allowed; must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3")]
-    Form(String),
-    /// The value is neither JSON nor a word.
-    #[error("the value of the override {argument:?} is not JSON: {message}")]
-    Value {
-        /// The whole argument.
-        argument: String,
-        /// Message of the JSON parser.
-        message: String,
-    },
-    /// A key addresses a value that is not an object, or a number an entry that a list does not have.
-    #[error("the override {argument:?} leads nowhere: {at} {message}")]
-    Path {
-        /// The whole argument.
-        argument: String,
-        /// The part of the path that exists.
-        at: String,
-        /// The error at that part.
-        message: String,
-    },
-}
+#[error("{0}")]
+pub struct OverrideError(String);
 
 impl FromStr for Override {
     type Err = OverrideError;
 
     fn from_str(argument: &str) -> Result<Self, OverrideError> {
-        let form = || OverrideError::Form(argument.to_owned());
+        let form = || {
+            OverrideError(format!(
+                "the override {argument:?} is not allowed; must read KEY.PATH=JSON, such as time.step=0.01 or bodies.0.density=3"
+            ))
+        };
         let (key, text) = argument.split_once('=').ok_or_else(form)?;
         let steps = Some(key.trim()).filter(|key| is_path(key)).map(steps);
         let steps = steps.filter(|steps| steps.len() <= MAX_STEPS).ok_or_else(form)?;
@@ -63,8 +46,8 @@ impl FromStr for Override {
             Ok(value) => value,
             Err(_) if is_word(text.trim()) => Value::String(text.trim().to_owned()),
             Err(malformed) => {
-                let (argument, message) = (argument.to_owned(), malformed.message);
-                return Err(OverrideError::Value { argument, message });
+                let message = malformed.message;
+                return Err(OverrideError(format!("the value of the override {argument:?} is not JSON: {message}")));
             }
         };
         Ok(Self { argument: argument.to_owned(), steps, value })
@@ -92,7 +75,7 @@ impl Override {
         for (i, step) in self.steps.iter().enumerate() {
             let wrong = |message: String| {
                 let at = self.steps.get(..i).map(path).filter(|at| !at.is_empty()).unwrap_or("the scene".into());
-                OverrideError::Path { argument: self.argument.clone(), at, message }
+                OverrideError(format!("the override {:?} leads nowhere: {at} {message}", self.argument))
             };
             if here.is_null() && matches!(step, Step::Key(_)) {
                 *here = Value::Object(serde_json::Map::new());

@@ -1,8 +1,9 @@
 //! Particles from a CSV file: `x[,y[,z]],volume[,vx[,vy[,vz]]]`.
 
 use crate::tensor::Vector;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 /// Maximum number of particles in one file.
@@ -25,66 +26,19 @@ pub struct FileParticles<const D: usize> {
     pub velocities: Option<Vec<Vector<f64, D>>>,
 }
 
-/// A particle file that cannot be used. Lines and columns are counted from 1.
+/// A particle file that cannot be used: the line, and what is wrong there. Lines and columns are counted from 1.
 #[derive(Debug, thiserror::Error)]
-pub enum ParticleFileError {
-    /// The file cannot be read, or is not UTF-8.
-    #[error("line {line}: cannot be read: {source}")]
-    Io {
-        /// The line.
-        line: usize,
-        /// The cause.
-        source: std::io::Error,
-    },
-    /// A line is too long.
-    #[error("line {line}: is longer than {MAX_LINE} bytes")]
-    LongLine {
-        /// The line.
-        line: usize,
-    },
-    /// The first line does not name the columns.
-    #[error("line 1: the header {found:?} is not allowed; must be {expected:?} or {with_velocity:?}")]
-    Header {
-        /// The first line of the file.
-        found: String,
-        /// The expected header without velocities.
-        expected: String,
-        /// The expected header with velocities.
-        with_velocity: String,
-    },
-    /// A line has too few or too many columns.
-    #[error("line {line}: {found} columns are not allowed; must be {expected}, as in the header")]
-    Columns {
-        /// The line.
-        line: usize,
-        /// Columns found.
-        found: usize,
-        /// Columns of the header.
-        expected: usize,
-    },
-    /// A value is not a number, or not one that is allowed.
-    #[error("line {line}, column {column} ({name}): {found:?} is not allowed; must be {allowed}")]
-    Value {
-        /// The line.
-        line: usize,
-        /// The column.
-        column: usize,
-        /// Name of the column in the header.
-        name: &'static str,
-        /// The text found.
-        found: String,
-        /// The allowed values.
-        allowed: &'static str,
-    },
-    /// The file has a header only.
-    #[error("the file has no particles")]
-    Empty,
-    /// The file has too many particles.
-    #[error("line {line}: more than {MAX_PARTICLES} particles")]
-    TooMany {
-        /// The line.
-        line: usize,
-    },
+#[error("{0}")]
+pub struct ParticleFileError(String);
+
+impl ParticleFileError {
+    fn in_line(line: usize, what: impl Display) -> Self {
+        Self(format!("line {line}: {what}"))
+    }
+}
+
+fn unreadable(line: usize) -> impl Fn(io::Error) -> ParticleFileError {
+    move |source| ParticleFileError::in_line(line, format_args!("cannot be read: {source}"))
 }
 
 /// Reads the particle file at `path`.
@@ -104,7 +58,7 @@ pub enum ParticleFileError {
 /// # Errors
 /// The first wrong line, and the wrong column in that line.
 pub fn read_file<const D: usize>(path: &Path) -> Result<FileParticles<D>, ParticleFileError> {
-    let file = File::open(path).map_err(|source| ParticleFileError::Io { line: 1, source })?;
+    let file = File::open(path).map_err(unreadable(1))?;
     read(BufReader::new(file))
 }
 
@@ -136,7 +90,9 @@ pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, Part
         plain
     } else {
         let (expected, with_velocity) = (plain.join(","), moving.join(","));
-        return Err(ParticleFileError::Header { found: shortened(header), expected, with_velocity });
+        let found = shortened(header);
+        let what = format!("the header {found:?} is not allowed; must be {expected:?} or {with_velocity:?}");
+        return Err(ParticleFileError::in_line(1, what));
     };
 
     let mut particles = FileParticles { positions: Vec::new(), volumes: Vec::new(), velocities: None };
@@ -147,11 +103,13 @@ pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, Part
             continue;
         }
         if particles.volumes.len() == MAX_PARTICLES {
-            return Err(ParticleFileError::TooMany { line });
+            return Err(ParticleFileError::in_line(line, format_args!("more than {MAX_PARTICLES} particles")));
         }
         let found = text.split(',').count();
         if found != names.len() {
-            return Err(ParticleFileError::Columns { line, found, expected: names.len() });
+            let expected = names.len();
+            let what = format!("{found} columns are not allowed; must be {expected}, as in the header");
+            return Err(ParticleFileError::in_line(line, what));
         }
         let mut row = [0.0; 7];
         for (column, ((value, name), word)) in row.iter_mut().zip(&names).zip(text.split(',')).enumerate() {
@@ -162,7 +120,7 @@ pub fn read<const D: usize>(text: impl BufRead) -> Result<FileParticles<D>, Part
         velocities.push(Vector::from_fn(|k, _| row[D + 1 + k]));
     }
     if particles.volumes.is_empty() {
-        return Err(ParticleFileError::Empty);
+        return Err(ParticleFileError("the file has no particles".to_owned()));
     }
     particles.velocities = (names.len() > D + 1).then_some(velocities);
     Ok(particles)
@@ -175,7 +133,9 @@ fn number(word: &str, line: usize, column: usize, name: &'static str) -> Result<
         Ok(x) if x.abs() <= 1e100 && (!volume || x > 0.0) => Ok(x),
         _ => {
             let allowed = if volume { "a finite number > 0" } else { "a finite number, at most 1e100 in size" };
-            Err(ParticleFileError::Value { line, column, name, found: shortened(word), allowed })
+            let found = shortened(word);
+            let place = format!("line {line}, column {column} ({name})");
+            Err(ParticleFileError(format!("{place}: {found:?} is not allowed; must be {allowed}")))
         }
     }
 }
@@ -196,9 +156,11 @@ impl<R: BufRead> Lines<R> {
         let line = self.line;
         let mut text = String::new();
         let read = self.text.by_ref().take(MAX_LINE + 1).read_line(&mut text);
-        match read.map_err(|source| ParticleFileError::Io { line, source })? {
+        match read.map_err(unreadable(line))? {
             0 => Ok(None),
-            length if length as u64 > MAX_LINE => Err(ParticleFileError::LongLine { line }),
+            length if length as u64 > MAX_LINE => {
+                Err(ParticleFileError::in_line(line, format_args!("is longer than {MAX_LINE} bytes")))
+            }
             _ => Ok(Some(text)),
         }
     }

@@ -1,6 +1,10 @@
 //! Positions of keys and values in the text of a scene.
 
 use crate::problems::Place;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use serde_json::value::RawValue;
+use std::fmt;
 
 /// Characters of the line shown on each side of the caret.
 const CONTEXT: usize = 60;
@@ -67,102 +71,56 @@ pub(super) fn path(steps: &[Step]) -> String {
 /// The byte offset in `text` (valid JSON) of the key or list entry named by `steps`, and the number of steps that lead there. If the key is
 /// absent, both belong to its innermost parent that is present. `None` if even the first step is absent.
 pub(super) fn locate(text: &str, steps: &[Step]) -> Option<(usize, usize)> {
-    let mut scanner = Scanner { bytes: text.as_bytes(), at: 0 };
+    let mut here = text;
     let mut found = None;
     for (i, step) in steps.iter().enumerate() {
-        match scanner.enter(step) {
-            Some(place) => found = Some((place, i + 1)),
-            None => break,
-        }
+        let Some((name, value)) = entry(here, step) else { break };
+        // Both borrow from the text.
+        found = Some((name.as_ptr().addr() - text.as_ptr().addr(), i + 1));
+        here = value;
     }
     found
 }
 
-/// A scanner over text that is known to be valid JSON.
-struct Scanner<'a> {
-    bytes: &'a [u8],
-    at: usize,
+/// The name of an entry of an object or a list, and its value. An entry of a list has its value for a name.
+fn entry<'a>(json: &'a str, step: &Step) -> Option<(&'a str, &'a str)> {
+    match step {
+        Step::Index(index) => {
+            let list: Vec<&RawValue> = serde_json::from_str(json).ok()?;
+            list.get(*index).map(|value| (value.get(), value.get()))
+        }
+        Step::Key(key) => {
+            let quoted = format!("\"{key}\"");
+            let Entries(entries) = serde_json::from_str(json).ok()?;
+            entries.iter().map(|(name, value)| (name.get(), value.get())).find(|(name, _)| *name == quoted)
+        }
+    }
 }
 
-impl Scanner<'_> {
-    fn peek(&self) -> Option<u8> {
-        self.bytes.get(self.at).copied()
+/// The entries of an object as they are written.
+struct Entries<'a>(Vec<(&'a RawValue, &'a RawValue)>);
+
+impl<'de> Deserialize<'de> for Entries<'de> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(EntriesVisitor)
+    }
+}
+
+struct EntriesVisitor;
+
+impl<'de> Visitor<'de> for EntriesVisitor {
+    type Value = Entries<'de>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
     }
 
-    fn skip_space(&mut self) {
-        while self.peek().is_some_and(|byte| b" \t\r\n:,".contains(&byte)) {
-            self.at += 1;
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entries<'de>, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
         }
-    }
-
-    /// Skips a string and returns its bytes, quotes excluded, escapes unresolved.
-    fn string(&mut self) -> &[u8] {
-        let start = self.at + 1;
-        self.at = start;
-        while let Some(byte) = self.peek() {
-            match byte {
-                b'"' => break,
-                b'\\' => self.at += 2,
-                _ => self.at += 1,
-            }
-        }
-        let end = self.at.min(self.bytes.len());
-        self.at = end + 1;
-        self.bytes.get(start..end).unwrap_or_default()
-    }
-
-    fn skip_value(&mut self) {
-        let mut depth = 0_usize;
-        loop {
-            self.skip_space();
-            match self.peek() {
-                None => return,
-                Some(b'"') => {
-                    self.string();
-                }
-                Some(b'{' | b'[') => {
-                    depth += 1;
-                    self.at += 1;
-                }
-                Some(b'}' | b']') => {
-                    depth = depth.saturating_sub(1);
-                    self.at += 1;
-                }
-                Some(_) => {
-                    while self.peek().is_some_and(|byte| !b" \t\r\n:,{}[]\"".contains(&byte)) {
-                        self.at += 1;
-                    }
-                }
-            }
-            if depth == 0 {
-                return;
-            }
-        }
-    }
-
-    /// Moves from the start of a value to the entry of that value named by `step`, and returns the offset of the name.
-    fn enter(&mut self, step: &Step) -> Option<usize> {
-        self.skip_space();
-        let open = self.peek()?;
-        let mut index = 0;
-        self.at += 1;
-        loop {
-            self.skip_space();
-            let place = self.at;
-            match (self.peek()?, open, step) {
-                (b'}' | b']', _, _) => return None,
-                (b'"', b'{', step) => {
-                    let key = self.string();
-                    if matches!(step, Step::Key(wanted) if wanted.as_bytes() == key) {
-                        return Some(place);
-                    }
-                }
-                (_, b'[', Step::Index(wanted)) if *wanted == index => return Some(place),
-                (_, b'[', Step::Index(_)) => index += 1,
-                _ => return None,
-            }
-            self.skip_value();
-        }
+        Ok(Entries(entries))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::json::{Malformed, parse, segments};
 use super::overrides::{Override, OverrideError};
 use super::place::{Step, locate, path, steps};
-use super::{Scene, accuracy, keys, suggest};
+use super::{Scene, accuracy, keys};
 use crate::problems::{KEPT, Place, Problems};
 use serde_json::Value;
 use std::fs::File;
@@ -141,31 +141,18 @@ pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
         SceneError::Values(problems)
     };
     let chosen = accuracy::set_keys(&mut json).map_err(placed)?;
-    let scene: Scene = serde_path_to_error::deserialize(&json).map_err(|error| {
-        let malformed = |steps: &[Step], message: &str| Malformed {
-            path: path(steps),
-            message: explain(message),
-            place: place(steps),
-            others: Vec::new(),
-        };
-        let (first, said) = (segments(error.path()), error.inner().to_string());
-        // serde reports one error for each key. Further keys missing from that object are reported here.
-        let another = |(steps, message): &(Vec<Step>, String)| {
-            *steps != first || (message.starts_with("missing field") && *message != said)
-        };
-        let others = keys::wrong(&json).into_iter().filter(another).take(KEPT - 1);
-        let others = others.map(|(steps, message)| malformed(&steps, &message)).collect();
-        Malformed { others, ..malformed(&first, &said) }
-    })?;
-    if let Some((steps, message)) = serde_json::to_value(&scene).ok().and_then(|read| misshapen(&json, &read)) {
-        return Err(Malformed {
-            path: path(&steps),
-            message: message.to_owned(),
-            place: place(&steps),
-            others: Vec::new(),
-        }
-        .into());
+    let malformed = |(steps, message): (Vec<Step>, String)| Malformed {
+        path: path(&steps),
+        message: shortened(message),
+        place: place(&steps),
+        others: Vec::new(),
+    };
+    let mut wrong = keys::wrong(&json).into_iter().take(KEPT).map(malformed);
+    if let Some(first) = wrong.next() {
+        return Err(Malformed { others: wrong.collect(), ..first }.into());
     }
+    let scene: Scene = serde_path_to_error::deserialize(&json)
+        .map_err(|error| malformed((segments(error.path()), error.inner().to_string())))?;
     let problems = scene.check();
     if problems.is_empty() { Ok(Scene { chosen, ..scene.complete() }) } else { Err(placed(problems)) }
 }
@@ -198,30 +185,6 @@ fn make_whole(json: &mut Value) {
     }
 }
 
-/// Finds a value that serde accepts but the schema does not. serde also reads a list as an object, with the fields in declaration order,
-/// and an object as a word. The next version could read such a scene differently.
-fn misshapen(written: &Value, read: &Value) -> Option<(Vec<Step>, &'static str)> {
-    let within = |step: Step, written, read| {
-        misshapen(written, read).map(|(mut steps, message)| {
-            steps.insert(0, step);
-            (steps, message)
-        })
-    };
-    match (written, read) {
-        (Value::Array(_), Value::Object(_)) => Some((Vec::new(), "invalid type: a list, expected an object")),
-        (Value::Object(_), Value::String(_)) => Some((Vec::new(), "invalid type: an object, expected a word")),
-        (Value::Array(written), Value::Array(read)) => {
-            let pairs = written.iter().zip(read).enumerate();
-            pairs.map(|(i, (written, read))| within(Step::Index(i), written, read)).find_map(|found| found)
-        }
-        (Value::Object(written), Value::Object(read)) => {
-            let pairs = written.iter().filter_map(|(key, value)| Some((key, value, read.get(key)?)));
-            pairs.map(|(key, written, read)| within(Step::Key(key.clone()), written, read)).find_map(|found| found)
-        }
-        _ => None,
-    }
-}
-
 /// The source of the value at `steps`: the last override that set the value, or the text.
 fn find(steps: &[Step], text: &str, overrides: &[Override]) -> Option<Place> {
     let within = |one: &Override| steps.starts_with(&one.steps);
@@ -238,31 +201,9 @@ fn find(steps: &[Step], text: &str, overrides: &[Override]) -> Option<Place> {
 /// Maximum characters of a message, which quotes the text.
 const MESSAGE: usize = 600;
 
-/// serde's message, reworded for the author of a scene. A suggestion follows a misspelt word.
-fn explain(message: &str) -> String {
-    if message.chars().count() > MESSAGE {
-        return message.chars().take(MESSAGE).chain("…".chars()).collect();
+fn shortened(message: String) -> String {
+    if message.chars().count() <= MESSAGE {
+        return message;
     }
-    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
-        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-        let meant = quoted.split_first().and_then(|(word, allowed)| suggest::nearest(word, allowed));
-        return match meant {
-            Some(meant) => format!("{message}; did you mean `{meant}`?"),
-            None => message.to_owned(),
-        };
-    }
-    let Some((found, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
-    let expected = match expected {
-        "f64" => "a number",
-        "u8" => "a whole number from 0 to 255",
-        "u32" => "a whole number from 0 to 4294967295",
-        "a sequence" => "a list",
-        "a boolean" => "true or false",
-        "map with a single key" => "an object with exactly one key",
-        "string or map" => "a word or an object with one key",
-        struct_name if struct_name.starts_with("struct ") => "an object",
-        row if row.starts_with("tuple struct Row") => "a row [time, [components]]",
-        other => other,
-    };
-    format!("{found}, expected {expected}")
+    message.chars().take(MESSAGE).chain("…".chars()).collect()
 }

@@ -1,14 +1,15 @@
 //! Regions of space in a scene.
 
+use super::build_error::BuildError;
 use super::image_file::ImageFile;
-use super::shape_file::ShapeFile;
 use super::surface_file::SurfaceFile;
-use super::vector::{check_normal, vector};
-use crate::problems::{LARGEST, MOST, Number, Problems};
+use super::vector::{self, corners, direction};
+use crate::problems::{LARGEST, MOST, Problems};
 use crate::shape::{self, EDGE, PolygonError, rotation};
 use crate::tensor::{Tensor, Vector, identity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A region of space.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -115,113 +116,121 @@ impl Shape {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn build<const D: usize>(&self) -> Option<shape::Shape<D>> {
-        let all = |parts: &[Self]| parts.iter().map(Self::build).collect::<Option<Vec<_>>>();
-        let part = |part: &Self| part.build().map(Box::new);
+        self.checked(&mut Problems::default(), "")
+    }
+
+    /// The geometry; an error for the key `path` if it has another dimension than `D`.
+    pub(super) fn built<const D: usize>(&self, path: &str) -> Result<shape::Shape<D>, BuildError> {
+        self.build().ok_or_else(|| BuildError::at(path, format!("does not fit {D} dimensions")))
+    }
+
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+        match dimension {
+            1 => drop(self.checked::<1>(problems, path)),
+            2 => drop(self.checked::<2>(problems, path)),
+            _ => drop(self.checked::<3>(problems, path)),
+        }
+    }
+
+    /// The geometry; `None` if it is not allowed, with the reasons in `problems`, and while its file has not been read.
+    pub(super) fn checked<const D: usize>(&self, problems: &mut Problems, path: &str) -> Option<shape::Shape<D>> {
+        let at = |key: &str| format!("{path}.{key}");
         Some(match self {
-            Self::Box { min, max } => shape::Block { min: vector(min)?, max: vector(max)? }.into(),
-            Self::Ball { center, radius } => shape::Ball { center: vector(center)?, radius: *radius }.into(),
+            Self::Box { min, max } => {
+                let [min, max] = corners(problems, &at("box"), min, max)?;
+                shape::Block { min, max }.into()
+            }
+            Self::Ball { center, radius } => {
+                let center = vector::checked(problems, &at("ball.center"), center);
+                let allowed = problems.positive(&at("ball.radius"), *radius);
+                shape::Ball { center: center.filter(|_| allowed)?, radius: *radius }.into()
+            }
             Self::HalfSpace { point, normal } => {
-                shape::HalfSpace { point: vector(point)?, normal: vector(normal)? }.into()
+                let point = vector::checked(problems, &at("half_space.point"), point);
+                let normal = direction(problems, &at("half_space.normal"), normal);
+                shape::HalfSpace { point: point?, normal: normal? }.into()
             }
-            Self::Polygon(vertices) => polygon::<D>(vertices)?.ok()?.into(),
-            Self::Cylinder { from, to, radius } => cone(from, to, [*radius; 2])?.into(),
-            Self::Cone { from, to, radii } => cone(from, to, *radii)?.into(),
-            Self::Union(parts) => shape::Union(all(parts)?).into(),
-            Self::Difference { of, minus } => shape::Difference { of: part(of)?, minus: part(minus)? }.into(),
-            Self::Intersection(parts) => shape::Intersection(all(parts)?).into(),
-            Self::Rotated { of, about, angle, axis } => {
-                let axis = axis.as_ref().map(|axis| vector(axis).ok_or(())).transpose().ok()?;
-                let rotation = rotation(*angle, axis.as_ref())?;
-                similar(of.build()?, vector(about)?, rotation, 1.0)
+            Self::Polygon(vertices) => polygon(vertices, problems, &at("polygon"))?.into(),
+            Self::Cylinder { from, to, radius } => {
+                let allowed = problems.positive(&at("cylinder.radius"), *radius);
+                cone(from, to, [*radius; 2], problems, &at("cylinder")).filter(|_| allowed)?.into()
             }
-            Self::Scaled { of, about, factor } => similar(of.build()?, vector(about)?, identity(), *factor),
-            Self::Surface(file) => file.surface.get()?.in_dimension()?.into(),
-            Self::Image(file) => file.solid()?.into(),
+            Self::Cone { from, to, radii } => {
+                let allowed = check_radii(*radii, problems, &at("cone.radii"));
+                cone(from, to, *radii, problems, &at("cone")).filter(|_| allowed)?.into()
+            }
+            Self::Union(parts) => {
+                let allowed = has_few(parts, problems, &at("union"));
+                shape::Union(self.checked_parts(problems, path).filter(|_| allowed)?).into()
+            }
+            Self::Intersection(parts) => {
+                let allowed = has_few(parts, problems, &at("intersection"));
+                shape::Intersection(self.checked_parts(problems, path).filter(|_| allowed)?).into()
+            }
+            Self::Difference { .. } => {
+                let [of, minus] = self.checked_parts(problems, path)?.try_into().ok()?;
+                shape::Difference { of: Box::new(of), minus: Box::new(minus) }.into()
+            }
+            Self::Rotated { about, angle, axis, .. } => {
+                let of = self.checked_parts(problems, path);
+                let about = vector::checked(problems, &at("rotated.about"), about);
+                let allowed = problems.number(&at("rotated.angle"), *angle);
+                let of = of.filter(|_| allowed)?.pop()?;
+                let axis = rotation_axis(axis.as_deref(), problems, &at("rotated"))?;
+                similar(of, about?, rotation(*angle, axis.as_ref())?, 1.0)
+            }
+            Self::Scaled { about, factor, .. } => {
+                let of = self.checked_parts(problems, path);
+                let about = vector::checked(problems, &at("scaled.about"), about);
+                let allowed = problems.positive(&at("scaled.factor"), *factor);
+                similar(of?.pop()?, about.filter(|_| allowed)?, identity(), *factor)
+            }
+            Self::Surface(file) => surface(file, problems, &at("surface"))?.into(),
+            Self::Image(file) => file.build(problems, &at("image"))?.into(),
         })
     }
 
-    /// Checks the shape, and returns whether it is allowed.
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+    /// All parts, checked each.
+    fn checked_parts<const D: usize>(&self, problems: &mut Problems, path: &str) -> Option<Vec<shape::Shape<D>>> {
+        let checked = |(key, part): (String, &Self)| part.checked(problems, &format!("{path}.{key}"));
+        let parts: Vec<_> = self.parts().into_iter().map(checked).collect();
+        parts.into_iter().collect()
+    }
+
+    /// The shapes that this shape is made of, with their keys.
+    fn parts(&self) -> Vec<(String, &Self)> {
         match self {
-            Self::Box { min, max } => check_box(min, max, problems, &format!("{path}.box"), dimension),
-            Self::Ball { center, radius } => {
-                let ok = problems.vector(&format!("{path}.ball.center"), center, dimension);
-                problems.positive(&format!("{path}.ball.radius"), *radius) && ok
-            }
-            Self::HalfSpace { point, normal } => {
-                let ok = problems.vector(&format!("{path}.half_space.point"), point, dimension);
-                check_normal(problems, &format!("{path}.half_space.normal"), normal, dimension) && ok
-            }
-            Self::Polygon(vertices) => check_polygon(vertices, problems, &format!("{path}.polygon"), dimension),
-            Self::Cylinder { from, to, radius } => {
-                let path = format!("{path}.cylinder");
-                let ok = problems.positive(&format!("{path}.radius"), *radius);
-                check_axis(from, to, *radius, problems, &path, dimension) && ok
-            }
-            Self::Cone { from, to, radii } => {
-                let path = format!("{path}.cone");
-                let ok = check_radii(*radii, problems, &format!("{path}.radii"));
-                check_axis(from, to, radii[0].max(radii[1]), problems, &path, dimension) && ok
-            }
-            Self::Union(parts) => check_parts(parts, problems, &format!("{path}.union"), dimension),
-            Self::Difference { of, minus } => {
-                let ok = of.check(problems, &format!("{path}.difference.of"), dimension);
-                minus.check(problems, &format!("{path}.difference.minus"), dimension) && ok
-            }
-            Self::Intersection(parts) => check_parts(parts, problems, &format!("{path}.intersection"), dimension),
-            Self::Rotated { of, about, angle, axis } => {
-                let path = format!("{path}.rotated");
-                let mut ok = of.check(problems, &format!("{path}.of"), dimension);
-                ok &= problems.vector(&format!("{path}.about"), about, dimension);
-                ok &= problems.number(&format!("{path}.angle"), *angle);
-                ok && check_rotation_axis(axis.as_deref(), problems, &path, dimension)
-            }
-            Self::Scaled { of, about, factor } => {
-                let path = format!("{path}.scaled");
-                let mut ok = of.check(problems, &format!("{path}.of"), dimension);
-                ok &= problems.vector(&format!("{path}.about"), about, dimension);
-                problems.positive(&format!("{path}.factor"), *factor) && ok
-            }
-            Self::Surface(file) => check_surface(file, problems, &format!("{path}.surface"), dimension),
-            Self::Image(file) => file.check(problems, &format!("{path}.image"), dimension),
+            Self::Union(parts) => numbered("union", parts),
+            Self::Intersection(parts) => numbered("intersection", parts),
+            Self::Difference { of, minus } => vec![("difference.of".into(), of), ("difference.minus".into(), minus)],
+            Self::Rotated { of, .. } => vec![("rotated.of".into(), of)],
+            Self::Scaled { of, .. } => vec![("scaled.of".into(), of)],
+            _ => Vec::new(),
         }
     }
 
     /// Whether pixels are part of the shape.
     pub(super) fn has_pixels(&self) -> bool {
-        let mut any = false;
-        let _ = self.each_file("", &mut |_, file| {
-            any |= matches!(file, ShapeFile::Image(_));
-            Ok::<(), ()>(())
-        });
-        any
+        matches!(self, Self::Image(_)) || self.parts().iter().any(|(_, part)| part.has_pixels())
     }
 
-    /// Visits the files of the shape, each with its path in the scene.
-    pub(super) fn each_file<E>(
-        &self,
-        path: &str,
-        visit: &mut impl FnMut(&str, ShapeFile<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let mut all = |parts: &[Self], key: &str| {
-            let mut parts = parts.iter().enumerate();
-            parts.try_for_each(|(i, part)| part.each_file(&format!("{path}.{key}[{i}]"), visit))
-        };
-        match self {
-            Self::Union(parts) => all(parts, "union"),
-            Self::Intersection(parts) => all(parts, "intersection"),
-            Self::Difference { of, minus } => {
-                of.each_file(&format!("{path}.difference.of"), visit)?;
-                minus.each_file(&format!("{path}.difference.minus"), visit)
+    /// Reads the files of the shape from `folder`.
+    pub(super) fn read_files(&self, path: &str, folder: &Path) -> Result<(), BuildError> {
+        let (key, file, read) = match self {
+            Self::Surface(surface) => ("surface", &surface.file, surface.read(folder)),
+            Self::Image(image) => ("image", &image.file, image.read(folder)),
+            _ => {
+                let mut parts = self.parts().into_iter();
+                return parts.try_for_each(|(key, part)| part.read_files(&format!("{path}.{key}"), folder));
             }
-            Self::Rotated { of, .. } => of.each_file(&format!("{path}.rotated.of"), visit),
-            Self::Scaled { of, .. } => of.each_file(&format!("{path}.scaled.of"), visit),
-            Self::Surface(file) => visit(&format!("{path}.surface.file"), ShapeFile::Surface(file)),
-            Self::Image(file) => visit(&format!("{path}.image.file"), ShapeFile::Image(file)),
-            Self::Box { .. } | Self::Ball { .. } | Self::HalfSpace { .. } => Ok(()),
-            Self::Polygon(_) | Self::Cylinder { .. } | Self::Cone { .. } => Ok(()),
-        }
+        };
+        let place = folder.join(file);
+        read.map_err(|why| BuildError::at(format!("{path}.{key}.file"), format!("{} {why}", place.display())))
     }
+}
+
+fn numbered<'a>(key: &str, parts: &'a [Shape]) -> Vec<(String, &'a Shape)> {
+    parts.iter().take(MOST).enumerate().map(|(i, part)| (format!("{key}[{i}]"), part)).collect()
 }
 
 /// A solid, rotated and scaled. A surface of triangles stays a surface with moved vertices, which can still be cut for whole rows of boxes.
@@ -237,33 +246,44 @@ fn similar<const D: usize>(
     }
 }
 
-fn refused(problems: &mut Problems, path: &str, value: &str, allowed: &str) -> bool {
-    problems.refuse(path, value, allowed);
-    false
-}
-
-/// The polygon, or the reason why it is not allowed; `None` unless every vertex has `D` components.
-fn polygon<const D: usize>(vertices: &[Vec<f64>]) -> Option<Result<shape::Polygon<D>, PolygonError>> {
-    let vertices = vertices.iter().map(|x| vector(x)).collect::<Option<Vec<_>>>()?;
-    Some(shape::Polygon::new(vertices))
-}
-
-fn cone<const D: usize>(from: &[f64], to: &[f64], radii: [f64; 2]) -> Option<shape::Cone<D>> {
-    shape::Cone::new([vector(from)?, vector(to)?], radii)
-}
-
-fn check_box(min: &[f64], max: &[f64], problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    let mut ok = problems.vector(&format!("{path}.min"), min, dimension);
-    ok &= problems.vector(&format!("{path}.max"), max, dimension);
-    if !ok {
-        return false;
+/// The polygon; `None` if it is not allowed, with the reasons in `problems`.
+fn polygon<const D: usize>(vertices: &[Vec<f64>], problems: &mut Problems, path: &str) -> Option<shape::Polygon<D>> {
+    if D != 2 {
+        problems.refuse(path, "a polygon", format!("it needs a grid of 2 dimensions, and this one has {D}"));
+        return None;
     }
-    for (k, (&min, &max)) in min.iter().zip(max).enumerate() {
-        let allowed = format!("must be greater than min[{k}] = {}", Number(min));
-        problems.require(max > min, &format!("{path}.max[{k}]"), Number(max), allowed);
-        ok &= max > min;
+    let checked = |(i, x): (usize, &Vec<f64>)| vector::checked(problems, &format!("{path}[{i}]"), x);
+    let corners: Vec<_> = vertices.iter().take(MOST).enumerate().map(checked).collect();
+    if problems.few(path, vertices).len() < vertices.len() {
+        return None;
     }
-    ok
+    let refuse = |error: &PolygonError| {
+        let path = error.vertex().map_or(path.to_owned(), |vertex| format!("{path}[{vertex}]"));
+        problems.refuse(&path, error, PolygonError::ALLOWED);
+    };
+    shape::Polygon::new(corners.into_iter().collect::<Option<_>>()?).inspect_err(refuse).ok()
+}
+
+/// The cone around the axis between two ends; `None` if it is not allowed, with the reasons in `problems`.
+fn cone<const D: usize>(
+    from: &[f64],
+    to: &[f64],
+    radii: [f64; 2],
+    problems: &mut Problems,
+    path: &str,
+) -> Option<shape::Cone<D>> {
+    if D < 2 {
+        problems.refuse(path, "a solid around an axis", "a line has none: use a box");
+        return None;
+    }
+    let ends = [("from", from), ("to", to)].map(|(key, x)| vector::checked(problems, &format!("{path}.{key}"), x));
+    let [from, to] = ends;
+    let (from, to): (Vector<f64, D>, Vector<f64, D>) = (from?, to?);
+    if (to - from).norm() <= EDGE * radii[0].max(radii[1]) {
+        let allowed = "must differ from `from`: the two give the axis";
+        problems.refuse(&format!("{path}.to"), format!("{:?}", to.as_slice()), allowed);
+    }
+    shape::Cone::new([from, to], radii)
 }
 
 /// Checks the radii of a cone. One of them may be 0.
@@ -273,74 +293,42 @@ fn check_radii(radii: [f64; 2], problems: &mut Problems, path: &str) -> bool {
         ok &= problems.between(&format!("{path}[{i}]"), radius, 0.0, LARGEST);
     }
     if ok && radii == [0.0, 0.0] {
-        return refused(problems, path, "[0, 0]", "one of the two must be > 0");
+        problems.refuse(path, "[0, 0]", "one of the two must be > 0");
+        return false;
     }
     ok
 }
 
-/// Checks the axis of a rotated shape: needed in 3D, and not allowed in 2D.
-fn check_rotation_axis(axis: Option<&[f64]>, problems: &mut Problems, path: &str, dimension: usize) -> bool {
+/// The axis of a rotated shape: needed in 3D, and not allowed in 2D. `None` if it is not allowed, with the reason in `problems`.
+fn rotation_axis<const D: usize>(
+    axis: Option<&[f64]>,
+    problems: &mut Problems,
+    path: &str,
+) -> Option<Option<Vector<f64, D>>> {
     let axis_path = format!("{path}.axis");
-    match (axis, dimension) {
-        (Some(axis), 3) => check_normal(problems, &axis_path, axis, dimension),
-        (None, 2) => true,
-        (None, 3) => refused(problems, path, "a rotation without an axis", "give its \"axis\", a direction"),
-        (Some(_), 2) => refused(problems, &axis_path, "an axis", "in 2 dimensions it is the third: remove it"),
-        _ => refused(problems, path, "a rotation", "a line has no directions to turn in"),
+    match (axis, D) {
+        (Some(axis), 3) => return direction(problems, &axis_path, axis).map(Some),
+        (None, 2) => return Some(None),
+        (None, 3) => problems.refuse(path, "a rotation without an axis", "give its \"axis\", a direction"),
+        (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2 dimensions it is the third: remove it"),
+        _ => problems.refuse(path, "a rotation", "a line has no directions to turn in"),
     }
+    None
 }
 
-fn check_surface(surface: &SurfaceFile, problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    if dimension != 3 {
-        let allowed = format!("it needs a grid of 3 dimensions, and this one has {dimension}");
-        return refused(problems, path, "a surface", &allowed);
+/// The surface; `None` if it is not allowed, with the reason in `problems`, and while its file has not been read.
+fn surface<const D: usize>(file: &SurfaceFile, problems: &mut Problems, path: &str) -> Option<shape::Surface<D>> {
+    if D != 3 {
+        problems.refuse(path, "a surface", format!("it needs a grid of 3 dimensions, and this one has {D}"));
+        return None;
     }
-    if !surface.has_format() {
-        let value = format!("{:?}", surface.file);
-        return refused(problems, &format!("{path}.file"), &value, "must end in .stl or .ply");
-    }
-    true
+    let found = format_args!("{:?}", file.file);
+    problems.require(file.has_format(), &format!("{path}.file"), found, "must end in .stl or .ply");
+    file.surface.get()?.in_dimension()
 }
 
-fn check_polygon(vertices: &[Vec<f64>], problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    if dimension != 2 {
-        let allowed = format!("it needs a grid of 2 dimensions, and this one has {dimension}");
-        return refused(problems, path, "a polygon", &allowed);
-    }
-    let mut ok = vertices.len() <= MOST;
-    for (i, vertex) in problems.few(path, vertices).iter().enumerate() {
-        ok &= problems.vector(&format!("{path}[{i}]"), vertex, dimension);
-    }
-    match polygon::<2>(vertices).filter(|_| ok) {
-        Some(Err(error)) => {
-            let path = error.vertex().map_or(path.to_owned(), |vertex| format!("{path}[{vertex}]"));
-            refused(problems, &path, &error.to_string(), PolygonError::ALLOWED)
-        }
-        Some(Ok(_)) => true,
-        None => false,
-    }
-}
-
-/// Checks the two ends of a cylinder or cone.
-fn check_axis(from: &[f64], to: &[f64], radius: f64, problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    if dimension < 2 {
-        return refused(problems, path, "a solid around an axis", "a line has none: use a box");
-    }
-    let mut ok = problems.vector(&format!("{path}.from"), from, dimension);
-    ok &= problems.vector(&format!("{path}.to"), to, dimension);
-    let length = from.iter().zip(to).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();
-    if ok && length <= EDGE * radius {
-        let allowed = "must differ from `from`: the two give the axis";
-        return refused(problems, &format!("{path}.to"), &format!("{to:?}"), allowed);
-    }
-    ok
-}
-
-fn check_parts(parts: &[Shape], problems: &mut Problems, path: &str, dimension: usize) -> bool {
-    let mut ok = (1..=MOST).contains(&parts.len());
+/// Whether a union or an intersection has an allowed number of shapes.
+fn has_few(parts: &[Shape], problems: &mut Problems, path: &str) -> bool {
     problems.require(!parts.is_empty(), path, "an empty list", "must have at least one shape");
-    for (i, part) in problems.few(path, parts).iter().enumerate() {
-        ok &= part.check(problems, &format!("{path}[{i}]"), dimension);
-    }
-    ok
+    !problems.few(path, parts).is_empty()
 }

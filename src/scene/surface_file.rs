@@ -1,5 +1,6 @@
 //! Surfaces of triangles from files of STL and PLY.
 
+use super::file::{ShapeFileError, open};
 use crate::shape::{Surface, SurfaceError};
 use crate::tensor::Vector;
 use ply_rs_bw::parser::Parser;
@@ -7,7 +8,7 @@ use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -26,37 +27,6 @@ pub struct SurfaceFile {
     /// The surface, once the file has been read.
     #[serde(skip)]
     pub(super) surface: OnceLock<Surface<3>>,
-}
-
-/// A file that gives no solid.
-#[derive(Debug, thiserror::Error)]
-pub enum SurfaceFileError {
-    /// The file cannot be read, or does not have the format of its ending.
-    #[error("cannot be read: {0}")]
-    Io(#[from] io::Error),
-    /// The path is a folder, a device or a pipe.
-    #[error("is no regular file")]
-    NoFile,
-    /// The file is too long.
-    #[error("has {0} bytes; at most {MAX_BYTES} are read")]
-    TooLong(u64),
-    /// The ending is neither `.stl` nor `.ply`.
-    #[error("must end in .stl or .ply")]
-    Ending,
-    /// A PLY file has no coordinates of its vertices, or no vertices of its faces.
-    #[error("has no {0}")]
-    Lacks(&'static str),
-    /// A face of a PLY file has fewer than three vertices.
-    #[error("face {face} has {corners} corners (faces are counted from 0)")]
-    Face {
-        /// Number of the face.
-        face: usize,
-        /// Number of its vertices.
-        corners: usize,
-    },
-    /// The triangles do not bound a solid.
-    #[error("holds {0}")]
-    Surface(#[from] SurfaceError),
 }
 
 /// Vertex positions, and the three vertex numbers of each triangle.
@@ -89,7 +59,7 @@ impl SurfaceFile {
     ///
     /// # Errors
     /// The errors of [`read_file`].
-    pub(super) fn read(&self, folder: &Path) -> Result<(), SurfaceFileError> {
+    pub(super) fn read(&self, folder: &Path) -> Result<(), ShapeFileError> {
         if self.surface.get().is_none() {
             let _ = self.surface.set(read_file(&folder.join(&self.file))?);
         }
@@ -116,17 +86,12 @@ impl SurfaceFile {
 ///
 /// # Errors
 /// The file cannot be read, or its surface is open, faces both ways or crosses itself (with the position).
-pub fn read_file(path: &Path) -> Result<Surface<3>, SurfaceFileError> {
-    let format = Format::of(path).ok_or(SurfaceFileError::Ending)?;
-    let about = fs::metadata(path)?;
-    // Reading a pipe may block for ever.
-    if !about.is_file() {
-        return Err(SurfaceFileError::NoFile);
+pub fn read_file(path: &Path) -> Result<Surface<3>, ShapeFileError> {
+    let format = Format::of(path).ok_or_else(|| ShapeFileError("must end in .stl or .ply".to_owned()))?;
+    let (mut file, length) = open(path)?;
+    if length > MAX_BYTES {
+        return Err(ShapeFileError(format!("has {length} bytes; at most {MAX_BYTES} are read")));
     }
-    if about.len() > MAX_BYTES {
-        return Err(SurfaceFileError::TooLong(about.len()));
-    }
-    let mut file = BufReader::new(File::open(path)?);
     let (corners, triangles): Triangles = match format {
         Format::Stl => {
             let mesh = stl_io::read_stl(&mut file)?;
@@ -135,7 +100,7 @@ pub fn read_file(path: &Path) -> Result<Surface<3>, SurfaceFileError> {
         }
         Format::Ply => of_ply(&mut file)?,
     };
-    Ok(joined(&corners, &triangles)?)
+    joined(&corners, &triangles).map_err(|error| ShapeFileError(format!("holds {error}")))
 }
 
 /// The surface, with coincident vertices merged.
@@ -189,22 +154,27 @@ impl PropertyAccess for Entry {
 }
 
 /// Vertices and triangles of a PLY file. A face with more than three vertices becomes a fan of triangles.
-fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, SurfaceFileError> {
+fn of_ply(file: &mut BufReader<File>) -> Result<Triangles, ShapeFileError> {
     let ply = Parser::<Entry>::new().read_ply(file).map_err(io::Error::other)?;
     let list = |name| ply.payload.get(name).map_or(&[][..], Vec::as_slice);
+    let lacks = |what| move || ShapeFileError(format!("has no {what}"));
     let place = |entry: &Entry| match entry.place {
         [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
-        _ => Err(SurfaceFileError::Lacks("x, y and z of its vertices")),
+        _ => Err(lacks("x, y and z of its vertices")()),
     };
     let corners = list("vertex").iter().map(place).collect::<Result<Vec<_>, _>>()?;
     let mut triangles = Vec::new();
     for (face, entry) in list("face").iter().enumerate() {
-        let list = entry.corners.as_ref().ok_or(SurfaceFileError::Lacks("vertex_indices of its faces"))?;
-        let [first, rest @ ..] = list.as_slice() else { return Err(SurfaceFileError::Face { face, corners: 0 }) };
+        let list = entry.corners.as_ref().ok_or_else(lacks("vertex_indices of its faces"))?;
+        let [first, rest @ ..] = list.as_slice() else { return Err(too_few_corners(face, 0)) };
         if rest.len() < 2 {
-            return Err(SurfaceFileError::Face { face, corners: list.len() });
+            return Err(too_few_corners(face, list.len()));
         }
         triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]].map(|corner| corner as usize)));
     }
     Ok((corners, triangles))
+}
+
+fn too_few_corners(face: usize, corners: usize) -> ShapeFileError {
+    ShapeFileError(format!("face {face} has {corners} corners (faces are counted from 0)"))
 }

@@ -1,6 +1,6 @@
 //! Vectors in a scene: lists of numbers, one for each dimension.
 
-use crate::problems::Problems;
+use crate::problems::{Number, Problems};
 use crate::tensor::Vector;
 
 /// Checks a direction. The largest component must lie between 1e-100 and 1e100 in size, so that the length is finite and not zero.
@@ -14,7 +14,34 @@ pub(super) fn check_normal(problems: &mut Problems, path: &str, normal: &[f64], 
     ok
 }
 
-/// The components as a vector; `None` unless there are `D`.
-pub(super) fn vector<const D: usize>(components: &[f64]) -> Option<Vector<f64, D>> {
-    (components.len() == D).then(|| Vector::from_column_slice(components))
+/// The components as a vector. There must be `D`, as in every scene that has passed its checks.
+pub(super) fn vector<const D: usize>(components: &[f64]) -> Vector<f64, D> {
+    Vector::from_column_slice(components)
+}
+
+/// The vector; `None` if it is not allowed, with the reason in `problems`.
+pub(super) fn checked<const D: usize>(problems: &mut Problems, path: &str, x: &[f64]) -> Option<Vector<f64, D>> {
+    problems.vector(path, x, D).then(|| vector(x))
+}
+
+/// The direction; `None` if it is not allowed, with the reason in `problems`.
+pub(super) fn direction<const D: usize>(problems: &mut Problems, path: &str, n: &[f64]) -> Option<Vector<f64, D>> {
+    check_normal(problems, path, n, D).then(|| vector(n))
+}
+
+/// The corners of a box, the lower one first; `None` if they are not allowed, with the reasons in `problems`.
+pub(super) fn corners<const D: usize>(
+    problems: &mut Problems,
+    path: &str,
+    min: &[f64],
+    max: &[f64],
+) -> Option<[Vector<f64, D>; 2]> {
+    let lower = checked::<D>(problems, &format!("{path}.min"), min);
+    let upper = checked::<D>(problems, &format!("{path}.max"), max);
+    let (min, max) = (lower?, upper?);
+    for k in 0..D {
+        let allowed = format!("must be greater than min[{k}] = {}", Number(min[k]));
+        problems.require(max[k] > min[k], &format!("{path}.max[{k}]"), Number(max[k]), allowed);
+    }
+    (0..D).all(|k| max[k] > min[k]).then_some([min, max])
 }

@@ -14,7 +14,6 @@ use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use spacing::Unknown;
 use std::fmt::{self, Display};
 
 /// The wanted accuracy of the results.
@@ -126,7 +125,7 @@ pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
             return Ok(setter.chosen);
         };
         if has_load_steps(setter.scene) {
-            return Err(needed("time.step", accuracy, &Unknown::NoInertia));
+            return Err(needed("time.step", accuracy, "load steps of a scene without inertia have no natural length"));
         }
         let speed = spacing::speed(&bodies).map_err(|why| needed("time.step", accuracy, &why))?;
         let longest = level.courant * spacing / speed;
@@ -156,7 +155,7 @@ fn outside(accuracy: Accuracy) -> Problems {
     problems
 }
 
-fn needed(key: &str, accuracy: Accuracy, why: &Unknown) -> Problems {
+fn needed(key: &str, accuracy: Accuracy, why: &str) -> Problems {
     let mut problems = Problems::default();
     problems.refuse("accuracy", accuracy, format_args!("it would choose {key}, but {why}; give {key}"));
     problems

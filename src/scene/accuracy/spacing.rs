@@ -16,55 +16,34 @@ const MAX_REFINEMENT: usize = 2;
 /// Maximum number of cells along the shortest edge of the box.
 const MOST_CELLS: f64 = 1e5;
 
-/// Reasons why a spacing or a time step cannot be chosen.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(super) enum Unknown {
-    /// A body from a file.
-    #[error("how large the body {0:?} is stands in its file of particles")]
-    Extent(String),
-    /// Edges without a common divisor.
-    #[error("no spacing between {finest:.4e} and {coarsest:.4e} divides every edge of the grid")]
-    NoDivisor { finest: f64, coarsest: f64 },
-    /// A box without an extent, or with too many cells.
-    #[error("the box of the grid has no extent, or too many cells")]
-    NoBox,
-    /// A body without an extent.
-    #[error("the body {0:?} has no extent inside the grid")]
-    NoExtent(String),
-    /// A scene without a body.
-    #[error("there is no body")]
-    NoBody,
-    /// A law without a speed of sound.
-    #[error("the constants or the density of the body {0:?} give no speed of sound")]
-    NoSpeed(String),
-    /// Load steps.
-    #[error("load steps of a scene without inertia have no natural length")]
-    NoInertia,
-}
+const NO_BOX: &str = "the box of the grid has no extent, or too many cells";
+const NO_BODY: &str = "there is no body";
 
 /// The largest spacing that divides all edges of the box and puts at least `cells` cells across the smallest extent of every body. If a
-/// spacing up to twice as fine also puts nodes on the faces of all bodies that are boxes, that one is taken.
-pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, Unknown> {
+/// spacing up to twice as fine also puts nodes on the faces of all bodies that are boxes, that one is taken. Or the reason why there is none.
+pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, String> {
     match grid.dimension() {
         1 => fitting_in::<1>(grid, bodies, cells),
         2 => fitting_in::<2>(grid, bodies, cells),
         3 => fitting_in::<3>(grid, bodies, cells),
-        _ => Err(Unknown::NoBox),
+        _ => Err(NO_BOX.to_owned()),
     }
 }
 
-fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, Unknown> {
+fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64, String> {
     let origin = grid.origin();
     let sound = origin.len() == D && grid.size.iter().all(|&size| size > 0.0 && size.is_finite());
     if !sound || !origin.iter().all(|x| x.is_finite()) {
-        return Err(Unknown::NoBox);
+        return Err(NO_BOX.to_owned());
     }
     let mut extent = f64::INFINITY;
     // Faces of bodies that are boxes, as distances from the lower corner of the grid.
     let mut faces: Vec<f64> = Vec::new();
     for body in bodies {
-        let shape = body.shape.as_ref().ok_or_else(|| Unknown::Extent(body.name.clone()))?;
-        let no_extent = || Unknown::NoExtent(body.name.clone());
+        let name = &body.name;
+        let shape = body.shape.as_ref();
+        let shape = shape.ok_or_else(|| format!("how large the body {name:?} is stands in its file of particles"))?;
+        let no_extent = || format!("the body {name:?} has no extent inside the grid");
         let built = shape.build::<D>().ok_or_else(no_extent)?;
         let (min, max): (Vector<f64, D>, Vector<f64, D>) = built.bounding_box();
         for k in 0..D {
@@ -82,10 +61,10 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
     let shortest = grid.size.iter().copied().fold(f64::INFINITY, f64::min);
     let fewest = (shortest / coarsest - ON_NODE).ceil().max(1.0);
     if bodies.is_empty() {
-        return Err(Unknown::NoBody);
+        return Err(NO_BODY.to_owned());
     }
     if fewest >= MOST_CELLS {
-        return Err(Unknown::NoBox);
+        return Err(NO_BOX.to_owned());
     }
     let fewest = fewest as usize;
     let divides = |h: f64| GridBox { spacing: h, ..grid.clone() }.cells().is_some();
@@ -94,19 +73,20 @@ fn fitting_in<const D: usize>(grid: &GridBox, bodies: &[Body], cells: f64) -> Re
         (fewest..=MAX_REFINEMENT * fewest).map(|n| shortest / n as f64).filter(|&h| divides(h)).peekable();
     let first = candidates.peek().copied();
     let found = candidates.find(|&h| faces.iter().all(|&x| on_node(x, h))).or(first);
-    found.ok_or(Unknown::NoDivisor { finest: coarsest / MAX_REFINEMENT as f64, coarsest })
+    let finest = coarsest / MAX_REFINEMENT as f64;
+    found.ok_or_else(|| format!("no spacing between {finest:.4e} and {coarsest:.4e} divides every edge of the grid"))
 }
 
 /// The greatest speed of pressure waves in the undeformed bodies, c = √(M/ρ), M = Λ + 2G in isotropic solids.
-pub(super) fn speed(bodies: &[Body]) -> Result<f64, Unknown> {
+pub(super) fn speed(bodies: &[Body]) -> Result<f64, String> {
     let mut greatest: f64 = 0.0;
     for body in bodies {
         let law = body.material.law(&mut Problems::default(), "material");
         let speed = law.map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
         if !(speed > 0.0 && speed.is_finite()) {
-            return Err(Unknown::NoSpeed(body.name.clone()));
+            return Err(format!("the constants or the density of the body {:?} give no speed of sound", body.name));
         }
         greatest = greatest.max(speed);
     }
-    if greatest > 0.0 { Ok(greatest) } else { Err(Unknown::NoBody) }
+    if greatest > 0.0 { Ok(greatest) } else { Err(NO_BODY.to_owned()) }
 }
