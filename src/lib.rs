@@ -1,7 +1,7 @@
 //! Implicit finite-strain material point method with a matrix-free, Voigt-free tangent.
 //!
-//! A body is a cloud of particles that carry its state. A Cartesian grid, reset in every step, carries the unknowns. This page goes through
-//! one step of the method and links each formula to its code. Numbers in parentheses are the equations of Molinos, Stickle, Navas, Yagüe,
+//! A body is a cloud of particles that carry its state. A Cartesian grid carries the unknowns. This page goes through
+//! one step after a grid reset, and links each formula to its code. [`mechanics::reference`] says what changes where the grid is not reset. Numbers in parentheses are the equations of Molinos, Stickle, Navas, Yagüe,
 //! Manzanal, Pastor, "Toward a local maximum-entropy material point method at finite strain within a B-free approach". The formulas here
 //! correct the misprints of the paper.
 //!
@@ -32,7 +32,7 @@
 //!
 //! # One step
 //!
-//! [`simulation::Simulation::step`] is the following, in this order.
+//! [`simulation::Simulation::step`] is the following, in this order. Arc length, mean dilatation and aggregation are left out.
 //!
 //! **1. Shape functions.** A particle at xₙ is connected to the nodes with N ≠ 0 or ∇ₙN ≠ 0. A node connected to some particle is active
 //! ([`nodes::Nodes`]). The paper's local maximum-entropy functions (24)–(28) are, with D = x − x_I,

@@ -232,10 +232,10 @@ impl<const D: usize> Particles<D> {
         MaterialState::new(self.displacement_gradient[p]).in_step(dt, internal)
     }
 
-    /// Calls [`Self::remember_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
-    pub(crate) fn remember<L: Law>(&mut self, bodies: &[Body<L>]) {
+    /// Calls [`Self::set_internal_to_rest`] if a law has more internal variables than there is room for. Bodies set up in code need it.
+    pub(crate) fn make_room_for_internal<L: Law>(&mut self, bodies: &[Body<L>]) {
         if bodies.iter().any(|body| body.law.internal_variables().len() > self.remembered) {
-            self.remember_rest(bodies);
+            self.set_internal_to_rest(bodies);
         }
         self.make_room_for_dilatation(bodies);
     }
@@ -253,7 +253,7 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Sets the internal variables of every particle to the values at rest of its law.
-    pub fn remember_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
+    pub fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.remembered = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
         let width = self.remembered;
         let at_rest = |&body: &u32| {

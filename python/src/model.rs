@@ -20,7 +20,7 @@ pub trait Model: Send + Sync {
     fn stop(&mut self, stop: Option<Stop>);
     /// By the ids of the particles; as many numbers as there are particles and components.
     fn values(&self, field: Field) -> Result<Vec<f64>, OutputError>;
-    fn coming(&self) -> Result<Arc<dyn System>, StepError>;
+    fn next_step(&self) -> Result<Arc<dyn System>, StepError>;
     fn kinetic_energy(&self) -> f64;
     fn strain_energy(&self) -> f64;
     fn external_work(&self) -> f64;
@@ -60,8 +60,8 @@ impl<const D: usize> Model for Sized<D> {
         field.values(&self.simulation, &self.start)
     }
 
-    fn coming(&self) -> Result<Arc<dyn System>, StepError> {
-        Ok(Arc::new(self.simulation.coming()?))
+    fn next_step(&self) -> Result<Arc<dyn System>, StepError> {
+        Ok(Arc::new(self.simulation.next_step()?))
     }
 
     fn kinetic_energy(&self) -> f64 {

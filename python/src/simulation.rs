@@ -35,11 +35,11 @@ impl Simulation {
         Self { model, end, bodies, plan, arrays: HashMap::new(), coming: None }
     }
 
-    fn coming(&mut self, py: Python<'_>) -> PyResult<Arc<dyn System>> {
+    fn next_step(&mut self, py: Python<'_>) -> PyResult<Arc<dyn System>> {
         if let Some(coming) = &self.coming {
             return Ok(coming.clone());
         }
-        let coming = py.detach(|| self.model.coming()).map_err(|error| step_error(&error))?;
+        let coming = py.detach(|| self.model.next_step()).map_err(|error| step_error(&error))?;
         self.coming = Some(coming.clone());
         Ok(coming)
     }

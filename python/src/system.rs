@@ -5,7 +5,7 @@ use crate::law::BodyLaw;
 use crate::step_error;
 use bfree::approximation::Approximation;
 use bfree::mechanics::residual::Inadmissible;
-use bfree::simulation::Coming;
+use bfree::simulation::NextStep;
 use bfree::tensor::Vector;
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -34,9 +34,9 @@ fn flat<const D: usize>(field: &[Vector<f64, D>]) -> Vec<f64> {
     field.iter().flatten().copied().collect()
 }
 
-impl<const D: usize> System for Coming<D, BodyLaw, Approximation> {
+impl<const D: usize> System for NextStep<D, BodyLaw, Approximation> {
     fn shape(&self) -> [usize; 2] {
-        [Coming::nodes(self).len(), D]
+        [NextStep::nodes(self).len(), D]
     }
 
     fn nodes(&self) -> Vec<f64> {
@@ -44,16 +44,16 @@ impl<const D: usize> System for Coming<D, BodyLaw, Approximation> {
     }
 
     fn prescribed(&self) -> Vec<f64> {
-        let mut motion = vec![0.0; Coming::nodes(self).len() * D];
-        for dof in Coming::prescribed(self) {
+        let mut motion = vec![0.0; NextStep::nodes(self).len() * D];
+        for dof in NextStep::prescribed(self) {
             motion[dof.node * D + dof.component] = self.instant() * dof.step.increment;
         }
         motion
     }
 
     fn free(&self) -> Vec<bool> {
-        let mut free = vec![true; Coming::nodes(self).len() * D];
-        for dof in Coming::prescribed(self) {
+        let mut free = vec![true; NextStep::nodes(self).len() * D];
+        for dof in NextStep::prescribed(self) {
             free[dof.node * D + dof.component] = false;
         }
         // Those that follow others are no unknowns either.

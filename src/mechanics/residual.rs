@@ -1,9 +1,12 @@
 //! The residual R(Δφ) of one step: the sum of its terms, coded once, generic over the number type (eqs. 17, 33, with the signs corrected).
+//!
+//! Everywhere in the terms, the argument Δφ is the nodal motion since the last grid reset. With a reset in every step, as in the paper, it
+//! is the motion since t_n. Otherwise it is φ_n + Δφ, and α₁ (Δφ − Δφ̂) counts from φ_n ([`Nodal::predicted`](crate::mechanics::transfer::Nodal::predicted)).
 
 use crate::material::Law;
 use crate::mechanics::constitutive::Part;
 use crate::mechanics::loads::{Loads, PrescribedDof, Pressing};
-use crate::mechanics::sweep::{Flow, Number, Weights};
+use crate::mechanics::sweep::{Mode, Number, Weights};
 use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
@@ -120,10 +123,10 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         }
         let mut points = self.terms.at_points::<T>(&picked, part, dphi);
         // Terms that use values alone add their magnitudes at the nodes.
-        points.retain(|(flow, _)| !magnitude || flow.gradient);
-        let (flows, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
-        if let Some(flow) = flows.into_iter().reduce(Flow::and) {
-            self.step.supports.sweep(Some(dphi), Flow { weights, ..flow }, out, |group, at, sums| {
+        points.retain(|(mode, _)| !magnitude || mode.gradient);
+        let (modes, all): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        if let Some(mode) = modes.into_iter().reduce(Mode::and) {
+            self.step.supports.sweep(Some(dphi), Mode { weights, ..mode }, out, |group, at, sums| {
                 for add in &all {
                     add(group, at, sums).map_err(|error| (error.particle, error))?;
                 }

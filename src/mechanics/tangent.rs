@@ -4,8 +4,8 @@ use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Form, Laws};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
-use crate::mechanics::sweep::{Flow, Group, Quadratic, Supports};
-use crate::mechanics::terms::{Frozen, Piece};
+use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
+use crate::mechanics::terms::{Linearized, Piece};
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
 use crate::pooled::Pooled;
@@ -48,7 +48,7 @@ pub struct Tangent<'a, const D: usize> {
     pub(super) supports: &'a Supports<D>,
     pub(super) unknowns: Unknowns<'a, D>,
     pub(super) particles: &'a Particles<D>,
-    pub(super) terms: Vec<Box<dyn Frozen<D> + 'a>>,
+    pub(super) terms: Vec<Box<dyn Linearized<D> + 'a>>,
 }
 
 impl<const D: usize> Tangent<'_, D> {
@@ -58,10 +58,10 @@ impl<const D: usize> Tangent<'_, D> {
         let extended = self.unknowns.extended_in(self.supports, u);
         let u = extended.as_deref().unwrap_or(u);
         self.terms.iter().for_each(|term| term.add_product_at_nodes(u, out));
-        let (flows, all): (Vec<_>, Vec<_>) =
+        let (modes, all): (Vec<_>, Vec<_>) =
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
-        if let Some(flow) = flows.into_iter().reduce(Flow::and) {
-            self.supports.product(u, flow, out, |group, at, sums| {
+        if let Some(mode) = modes.into_iter().reduce(Mode::and) {
+            self.supports.product(u, mode, out, |group, at, sums| {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }
@@ -114,7 +114,7 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// det F ≤ 0. The error names the particle with the smallest id.
     pub fn tangent(&self, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.frozen(None, dphi)
+        self.linearized(None, dphi)
     }
 
     /// Linearises one piece of the residual at Δφ.
@@ -122,11 +122,11 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// # Errors
     /// See [`Self::tangent`].
     pub fn tangent_of(&self, piece: Piece, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        self.frozen(Some(piece), dphi)
+        self.linearized(Some(piece), dphi)
     }
 
-    fn frozen(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
-        let terms = self.terms.freeze(piece, &self.unknowns.extended(dphi))?;
+    fn linearized(&self, piece: Option<Piece>, dphi: &[Vector<f64, D>]) -> Result<Tangent<'_, D>, Inadmissible> {
+        let terms = self.terms.linearize(piece, &self.unknowns.extended(dphi))?;
         let (supports, particles) = (self.step.supports, self.step.particles);
         Ok(Tangent { supports, unknowns: self.unknowns.clone(), particles, terms })
     }
@@ -170,17 +170,17 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
 /// Bytes of the linearised tangent of all particles.
 ///
 /// ```
-/// use bfree::mechanics::{sweep::Supports, tangent::frozen_bytes};
+/// use bfree::mechanics::{sweep::Supports, tangent::tangent_bytes};
 ///
 /// let scene = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?;
 /// let simulation = scene.build::<2>("scenes".as_ref())?;
 /// let (particles, bodies) = (&simulation.particles, &simulation.bodies);
 /// let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &particles.position)?;
 /// // A neo-Hookean particle in 2D needs A, the symmetric B, κ and q: 9 numbers.
-/// assert!(frozen_bytes(particles, bodies, &supports) >= 9 * size_of::<f64>() * particles.len());
+/// assert!(tangent_bytes(particles, bodies, &supports) >= 9 * size_of::<f64>() * particles.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn frozen_bytes<const D: usize, L: Law>(
+pub fn tangent_bytes<const D: usize, L: Law>(
     particles: &Particles<D>,
     bodies: &[Body<L>],
     supports: &Supports<D>,

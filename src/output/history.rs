@@ -117,8 +117,9 @@ impl History {
         kept: Option<Written>,
     ) -> Result<Self, OutputError> {
         let has_inertia = simulation.settings.scheme.has_inertia();
-        let dissipates = simulation.loads.damping.is_some() || simulation.remembers(DISSIPATED);
-        let (follows_path, yields) = (simulation.settings.scheme.follows_path(), simulation.remembers(PLASTIC_STRAIN));
+        let dissipates = simulation.loads.damping.is_some() || simulation.has_internal_variable(DISSIPATED);
+        let (follows_path, yields) =
+            (simulation.settings.scheme.follows_path(), simulation.has_internal_variable(PLASTIC_STRAIN));
         let mut columns: Vec<String> = ["step", "time"].map(str::to_owned).into();
         columns.extend(follows_path.then(|| "load".into()));
         columns.extend(["dt", "kinetic", "strain", "external"].map(str::to_owned));

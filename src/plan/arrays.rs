@@ -7,8 +7,8 @@ use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::SurfacePoint;
 use crate::mechanics::reference::Renewal;
 use crate::mechanics::sweep::Supports;
-use crate::mechanics::tangent::frozen_bytes;
-use crate::mechanics::terms::frozen_rows;
+use crate::mechanics::tangent::tangent_bytes;
+use crate::mechanics::terms::linearized_rows;
 use crate::mechanics::transfer::Projection;
 use crate::particles::{Body, Particles};
 use crate::simulation::Simulation;
@@ -177,11 +177,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
     }
 
     fn tangent(&self) -> Vec<PlannedArray> {
-        let frozen = frozen_bytes(&self.simulation.particles, &self.simulation.bodies, self.supports);
+        let linearized = tangent_bytes(&self.simulation.particles, &self.simulation.bodies, self.supports);
         // θ, and on a kept grid θ at the last reset; the cell, and the result of a loop over particles there.
         let mean_dilatation = Cells::BYTES + numbers(if self.keeps_grid { 4 } else { 3 });
         vec![
-            PlannedArray::whole(true, "frozen tangent", frozen),
+            PlannedArray::whole(true, "linearized tangent", linearized),
             PlannedArray {
                 used: self.averages,
                 name: "particles: mean dilatation",
@@ -190,9 +190,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             },
             PlannedArray {
                 used: self.averages,
-                name: "frozen tangent: mean dilatation",
+                name: "linearized tangent: mean dilatation",
                 entries: self.supports.groups() * LANES,
-                entry_bytes: numbers(frozen_rows(D) + 1),
+                entry_bytes: numbers(linearized_rows(D) + 1),
             },
         ]
     }

@@ -75,7 +75,7 @@ impl Scene {
             bodies.push(particles::Body { name, law, density, dilatation });
         }
         let loads = self.loads(&means, &grid, &mut particles)?;
-        particles.remember_rest(&bodies);
+        particles.set_internal_to_rest(&bodies);
         let clock = Clock::new(self.time.step, self.time.max_halvings);
         let mut simulation = Simulation {
             loads,

@@ -1,8 +1,8 @@
 //! The allowed word nearest to a misspelt one.
 
-use strsim::levenshtein;
+use strsim::damerau_levenshtein;
 
-/// Maximum number of letters to change, insert or drop.
+/// Maximum number of letters to change, insert, drop or exchange with a neighbour.
 const MAX_EDITS: usize = 2;
 
 /// Maximum length of a word; no key is longer.
@@ -16,7 +16,7 @@ pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
     }
     allowed
         .iter()
-        .map(|candidate| (levenshtein(word, candidate), *candidate))
+        .map(|candidate| (damerau_levenshtein(word, candidate), *candidate))
         .filter(|(edits, candidate)| *edits <= MAX_EDITS && *edits < letters.min(candidate.len()))
         .min_by_key(|(edits, _)| *edits)
         .map(|(_, candidate)| candidate)

@@ -1,8 +1,8 @@
 //! A simulation: the state at the last converged step, and the step that advances this state (`step.rs`).
 
 mod balance;
-mod coming;
 mod history;
+mod next_step;
 mod preconditioner;
 mod report;
 mod settings;
@@ -12,8 +12,8 @@ mod touching;
 mod work;
 
 pub use crate::mechanics::loads::Reaction;
-pub use coming::Coming;
 pub use history::History;
+pub use next_step::NextStep;
 pub use report::{AdvanceError, FailedAttempt, StepError, StepReport};
 pub use settings::{InitialGuess, Settings};
 pub use touching::Sharing;
@@ -89,7 +89,7 @@ pub struct Simulation<const D: usize, L = Material, A = Approximation> {
 pub struct Workspace<const D: usize> {
     supports: Option<Supports<D>>,
     /// Whether the next step uses the shape functions unchanged, because the grid was not reset.
-    serves: bool,
+    supports_are_valid: bool,
     pool: Pool,
 }
 
@@ -177,13 +177,13 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 
 impl<const D: usize, L: Law, A> Simulation<D, L, A> {
     /// Whether a law has an internal variable of this name.
-    pub(crate) fn remembers(&self, name: &str) -> bool {
+    pub(crate) fn has_internal_variable(&self, name: &str) -> bool {
         self.bodies.iter().any(|body| body.law.internal_variables().iter().any(|one| one.name == name))
     }
 
     /// Energy dissipated by plastic flow and relaxation since the start: Σ V₀ times the density that each law records.
     pub fn dissipated_by_laws(&self) -> f64 {
-        if !self.remembers(DISSIPATED) {
+        if !self.has_internal_variable(DISSIPATED) {
             return 0.0;
         }
         let particles = &self.particles;
@@ -255,7 +255,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             })
             .collect::<Vec<_>>();
         let mut particles = self.particles;
-        particles.remember_rest(&bodies);
+        particles.set_internal_to_rest(&bodies);
         Simulation {
             loads: self.loads,
             settings: self.settings,

@@ -52,7 +52,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             (Multigrid, "restarts lose what few iterations keep")
         } else if !self.takes_long_steps() {
             (BlockJacobi, "inertia dominates")
-        } else if self.remembers(PLASTIC_STRAIN) {
+        } else if self.has_internal_variable(PLASTIC_STRAIN) {
             // Near a limit load, multigrid takes a fourth to a sixtieth of the iterations (`docs/src/tutorial/plasticity.md`).
             (Multigrid, "the body may flow")
         } else if Preconditioning::HAS_DIRECT && particles <= few[D - 1] {

@@ -27,7 +27,7 @@ pub struct StepReport<const D: usize> {
     pub error: Option<f64>,
     /// Whether the grid was reset before the step.
     pub renewed: bool,
-    /// Whether a contact, a prescribed condition outside `Simulation::held`, has active nodes in this step.
+    /// Whether a contact, a prescribed condition outside [`History::constrained`](super::History::constrained), has active nodes in this step.
     pub feels_wall: bool,
     /// Bodies that share nodes.
     pub sharing: Vec<Sharing>,

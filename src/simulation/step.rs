@@ -38,7 +38,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
     /// A step like [`Self::step`]. `spent` counts the work, also if the step fails.
     fn attempt(&mut self, spent: &mut Spent) -> Result<StepReport<D>, StepError> {
-        self.particles.remember(&self.bodies);
+        self.particles.make_room_for_internal(&self.bodies);
         let (dt, scheme, watch) = (self.clock.step(), self.settings.scheme.clone(), &mut spent.watch);
 
         let supports = self.supports()?;
@@ -123,7 +123,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         if let Some(order) = &order {
             self.rearrange(order);
         }
-        self.workspace.serves = !self.history.resets_grid() && order.is_none();
+        self.workspace.supports_are_valid = !self.history.resets_grid() && order.is_none();
         self.workspace.supports = Some(if order.is_some() { supports.rearranged() } else { supports });
     }
 

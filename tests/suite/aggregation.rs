@@ -111,7 +111,7 @@ fn the_tangent_is_the_derivative_of_the_aggregated_residual() -> Result<(), Fail
     for (name, more) in cases {
         let overrides: Vec<&str> = more.iter().copied().chain([AGGREGATION]).collect();
         let simulation = scene::<2>(name, &overrides)?;
-        let coming = simulation.coming()?;
+        let coming = simulation.next_step()?;
         let equilibrium = coming.equilibrium();
         let followers = equilibrium.step.supports.extension().map_or(0, |extension| extension.len());
         assert!(followers > 0, "{name}: no node follows");

@@ -41,7 +41,7 @@ fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
         let loaded = simulation.clone();
         for _ in 0..4 {
             // The equilibrium of the next step, as the step solves it: at Δφ = 0 its residual vanishes.
-            let coming = simulation.coming()?;
+            let coming = simulation.next_step()?;
             let still = coming.motion(&vec![Vector::zeros(); coming.nodes().len()]);
             let mut residual = coming.equilibrium().residual(&still)?;
             coming.equilibrium().clear_prescribed(&mut residual);

@@ -9,8 +9,8 @@ use bfree::material::{ClosedTangent, Lame, Law, Material, MaterialState, NeoHook
 use bfree::mechanics::loads::Loads;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Newmark;
-use bfree::mechanics::sweep::{Flow, Points, Supports, Weights};
-use bfree::mechanics::tangent::frozen_bytes;
+use bfree::mechanics::sweep::{Mode, Points, Supports, Weights};
+use bfree::mechanics::tangent::tangent_bytes;
 use bfree::mechanics::terms::Step;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
@@ -123,7 +123,7 @@ fn scalars_and_weights<const D: usize>(fast: &Supports<D>, plain: &Supports<D>, 
         }
         for supports in [fast, plain] {
             let mut out = vec![Vector::from([0.0]); u.len()];
-            let swept = supports.sweep(Some(&first), Flow { weights, ..Flow::BOTH }, &mut out, |group, at, sums| {
+            let swept = supports.sweep(Some(&first), Mode { weights, ..Mode::BOTH }, &mut out, |group, at, sums| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     let (u, gradient) = at.lane(lane);
                     sums.value[0][lane] += u[0] * value(p as usize)[0];

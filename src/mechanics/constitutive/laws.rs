@@ -221,18 +221,18 @@ fn tangents_of<L: Law, const D: usize>(
     let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
     for lane in 0..LANES {
         let (gradient, at_n, volume) = states.of_lane::<D>(lane);
-        let (frozen, det) = point::freeze(law, &at_n, &gradient, volume, part);
+        let (tangent, det) = point::linearize(law, &at_n, &gradient, volume, part);
         det_f[lane] = det;
-        match (frozen, form) {
-            (point::Frozen::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
+        match (tangent, form) {
+            (point::LocalTangent::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {
                 write(&closed, form, &mut rows, lane);
             }
-            (frozen, _) => {
+            (tangent, _) => {
                 for k in 0..D {
                     for l in 0..D {
-                        let block = match &frozen {
-                            point::Frozen::Closed(closed) => closed.unit_block(Single, k, l),
-                            point::Frozen::General(blocks) => blocks[k][l],
+                        let block = match &tangent {
+                            point::LocalTangent::Closed(closed) => closed.unit_block(Single, k, l),
+                            point::LocalTangent::General(blocks) => blocks[k][l],
                         };
                         for i in 0..D {
                             for j in 0..D {

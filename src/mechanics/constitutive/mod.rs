@@ -2,6 +2,9 @@
 //!
 //! [`point`] has one particle, in formulas. [`laws`] calls these formulas for the particles of a group side by side. [`tangents`] stores
 //! their linearised tangents, and applies them.
+//!
+//! H_n, F_n and ∇_n N are those of the reference configuration, at the last grid reset. With a reset in every step that is t_n. Internal
+//! variables are always those at t_n.
 
 mod laws;
 mod point;

@@ -74,7 +74,7 @@ pub(super) fn internal<L: Law, T: Real, const D: usize>(
 }
 
 /// δσ = V₀ δP F_nᵀ as a linear map of L = Σ u ⊗ ∇_n N.
-pub(super) enum Frozen<const D: usize> {
+pub(super) enum LocalTangent<const D: usize> {
     Closed(ClosedTangent<f64, D>),
     /// The blocks F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ + (F_nᵀe_k · S F_nᵀe_l) I of all pairs of unit gradients (eqs. 37, 38), times V₀.
     General([[[[f64; D]; D]; D]; D]),
@@ -82,20 +82,20 @@ pub(super) enum Frozen<const D: usize> {
 
 /// The law linearised at ∇u = `g`, whole or one `part`, and det F as in [`internal`].
 #[inline(always)]
-pub(super) fn freeze<L: Law, const D: usize>(
+pub(super) fn linearize<L: Law, const D: usize>(
     law: &L,
     at_n: &MaterialState<f64, D>,
     g: &Tensor<f64, D>,
     volume: f64,
     part: Part,
-) -> (Frozen<D>, f64) {
+) -> (LocalTangent<D>, f64) {
     let (at, det_f) = at_n.deformed(compose(g, &at_n.h)).admissible_or_rest();
     let f_n = at_n.f;
     // δF S F_nᵀ = L B with B = F_n S F_nᵀ
     let geometric = || f_n * law.stress(&at) * f_n.transpose();
-    let frozen = match law.closed(&f_n, &at, volume) {
-        Some(closed) if part == Part::Whole => Frozen::Closed(closed),
-        Some(closed) => Frozen::Closed(closed.part(&scaled(&geometric(), volume), part == Part::Geometric)),
+    let tangent = match law.closed(&f_n, &at, volume) {
+        Some(closed) if part == Part::Whole => LocalTangent::Closed(closed),
+        Some(closed) => LocalTangent::Closed(closed.part(&scaled(&geometric(), volume), part == Part::Geometric)),
         None => {
             let mut blocks = match part {
                 Part::Geometric => [[Tensor::zeros(); D]; D],
@@ -111,8 +111,8 @@ pub(super) fn freeze<L: Law, const D: usize>(
                 }
             }
             let entries = |b: Tensor<f64, D>| std::array::from_fn(|i| std::array::from_fn(|j| volume * b[(i, j)]));
-            Frozen::General(blocks.map(|row| row.map(entries)))
+            LocalTangent::General(blocks.map(|row| row.map(entries)))
         }
     };
-    (frozen, det_f)
+    (tangent, det_f)
 }

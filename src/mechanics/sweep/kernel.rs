@@ -5,7 +5,7 @@
 //! - Gather, one particle a lane: u = Σ u_I N_I,  L = Σ u_I ⊗ ∇N_I, contracted along x, then y, then z.
 //! - Scatter, one row (y, z) of the window a lane: f_I += σ ∇N_I + q N_I, summed over the particles in registers.
 
-use super::Flow;
+use super::Mode;
 use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
 use crate::scalar::{Arithmetic, Real};
 use crate::tensor::Vector;
@@ -97,7 +97,7 @@ pub(super) use each_tile;
 pub struct Gather<'a> {
     pub window: Window<'a>,
     pub nodal: &'a [f64],
-    pub flow: Flow,
+    pub mode: Mode,
     pub value: &'a mut [[f64; LANES]],
     pub gradient: &'a mut [[f64; LANES]],
 }
@@ -105,16 +105,16 @@ pub struct Gather<'a> {
 impl<const C: usize, const D: usize> WithLanes for In<Gather<'_>, C, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
-        let Gather { window, nodal, flow, value, gradient } = self.0;
+        let Gather { window, nodal, mode, value, gradient } = self.0;
         let mut out = Gathered { value: [s.zero(); C], gradient: [[s.zero(); D]; C] };
-        each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, flow.value, &mut out));
+        each_tile!(window, start => gather_tile::<S, C, D>(s, &window, start, nodal, mode.value, &mut out));
         // Loops, not closures: a closure that is not inlined loses the wide instructions.
-        if flow.value {
+        if mode.value {
             for (c, row) in value.iter_mut().enumerate().take(C) {
                 s.store(out.value[c], row);
             }
         }
-        if flow.gradient {
+        if mode.gradient {
             let slopes = out.gradient.as_flattened();
             for (k, row) in gradient.iter_mut().enumerate().take(C * D) {
                 s.store(slopes[k], row);
@@ -232,7 +232,7 @@ fn gather_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
 /// [`Gather::nodal`], one vector of lanes longer than its nodes need.
 pub struct Scatter<'a> {
     pub window: Window<'a>,
-    pub flow: Flow,
+    pub mode: Mode,
     pub value: &'a [[f64; LANES]],
     pub gradient: &'a [[f64; LANES]],
     pub out: &'a mut [f64],
@@ -241,14 +241,14 @@ pub struct Scatter<'a> {
 impl<const C: usize, const D: usize> WithLanes for In<Scatter<'_>, C, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
-        let Scatter { window, flow, value, gradient, out } = self.0;
+        let Scatter { window, mode, value, gradient, out } = self.0;
         // Fixed lengths, so that no index is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
         let rows = window.width[1] * window.width[2];
         let at_once = S::ROWS;
         for chunk in 0..rows.div_ceil(at_once) {
             let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
-            each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, flow, value, gradient, out));
+            each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, mode, value, gradient, out));
         }
     }
 }
@@ -319,7 +319,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
     window: &Window<'_>,
     start: usize,
     pairs: &Pairs<S, D>,
-    flow: Flow,
+    mode: Mode,
     value: &[[f64; LANES]; C],
     gradient: &[[[f64; LANES]; D]; C],
     out: &mut [f64],
@@ -335,7 +335,7 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
         mutant!("sweep: the last lane of a full group is not scattered": { if p + 1 == LANES { continue; } });
         // across = σ_y N_y' N_z + σ_z N_y N_z' + q N_y N_z,  along = σ_x N_y N_z. The mode is tested outside the inner loops.
         let (mut across, mut along) = ([zero; C], [zero; C]);
-        if flow.gradient {
+        if mode.gradient {
             for c in 0..C {
                 for k in 1..D {
                     across[c] = s.mul_add(lanes.splat_rows(gradient[c][k][p]), pairs.products[k][p], across[c]);
@@ -343,12 +343,12 @@ fn scatter_tile<S: Lanes, const C: usize, const D: usize, const W: usize>(
                 along[c] = s.mul(lanes.splat_rows(gradient[c][0][p]), pairs.products[0][p]);
             }
         }
-        if flow.value {
+        if mode.value {
             for c in 0..C {
                 across[c] = s.mul_add(lanes.splat_rows(value[c][p]), pairs.products[0][p], across[c]);
             }
         }
-        if !flow.gradient {
+        if !mode.gradient {
             for x in 0..sums.len() {
                 let nx = lanes.splat_rows(n[x][p]);
                 for c in 0..C {
@@ -401,13 +401,13 @@ mod tests {
         fn run<S: Lanes>(self, s: S) {
             let stride = [BOX[0], BOX[0] * BOX[1]];
             let window = Window { dimension: 3, width: WIDTH, weights: self.0, lanes: PARTICLES, first: FIRST, stride };
-            let (flow, mut at) = (Flow::BOTH, At::<f64, 3, 3>::zero());
+            let (mode, mut at) = (Mode::BOTH, At::<f64, 3, 3>::zero());
             let At { value, gradient } = &mut at;
             let gradient = gradient.as_flattened_mut();
-            In::<_, 3, 3>(Gather { window, nodal: self.1, flow, value, gradient }).run(s);
+            In::<_, 3, 3>(Gather { window, nodal: self.1, mode, value, gradient }).run(s);
             let mut out = vec![0.0; self.1.len() + LANES];
             let (value, gradient) = (at.value.as_slice(), at.gradient.as_flattened());
-            In::<_, 3, 3>(Scatter { window, flow, value, gradient, out: &mut out }).run(s);
+            In::<_, 3, 3>(Scatter { window, mode, value, gradient, out: &mut out }).run(s);
             self.2.push((gradient.iter().chain(value).flatten().copied().collect(), out));
         }
     }

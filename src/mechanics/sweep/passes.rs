@@ -2,7 +2,7 @@
 
 use super::kernel::At;
 use super::supports::{Way, either};
-use super::{Fill, Flow, Group, Number, Quadratic, Supports, Weights};
+use super::{Fill, Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
 use crate::parallel::First;
 use crate::scalar::Real;
@@ -18,7 +18,7 @@ impl<const D: usize> Supports<D> {
     pub fn sweep<T: Number, const C: usize, E: Send>(
         &self,
         field: Option<&[Vector<T, C>]>,
-        flow: Flow,
+        mode: Mode,
         out: &mut [Vector<T, C>],
         point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) -> Result<(), (usize, E)> + Sync,
     ) -> Result<(), E> {
@@ -32,7 +32,7 @@ impl<const D: usize> Supports<D> {
         };
         let field = field.map(T::flat);
         T::add_flat(out, |out| {
-            either!(self, way => way.sweep::<C>(T::FIELDS, field.as_deref(), flow, out, &point));
+            either!(self, way => way.sweep::<C>(T::FIELDS, field.as_deref(), mode, out, &point));
         });
         failure.check()
     }
@@ -41,7 +41,7 @@ impl<const D: usize> Supports<D> {
     pub(crate) fn product(
         &self,
         u: &[Vector<f64, D>],
-        flow: Flow,
+        mode: Mode,
         out: &mut [Vector<f64, D>],
         point: impl Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync,
     ) {
@@ -49,7 +49,7 @@ impl<const D: usize> Supports<D> {
             point(group, at, sums);
             Ok(())
         };
-        let Ok(()) = self.sweep(Some(u), flow, out, point);
+        let Ok(()) = self.sweep(Some(u), mode, out, point);
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
@@ -106,7 +106,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        self.sweep(Some(field), Flow::BOTH, out, each_lane(point))
+        self.sweep(Some(field), Mode::BOTH, out, each_lane(point))
     }
 
     /// The sum of [`Self::assemble`] with |N_I| and |∇_n N_I| in place of N_I and ∇_n N_I.
@@ -139,7 +139,7 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<T, D>],
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
-        self.sweep(Some(field), Flow { weights: Weights::Magnitude, ..Flow::BOTH }, out, each_lane(point))
+        self.sweep(Some(field), Mode { weights: Weights::Magnitude, ..Mode::BOTH }, out, each_lane(point))
     }
 
     /// `out_I += Σ_p value(p) N_I`, for C components: 1 or D.
@@ -162,8 +162,8 @@ impl<const D: usize> Supports<D> {
                 (0..C).for_each(|c| sums[0].value[c][lane] = value[c]);
             }
         };
-        let flow = Flow { weights, ..Flow::VALUE };
-        either!(self, way => way.sweep::<C>(1, None, flow, bytemuck::cast_slice_mut(out), &point));
+        let mode = Mode { weights, ..Mode::VALUE };
+        either!(self, way => way.sweep::<C>(1, None, mode, bytemuck::cast_slice_mut(out), &point));
     }
 
     /// Σ u_I N_I at every particle.
@@ -195,7 +195,7 @@ impl<const D: usize> Supports<D> {
         self.pass();
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
         let field = bytemuck::cast_slice(field);
-        either!(self, way => way.each::<_, C>(1, field, Flow::VALUE, &point, &mut take));
+        either!(self, way => way.each::<_, C>(1, field, Mode::VALUE, &point, &mut take));
     }
 
     /// Calls `take(p, point(p, u_p, ∇u_p))` for every particle, in an order that does not depend on the number of threads.
@@ -227,7 +227,7 @@ impl<const D: usize> Supports<D> {
             let gradient = Tensor::from_fn(|c, k| T::from_fields(|i| fields[i].gradient[c][k][lane]));
             point(p, value, gradient)
         };
-        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Flow::BOTH, &point, &mut take));
+        either!(self, way => way.each::<_, D>(T::FIELDS, &T::flat(field), Mode::BOTH, &point, &mut take));
     }
 
     /// `point(p, u_p, ∇u_p)` of every particle, in the order of the particles in memory.

@@ -5,7 +5,7 @@ use super::block::Group;
 use super::blocks::Quadratic;
 use super::kernel::At;
 use super::points::{Points, SupportError};
-use super::{Fill, Flow, Point, Visit};
+use super::{Fill, Mode, Point, Visit};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
@@ -101,7 +101,7 @@ impl<const D: usize> Plain<D> {
         &self,
         fields: usize,
         field: Option<&[f64]>,
-        flow: Flow,
+        mode: Mode,
         out: &mut [f64],
         point: &Point<'_, C, D>,
     ) {
@@ -113,16 +113,16 @@ impl<const D: usize> Plain<D> {
         };
         self.in_order(evaluate, |group, sums| {
             for (lane, (node, n, grad_n)) in self.entries_of(group) {
-                let changed = flow.weights.changed().unwrap_or(|n| n);
+                let changed = mode.weights.changed().unwrap_or(|n| n);
                 let (n, grad_n) = (changed(n), grad_n.map(changed));
                 mutant!("sweep: the plain loop scatters stresses by one slope": grad_n = Vector::<f64, D>::repeat(grad_n[0]));
                 for (f, sums) in sums.iter().enumerate() {
                     for c in 0..C {
                         let to = &mut out[(node * fields + f) * C + c];
-                        if flow.value {
+                        if mode.value {
                             *to += sums.value[c][lane] * n;
                         }
-                        for k in (0..D).filter(|_| flow.gradient) {
+                        for k in (0..D).filter(|_| mode.gradient) {
                             *to += sums.gradient[c][k][lane] * grad_n[k];
                         }
                     }
@@ -148,7 +148,7 @@ impl<const D: usize> Plain<D> {
         &self,
         fields: usize,
         field: &[f64],
-        _: Flow,
+        _: Mode,
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {

@@ -8,7 +8,7 @@ use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
 use super::kernel::{self, At, Gather, Scatter, Window};
 use super::tiled::Tiled;
-use super::{Fill, Flow, Point, Visit};
+use super::{Fill, Mode, Point, Visit};
 use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
@@ -38,7 +38,7 @@ impl<const D: usize> Tiled<D> {
         &self,
         fields: usize,
         field: Option<&[f64]>,
-        flow: Flow,
+        mode: Mode,
         out: &mut [f64],
         point: &Point<'_, C, D>,
     ) {
@@ -55,18 +55,18 @@ impl<const D: usize> Tiled<D> {
             for group in 0..block.groups.len() {
                 let mut window = block.groups.window(group);
                 if field.is_some() {
-                    gather(window, nodal, flow, at);
+                    gather(window, nodal, mode, at);
                 }
                 sums.fill(At::zero());
                 point(block.groups.group(group), at, sums);
-                if let Some(changed) = flow.weights.changed() {
+                if let Some(changed) = mode.weights.changed() {
                     weights.clear();
                     weights.extend(window.weights.iter().map(|row| row.map(changed)));
                     window = Window { weights, ..window };
                 }
                 for (sums, buffer) in sums.iter().zip(buffer.chunks_mut(length(block))) {
                     let (value, gradient) = (&sums.value, sums.gradient.as_flattened());
-                    kernel::scatter(C, Scatter { window, flow, value, gradient, out: buffer });
+                    kernel::scatter(C, Scatter { window, mode, value, gradient, out: buffer });
                 }
             }
         };
@@ -151,12 +151,12 @@ impl<const D: usize> Tiled<D> {
         &self,
         fields: usize,
         field: &[f64],
-        flow: Flow,
+        mode: Mode,
         point: &Visit<'_, R, C, D>,
         take: &mut dyn FnMut(usize, R),
     ) {
         let gather = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(usize, R)| {
-            gathered(block, field, fields, flow, scratch, |group, at| {
+            gathered(block, field, fields, mode, scratch, |group, at| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     take(p as usize, point(p as usize, at, lane));
                 }
@@ -189,7 +189,7 @@ impl<const D: usize> Tiled<D> {
         }
         let one = |scratch: &mut Scratch<D, D>, (block, chunk): (&Block, &mut [[f64; LANES]])| {
             let mut rows = chunk.chunks_mut(count);
-            gathered(block, field, 1, Flow::GRADIENT, scratch, |group, at| {
+            gathered(block, field, 1, Mode::GRADIENT, scratch, |group, at| {
                 if let Some(rows) = rows.next() {
                     fill(group, &at[0], rows);
                 }
@@ -233,9 +233,9 @@ fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nod
 }
 
 /// Gathers u and L of a group from the boxes of the fields.
-fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], flow: Flow, at: &mut [At<f64, C, D>]) {
+fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], mode: Mode, at: &mut [At<f64, C, D>]) {
     for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
-        kernel::gather(C, Gather { window, nodal, flow, value, gradient: gradient.as_flattened_mut() });
+        kernel::gather(C, Gather { window, nodal, mode, value, gradient: gradient.as_flattened_mut() });
     }
 }
 
@@ -244,14 +244,14 @@ fn gathered<const C: usize, const D: usize>(
     block: &Block,
     field: &[f64],
     fields: usize,
-    flow: Flow,
+    mode: Mode,
     Scratch { nodal, at, .. }: &mut Scratch<C, D>,
     mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
 ) {
     gather_boxes::<C>(block, field, fields, nodal);
     at.resize(fields, At::zero());
     for group in 0..block.groups.len() {
-        gather(block.groups.window(group), nodal, flow, at);
+        gather(block.groups.window(group), nodal, mode, at);
         visit(block.groups.group(group), at);
     }
 }

@@ -1,5 +1,5 @@
-//! The out-of-balance force R₀ of the last converged state on a grid that has just been reset, carried over as a force on the nodes. The
-//! state was in balance on the old grid. Without R₀, each reset would add an error of its own to the stresses.
+//! The out-of-balance force R₀: the residual, on a new grid, of the last state that was in balance on the old grid. R₀ is a constant force
+//! on the nodes in all steps until the next reset. Without R₀, each reset would add an error of its own to the stresses.
 
 use super::{Given, Reason, Role, Step, Sum, Term, dead_load};
 use crate::mechanics::constitutive::Inadmissible;

@@ -1,14 +1,16 @@
 //! Rayleigh damping, (a M̃ + b K_n) v. K_n is the material part of the stiffness at the beginning of the step, so b K_n does not damp rigid
 //! rotations.
 
-use super::inertia::FrozenMass;
-use super::stress::FrozenStress;
-use super::{BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, summed};
+use super::inertia::LinearizedMass;
+use super::stress::LinearizedStress;
+use super::{
+    BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Role, Step, Stress, Sum, Term, summed,
+};
 use crate::material::Law;
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Rayleigh;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Flow, Number};
+use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::tensor::{Tensor, Vector};
 
@@ -17,7 +19,7 @@ pub struct Damping<'a, const D: usize, L> {
     rayleigh: Rayleigh,
     step: Step<'a, D, L>,
     /// K_n; `None` if b = 0 or if a particle has det F ≤ 0. In the second case the stress has no value either, and the step fails there.
-    stiffness: Option<FrozenStress>,
+    stiffness: Option<LinearizedStress>,
 }
 
 impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
@@ -27,10 +29,10 @@ impl<'a, const D: usize, L: Law> Damping<'a, D, L> {
         Some(Self { rayleigh, step: *step, stiffness: stiff.and_then(Result::ok) })
     }
 
-    /// The material part of the stiffness at Δφ = 0.
-    fn stiffness(step: &Step<'a, D, L>) -> Result<FrozenStress, Inadmissible> {
-        let at_rest = vec![Vector::zeros(); step.supports.nodes()];
-        Stress::new(step).frozen(&at_rest, Part::Material)
+    /// The material part of the stiffness at φ_n, the nodal motion since the last grid reset.
+    fn stiffness(step: &Step<'a, D, L>) -> Result<LinearizedStress, Inadmissible> {
+        let motion: Vec<_> = step.nodal.moved(step.supports.nodes()).collect();
+        Stress::new(step).linearized(&motion, Part::Material)
     }
 }
 
@@ -39,9 +41,9 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
     fn force(&self, v: &[Vector<f64, D>]) -> Vec<Vector<f64, D>> {
         let mut force = vec![Vector::zeros(); v.len()];
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
-        if let Some((flow, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
+        if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
-            self.step.supports.product(v, flow, &mut of_stiffness, add);
+            self.step.supports.product(v, mode, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
         }
         force
@@ -97,7 +99,7 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         out.iter_mut().zip(force).for_each(|(out, force)| *out += force.abs());
     }
 
-    fn freeze(&self, _: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
+    fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
         let Rayleigh { mass, stiffness } = self.rayleigh;
         let a4 = self.step.alphas.a4;
         mutant!("damping: the product has the factor of the acceleration": a4 = self.step.alphas.a1);
@@ -105,42 +107,42 @@ impl<const D: usize, L: Law> Term<D> for Damping<'_, D, L> {
         if stiffness > 0.0 {
             of_stress = Some(Self::stiffness(&self.step)?.times(a4 * stiffness));
         }
-        let of_mass = FrozenMass { mass: self.step.mass(), factor: a4 * mass };
-        Ok(Some(Box::new(FrozenDamping { of_mass, of_stress })))
+        let of_mass = LinearizedMass { mass: self.step.mass(), factor: a4 * mass };
+        Ok(Some(Box::new(LinearizedDamping { of_mass, of_stress })))
     }
 }
 
 /// α₄ (a M̃ + b K_n)
-struct FrozenDamping<'a, const D: usize> {
-    of_mass: FrozenMass<'a, D>,
-    of_stress: Option<FrozenStress>,
+struct LinearizedDamping<'a, const D: usize> {
+    of_mass: LinearizedMass<'a, D>,
+    of_stress: Option<LinearizedStress>,
 }
 
-impl<const D: usize> FrozenDamping<'_, D> {
-    fn each(&self) -> impl Iterator<Item = &dyn Frozen<D>> {
-        let of_mass: &dyn Frozen<D> = &self.of_mass;
-        let of_stress = self.of_stress.as_ref().map(|frozen| frozen as &dyn Frozen<D>);
+impl<const D: usize> LinearizedDamping<'_, D> {
+    fn each(&self) -> impl Iterator<Item = &dyn Linearized<D>> {
+        let of_mass: &dyn Linearized<D> = &self.of_mass;
+        let of_stress = self.of_stress.as_ref().map(|linearized| linearized as &dyn Linearized<D>);
         [Some(of_mass), of_stress].into_iter().flatten()
     }
 }
 
-impl<const D: usize> Frozen<D> for FrozenDamping<'_, D> {
+impl<const D: usize> Linearized<D> for LinearizedDamping<'_, D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        self.each().for_each(|frozen| frozen.add_product_at_nodes(u, out));
+        self.each().for_each(|linearized| linearized.add_product_at_nodes(u, out));
     }
 
-    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
-        let (flows, all): (Vec<_>, Vec<_>) = self.each().filter_map(|of| of.product_at_points(u)).unzip();
-        let flow = flows.into_iter().reduce(Flow::and)?;
-        Some((flow, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))
+    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
+        let (modes, all): (Vec<_>, Vec<_>) = self.each().filter_map(|of| of.product_at_points(u)).unzip();
+        let mode = modes.into_iter().reduce(Mode::and)?;
+        Some((mode, Box::new(move |group, at, sums| all.iter().for_each(|add| add(group, at, sums)))))
     }
 
     fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {
-        self.each().for_each(|frozen| frozen.add_blocks_at_nodes(blocks));
+        self.each().for_each(|linearized| linearized.add_blocks_at_nodes(blocks));
     }
 
     fn blocks_at_points(&self) -> Option<BlocksAtPoints<'_>> {
-        let all: Vec<_> = self.each().filter_map(Frozen::blocks_at_points).collect();
+        let all: Vec<_> = self.each().filter_map(Linearized::blocks_at_points).collect();
         Some(Box::new(move |group, form| all.iter().for_each(|add| add(group, form))))
     }
 }

@@ -1,10 +1,12 @@
 //! Inertia, M̃ a with a = α₁ (Δφ − Δφ̂): eq. 33 with the sign corrected.
 
-use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
+use super::{
+    AtPoints, BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term, summed,
+};
 use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::Alphas;
-use crate::mechanics::sweep::{Flow, Number};
+use crate::mechanics::sweep::{Mode, Number};
 use crate::mechanics::transfer::Nodal;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity, scaled};
@@ -60,7 +62,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
     }
 
     /// q = (1−ε) m a
-    fn at_points<T: Number>(&self, _: Part, _: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
         let add: AtPoints<'_, T, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = T::lit(self.alphas.a1 * self.mass.consistent(p as usize).unwrap_or(0.0));
@@ -71,7 +73,7 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
             }
             Ok(())
         });
-        (self.mass.lumping < 1.0).then_some((Flow::VALUE, add))
+        (self.mass.lumping < 1.0).then_some((Mode::VALUE, add))
     }
 
     /// ½ a·M̃ a/α₁
@@ -102,32 +104,32 @@ impl<const D: usize> Term<D> for Inertia<'_, D> {
         }
     }
 
-    fn freeze(&self, _: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
-        Ok(Some(Box::new(FrozenMass { mass: self.mass, factor: self.alphas.a1 })))
+    fn linearize(&self, _: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+        Ok(Some(Box::new(LinearizedMass { mass: self.mass, factor: self.alphas.a1 })))
     }
 }
 
 /// A multiple of M̃.
-pub(super) struct FrozenMass<'a, const D: usize> {
+pub(super) struct LinearizedMass<'a, const D: usize> {
     pub(super) mass: Mass<'a, D>,
     pub(super) factor: f64,
 }
 
-impl<const D: usize> Frozen<D> for FrozenMass<'_, D> {
+impl<const D: usize> Linearized<D> for LinearizedMass<'_, D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for ((out, u), m) in out.iter_mut().zip(u).zip(self.mass.lumped) {
             *out += u * (self.factor * self.mass.lumping * m);
         }
     }
 
-    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
+    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         let add: ProductAtPoints<'_, D> = Box::new(|group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let weight = self.factor * self.mass.consistent(p as usize).unwrap_or(0.0);
                 (0..D).for_each(|c| sums.value[c][lane] += weight * at.value[c][lane]);
             }
         });
-        (self.mass.lumping < 1.0).then_some((Flow::VALUE, add))
+        (self.mass.lumping < 1.0).then_some((Mode::VALUE, add))
     }
 
     fn add_blocks_at_nodes(&self, blocks: &mut [Tensor<f64, D>]) {

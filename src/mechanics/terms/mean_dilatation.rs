@@ -15,14 +15,15 @@
 //! The first part of δσ couples the particles of a cell; the second has the form of a [`ClosedTangent`](crate::material::ClosedTangent).
 
 use super::{
-    AtPoints, BlocksAtPoints, Freezing, Frozen, FunctionsAt, Given, ProductAtPoints, Reason, Step, Sum, Term, summed,
+    AtPoints, BlocksAtPoints, FunctionsAt, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term,
+    summed,
 };
 use crate::lanes::LANES;
 use crate::material::{Law, MaterialState, VolumeResponse};
 use crate::mechanics::constitutive::{AddTo, Form, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::dilatation::{Cells, Member, total};
-use crate::mechanics::sweep::{Flow, Number, Supports};
+use crate::mechanics::sweep::{Mode, Number, Supports};
 use crate::pooled::Pooled;
 use crate::scalar::Real;
 use crate::tensor::{Tensor, Vector, cofactor, identity, scaled};
@@ -105,10 +106,10 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         vec![(<Self as Term<D>>::NAME, given.averages, why.into())]
     }
 
-    fn at_points<T: Number>(&self, _: Part, dphi: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _: Part, dphi: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
         let states = self.states(dphi);
         Some((
-            Flow::GRADIENT,
+            Mode::GRADIENT,
             Box::new(move |group, at, sums| {
                 for (lane, &p) in group.particles.iter().enumerate() {
                     let Some(cell) = self.cells.cell(p) else { continue };
@@ -142,7 +143,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         Some(Ok(summed(energies.into_iter().flatten())))
     }
 
-    fn freeze(&self, dphi: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
+    fn linearize(&self, dphi: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
         let supports = self.step.supports;
         let states = self.states(dphi);
         let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
@@ -167,17 +168,17 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
             }
         });
         let stiffness = states.into_iter().map(|state| state.stiffness).collect();
-        Ok(Some(Box::new(FrozenMean { cells: &self.cells, supports, rows, stiffness })))
+        Ok(Some(Box::new(LinearizedMean { cells: &self.cells, supports, rows, stiffness })))
     }
 }
 
 /// Numbers per particle in the linearised tangent.
-pub(crate) const fn frozen_rows(dimension: usize) -> usize {
+pub(crate) const fn linearized_rows(dimension: usize) -> usize {
     Form::Closed.rows(dimension) + 1
 }
 
 /// The linearised δσ: `stiffness` couples the particles of a cell, and `rows` is the local part.
-struct FrozenMean<'a, const D: usize> {
+struct LinearizedMean<'a, const D: usize> {
     cells: &'a Cells,
     supports: &'a Supports<D>,
     /// A, zeros, κ, q, and V₀ J.
@@ -186,10 +187,10 @@ struct FrozenMean<'a, const D: usize> {
     stiffness: Vec<f64>,
 }
 
-impl<const D: usize> FrozenMean<'_, D> {
+impl<const D: usize> LinearizedMean<'_, D> {
     /// A, zeros, κ and q of a group, and V₀ J.
     fn of_group(&self, group: usize) -> (&[[f64; LANES]], &[f64; LANES]) {
-        let count = frozen_rows(D);
+        let count = linearized_rows(D);
         let rows = &self.rows[group * count..(group + 1) * count];
         (&rows[..count - 1], &rows[count - 1])
     }
@@ -213,11 +214,11 @@ impl<const D: usize> FrozenMean<'_, D> {
     }
 }
 
-impl<const D: usize> Frozen<D> for FrozenMean<'_, D> {
-    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
+impl<const D: usize> Linearized<D> for LinearizedMean<'_, D> {
+    fn product_at_points(&self, u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         let coupling = self.coupling(u?);
         Some((
-            Flow::GRADIENT,
+            Mode::GRADIENT,
             Box::new(move |group, at, sums| {
                 let (rows, weight) = self.of_group(group.number);
                 let (l, out) = (at.gradient.as_flattened(), sums.gradient.as_flattened_mut());

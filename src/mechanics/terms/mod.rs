@@ -23,7 +23,7 @@ pub use carried_over::CarriedOver;
 pub use damping::Damping;
 pub use inertia::Inertia;
 pub use mean_dilatation::MeanDilatation;
-pub(crate) use mean_dilatation::frozen_rows;
+pub(crate) use mean_dilatation::linearized_rows;
 pub use pressure::Pressure;
 pub use stress::Stress;
 pub use traction::Traction;
@@ -33,7 +33,7 @@ use crate::mechanics::constitutive::{Inadmissible, Part};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::mass::Mass;
 use crate::mechanics::schemes::{Alphas, Scheme};
-use crate::mechanics::sweep::{At, Flow, Group, Number, Quadratic, Supports};
+use crate::mechanics::sweep::{At, Group, Mode, Number, Quadratic, Supports};
 use crate::mechanics::transfer::Nodal;
 use crate::mechanics::unknowns::Function;
 use crate::particles::{Body, Particles};
@@ -121,7 +121,7 @@ fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
 }
 
 /// The result of linearising a term; `None` for a dead load.
-pub(crate) type Freezing<'a, const D: usize> = Result<Option<Box<dyn Frozen<D> + 'a>>, Inadmissible>;
+pub(crate) type LinearizedTerm<'a, const D: usize> = Result<Option<Box<dyn Linearized<D> + 'a>>, Inadmissible>;
 
 /// A term of the residual R(Δφ).
 pub(crate) trait Term<const D: usize>: Sync {
@@ -138,9 +138,9 @@ pub(crate) trait Term<const D: usize>: Sync {
     /// Adds the contribution at the nodes.
     fn add_at_nodes<T: Number>(&self, _dphi: &[Vector<T, D>], _out: &mut [Vector<T, D>]) {}
 
-    /// The contribution at the particles at Δφ. Its [`Flow`] says which of u and L it reads, and which of q and σ it writes. Only the
+    /// The contribution at the particles at Δφ. Its [`Mode`] says which of u and L it reads, and which of q and σ it writes. Only the
     /// occurrences of Δφ in `part` carry derivatives.
-    fn at_points<T: Number>(&self, _part: Part, _dphi: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
+    fn at_points<T: Number>(&self, _part: Part, _dphi: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
         None
     }
 
@@ -165,19 +165,19 @@ pub(crate) trait Term<const D: usize>: Sync {
     ///
     /// # Errors
     /// det F ≤ 0 somewhere.
-    fn freeze(&self, _dphi: &[Vector<f64, D>], _part: Part) -> Freezing<'_, D> {
+    fn linearize(&self, _dphi: &[Vector<f64, D>], _part: Part) -> LinearizedTerm<'_, D> {
         Ok(None)
     }
 }
 
 /// A term linearised at one Δφ: the data that its product needs, and no more.
-pub(crate) trait Frozen<const D: usize>: Sync {
+pub(crate) trait Linearized<const D: usize>: Sync {
     /// Adds the contribution to the product at the nodes.
     fn add_product_at_nodes(&self, _u: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
-    /// The contribution to the product with `u` at the particles, with its [`Flow`]. `u` is `None` if gradients are the same at all
+    /// The contribution to the product with `u` at the particles, with its [`Mode`]. `u` is `None` if gradients are the same at all
     /// particles of a cell.
-    fn product_at_points(&self, _u: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
+    fn product_at_points(&self, _u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         None
     }
 
@@ -276,7 +276,7 @@ macro_rules! terms {
                 picked: impl Fn(&str, Role) -> bool,
                 part: Part,
                 dphi: &[Vector<T, D>],
-            ) -> Vec<(Flow, AtPoints<'_, T, D>)> {
+            ) -> Vec<(Mode, AtPoints<'_, T, D>)> {
                 let mut all = Vec::new();
                 $(if let Some(term) = self.$field.as_ref().filter(|_| picked(<$term as Term<D>>::NAME, <$term as Term<D>>::ROLE)) {
                     all.extend(term.at_points(part, dphi));
@@ -317,14 +317,14 @@ macro_rules! terms {
             }
 
             /// Linearises all terms, or one piece.
-            pub(crate) fn freeze(
+            pub(crate) fn linearize(
                 &self,
                 piece: Option<Piece>,
                 dphi: &[Vector<f64, D>],
-            ) -> Result<Vec<Box<dyn Frozen<D> + '_>>, Inadmissible> {
+            ) -> Result<Vec<Box<dyn Linearized<D> + '_>>, Inadmissible> {
                 let mut all = Vec::new();
                 $(if let Some(term) = self.$field.as_ref().filter(|_| piece.is_none_or(|piece| piece.term == <$term as Term<D>>::NAME)) {
-                    all.extend(term.freeze(dphi, piece.map_or(Part::Whole, |piece| piece.part))?);
+                    all.extend(term.linearize(dphi, piece.map_or(Part::Whole, |piece| piece.part))?);
                 })*
                 Ok(all)
             }

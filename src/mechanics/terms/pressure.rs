@@ -1,6 +1,6 @@
 //! Follower pressure, +p cof(F) N A on the particles of a surface. The tangent is exact, and not symmetric on an open surface.
 
-use super::{Freezing, Frozen, FunctionsAt, Given, Reason, Role, Step, Sum, Term};
+use super::{FunctionsAt, Given, Linearized, LinearizedTerm, Reason, Role, Step, Sum, Term};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
 use crate::mechanics::loads::{Pressing, PressurePoint};
 use crate::mechanics::sweep::{Number, Supports};
@@ -53,36 +53,39 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
         }
     }
 
-    fn freeze(&self, dphi: &[Vector<f64, D>], _: Part) -> Freezing<'_, D> {
-        let freeze = |point: &PressurePoint<D>| {
+    fn linearize(&self, dphi: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
+        let linearize = |point: &PressurePoint<D>| {
             let (p, h_n) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
             let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));
             let f_inv_t = at.inverse_transpose();
-            FrozenPoint {
+            LinearizedPoint {
                 particle: p,
                 df_inv_t: f_inv_t * (identity::<f64, D>() + h_n).transpose(),
                 force: f_inv_t * point.force * at.jacobian,
             }
         };
-        Ok(Some(Box::new(FrozenPressure { supports: self.supports, points: self.points.iter().map(freeze).collect() })))
+        Ok(Some(Box::new(LinearizedPressure {
+            supports: self.supports,
+            points: self.points.iter().map(linearize).collect(),
+        })))
     }
 }
 
-struct FrozenPressure<'a, const D: usize> {
+struct LinearizedPressure<'a, const D: usize> {
     supports: &'a Supports<D>,
-    points: Vec<FrozenPoint<D>>,
+    points: Vec<LinearizedPoint<D>>,
 }
 
 /// δ(p A cof(F) N) = (A:L) w − A Lᵀ w with A = ΔF⁻ᵀ, w = p A J F⁻ᵀ N.
-struct FrozenPoint<const D: usize> {
+struct LinearizedPoint<const D: usize> {
     particle: usize,
     df_inv_t: Tensor<f64, D>,
     force: Vector<f64, D>,
 }
 
-impl<const D: usize> Frozen<D> for FrozenPressure<'_, D> {
+impl<const D: usize> Linearized<D> for LinearizedPressure<'_, D> {
     fn add_product_at_nodes(&self, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
-        for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
+        for LinearizedPoint { particle, df_inv_t: a, force: w } in &self.points {
             let l = self.supports.gradient_at(*particle, u);
             let delta = w * contract(a, &l) - a * (l.transpose() * w);
             mutant!("loads: the tangent of a pressure has a wrong sign": delta = w * contract(a, &l) + a * (l.transpose() * w));
@@ -94,7 +97,7 @@ impl<const D: usize> Frozen<D> for FrozenPressure<'_, D> {
 
     /// N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
-        for FrozenPoint { particle, df_inv_t: a, force: w } in &self.points {
+        for LinearizedPoint { particle, df_inv_t: a, force: w } in &self.points {
             for (node, function) in functions(*particle) {
                 for k in 0..D {
                     let g = a * function.gradient[k];

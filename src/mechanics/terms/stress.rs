@@ -1,11 +1,13 @@
 //! The internal force Σ_p V₀ F S ∇N (eq. 17), and its tangent, geometric and material (eqs. 34, 38).
 
-use super::{AtPoints, BlocksAtPoints, Freezing, Frozen, Given, ProductAtPoints, Reason, Step, Sum, Term, summed};
+use super::{
+    AtPoints, BlocksAtPoints, Given, Linearized, LinearizedTerm, ProductAtPoints, Reason, Step, Sum, Term, summed,
+};
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Flow, Number, Supports};
+use crate::mechanics::sweep::{Mode, Number, Supports};
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
@@ -31,7 +33,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
     }
 
     /// The tangent linearised at Δφ, whole or one `part`.
-    pub(super) fn frozen(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<FrozenStress, Inadmissible> {
+    pub(super) fn linearized(&self, dphi: &[Vector<f64, D>], part: Part) -> Result<LinearizedStress, Inadmissible> {
         let form = self.laws.form();
         let count = form.rows(D);
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
@@ -43,7 +45,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
             }
         });
         failure.check()?;
-        Ok(FrozenStress { form, rows, factor: 1.0 })
+        Ok(LinearizedStress { form, rows, factor: 1.0 })
     }
 }
 
@@ -55,8 +57,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         vec![("internal force", true, format!("F S of every particle, {D}×{D}"))]
     }
 
-    fn at_points<T: Number>(&self, part: Part, _: &[Vector<T, D>]) -> Option<(Flow, AtPoints<'_, T, D>)> {
-        Some((Flow::GRADIENT, Box::new(self.laws.stresses(part))))
+    fn at_points<T: Number>(&self, part: Part, _: &[Vector<T, D>]) -> Option<(Mode, AtPoints<'_, T, D>)> {
+        Some((Mode::GRADIENT, Box::new(self.laws.stresses(part))))
     }
 
     fn energy<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<Sum<T>, Inadmissible>> {
@@ -91,20 +93,20 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         })
     }
 
-    fn freeze(&self, dphi: &[Vector<f64, D>], part: Part) -> Freezing<'_, D> {
-        Ok(Some(Box::new(self.frozen(dphi, part)?)))
+    fn linearize(&self, dphi: &[Vector<f64, D>], part: Part) -> LinearizedTerm<'_, D> {
+        Ok(Some(Box::new(self.linearized(dphi, part)?)))
     }
 }
 
 /// δσ = 𝔸 : L at all particles, one particle per lane.
-pub(super) struct FrozenStress {
+pub(super) struct LinearizedStress {
     form: Form,
     rows: Pooled<[f64; LANES]>,
     /// The factor of all products.
     factor: f64,
 }
 
-impl FrozenStress {
+impl LinearizedStress {
     pub(super) fn times(self, factor: f64) -> Self {
         Self { factor: factor * self.factor, ..self }
     }
@@ -115,10 +117,10 @@ impl FrozenStress {
     }
 }
 
-impl<const D: usize> Frozen<D> for FrozenStress {
-    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Flow, ProductAtPoints<'_, D>)> {
+impl<const D: usize> Linearized<D> for LinearizedStress {
+    fn product_at_points(&self, _: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         Some((
-            Flow::GRADIENT,
+            Mode::GRADIENT,
             Box::new(|group, at, sums| {
                 let (form, rows, l) = (self.form, self.of_group(group.number, D), at.gradient.as_flattened());
                 if self.factor == 1.0 {

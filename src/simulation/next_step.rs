@@ -18,7 +18,7 @@ use crate::tensor::Vector;
 ///
 /// // Of a body in free flight the first step is solved by Δφ = Δt v.
 /// let simulation = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.build::<2>("scenes".as_ref())?;
-/// let coming = simulation.coming()?;
+/// let coming = simulation.next_step()?;
 /// let dphi = vec![Vector::from([0.5, 0.0]) * simulation.clock.step(); coming.nodes().len()];
 /// let (equilibrium, phi) = (coming.equilibrium(), coming.motion(&dphi));
 /// let residual = equilibrium.residual(&phi)?;
@@ -26,7 +26,7 @@ use crate::tensor::Vector;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Coming<const D: usize, L = Material, A = Approximation> {
+pub struct NextStep<const D: usize, L = Material, A = Approximation> {
     /// The copy, with the particles in the reference configuration.
     simulation: Simulation<D, L, A>,
     supports: Supports<D>,
@@ -37,22 +37,22 @@ pub struct Coming<const D: usize, L = Material, A = Approximation> {
 impl<const D: usize, L: Law + Clone, A: ShapeFunction + Clone> Simulation<D, L, A> {
     /// The problem of the next step, with the present step length of the clock.
     ///
-    /// Example: [`Coming`].
+    /// Example: [`NextStep`].
     ///
     /// # Errors
     /// A particle without shape functions, or velocities so large that their projection overflows.
-    pub fn coming(&self) -> Result<Coming<D, L, A>, StepError> {
+    pub fn next_step(&self) -> Result<NextStep<D, L, A>, StepError> {
         let mut simulation = Self { workspace: Workspace::default(), ..self.clone() };
-        simulation.particles.remember(&simulation.bodies);
+        simulation.particles.make_room_for_internal(&simulation.bodies);
         let supports = simulation.new_supports(None)?;
         let prescribed = self.prescribed(supports.active());
         let nodal = simulation.nodal(&supports, &prescribed)?.with_prescribed(&prescribed);
         let nodal = nodal.extended(&Unknowns::new(&supports, &prescribed));
-        Ok(Coming { simulation, supports, nodal, prescribed })
+        Ok(NextStep { simulation, supports, nodal, prescribed })
     }
 }
 
-impl<const D: usize, L: Law, A: ShapeFunction> Coming<D, L, A> {
+impl<const D: usize, L: Law, A: ShapeFunction> NextStep<D, L, A> {
     /// The active nodes.
     pub fn nodes(&self) -> &Nodes {
         self.supports.active()

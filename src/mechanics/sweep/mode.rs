@@ -2,7 +2,7 @@
 
 /// The evaluation mode of a pass over the particles. It holds for gather and scatter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Flow {
+pub struct Mode {
     /// Σ u_I N_I is gathered, and q N_I scattered.
     pub value: bool,
     /// Σ u_I ⊗ ∇N_I is gathered, and σ ∇N_I scattered.
@@ -11,7 +11,7 @@ pub struct Flow {
     pub weights: Weights,
 }
 
-impl Flow {
+impl Mode {
     /// Values and gradients.
     pub const BOTH: Self = Self { value: true, gradient: true, weights: Weights::Signed };
     /// Gradients alone.
