@@ -7,7 +7,7 @@ pub use arrays::ArrayUse;
 use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad};
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
 use crate::mechanics::terms::{Given, Terms};
 use crate::mechanics::unknowns::Unknowns;
@@ -115,7 +115,7 @@ pub struct Plan {
     /// Free degrees of freedom of the first step.
     pub unknowns: usize,
     /// When the grid is reset.
-    pub renewal: Renewal,
+    pub grid_reset: GridReset,
     /// The method that solves the linear systems, and the reason.
     pub krylov: (Krylov, &'static str),
     /// The preconditioner of the linear systems, and the reason.
@@ -147,7 +147,7 @@ impl Plan {
             grid_nodes: simulation.grid.node_count(),
             active_nodes: nodes.len(),
             unknowns: unknowns(&supports, &prescribed),
-            renewal: simulation.settings.renewal,
+            grid_reset: simulation.settings.grid_reset,
             krylov: simulation.krylov(),
             preconditioner: simulation.preconditioner(),
             terms: terms(simulation, &supports),
@@ -259,7 +259,7 @@ impl Display for Plan {
         writeln!(f, "particles     {}", self.particles)?;
         writeln!(f, "active nodes  {} of {}", self.active_nodes, self.grid_nodes)?;
         writeln!(f, "unknowns      {}", self.unknowns)?;
-        writeln!(f, "grid          {}", self.renewal)?;
+        writeln!(f, "grid          {}", self.grid_reset)?;
         let (method, why) = self.krylov;
         writeln!(f, "solver        {method}: {why}")?;
         let (preconditioner, why) = self.preconditioner;

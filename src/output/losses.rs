@@ -52,7 +52,7 @@ impl Cause {
                  tenth of their speed of sound"
             }
             (Self::NewGrid, _) => {
-                "keep the grid where bodies are free: \"grid\": {\"renewed\": {\"strain\": 0.1}}, or \"never\""
+                "keep the grid where bodies are free: \"grid\": {\"reset\": {\"strain\": 0.1}}, or \"never\""
             }
             (Self::Step, _) => "shorten time.step, or give time.adaptive a tolerance",
         }

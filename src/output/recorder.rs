@@ -204,7 +204,7 @@ impl<const D: usize> Recorder<D> {
             step: number,
             energies,
             has_inertia,
-            cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.renewed),
+            cause: Cause::of(step.feels_wall, !step.sharing.is_empty(), step.reset),
             lumped: simulation.settings.lumping >= 1.0,
             cost,
             failed,

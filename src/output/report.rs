@@ -109,7 +109,7 @@ impl Counts {
         let newton = &step.newton.history;
         self.max_active_nodes = self.max_active_nodes.max(step.active_nodes);
         self.steps += 1;
-        self.grids += u64::from(step.renewed);
+        self.grids += u64::from(step.reset);
         self.particle_passes += step.seconds.passes().iter().sum::<u64>();
         self.max_newton_iterations = self.max_newton_iterations.max(newton.iterations.len());
         self.projection_iterations += step.projection_iterations as u64;

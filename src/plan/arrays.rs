@@ -5,7 +5,7 @@ use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::dilatation::Cells;
 use crate::mechanics::loads::SurfacePoint;
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::tangent::tangent_bytes;
 use crate::mechanics::terms::linearized_rows;
@@ -36,7 +36,7 @@ pub(super) fn arrays<const D: usize, L: Law, A: ShapeFunction>(
         particles: simulation.particles.len(),
         nodes: supports.active().len(),
         has_inertia: simulation.settings.scheme.has_inertia(),
-        keeps_grid: simulation.settings.renewal != Renewal::EveryStep,
+        keeps_grid: simulation.settings.grid_reset != GridReset::EveryStep,
         averages: simulation.bodies.iter().any(Body::averages),
     };
     let all = [

@@ -63,7 +63,7 @@ pub struct Prescribed {
     pub displacement: Option<Table>,
     /// A table of velocities; constant after the last row.
     pub velocity: Option<Table>,
-    /// A rotation. The region stays in place, and the nodes in it rotate. Where the grid is reset (`grid.renewed`), the region should be
+    /// A rotation. The region stays in place, and the nodes in it rotate. Where the grid is reset (`grid.reset`), the region should be
     /// rotationally symmetric about the axis.
     pub rotation: Option<Rotation>,
 }

@@ -116,7 +116,7 @@ impl Scene {
             lumping: self.time.lumping(),
             projection: self.time.projection.unwrap_or_default(),
             aggregation: self.aggregates(),
-            renewal: self.renewal(),
+            grid_reset: self.grid_reset(),
             initial_guess: self.time.initial_guess(),
             wall_update: self.time.wall_update.unwrap_or_default(),
             smoothing: match self.transfer.unwrap_or_default() {

@@ -6,7 +6,7 @@ use super::particle_file;
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
 use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
 use crate::simulation::Simulation;
@@ -164,7 +164,7 @@ impl Scene {
     }
 
     fn is_kept(&self) -> bool {
-        self.renewal() != Renewal::EveryStep
+        self.grid_reset() != GridReset::EveryStep
     }
 
     /// Whether sums over particles are Gauss quadrature. The conditions are a grid that is not reset in every step, Gauss layout in all

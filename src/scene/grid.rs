@@ -1,7 +1,7 @@
 //! The box and its background grid.
 
 use crate::grid::Grid;
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::problems::{Number, Problems, sensible};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
@@ -34,7 +34,9 @@ pub struct GridBox {
     /// When the background grid is reset. Between resets, the result does not depend on the number of steps, stresses are smooth, and
     /// bodies stay on the walls that they touch. Default: `{"strain": 1}` in load steps. With inertia, `{"strain": 0.1}` for a single body
     /// that a fixed face of the box holds from the start, if the transfer is `"flip"`, and `"every_step"` otherwise.
-    pub renewed: Option<Renewal>,
+    pub reset: Option<GridReset>,
+    /// Deprecated, and read for one release: the key is now `reset`. If `reset` is given, this key has no effect.
+    pub renewed: Option<GridReset>,
 }
 
 impl GridBox {
@@ -50,6 +52,11 @@ impl GridBox {
     /// Example: [`Self::build`].
     pub fn origin(&self) -> Vec<f64> {
         self.origin.clone().unwrap_or_else(|| vec![0.0; self.size.len()])
+    }
+
+    /// When the grid is reset, if that is given.
+    pub(super) fn reset(&self) -> Option<GridReset> {
+        self.reset.or(self.renewed)
     }
 
     /// The grid; `None` unless the section is valid and of dimension `D`.
@@ -107,8 +114,8 @@ impl GridBox {
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {
-        if let Some(Renewal::Strain(most)) = self.renewed {
-            problems.positive("grid.renewed.strain", most);
+        if let Some(GridReset::Strain(most)) = self.reset() {
+            problems.positive("grid.reset.strain", most);
         }
         if !(1..=3).contains(&self.size.len()) {
             let found = format!("a vector of length {}", self.size.len());

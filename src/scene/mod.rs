@@ -45,7 +45,7 @@ use crate::field::Field;
 use crate::material::{Law, Material, PLASTIC_STRAIN};
 use crate::mechanics::loads::Loads;
 use crate::mechanics::loads::Rayleigh;
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{LONG_STEPS, Parameters};
 use crate::shape::Layout;
 use schemars::JsonSchema;
@@ -232,12 +232,12 @@ impl Scene {
 
     /// When the grid is reset. A clamped body vibrates, and seldom meets anything. Other bodies may come to walls, and a grid that is reset
     /// in every step feels a wall from farther away.
-    fn renewal(&self) -> Renewal {
+    fn grid_reset(&self) -> GridReset {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
-        self.grid.renewed.unwrap_or(match self.time.scheme().has_inertia() {
-            false => Renewal::Strain(STATIC_STRAIN),
-            true if flip && self.is_clamped() => Renewal::Strain(VIBRATION_STRAIN),
-            true => Renewal::EveryStep,
+        self.grid.reset().unwrap_or(match self.time.scheme().has_inertia() {
+            false => GridReset::Strain(STATIC_STRAIN),
+            true if flip && self.is_clamped() => GridReset::Strain(VIBRATION_STRAIN),
+            true => GridReset::EveryStep,
         })
     }
 
@@ -344,8 +344,8 @@ impl Scene {
                 problems.refuse(&format!("prescribed[{i}]"), "a motion", allowed);
             }
         }
-        if self.grid.renewed == Some(Renewal::EveryStep) {
-            problems.refuse("grid.renewed", "\"every_step\"", allowed);
+        if self.grid.reset() == Some(GridReset::EveryStep) {
+            problems.refuse("grid.reset", "\"every_step\"", allowed);
         }
     }
 
@@ -354,7 +354,8 @@ impl Scene {
         self.time.complete();
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
-        self.grid.renewed = Some(self.renewal());
+        self.grid.reset = Some(self.grid_reset());
+        self.grid.renewed = None;
         if self.time.scheme().has_inertia() {
             self.transfer.get_or_insert_default();
         }

@@ -115,7 +115,11 @@ impl Scene {
             let scheme = word(self.time.scheme());
             format!("time.inertia is now called time.scheme, which is {scheme} here. Rename the key; the next release refuses it")
         });
-        ghost_stiffness.into_iter().chain(precision).chain(inertia).collect()
+        let renewed = self
+            .grid
+            .renewed
+            .map(|_| "grid.renewed is now called grid.reset. Rename the key; the next release refuses it".to_owned());
+        ghost_stiffness.into_iter().chain(precision).chain(inertia).chain(renewed).collect()
     }
 
     /// Bodies whose volume may differ from that of their shape, with their numbers.

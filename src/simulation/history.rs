@@ -5,7 +5,7 @@ use crate::approximation::ShapeFunction;
 use crate::material::Law;
 use crate::mechanics::loads::PrescribedDof;
 use crate::mechanics::reference::{
-    GridState, LastEquilibrium, Renewal, pairs, reached_body, reached_conditions, touch,
+    GridReset, GridState, LastEquilibrium, pairs, reached_body, reached_conditions, touch,
 };
 use crate::mechanics::residual::Inadmissible;
 use crate::mechanics::schemes::Alphas;
@@ -58,7 +58,7 @@ pub(super) struct Solved<'a, const D: usize> {
 
 /// The part of a step's report that is known once the particles have taken the step.
 pub(super) struct Accepted {
-    pub renewed: bool,
+    pub reset: bool,
     pub feels_wall: bool,
     pub sharing: Vec<Sharing>,
     pub yielding: f64,
@@ -74,7 +74,7 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 
     /// Whether a strain, a wall or another body may cause a grid reset.
     pub(crate) fn may_reset(&self) -> bool {
-        self.settings.renewal != Renewal::Never || !self.loads.prescribed.is_empty() || self.bodies.len() > 1
+        self.settings.grid_reset != GridReset::Never || !self.loads.prescribed.is_empty() || self.bodies.len() > 1
     }
 
     /// The positions at which the coming load step evaluates a force field, by particle id; empty if no step will ask for them.
@@ -89,10 +89,10 @@ impl<const D: usize, L, A> Simulation<D, L, A> {
 impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// Writes a step to the particles, and decides whether the next step resets the grid.
     pub(super) fn accept(&mut self, update: Update<'_, D>, step: &Solved<'_, D>, supports: &Supports<D>) -> Accepted {
-        let (renewed, dt) = (self.history.resets_grid(), self.clock.step());
+        let (reset, dt) = (self.history.resets_grid(), self.clock.step());
         let field_positions = self.field_positions();
         let mut grid = None;
-        if self.settings.renewal != Renewal::EveryStep {
+        if self.settings.grid_reset != GridReset::EveryStep {
             self.particles.store_reference();
             grid = Some(GridState::new(&update.end(step.nodal), step.dphi, dt));
         }
@@ -103,7 +103,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         }
         // Contact detection also updates the constrained conditions.
         let contact = grid.is_some() && self.in_contact(supports, step.prescribed);
-        self.history.grid = grid.filter(|_| !contact && self.settings.renewal.keeps(strain));
+        self.history.grid = grid.filter(|_| !contact && self.settings.grid_reset.keeps(strain));
         self.history.equilibrium = None;
         if self.history.resets_grid() {
             self.particles.reference = None;
@@ -113,13 +113,13 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
                 self.history.equilibrium = Some(last);
             }
         }
-        Accepted { renewed, feels_wall, sharing, yielding }
+        Accepted { reset, feels_wall, sharing, yielding }
     }
 
     /// Records the prescribed conditions that hold bodies from the start, and the bodies that touch.
     fn record_first_contacts(&mut self, prescribed: &[PrescribedDof]) {
         self.history.constrained = prescribed.iter().map(|dof| dof.owner).collect();
-        if self.settings.renewal != Renewal::EveryStep && self.bodies.len() > 1 {
+        if self.settings.grid_reset != GridReset::EveryStep && self.bodies.len() > 1 {
             let at_start = self.particles.reference().position;
             self.history.bonded = pairs(at_start, &self.particles.body, &self.grid);
         }

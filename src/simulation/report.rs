@@ -26,7 +26,7 @@ pub struct StepReport<const D: usize> {
     /// Local error in grid spacings, if a tolerance is set. The error exceeds the tolerance only if the step could not be halved.
     pub error: Option<f64>,
     /// Whether the grid was reset before the step.
-    pub renewed: bool,
+    pub reset: bool,
     /// Whether a contact, a prescribed condition outside [`History::constrained`](super::History::constrained), has active nodes in this step.
     pub feels_wall: bool,
     /// Bodies that share nodes.

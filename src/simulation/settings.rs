@@ -1,6 +1,6 @@
 //! Numerical settings of a step.
 
-use crate::mechanics::reference::Renewal;
+use crate::mechanics::reference::GridReset;
 use crate::mechanics::schemes::{Newmark, Scheme};
 use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::transfer::{Projection, WallUpdate};
@@ -36,7 +36,7 @@ pub struct Settings {
     /// nothing else holds such nodes.
     pub aggregation: bool,
     /// When the grid is reset.
-    pub renewal: Renewal,
+    pub grid_reset: GridReset,
     /// The starting point of Newton's method.
     pub initial_guess: InitialGuess,
     /// The change that resting walls make to particle velocities.
@@ -66,7 +66,7 @@ impl Default for Settings {
             lumping: 1.0,
             projection: Projection::default(),
             aggregation: false,
-            renewal: Renewal::default(),
+            grid_reset: GridReset::default(),
             initial_guess: InitialGuess::default(),
             wall_update: WallUpdate::default(),
             smoothing: None,

@@ -31,7 +31,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             let at_surface = approximation.separable().map_or(AtSurface::Own, Separable::at_surface);
             points = at_surface_points(points, particles, loads, grid, at_surface);
         }
-        let (supports, _) = Supports::renewed(spare, approximation, grid, &points, &workspace.pool)?;
+        let (supports, _) = Supports::rebuilt(spare, approximation, grid, &points, &workspace.pool)?;
         Ok(self.aggregated(supports))
     }
 

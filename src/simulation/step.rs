@@ -68,7 +68,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
 
         // Nothing fails from here on.
         let solved = Solved { nodal: &projected, prescribed: &prescribed, dphi: &dphi, reactions: &reactions };
-        let Accepted { renewed, feels_wall, sharing, yielding } = self.accept(update, &solved, &supports);
+        let Accepted { reset, feels_wall, sharing, yielding } = self.accept(update, &solved, &supports);
         if scheme.follows_path() {
             self.path = self.path.after(to, &dphi, dt);
         }
@@ -85,7 +85,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             projection_iterations: projected.iterations,
             reactions,
             error,
-            renewed,
+            reset,
             feels_wall,
             sharing,
             straight,

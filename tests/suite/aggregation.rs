@@ -3,7 +3,7 @@
 use crate::support::{Failure, Random, built, moved_in_column, scene};
 use bfree::aggregation::{Extension, Occupied, Pieces};
 use bfree::mechanics::check::direction;
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
@@ -180,7 +180,7 @@ fn momentum_is_that_of_the_particles() -> Result<(), Failure> {
     ] {
         let mut simulation = scene::<2>("collision.json", &[AGGREGATION, lumping, more])?;
         // The discs stay apart during the test.
-        simulation.settings.renewal = Renewal::EveryStep;
+        simulation.settings.grid_reset = GridReset::EveryStep;
         let random = direction::<2>(simulation.particles.len(), 3);
         simulation.particles.velocity.iter_mut().zip(&random).for_each(|(v, random)| *v += random * 0.01);
         let sum = |simulation: &Simulation<2>| -> Vector<f64, 2> { simulation.particles.momentum() };
@@ -290,7 +290,7 @@ fn statics_with_smooth_functions_is_right_wherever_cells_are_cut() -> Result<(),
 /// every step, and the run stopped.
 #[test]
 fn points_of_a_loaded_surface_stay_with_their_body() -> Result<(), Failure> {
-    let reset = r#"grid.renewed="every_step""#;
+    let reset = r#"grid.reset="every_step""#;
     let mut simulation = scene::<2>("cantilever.json", &["approximation=\"linear\"", reset])?;
     // The points start a sixteenth from the body, and the free end has little strain.
     let depth = |simulation: &Simulation<2>| {

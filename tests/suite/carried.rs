@@ -6,7 +6,7 @@ use bfree::simulation::Simulation;
 use bfree::tensor::Vector;
 use serde_json::json;
 
-const EVERY_STEP: &str = r#"grid.renewed="every_step""#;
+const EVERY_STEP: &str = r#"grid.reset="every_step""#;
 
 /// A short beam, bent by half of its length in eight load steps; its load follows `curve`.
 fn beam(curve: &str, more: &[&str]) -> Result<Simulation<2>, Failure> {
@@ -31,11 +31,11 @@ const RESTS: &str = "[[0,0],[0.5,1]]";
 /// On a reset grid the stresses are out of balance. This out-of-balance force is carried over, so under constant loads nothing moves.
 #[test]
 fn what_a_new_grid_does_not_balance_is_carried_over() -> Result<(), Failure> {
-    for renewed in [EVERY_STEP, r#"grid.renewed={"strain": 0.05}"#] {
+    for renewed in [EVERY_STEP, r#"grid.reset={"strain": 0.05}"#] {
         let mut simulation = beam(RESTS, &[renewed])?;
         let mut renewals = 0;
         for _ in 0..4 {
-            renewals += u32::from(simulation.advance()?.renewed);
+            renewals += u32::from(simulation.advance()?.reset);
         }
         assert!(renewals > 1, "{renewals}");
         let loaded = simulation.clone();
@@ -97,7 +97,7 @@ fn other_laws_have_to_be_balanced() -> Result<(), Failure> {
 #[test]
 fn reactions_balance_loads_after_renewals() -> Result<(), Failure> {
     for family in [r#""linear""#, r#"{"bspline": {"degree": 3}}"#] {
-        for renewed in [EVERY_STEP, r#"grid.renewed={"strain": 0.05}"#] {
+        for renewed in [EVERY_STEP, r#"grid.reset={"strain": 0.05}"#] {
             let mut simulation = beam("[[0,0],[1,1]]", &[renewed, &format!("approximation={family}")])?;
             for _ in 0..8 {
                 let step = simulation.advance()?;
@@ -114,7 +114,7 @@ fn reactions_balance_loads_after_renewals() -> Result<(), Failure> {
 #[test]
 fn reactions_go_on_over_renewals() -> Result<(), Failure> {
     let turned = json!({
-        "grid": {"size": [8, 8], "spacing": 0.5, "renewed": "every_step"},
+        "grid": {"size": [8, 8], "spacing": 0.5, "reset": "every_step"},
         "time": {"step": 0.125, "end": 1, "scheme": "none"},
         "bodies": [{"name": "bar", "shape": {"box": {"min": [1, 3.1], "max": [7, 4.9]}}, "density": 1,
                     "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}}],
@@ -187,7 +187,7 @@ fn pressed(names: &[&str], by: f64) -> serde_json::Value {
                "material": {"neo_hookean": {"young": 100, "poisson": 0.3}}})
     };
     json!({
-        "grid": {"size": [6, 3], "spacing": 0.5, "renewed": "every_step"},
+        "grid": {"size": [6, 3], "spacing": 0.5, "reset": "every_step"},
         "time": {"step": 0.25, "end": 1, "scheme": "none"},
         "approximation": "linear",
         "bodies": names.iter().enumerate().map(block).collect::<Vec<_>>(),
@@ -204,7 +204,7 @@ fn pressed(names: &[&str], by: f64) -> serde_json::Value {
 fn a_field_acts_where_a_body_has_come_to() -> Result<(), Failure> {
     for renewed in [json!("never"), json!("every_step"), json!({"strain": 0.1})] {
         let moved = json!({
-            "grid": {"size": [8, 3], "spacing": 0.5, "renewed": renewed},
+            "grid": {"size": [8, 3], "spacing": 0.5, "reset": renewed},
             "time": {"step": 0.25, "end": 1, "scheme": "none"},
             "bodies": [{"name": "block", "shape": {"box": {"min": [1, 1], "max": [2, 2]}}, "density": 2,
                         "material": {"neo_hookean": {"young": 1000, "poisson": 0.3}}}],

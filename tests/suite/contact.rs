@@ -76,7 +76,7 @@ fn a_restart_knows_which_bodies_are_bonded() -> Result<(), Failure> {
     let mut continued = restored(&simulation, &start)?;
     assert_eq!(continued.history.bonded(), simulation.history.bonded());
     for _ in 0..2 {
-        assert!(!simulation.advance()?.renewed && !continued.advance()?.renewed);
+        assert!(!simulation.advance()?.reset && !continued.advance()?.reset);
     }
     assert_eq!(continued.particles, simulation.particles);
     Ok(())

@@ -115,7 +115,7 @@ fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> 
     run(&mut four)?;
     let (a, b) = (tip(&one, &start), tip(&four, &start));
     assert!((a / b - 1.0).abs() < 1e-8, "{a} {b}");
-    let mut renewed = membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.renewed="every_step""#])?;
+    let mut renewed = membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.reset="every_step""#])?;
     for _ in 0..2 {
         renewed.advance()?;
     }
@@ -134,7 +134,7 @@ fn what_is_remembered_is_that_of_when_the_grid_was_new() -> Result<(), Failure> 
 #[test]
 fn tangents_are_exact() -> Result<(), Failure> {
     for shape in [LINEAR, "approximation={\"bspline\":{\"degree\":2}}"] {
-        let mut simulation = membrane(0.45, 6.0, 2, &[MEAN, shape, "grid.renewed=\"every_step\""])?;
+        let mut simulation = membrane(0.45, 6.0, 2, &[MEAN, shape, "grid.reset=\"every_step\""])?;
         simulation.settings.check_tangent = NonZeroU64::new(1);
         run(&mut simulation)?;
     }
@@ -143,7 +143,7 @@ fn tangents_are_exact() -> Result<(), Failure> {
 
 #[test]
 fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
-    let fresh = || membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.2}"#]);
+    let fresh = || membrane(0.49, 6.0, 4, &[MEAN, LINEAR, r#"grid.reset={"strain":0.2}"#]);
     let bits = |simulation: &Simulation<2>| -> Vec<u64> {
         let particles = simulation.particles.by_id();
         particles
@@ -180,16 +180,16 @@ fn threads_and_restarts_change_no_bit() -> Result<(), Failure> {
 /// A total Lagrangian grid whose reference configuration has θ ≠ 1. The particles may be reordered in memory between two steps.
 #[test]
 fn dilatations_of_a_kept_grid_go_with_their_particles() -> Result<(), Failure> {
-    let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.renewed={"strain":0.05}"#])?;
+    let mut simulation = membrane(0.49, 6.0, 8, &[MEAN, LINEAR, r#"grid.reset={"strain":0.05}"#])?;
     let mut renewed = 0;
     while renewed < 2 || simulation.history.resets_grid() {
-        renewed += u32::from(simulation.advance()?.renewed);
+        renewed += u32::from(simulation.advance()?.reset);
         assert!(simulation.clock.time() < 0.8, "no second grid that is kept");
     }
     let mut other = simulation.clone();
     let order: Vec<u32> = (0..other.particles.len() as u32).rev().collect();
     other.rearrange(&order);
-    assert!(!simulation.advance()?.renewed && !other.advance()?.renewed);
+    assert!(!simulation.advance()?.reset && !other.advance()?.reset);
     assert_eq!(simulation.particles.by_id(), other.particles.by_id());
     Ok(())
 }

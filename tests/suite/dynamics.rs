@@ -156,7 +156,7 @@ fn a_cantilever_that_vibrates_keeps_its_energy_and_its_frequency_by_default() ->
     let [balance, period] = vibrated(&[])?;
     assert!(balance.abs() < 5e-3 && period.abs() < 3e-3, "{balance} {period}");
     // The manual describes a grid that is reset in every step; a run warns of it.
-    let [balance, period] = vibrated(&[r#"grid.renewed="every_step""#])?;
+    let [balance, period] = vibrated(&[r#"grid.reset="every_step""#])?;
     assert!((balance + 0.025).abs() < 0.002 && (period - 0.009).abs() < 0.001, "{balance} {period}");
     Ok(())
 }

@@ -263,7 +263,7 @@ fn a_bar_creeps_on_new_grids_as_on_one_that_is_kept() -> Result<(), Failure> {
             r#"tractions=[{"body":"membrane","region":{"half_space":{"point":[8,0],"normal":[-1,0]}},"traction":[0.1,0],"curve":[[0,0],[0.1,1]]}]"#,
             "output={}",
             "time.step=0.1",
-            &format!("grid.renewed={renewed}"),
+            &format!("grid.reset={renewed}"),
         ];
         let mut simulation = scene::<2>("cook.json", &bar)?;
         let end = |simulation: &Simulation<2>| simulation.particles.position.iter().map(|x| x[0]).fold(0.0, f64::max);

@@ -1,7 +1,7 @@
 //! Total Lagrangian steps on one grid: the answer does not depend on the number of steps. Tests of the conditions for a grid reset.
 
 use crate::support::{Failure, apart, built, scene};
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::simulation::{Simulation, StepError};
 use bfree::tensor::Vector;
 use serde_json::json;
@@ -14,17 +14,17 @@ const NO_GAMMA: &str = "time.gamma=null";
 /// One body that a fixed face of the box holds from the start; others may come to walls.
 #[test]
 fn a_clamped_body_keeps_its_grid_by_default() -> Result<(), Failure> {
-    let asked = |name: &str, overrides: &[&str]| -> Result<Renewal, Failure> {
-        Ok(scene::<2>(name, overrides)?.settings.renewal)
+    let asked = |name: &str, overrides: &[&str]| -> Result<GridReset, Failure> {
+        Ok(scene::<2>(name, overrides)?.settings.grid_reset)
     };
-    let (kept, new) = (Renewal::Strain(0.1), Renewal::EveryStep);
+    let (kept, new) = (GridReset::Strain(0.1), GridReset::EveryStep);
     for (overrides, renewal) in [
         (&[][..], kept),
         (&[r#"boundary.left="sliding""#], new),
         (&[r#"boundary={"right":"fixed"}"#], new),
         (&[r#"transfer={"pic":{}}"#], new),
-        (&[r#"grid.renewed="every_step""#], new),
-        (&[r#"time.scheme="none""#, NO_BETA, NO_GAMMA], Renewal::Strain(1.0)),
+        (&[r#"grid.reset="every_step""#], new),
+        (&[r#"time.scheme="none""#, NO_BETA, NO_GAMMA], GridReset::Strain(1.0)),
     ] {
         assert_eq!(asked("cantilever.json", overrides)?, renewal, "{overrides:?}");
     }
@@ -50,7 +50,7 @@ fn beam(steps: u32, more: &[&str]) -> Result<Simulation<2>, Failure> {
 fn run<const D: usize>(simulation: &mut Simulation<D>) -> Result<Vec<bool>, Failure> {
     let mut renewed = Vec::new();
     while simulation.clock.time() < 1.0 - 1e-9 {
-        renewed.push(simulation.advance()?.renewed);
+        renewed.push(simulation.advance()?.reset);
     }
     Ok(renewed)
 }
@@ -73,7 +73,7 @@ fn the_answer_does_not_depend_on_the_number_of_load_steps() -> Result<(), Failur
             assert!((ratio - 1.0).abs() < 1e-8, "{family}, {steps} steps: {ratio}");
         }
         // With a grid reset in every step, the answer depends on the number of steps.
-        let mut renewed = beam(7, &[&family, r#"grid.renewed="every_step""#])?;
+        let mut renewed = beam(7, &[&family, r#"grid.reset="every_step""#])?;
         assert!(run(&mut renewed)?.iter().all(|&renewed| renewed) && renewed.history.resets_grid());
         assert!(apart(&one, &renewed) > 1e-5, "{family}: {:e}", apart(&one, &renewed));
     }
@@ -96,13 +96,13 @@ fn the_work_along_the_path_is_what_is_stored() -> Result<(), Failure> {
 
 #[test]
 fn a_strain_makes_it_anew() -> Result<(), Failure> {
-    let mut simulation = beam(10, &[r#"grid.renewed={"strain": 0.05}"#])?;
+    let mut simulation = beam(10, &[r#"grid.reset={"strain": 0.05}"#])?;
     let renewed = run(&mut simulation)?;
     let count = renewed.iter().filter(|&&renewed| renewed).count();
     assert!(renewed[0] && count > 1 && count < 10, "{renewed:?}");
-    assert!(!Renewal::Strain(0.05).keeps(f64::NAN));
-    let error = beam(1, &[r#"grid.renewed={"strain": 0}"#]).err().ok_or("no strain")?.to_string();
-    assert!(error.contains("grid.renewed.strain") && error.contains("> 0"), "{error}");
+    assert!(!GridReset::Strain(0.05).keeps(f64::NAN));
+    let error = beam(1, &[r#"grid.reset={"strain": 0}"#]).err().ok_or("no strain")?.to_string();
+    assert!(error.contains("grid.reset.strain") && error.contains("> 0"), "{error}");
     Ok(())
 }
 
@@ -118,13 +118,13 @@ fn a_wall_that_is_met_makes_it_anew() -> Result<(), Failure> {
         lowered,
         "output={}",
         "time.step=0.05",
-        r#"grid.renewed="never""#,
+        r#"grid.reset="never""#,
     ];
     let mut simulation: Simulation<2> = scene(BEAM, &hanging)?;
     let mut by_floor = Vec::new();
     while simulation.clock.time() < 1.0 - 1e-9 {
         let step = simulation.advance()?;
-        by_floor.push((step.renewed, step.reactions[0].force[1]));
+        by_floor.push((step.reset, step.reactions[0].force[1]));
     }
     let renewals: Vec<usize> = (0..by_floor.len()).filter(|&step| by_floor[step].0).collect();
     // The block comes within a cell of the floor after t = 0.2. From the next step on, the floor carries load.
@@ -163,7 +163,7 @@ fn a_body_that_is_met_makes_it_anew() -> Result<(), Failure> {
         let mut by_floor = Vec::new();
         while simulation.clock.time() < 1.0 - 1e-9 {
             let step = simulation.advance()?;
-            by_floor.push((step.renewed, step.reactions[0].force[1]));
+            by_floor.push((step.reset, step.reactions[0].force[1]));
         }
         let end = |body: u32, best: fn(f64, f64) -> f64, start| {
             let particles = &simulation.particles;
@@ -244,12 +244,12 @@ fn what_was_changed_by_hand_is_noticed() -> Result<(), Failure> {
 fn the_tangent_is_the_derivative_on_a_grid_that_is_kept() -> Result<(), Failure> {
     for scheme in [r#""newmark""#, r#"{"generalized_alpha": {"spectral_radius": 0.6}}"#] {
         let (inertia, more) = (format!("time.scheme={scheme}"), r#"damping={"mass": 0.1, "stiffness": 0.01}"#);
-        let kept = r#"grid.renewed="never""#;
+        let kept = r#"grid.reset="never""#;
         let overrides = [&inertia, more, kept, "time.lumping=0.4", "aggregation=true", NO_BETA, NO_GAMMA];
         let mut simulation: Simulation<2> = scene("rebound.json", &overrides)?;
         simulation.settings.check_tangent = NonZeroU64::new(1);
         for step in 0..4 {
-            assert_eq!(simulation.step()?.renewed, step == 0);
+            assert_eq!(simulation.step()?.reset, step == 0);
         }
     }
     Ok(())
@@ -268,7 +268,7 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
         let flown = |renewed: &str| -> Result<Simulation<2>, Failure> {
             let overrides = [
                 &format!("time.scheme={scheme}"),
-                &format!("grid.renewed=\"{renewed}\""),
+                &format!("grid.reset=\"{renewed}\""),
                 r#"bodies[0].layout="regular""#,
                 "time.step=0.01",
                 "time.lumping=0.05",
@@ -308,10 +308,10 @@ fn inertia_acts_on_a_grid_that_is_kept() -> Result<(), Failure> {
 #[test]
 fn a_body_leaves_the_wall_that_it_has_hit() -> Result<(), Failure> {
     let thrown = |renewed: &str| -> Result<_, Failure> {
-        let mut simulation: Simulation<2> = scene("rebound.json", &[&format!("grid.renewed=\"{renewed}\"")])?;
+        let mut simulation: Simulation<2> = scene("rebound.json", &[&format!("grid.reset=\"{renewed}\"")])?;
         let (start, mut renewals) = (simulation.particles.momentum()[0], 0);
         for _ in 0..800 {
-            renewals += usize::from(simulation.step()?.renewed);
+            renewals += usize::from(simulation.step()?.reset);
         }
         Ok((simulation.particles.momentum()[0] / start, renewals))
     };
@@ -326,10 +326,10 @@ fn a_body_leaves_the_wall_that_it_has_hit() -> Result<(), Failure> {
 #[test]
 fn bodies_that_meet_do_not_pass_through_each_other() -> Result<(), Failure> {
     let soft = |renewed: &str| -> Result<_, Failure> {
-        let mut simulation: Simulation<2> = scene("collision.json", &[&format!("grid.renewed=\"{renewed}\"")])?;
+        let mut simulation: Simulation<2> = scene("collision.json", &[&format!("grid.reset=\"{renewed}\"")])?;
         let mut renewals = 0;
         for _ in 0..200 {
-            renewals += usize::from(simulation.step()?.renewed);
+            renewals += usize::from(simulation.step()?.reset);
         }
         let particles = &simulation.particles;
         let of = |p: usize| if particles.body[p] == 0 { particles.velocity[p][0] * particles.mass[p] } else { 0.0 };
@@ -350,18 +350,18 @@ fn a_wall_that_is_met_holds_nobody_from_the_start() -> Result<(), Failure> {
                 "velocity": [0, speed], "material": { "neo_hookean": { "young": 1000, "poisson": 0.3 } } })
     };
     let scene = json!({
-        "grid": { "size": [3, 1.5], "spacing": 0.25, "renewed": "never" },
+        "grid": { "size": [3, 1.5], "spacing": 0.25, "reset": "never" },
         "approximation": "linear",
         "time": { "step": 0.02, "end": 1 },
         "bodies": [block("resting", [0.25, 0.0], 0.0), block("falling", [2.0, 0.5], -2.0)],
         "boundary": { "bottom": "fixed" }
     });
     let mut simulation: Simulation<2> = built(&scene)?;
-    assert!(simulation.advance()?.renewed);
+    assert!(simulation.advance()?.reset);
     assert!(simulation.history.constrained().contains(&0));
     let mut met = false;
     while simulation.clock.time() < 0.4 {
-        let renewed = simulation.advance()?.renewed;
+        let renewed = simulation.advance()?.reset;
         assert!(renewed == met, "at {}", simulation.clock.time());
         met = simulation.history.resets_grid();
     }

@@ -49,7 +49,7 @@ const LADDER: [(&str, &str); 8] = [
 /// A block with every feature.
 const ALL: [&str; 6] = [
     // In load steps the grid would not be reset by default.
-    r#"grid.renewed="every_step""#,
+    r#"grid.reset="every_step""#,
     r#"transfer={"limited":{"rate":1}}"#,
     "time.lumping=0.5",
     r#"boundary={"bottom":{"velocity":[[0,[null,0]],[1,[null,0.01]]]},"left":"sliding","right":"sliding"}"#,

@@ -89,7 +89,7 @@ fn a_path_without_end_is_said_to_be_one() -> Result<(), Failure> {
 fn what_a_path_cannot_have_is_refused() -> Result<(), Failure> {
     for (key, path) in [
         (r#"boundary={"left":{"displacement":[[0,[0,0]],[1,[0,0.1]]]}}"#, "boundary.left"),
-        (r#"grid.renewed="every_step""#, "grid.renewed"),
+        (r#"grid.reset="every_step""#, "grid.reset"),
         (r#"pressures=[{"body":"beam","pressure":1}]"#, "pressures[0]"),
         (r#"prescribed=[{"region":{"box":{"min":[0,0],"max":[1,4]}},"velocity":[[0,[1,0]]]}]"#, "prescribed[0]"),
     ] {

@@ -116,7 +116,7 @@ const IN_PARTS: [(&str, &[&str], &[&str]); 8] = [
         &[],
     ),
     // Inertia with one reference configuration, reset when the body meets a wall.
-    ("rebound.json", &[r#"grid.renewed="never""#, "output.checkpoint=1"], &["--until", "12"]),
+    ("rebound.json", &[r#"grid.reset="never""#, "output.checkpoint=1"], &["--until", "12"]),
     // Load steps without a grid reset.
     ("column_static.json", &["output.checkpoint=0.2", "time.step=0.04"], &[]),
     // Steps of adaptive length.
@@ -128,7 +128,7 @@ const IN_PARTS: [(&str, &[&str], &[&str]); 8] = [
     // Load steps with occasional grid resets, which carry over the out-of-balance force.
     (
         "elastica.json",
-        &[r#"grid.renewed={"strain":0.05}"#, "grid.spacing=0.5", "time.step=0.02", "output.checkpoint=0.1"],
+        &[r#"grid.reset={"strain":0.05}"#, "grid.spacing=0.5", "time.step=0.02", "output.checkpoint=0.1"],
         &[],
     ),
 ];

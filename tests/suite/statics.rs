@@ -263,13 +263,13 @@ fn the_krylov_method_is_chosen_by_the_symmetry_of_the_tangent() -> Result<(), Fa
 #[test]
 fn splines_curve_at_walls_where_sums_are_integrals_and_no_mass_is_lumped() -> Result<(), Failure> {
     let gauss = r#"bodies.0.layout="gauss""#;
-    let kept = r#"grid.renewed="never""#;
+    let kept = r#"grid.reset="never""#;
     let (quadratic, cubic) = (r#"approximation={"bspline":{"degree":2}}"#, r#"approximation={"bspline":{"degree":3}}"#);
     for (name, overrides, expected) in [
         ("elastica.json", vec![], NotAKnotBspline(Bspline::Cubic).into()),
         ("elastica.json", vec![quadratic], NotAKnotBspline(Bspline::Quadratic).into()),
         ("elastica.json", vec![r#"bodies.0.layout="regular""#], Bspline::Cubic.into()),
-        ("elastica.json", vec![gauss, r#"grid.renewed="every_step""#], Bspline::Cubic.into()),
+        ("elastica.json", vec![gauss, r#"grid.reset="every_step""#], Bspline::Cubic.into()),
         ("rebound.json", vec![cubic, gauss, kept], Approximation::from(Bspline::Cubic)),
     ] {
         assert_eq!(scene::<2>(name, &overrides)?.approximation, expected, "{name}, {overrides:?}");

@@ -319,7 +319,7 @@ fn renewal<const D: usize>() {
         let anew = Supports::new(&shape, &grid, &after).unwrap();
         for other in shapes() {
             let (spare, _) = Supports::new(&other, &grid, &before).unwrap();
-            let renewed = Supports::renewed(Some(spare), &shape, &grid, &Points::at(&after), &Pool::default()).unwrap();
+            let renewed = Supports::rebuilt(Some(spare), &shape, &grid, &Points::at(&after), &Pool::default()).unwrap();
             assert_eq!(renewed.1, anew.1);
             assert_eq!(renewed.0.windows(), anew.0.windows());
             for p in 0..after.len() {

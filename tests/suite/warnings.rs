@@ -1,6 +1,7 @@
 //! The warnings of `bfree check` and of the start of a run, with numbers.
 
 use crate::support::Failure;
+use bfree::mechanics::reference::GridReset;
 use bfree::scene;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -151,14 +152,23 @@ fn a_body_that_locks_is_named_with_its_number_and_its_cure() -> Result<(), Failu
 }
 
 #[test]
-fn the_deprecated_precision_is_read_and_named() -> Result<(), Failure> {
+fn deprecated_keys_are_read_and_named() -> Result<(), Failure> {
     let body = || json!([block("a", [1.0, 1.0], [4.0, 4.0])]);
-    for precision in ["double", "mixed"] {
-        let found = warnings(body(), json!({"solver": {"krylov": {"precision": precision}}}), Path::new("."))?;
+    let grid = json!({"size": [8, 8], "spacing": 1, "renewed": "never"});
+    for (key, given, cure) in [
+        ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "double"}}}), "Remove the key"),
+        ("solver.krylov.precision", json!({"solver": {"krylov": {"precision": "mixed"}}}), "Remove the key"),
+        ("time.inertia", json!({"time": {"step": 0.1, "end": 1, "inertia": "newmark"}}), "time.scheme"),
+        ("grid.renewed", json!({"grid": grid}), "grid.reset"),
+    ] {
+        let found = warnings(body(), given, Path::new("."))?;
         assert_eq!(found.len(), 1, "{found:?}");
-        assert_one(&found, &["solver.krylov.precision", "Remove the key"]);
+        assert_one(&found, &[key, cure]);
     }
     assert_eq!(warnings(body(), json!({}), Path::new("."))?, Vec::<String>::new());
+    let asked = ["grid.renewed=\"never\"".parse()?];
+    let simulation = scene::read_file("scenes/rebound.json".as_ref(), &asked)?.build::<2>("scenes".as_ref())?;
+    assert_eq!(simulation.settings.grid_reset, GridReset::Never);
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The laws at the particles: stress, linearised tangent and its storage.
 //!
-//! [`point`] has one particle, in formulas. [`laws`] calls these formulas for the particles of a group side by side. [`tangents`] stores
+//! `point.rs` has one particle, in formulas. `laws.rs` calls these formulas for the particles of a group side by side. `tangents.rs` stores
 //! their linearised tangents, and applies them.
 //!
 //! H_n, F_n and ∇_n N are those of the reference configuration, at the last grid reset. With a reset in every step that is t_n. Internal

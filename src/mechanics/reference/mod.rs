@@ -37,7 +37,7 @@ use std::fmt::{Display, Formatter};
 /// is carried over as a force on the nodes of the new grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Renewal {
+pub enum GridReset {
     /// After every step, as in the paper.
     #[default]
     EveryStep,
@@ -48,7 +48,7 @@ pub enum Renewal {
     Strain(#[schemars(extend("exclusiveMinimum" = 0))] f64),
 }
 
-impl Renewal {
+impl GridReset {
     /// Whether the grid is kept after a step that ends with this strain.
     pub fn keeps(self, strain: f64) -> bool {
         match self {
@@ -60,7 +60,7 @@ impl Renewal {
     }
 }
 
-impl Display for Renewal {
+impl Display for GridReset {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::EveryStep => f.write_str("reset in every step"),

@@ -61,7 +61,7 @@ pub struct Group<'a> {
 
 impl Groups {
     /// An empty list that reuses the arrays of `self`.
-    pub(super) fn renewed(mut self, dimension: usize, size: [usize; 3]) -> Self {
+    pub(super) fn emptied(mut self, dimension: usize, size: [usize; 3]) -> Self {
         self.windows.clear();
         self.weights.clear();
         self.particles.clear();

@@ -73,7 +73,7 @@ struct Building<'a, const D: usize> {
 impl<const D: usize> Building<'_, D> {
     /// The groups of the particles, in the arrays of `spare`. Marks the nodes with nonzero shape functions in `active`.
     fn groups(&self, spare: Groups, scratch: &mut Scratch, active: &mut [u64]) -> Result<Groups, ApproximationError> {
-        let mut built = spare.renewed(D, self.size);
+        let mut built = spare.emptied(D, self.size);
         let mut groups = std::mem::take(&mut scratch.groups);
         groups.clear();
         let (mut start, mut rows) = (0, 0);

@@ -15,8 +15,8 @@
 //! meaning: a mass has one component a node, a motion has D. Gather and scatter are linear, so a dual number travels as two fields.
 //! Derivatives therefore go through the production kernels.
 //!
-//! [`plain`] is this loop, and serves shape functions that are not products. For products N = Π_k N_k, [`tiled`] has the shape functions
-//! of each axis, and [`waves`] runs the loop over them on all cores. Both give one answer:
+//! `plain.rs` is this loop, and serves shape functions that are not products. For products N = Π_k N_k, `tiled.rs` has the shape functions
+//! of each axis, and `waves.rs` runs the loop over them on all cores. Both give one answer:
 //!
 //! - A *lane* is one slot of a vector of eight numbers, and holds one particle.
 //! - A *group* is a batch of up to eight particles that share a window of nodes. They lie in one cell, or in neighbours along x.

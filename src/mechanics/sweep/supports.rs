@@ -94,7 +94,7 @@ impl<const D: usize> Supports<D> {
         grid: &Grid<D>,
         positions: &[Vector<f64, D>],
     ) -> Result<(Self, Nodes), SupportError> {
-        Self::renewed(None, approximation, grid, &Points::at(positions), &Pool::default())
+        Self::rebuilt(None, approximation, grid, &Points::at(positions), &Pool::default())
     }
 
     /// [`Self::new`] in the memory of `spare`, such as the supports of the last step. Sorting begins with the order of particles
@@ -112,17 +112,17 @@ impl<const D: usize> Supports<D> {
     /// let before = &simulation.particles.position;
     /// let now: Vec<_> = before.iter().map(|x| x + Vector::from([0.3, 0.1])).collect();
     /// let (last, _) = Supports::new(shape, grid, before)?;
-    /// let (renewed, nodes) = Supports::renewed(Some(last), shape, grid, &Points::at(&now), &Pool::default())?;
+    /// let (rebuilt, nodes) = Supports::rebuilt(Some(last), shape, grid, &Points::at(&now), &Pool::default())?;
     /// let (anew, same_nodes) = Supports::new(shape, grid, &now)?;
     /// assert_eq!(nodes, same_nodes);
     /// let field = direction::<2>(nodes.len(), 1);
-    /// assert_eq!(renewed.values(&field), anew.values(&field));
+    /// assert_eq!(rebuilt.values(&field), anew.values(&field));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     /// The errors of [`Self::new`].
-    pub fn renewed<A: ShapeFunction>(
+    pub fn rebuilt<A: ShapeFunction>(
         spare: Option<Self>,
         approximation: &A,
         grid: &Grid<D>,

@@ -14,7 +14,7 @@ fn built<const D: usize>(written: &Value) -> Result<Simulation<D>, Failure> {
 /// Half a disc. The whole body rotates about a point beside it, by `angle` within a unit of time.
 fn carried(angle: f64, more: &Value) -> Value {
     let mut scene = json!({
-        "grid": {"size": [8, 8], "spacing": 0.5, "renewed": "never"},
+        "grid": {"size": [8, 8], "spacing": 0.5, "reset": "never"},
         "approximation": {"bspline": {"degree": 3}},
         "bodies": [{
             "name": "half", "density": 2, "material": {"neo_hookean": {"young": 100, "poisson": 0.3}},
@@ -41,7 +41,7 @@ fn rotated(x: &Vector<f64, 2>, angle: f64) -> Vector<f64, 2> {
 fn what_rotates_as_a_whole_is_where_it_should_be_and_does_not_strain() -> Result<(), Failure> {
     // One step of a quarter turn; and eight steps, with one reference configuration and with a reset in every step. Splines are exact for
     // affine motion.
-    let renewed = json!({"grid": {"size": [8, 8], "spacing": 0.5, "renewed": "every_step"}});
+    let renewed = json!({"grid": {"size": [8, 8], "spacing": 0.5, "reset": "every_step"}});
     for (more, steps) in [(json!({}), 1), (json!({}), 8), (renewed, 8)] {
         let mut simulation = built::<2>(&carried(FRAC_PI_2, &more))?;
         simulation.clock = bfree::clock::Clock::new(1.0 / f64::from(steps), 0);

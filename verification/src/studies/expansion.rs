@@ -68,7 +68,7 @@ fn cylinder(h: f64) -> Result<(Simulation<2>, Vec<Vector<f64, 2>>), StudyError> 
     );
     let (bulk, shear) = (40e3, 3.8e3);
     let overrides = [
-        format!(r#"grid={{"size":[{box_side},{box_side}],"spacing":{h},"renewed":"never"}}"#),
+        format!(r#"grid={{"size":[{box_side},{box_side}],"spacing":{h},"reset":"never"}}"#),
         r#"approximation="linear""#.to_owned(),
         format!(r#"time={{"step":{},"end":1,"scheme":"none","initial_guess":"last_step"}}"#, 1.0 / f64::from(STEPS)),
         body,

@@ -205,7 +205,7 @@ impl Scene {
         });
         let mut scene = json!({
             "grid": { "origin": in_space(self.origin, units.length), "size": size,
-                      "spacing": self.spacing * units.length, "renewed": self.renewed },
+                      "spacing": self.spacing * units.length, "reset": self.renewed },
             "approximation": self.family,
             "bodies": bodies.collect::<Vec<_>>(),
             "boundary": self.boundary(&in_space),

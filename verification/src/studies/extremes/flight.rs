@@ -4,7 +4,7 @@ use super::bodies::{self, PLAIN, settings, stir, sum_of_momenta};
 use super::{Effort, Outcome, Report, StudyError, rows, solvable, worse};
 use crate::studies::patch::angular_momentum;
 use bfree::approximation::{Approximation, Linear, Lme};
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::GeneralizedAlpha;
 use bfree::simulation::{InitialGuess, Simulation};
 use bfree::tensor::{Tensor, Vector};
@@ -64,7 +64,7 @@ fn flies(name: &str, shape: &Approximation, motion: &str, stirred: (f64, f64), s
 /// conserves angular momentum exactly.
 fn spins(shape: &Approximation, steps: u32) -> Result<f64, StudyError> {
     let mut simulation = square(shape, 0.0, (0.2, 0.0));
-    simulation.settings.renewal = Renewal::Never;
+    simulation.settings.grid_reset = GridReset::Never;
     simulation.settings.scheme = Arc::new(GeneralizedAlpha { spectral_radius: 1.0 });
     let start = angular_momentum(&simulation.particles);
     (0..steps).try_fold(0.0, |worst, _| {

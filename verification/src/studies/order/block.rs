@@ -7,7 +7,7 @@ use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Gimp, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::Statics;
 use bfree::simulation::Settings;
 use bfree::tensor::Vector;
@@ -89,10 +89,10 @@ fn loaded<const D: usize>(
     case: &Case,
     cells: u32,
     steps: u32,
-    renewal: Renewal,
+    grid_reset: GridReset,
 ) -> Result<Held<Block, D>, StudyError> {
     let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; D] };
-    let settings = Settings { scheme: Arc::new(Statics), renewal, ..Settings::default() };
+    let settings = Settings { scheme: Arc::new(Statics), grid_reset, ..Settings::default() };
     Held::new(block, grid, (&case.shape, case.layout), None, f64::from(steps).recip(), settings)?.after(steps)
 }
 
@@ -111,7 +111,7 @@ impl Refining<'_> {
         let least = [("displacement", displacement), ("stress", stress)];
         let labels = [case.name, case.layout.name, *walls, &D.to_string()];
         Refined { report, table, least }.run(&labels, sizes, |cells| {
-            let held = loaded::<D>(block, case, cells, STEPS, Renewal::Never)?;
+            let held = loaded::<D>(block, case, cells, STEPS, GridReset::Never)?;
             Ok(([held.displacement(), held.stress()], held.work))
         });
     }
@@ -156,7 +156,7 @@ fn with_inertia(outcome: &mut Outcome) {
         let refined = Refined { report: &mut report, table: &mut table, least };
         refined.run(&[name, layout.name], &PLANE, |cells| {
             let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
-            let settings = Settings { lumping: 0.0, renewal: Renewal::Never, ..Settings::default() };
+            let settings = Settings { lumping: 0.0, grid_reset: GridReset::Never, ..Settings::default() };
             let block = Block::curved_at_walls::<2>(CHANGE);
             let held = Held::new(block, grid, (&shape, layout), None, 0.5 / f64::from(cells), settings)?.after(2 * cells)?;
             Ok(([held.displacement(), held.velocity(), held.stress()], held.work))
@@ -178,15 +178,15 @@ fn renewed(outcome: &mut Outcome) {
         let Some(bound) = case.floor else { continue };
         for cells in [16, 32] {
             let mut row = [case.name, case.layout.name, &cells.to_string()].map(String::from).to_vec();
-            for (steps, renewal, name) in
-                [(2, Renewal::Never, "kept"), (2, Renewal::EveryStep, "once"), (8, Renewal::EveryStep, "in every step of 8")]
+            for (steps, grid_reset, name) in
+                [(2, GridReset::Never, "kept"), (2, GridReset::EveryStep, "once"), (8, GridReset::EveryStep, "in every step of 8")]
             {
                 let labels = [name, case.name, case.layout.name];
-                let found = loaded::<2>(Block::curved_at_walls::<2>(CHANGE), &case, cells, steps, renewal);
+                let found = loaded::<2>(Block::curved_at_walls::<2>(CHANGE), &case, cells, steps, grid_reset);
                 match found.map(|held| held.stress()) {
                     Ok(stress) => {
                         row.push(format!("{stress:.2e}"));
-                        if cells == 32 && renewal == Renewal::EveryStep {
+                        if cells == 32 && grid_reset == GridReset::EveryStep {
                             report.push(&labels, stress, bound);
                         }
                     }

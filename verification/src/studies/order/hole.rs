@@ -7,7 +7,7 @@ use crate::studies::Outcome;
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear, Lme, NotAKnotBspline};
 use bfree::grid::Grid;
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::Statics;
 use bfree::shape::Ball;
 use bfree::simulation::Settings;
@@ -39,8 +39,8 @@ pub(super) fn run(outcome: &mut Outcome) {
         let refined = Refined { report: &mut report, table: &mut table, least };
         refined.run(&[name, layout.name], &[8, 16, 32], |cells| {
             let grid = Grid { origin: Vector::zeros(), spacing: f64::from(cells).recip(), cells: [cells; 2] };
-            let (scheme, renewal) = (Arc::new(Statics), Renewal::Never);
-            let settings = Settings { scheme, renewal, aggregation: true, ..Settings::default() };
+            let (scheme, grid_reset) = (Arc::new(Statics), GridReset::Never);
+            let settings = Settings { scheme, grid_reset, aggregation: true, ..Settings::default() };
             let held = Held::new(block, grid, (&shape, layout), Some(&hole), 1.0, settings)?.after(1)?;
             Ok(([held.displacement(), held.stress()], held.work))
         });

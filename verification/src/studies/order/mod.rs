@@ -26,7 +26,7 @@ use bfree::tensor::{Tensor, Vector};
 
 /// The summary in the list of studies.
 pub(super) const ABOUT: &str =
-    "orders in h and dt at large deformation on a grid that is kept; what its renewal costs; the energy that the rebound loses";
+    "orders in h and dt at large deformation on a grid that is kept; what its grid_reset costs; the energy that the rebound loses";
 
 /// The allowed shortfall of an observed order. An error C hᵖ (1 + c h) of a body with c = 2, from 16 to 32 cells across, shows the order p
 /// + 2 (1/16 − 1/32)/ln 2.

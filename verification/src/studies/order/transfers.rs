@@ -5,7 +5,7 @@ use crate::studies::patch::{angular_momentum, spinning};
 use crate::studies::{Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear};
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::GeneralizedAlpha;
 use bfree::mechanics::smoothing::Smoothing;
 use bfree::mechanics::transfer::Projection;
@@ -60,7 +60,7 @@ fn lost(shape: &Approximation, transfer: &Transfer, renewed_after: impl Fn(u32) 
     let (spin, start, before) = (angular_momentum(particles), particles.momentum(), energy(&simulation));
     let size: f64 = particles.velocity.iter().zip(&particles.mass).map(|(v, m)| v.norm() * m).sum();
     for step in 1..=STEPS {
-        simulation.settings.renewal = if renewed_after(step) { Renewal::EveryStep } else { Renewal::Never };
+        simulation.settings.grid_reset = if renewed_after(step) { GridReset::EveryStep } else { GridReset::Never };
         simulation.step()?;
     }
     let particles = &simulation.particles;
@@ -76,7 +76,7 @@ fn losses(outcome: &mut Outcome) {
     let mut report = Report::new(format!("{title}: what transfers take"), &["of", "grid", "shape", "transfer"]);
     let mut table = Table::new(
         format!("{title}: change of angular momentum and energy, over the start"),
-        ["shape", "transfer", "L, kept", "one renewal", "new in every step", "E, kept", "one renewal", "new in every step"],
+        ["shape", "transfer", "L, kept", "one grid_reset", "new in every step", "E, kept", "one grid_reset", "new in every step"],
     );
     for (name, shape) in families() {
         for transfer in &TRANSFERS {
@@ -117,7 +117,7 @@ fn losses(outcome: &mut Outcome) {
 pub(super) fn run(outcome: &mut Outcome) {
     losses(outcome);
     outcome.remarks.push(
-        "Of a body that spins, the column \"one renewal\" is what a single renewal on the way adds to a grid that is kept; a consistent mass \
+        "Of a body that spins, the column \"one grid_reset\" is what a single grid_reset on the way adds to a grid that is kept; a consistent mass \
          keeps the angular momentum on both, where it comes to the end: NaN is a run that fails, by null modes of the mass."
             .into(),
     );

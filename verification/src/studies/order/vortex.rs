@@ -7,7 +7,7 @@ use crate::studies::{Effort, Outcome, StudyError};
 use crate::table::Table;
 use bfree::approximation::{Approximation, Bspline, Linear};
 use bfree::grid::Grid;
-use bfree::mechanics::reference::Renewal;
+use bfree::mechanics::reference::GridReset;
 use bfree::mechanics::schemes::{GeneralizedAlpha, Newmark, Scheme};
 use bfree::particles::Particles;
 use bfree::simulation::Settings;
@@ -54,7 +54,7 @@ fn in_space(effort: Effort, outcome: &mut Outcome) {
         let least = [("displacement", displacement), ("velocity", velocity), ("stress", stress)];
         let refined = Refined { report: &mut report, table: &mut table, least };
         refined.run(&[name, layout.name, &lumping.to_string()], &sizes, |cells| {
-            let settings = Settings { lumping, renewal: Renewal::Never, ..Settings::default() };
+            let settings = Settings { lumping, grid_reset: GridReset::Never, ..Settings::default() };
             let run = spun((&shape, layout), settings, cells, cells * cells / 20)?;
             Ok(([run.displacement(), run.velocity(), run.stress()], run.work))
         });
@@ -85,7 +85,7 @@ fn in_time(outcome: &mut Outcome) -> Result<(), StudyError> {
         (generalized(1.0), 2.0),
     ];
     for (scheme, order) in schemes {
-        let settings = || Settings { scheme: scheme.clone(), renewal: Renewal::Never, ..Settings::default() };
+        let settings = || Settings { scheme: scheme.clone(), grid_reset: GridReset::Never, ..Settings::default() };
         let run = |steps| spun((&Linear.into(), &GAUSS), settings(), 10, steps);
         let [coarse, middle, fine] = [run(80)?, run(160)?, run(320)?].map(|run| run.simulation.particles.by_id());
         let (before, after) = (apart(&coarse, &middle), apart(&middle, &fine));

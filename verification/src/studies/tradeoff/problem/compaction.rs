@@ -36,7 +36,7 @@ impl Compaction {
         let mut scene = scene();
         let step = whole_steps(end, FINE_COURANT * spacing / speed(), SAMPLES);
         scene["grid"]["spacing"] = spacing.into();
-        scene["grid"]["renewed"] = "never".into();
+        scene["grid"]["reset"] = "never".into();
         scene["approximation"] = json!({ "bspline": { "degree": 3 } });
         scene["bodies"][0]["layout"] = "regular".into();
         scene["time"] = json!({ "end": end, "step": step, "lumping": 0 });
