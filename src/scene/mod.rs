@@ -355,7 +355,6 @@ impl Scene {
         let layouts: Vec<_> = self.bodies.iter().map(|body| self.filling(body).layout).collect();
         self.bodies.iter_mut().zip(layouts).for_each(|(body, layout)| body.layout = Some(layout));
         self.grid.reset = Some(self.grid_reset());
-        self.grid.renewed = None;
         if self.time.scheme().has_inertia() {
             self.transfer.get_or_insert_default();
         }
