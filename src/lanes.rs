@@ -52,7 +52,7 @@ pub(crate) trait Square: Simd {
 }
 
 /// A computation that is generic over the lanes.
-pub trait WithLanes {
+pub(crate) trait WithLanes {
     /// Runs the computation with the lanes `s`.
     fn run<S: Lanes>(self, s: S);
 }

@@ -104,7 +104,7 @@ pub struct Particles<const D: usize> {
 
 /// Positions and deformations of all particles in one configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Configuration<const D: usize> {
+pub(crate) struct Configuration<const D: usize> {
     /// x
     pub position: Vec<Vector<f64, D>>,
     /// H = F − I
@@ -253,7 +253,7 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Sets the internal variables of every particle to the values at rest of its law.
-    pub fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
+    pub(crate) fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.remembered = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
         let width = self.remembered;
         let at_rest = |&body: &u32| {

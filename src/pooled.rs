@@ -109,7 +109,7 @@ impl<T: Element> Pooled<T> {
     }
 
     /// The vector as plain numbers, in the same memory.
-    pub fn into_numbers(mut self) -> Pooled<f64> {
+    pub(crate) fn into_numbers(mut self) -> Pooled<f64> {
         let vector = try_cast_vec(std::mem::take(&mut self.vector)).unwrap_or_default();
         Pooled { vector, pool: self.pool.clone() }
     }

@@ -352,7 +352,7 @@ impl<T: Real, const D: usize> Deformation<T, D> {
     /// tr E − ln J, of second order. While J is not large, it is the sum of (tr E − j) and (j − ln J). For large J both would be much
     /// larger than their sum.
     #[inline(always)]
-    pub fn trace_e_minus_log_jacobian(&self) -> T {
+    pub(crate) fn trace_e_minus_log_jacobian(&self) -> T {
         if self.j.value() < 2.0 {
             self.trace_e_minus_j() + self.j_minus_log_jacobian()
         } else {

@@ -169,7 +169,7 @@ impl Place {
     /// active whose N and h|∇N| are round-off themselves, and nothing would hold such a node. `edge` is the distance from a node of the
     /// cell to the edges of supports in the cell, in spacings.
     #[inline(always)]
-    pub fn at_edge(self, edge: f64, round_off: f64) -> Self {
+    pub(crate) fn at_edge(self, edge: f64, round_off: f64) -> Self {
         let round_off = round_off + ACCUMULATED;
         mutant!("shapes: round-off decides which nodes are active": round_off = -1.0);
         // At 0 supports end on faces of cells, and `Axis::spacings` has moved the point.

@@ -30,7 +30,7 @@ const CHUNK: usize = 8192;
 
 /// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum Damage {
+pub(crate) enum Damage {
     /// The file cannot be read.
     #[error("it cannot be read: {0}")]
     Io(#[from] io::Error),

@@ -68,7 +68,7 @@ impl<T: Real> Strained<T> {
     }
 
     /// F⁻¹ τ F⁻ᵀ
-    pub fn pulled_back<const D: usize>(&self, tau: &Tensor<T, 3>) -> Tensor<T, D> {
+    pub(crate) fn pulled_back<const D: usize>(&self, tau: &Tensor<T, 3>) -> Tensor<T, D> {
         let f_inv_t = self.at.inverse_transpose();
         cut(&(f_inv_t.transpose() * tau * f_inv_t))
     }
@@ -141,7 +141,7 @@ impl Principal {
     }
 
     /// [`Self::moduli`] for τ = p I + g dev ε, where p and t = g d depend on v = tr ε and d = ‖dev ε‖ alone.
-    pub fn radial_moduli(&self, radial: &Radial<f64>) -> Moduli {
+    pub(crate) fn radial_moduli(&self, radial: &Radial<f64>) -> Moduli {
         let Radial { p, g, p_v, p_d, t_v, t_d } = *radial;
         let (deviator, d) = (self.deviator(), self.norm());
         let n = deviator.map(|x| if d > 0.0 { x / d } else { 0.0 });
@@ -215,7 +215,7 @@ impl Moduli {
     }
 
     /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
-    pub fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
+    pub(crate) fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
         let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
         let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();
         for j in 0..D {

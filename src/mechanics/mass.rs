@@ -28,7 +28,7 @@ pub struct Mass<'a, const D: usize> {
 }
 
 /// K nodal fields.
-pub type Projected<const K: usize, const D: usize> = [Pooled<Vector<f64, D>>; K];
+pub(crate) type Projected<const K: usize, const D: usize> = [Pooled<Vector<f64, D>>; K];
 
 /// Σ_p m N_I at every active node.
 pub fn lumped<const D: usize>(particles: &Particles<D>, supports: &Supports<D>) -> Pooled<f64> {
@@ -52,7 +52,7 @@ impl<const D: usize> Mass<'_, D> {
     }
 
     /// `out += factor M̃ u`
-    pub fn add_product(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
+    pub(crate) fn add_product(&self, factor: f64, u: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) {
         for ((out, u), m) in out.iter_mut().zip(u).zip(self.lumped) {
             *out += u * (factor * (self.lumping * m));
         }

@@ -90,7 +90,11 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// E û in pooled memory; `None` if no node follows others.
-    pub fn extended_in(&self, supports: &Supports<D>, field: &[Vector<f64, D>]) -> Option<Pooled<Vector<f64, D>>> {
+    pub(crate) fn extended_in(
+        &self,
+        supports: &Supports<D>,
+        field: &[Vector<f64, D>],
+    ) -> Option<Pooled<Vector<f64, D>>> {
         (!self.followers.is_empty()).then(|| {
             let mut field = supports.pool().collect(field.iter().copied());
             self.followers.extend(&mut field);
@@ -107,14 +111,14 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// The mask of prescribed values, node by node.
-    pub fn prescribed_mask(&self, nodes: usize) -> Vec<bool> {
+    pub(crate) fn prescribed_mask(&self, nodes: usize) -> Vec<bool> {
         let mut mask = vec![false; D * nodes];
         self.prescribed.iter().for_each(|dof| mask[dof.node * D + dof.component] = true);
         mask
     }
 
     /// The mask of values that follow inner nodes, node by node.
-    pub fn following_mask(&self, nodes: usize) -> Vec<bool> {
+    pub(crate) fn following_mask(&self, nodes: usize) -> Vec<bool> {
         let mut mask = vec![false; D * nodes];
         for (outer, follows, _) in self.followers.rows() {
             mask[outer * D..(outer + 1) * D].copy_from_slice(&follows);
@@ -145,7 +149,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// The diagonal blocks of Eᵀ B E, for a block-diagonal B.
-    pub fn restrict_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn restrict_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
         for (outer, follows, leaders) in self.followers.rows() {
             let own = blocks[outer];
             let moved = Tensor::from_fn(|i, k| if follows[i] && follows[k] { own[(i, k)] } else { 0.0 });
@@ -165,7 +169,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
     }
 
     /// Corrects the diagonal blocks of a quadratic form at one particle: effective shape functions replace N and ∇N.
-    pub fn add_followers(
+    pub(crate) fn add_followers(
         &self,
         supports: &Supports<D>,
         particle: usize,
@@ -186,7 +190,7 @@ impl<'a, const D: usize> Unknowns<'a, D> {
 
     /// Sets the row and column of each value that is no unknown to those of the identity. Clears the off-diagonal entries of
     /// [`Self::uncoupled`] nodes.
-    pub fn finish_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
+    pub(crate) fn finish_blocks(&self, blocks: &mut [Tensor<f64, D>]) {
         for node in self.uncoupled() {
             blocks[node] = Tensor::from_diagonal(&blocks[node].diagonal());
         }

@@ -164,7 +164,7 @@ impl Progress {
     }
 
     /// Writes a warning for every audience.
-    pub fn warn(&self, warning: &Warning) {
+    pub(crate) fn warn(&self, warning: &Warning) {
         let Warning { kind, time, step, message } = warning;
         let text = format!("warning: t = {time}, step {step}: {message}");
         match &self.display {

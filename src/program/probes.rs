@@ -51,7 +51,7 @@ impl<const D: usize> Display for Bound<D> {
 }
 
 /// The probes of a scene, each with the particle nearest to it at the start.
-pub fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Bound<D>> {
+pub(crate) fn bound_probes<const D: usize>(scene: &Scene, simulation: &Simulation<D>) -> Vec<Bound<D>> {
     let particles = &simulation.particles;
     let bind = |probe: &scene::output::Probe| {
         let body = |name: &String| simulation.bodies.iter().position(|body| body.name == *name).map(|body| body as u32);

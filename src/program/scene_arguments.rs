@@ -125,7 +125,7 @@ fn written(scene: &Scene) -> String {
 }
 
 /// The keys set by `accuracy`, on one line. `None` if the scene has no `accuracy`.
-pub fn what_accuracy_sets(scene: &Scene) -> Option<String> {
+pub(crate) fn what_accuracy_sets(scene: &Scene) -> Option<String> {
     let accuracy = scene.accuracy?;
     let set: Vec<String> = scene.chosen.iter().map(ToString::to_string).collect();
     let set = if set.is_empty() { "nothing: the scene gives every key".to_owned() } else { set.join(", ") };

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The steps that a run takes: whole steps, and a shortened last step if the end lies between whole steps.
-pub struct Schedule {
+pub(crate) struct Schedule {
     end: f64,
     /// Whole steps of the clock to take.
     whole_steps: u64,
@@ -34,7 +34,7 @@ impl Schedule {
     }
 
     /// Whether steps are left to take.
-    pub fn is_left(&self, clock: &Clock) -> bool {
+    pub(crate) fn is_left(&self, clock: &Clock) -> bool {
         !self.whole_steps_are_taken(clock) || self.shortens && clock.to(self.end).is_some()
     }
 
@@ -64,7 +64,7 @@ pub struct Steps<const D: usize> {
 }
 
 /// The results until a time could not be written.
-pub struct Unwritten {
+pub(crate) struct Unwritten {
     pub time: f64,
     pub error: Box<dyn Error>,
 }

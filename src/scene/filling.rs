@@ -52,7 +52,7 @@ pub(super) struct Means<'a> {
 impl Means<'_> {
     /// Reserves room for `more` particles. A step stores the state at its start and at its end. Shape functions and the linearised tangent
     /// need more memory than a state, so three states are a lower bound. The exact amount is known only once the shape functions are.
-    pub fn make_room<const D: usize>(
+    pub(crate) fn make_room<const D: usize>(
         &self,
         path: &str,
         particles: &mut Particles<D>,

@@ -35,7 +35,7 @@ pub enum PolygonError {
 
 impl PolygonError {
     /// The rules for an outline.
-    pub const ALLOWED: &str = "a polygon of the plane has at least 3 vertices, no two at one place and not all on a line, and \
+    pub(crate) const ALLOWED: &str = "a polygon of the plane has at least 3 vertices, no two at one place and not all on a line, and \
                                edges that meet at the vertex they share and nowhere else (vertices are counted from 0)";
 
     /// The vertex to name for this error, if there is one.

@@ -343,7 +343,7 @@ mod testing {
         }
 
         /// Its diagonal as preconditioner.
-        pub fn jacobi(&self) -> BlockJacobi<1> {
+        pub(crate) fn jacobi(&self) -> BlockJacobi<1> {
             let mut inverse = BlockJacobi::default();
             inverse.take(self);
             inverse

@@ -75,7 +75,7 @@ impl<'a, T: Real> States<'a, T> {
 }
 
 /// The loop over the lanes of one law. It fills rows and det F.
-pub type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
+pub(crate) type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
 /// The loop over the lanes for each body.
 struct Chosen<'a, T> {

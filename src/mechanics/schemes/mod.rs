@@ -22,7 +22,7 @@ use std::fmt::{Debug, Display};
 use std::sync::Arc;
 
 /// Courant number of pressure waves. Above it, inertia hardly restrains a node at the boundary of a body.
-pub const LONG_STEPS: f64 = 10.0;
+pub(crate) const LONG_STEPS: f64 = 10.0;
 
 /// A time integration scheme, from t_n to t_{n+1}. Its [`Display`] is its name in reports.
 ///

@@ -39,7 +39,7 @@ pub struct Groups {
 
 /// The position of a group's window in the box, and of its weights in the array.
 #[derive(Clone, Copy, Debug)]
-pub struct Span {
+pub(crate) struct Span {
     /// Index of its first row of weights.
     pub(super) weights: u32,
     /// The first node of the window, as a place in the box.

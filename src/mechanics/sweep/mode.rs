@@ -17,7 +17,7 @@ impl Mode {
     /// Gradients alone.
     pub const GRADIENT: Self = Self { value: false, ..Self::BOTH };
     /// Values alone.
-    pub const VALUE: Self = Self { gradient: false, ..Self::BOTH };
+    pub(crate) const VALUE: Self = Self { gradient: false, ..Self::BOTH };
 
     /// The mode that serves both `self` and `other`, with the weights of `self`.
     pub fn and(self, other: Self) -> Self {

@@ -89,13 +89,14 @@ pub type AtPoints<'a, T, const D: usize> =
     Box<dyn Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync + 'a>;
 
 /// The contribution of a linearised term to the product, like [`AtPoints`]. A linearised term always exists, so there is no error.
-pub type ProductAtPoints<'a, const D: usize> = Box<dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a>;
+pub(crate) type ProductAtPoints<'a, const D: usize> =
+    Box<dyn Fn(Group<'_>, &At<f64, D, D>, &mut At<f64, D, D>) + Sync + 'a>;
 
 /// The effective shape functions of all unknowns at a particle, by node.
 pub(crate) type FunctionsAt<'a, const D: usize> = dyn Fn(usize) -> Vec<(usize, Function<D>)> + 'a;
 
 /// Adds the quadratic form of a linearised tangent at the particles of a group.
-pub type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
+pub(crate) type BlocksAtPoints<'a> = Box<dyn Fn(Group<'_>, &mut Quadratic) + Sync + 'a>;
 
 /// A sum, and the sum of the magnitudes of its contributions.
 pub type Sum<T> = (T, f64);

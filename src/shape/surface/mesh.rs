@@ -19,7 +19,7 @@ pub struct Mesh {
 }
 
 /// The part of a triangle on which the nearest point lies.
-pub enum Foot {
+pub(crate) enum Foot {
     Inside,
     Edge(usize),
     Vertex(usize),

@@ -38,7 +38,7 @@ enum Node {
 
 /// The tree, and the bounds of each triangle.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tree {
+pub(crate) struct Tree {
     bounds: Bounds,
     root: Node,
     triangles: Vec<Bounds>,
