@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// The most times a step can be halved.
-pub(crate) const MAX_HALVINGS: u32 = 20;
+pub const MAX_HALVINGS: u32 = 20;
 
 /// Ticks per nominal step.
 const TICKS: u64 = 1 << MAX_HALVINGS;

@@ -165,27 +165,27 @@ impl Simulation {
     /// Positions of the active nodes of the coming step.
     #[getter]
     fn nodes<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let coming = self.coming(py)?;
+        let coming = self.next_step(py)?;
         frozen(py, coming.nodes(), &coming.shape())
     }
 
     /// Which components of them are solved for.
     #[getter]
     fn free<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let coming = self.coming(py)?;
+        let coming = self.next_step(py)?;
         frozen(py, coming.free(), &coming.shape())
     }
 
     /// The motion of those that are not; 0 elsewhere.
     #[getter]
     fn prescribed<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let coming = self.coming(py)?;
+        let coming = self.next_step(py)?;
         frozen(py, coming.prescribed(), &coming.shape())
     }
 
     /// R(Δφ) of the coming step.
     fn residual<'py>(&mut self, py: Python<'py>, dphi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let coming = self.coming(py)?;
+        let coming = self.next_step(py)?;
         let shape = coming.shape();
         let dphi = numbers("dphi", dphi, shape.iter().product())?;
         let residual = py.detach(|| coming.residual(&dphi)).map_err(|error| step_error(&error))?;
@@ -195,7 +195,7 @@ impl Simulation {
     /// K at Δφ, by default at the start of the step.
     #[pyo3(signature = (dphi = None))]
     fn tangent<'py>(&mut self, py: Python<'py>, dphi: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        let system = self.coming(py)?;
+        let system = self.next_step(py)?;
         let order = system.shape().iter().product();
         let dphi = dphi.map_or_else(|| Ok(vec![0.0; order]), |dphi| numbers("dphi", dphi, order))?;
         Tangent { system, dphi }.operator(py)
