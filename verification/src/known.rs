@@ -197,15 +197,6 @@ pub const KNOWN: &[Known] = &[
     },
     Known {
         study: "robust",
-        what: "linear iterations with multigrid, 80 cells across; 20 asked",
-        why: "With boxes in full or not at all it was below 20: the parts of boxes at a surface that cuts cells are small, and \
-              LME 1.4 is wide.",
-        since: "22 November 2026",
-        factor: 1.2,
-        cells: &[full_effort(&["iterations", "block", "2", "LME 1.4", "0.0125"], 22.67)],
-    },
-    Known {
-        study: "robust",
         what: "linear iterations with multigrid, cubic functions at a Poisson's ratio of 0.499; 100 asked",
         why: "Outer coefficients that follow a cubic polynomial are stiff where the volume hardly changes, and the levels of hat functions do not see \
               it. With the ghost stiffness there were 48.",
