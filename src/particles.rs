@@ -253,7 +253,7 @@ impl<const D: usize> Particles<D> {
     }
 
     /// Sets the internal variables of every particle to the values at rest of its law.
-    pub(crate) fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
+    pub fn set_internal_to_rest<L: Law>(&mut self, bodies: &[Body<L>]) {
         self.remembered = bodies.iter().map(|body| body.law.internal_variables().len()).max().unwrap_or(0);
         let width = self.remembered;
         let at_rest = |&body: &u32| {

@@ -72,7 +72,7 @@ impl Stopwatch {
     }
 
     /// Adds the time since the last lap to the phase that began then and failed.
-    pub(crate) fn give_up(&mut self) {
+    pub fn give_up(&mut self) {
         if let Some(&(phase, _)) = Phase::ALL.get(self.over) {
             self.lap(phase, self.last.1);
         }

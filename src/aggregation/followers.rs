@@ -68,7 +68,7 @@ impl<const D: usize> Followers<D> {
     }
 
     /// R̂ = Eᵀ R, in place. Components that follow become zero.
-    pub(crate) fn restrict<T: Real>(&self, forces: &mut [Vector<T, D>]) {
+    pub fn restrict<T: Real>(&self, forces: &mut [Vector<T, D>]) {
         self.restrict_with(forces, |weight| weight);
     }
 

@@ -91,7 +91,7 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
 
     /// The block of the unit gradients e_k and e_l: κ A e_k ⊗ A e_l − q A e_l ⊗ A e_k + B_kl I + c_kl b.
     #[inline(always)]
-    pub(crate) fn unit_block<A: Arithmetic<N = N>>(&self, with: A, k: usize, l: usize) -> [[N; D]; D] {
+    pub fn unit_block<A: Arithmetic<N = N>>(&self, with: A, k: usize, l: usize) -> [[N; D]; D] {
         let a = &self.a;
         let mut block = [[with.zero(); D]; D];
         for i in 0..D {

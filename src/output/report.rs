@@ -118,7 +118,7 @@ impl Counts {
     }
 
     /// Adds attempts that failed.
-    pub(crate) fn add_failed(&mut self, attempts: &[FailedAttempt]) {
+    pub fn add_failed(&mut self, attempts: &[FailedAttempt]) {
         self.failed_attempts += attempts.len() as u64;
         for attempt in attempts {
             self.projection_iterations += attempt.projection_iterations as u64;

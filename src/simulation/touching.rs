@@ -60,7 +60,7 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// assert!(found[0].gap.is_some_and(|gap| gap.abs() < 1.0));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub(crate) fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
+    pub fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
         let interfaces = self.interfaces(supports);
         let of = |(bodies, sides): (&[u32; 2], &Interface)| Sharing {
             bodies: *bodies,

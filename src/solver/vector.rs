@@ -74,12 +74,12 @@ pub fn norm(x: &[f64]) -> f64 {
 }
 
 /// `y ← a x + y`
-pub(crate) fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     update(x, y, |x, y| a * x + y);
 }
 
 /// `y ← x + b y`
-pub(crate) fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
+pub fn xpby(x: &[f64], b: f64, y: &mut [f64]) {
     update(x, y, |x, y| x + b * y);
 }
 

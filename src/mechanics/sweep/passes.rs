@@ -190,7 +190,7 @@ impl<const D: usize> Supports<D> {
     /// assert_eq!(visited, values.len());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub(crate) fn each_value<const C: usize>(
+    pub fn each_value<const C: usize>(
         &self,
         field: &[Vector<f64, C>],
         mut take: impl FnMut(usize, Vector<f64, C>),

@@ -218,7 +218,7 @@ impl<'a, const D: usize> Update<'a, D> {
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
-    pub(crate) fn leaving(
+    pub fn leaving(
         &self,
         particles: &Particles<D>,
         supports: &Supports<D>,
