@@ -190,11 +190,7 @@ impl<const D: usize> Supports<D> {
     /// assert_eq!(visited, values.len());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn each_value<const C: usize>(
-        &self,
-        field: &[Vector<f64, C>],
-        mut take: impl FnMut(usize, Vector<f64, C>),
-    ) {
+    pub fn each_value<const C: usize>(&self, field: &[Vector<f64, C>], mut take: impl FnMut(usize, Vector<f64, C>)) {
         const { assert!(C == 1 || C == D) };
         self.pass();
         let point = |_: usize, at: &[At<f64, C, D>], lane: usize| Vector::from_fn(|c, _| at[0].value[c][lane]);
