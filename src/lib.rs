@@ -21,7 +21,7 @@
 //! | Λ, G | Lamé's constants | [`material::Lame`] |
 //! | h | spacing of the grid | [`grid::Grid`] |
 //! | N, ∇ₙN | shape functions and their gradients at the positions xₙ | [`approximation::ShapeFunction`] |
-//! | ∇N = Fₙᵀ ∇ₙN (47) | gradient in the reference configuration | [`mechanics::tangent`] |
+//! | ∇N = Fₙᵀ ∇ₙN (47) | gradient with respect to the undeformed body | [`mechanics::constitutive`] |
 //! | γ̂, β̂ = γ̂/h² | locality of the max-ent functions | [`approximation::Lme`] |
 //! | Δφ | motion of the nodes over the step: the unknowns | [`mechanics::residual`] |
 //! | M̃ = (1−ε) M + ε lumped(M) (41) | mass matrix, between consistent (ε = 0) and lumped (ε = 1) | [`simulation::Settings::lumping`] |
@@ -78,7 +78,7 @@
 //! Π(Δφ) = a·M̃a / (2 α₁) + Σ_p V₀ W(F) − f_ext·Δφ
 //! ```
 //!
-//! and Π is the merit function of the line search. A state with det F ≤ 0 is refused as Π = +∞.
+//! and the line search accepts a step by Π where ‖R‖ does not fall. It refuses a state with det F ≤ 0.
 //!
 //! **4. Newton's method** ([`solver::newton()`]) solves R = 0 on the free degrees of freedom. The linear systems K d = −R are solved by
 //! conjugate gradients ([`solver::conjugate_gradient()`]), or by GMRES ([`solver::gmres()`]) where K is not symmetric. The product with K

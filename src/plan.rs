@@ -217,12 +217,12 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
         scheme,
         lumping: settings.lumping,
         averages,
-        renews: simulation.may_reset(),
+        may_reset: simulation.may_reset(),
     });
     all.extend([
         ("aggregation", settings.aggregation, aggregated(supports)),
         ("smoothing", smooths, "only with a transfer other than flip".into()),
-        ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation, supports)),
+        ("choice of laws", simulation.bodies.len() > 1, choice_of_laws(simulation)),
         ("third axis", D == 3, format!("grid.size has {D} components: so has every vector")),
         ("prescribed nodes", !loads.prescribed.is_empty(), format!("{} conditions", loads.prescribed.len())),
         ("work of moving walls", moving, "only where a prescribed motion does not rest".into()),
@@ -241,14 +241,11 @@ fn aggregated<const D: usize>(supports: &Supports<D>) -> String {
 }
 
 /// The frequency at which the loop over particles looks up the law, in words.
-fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: &Supports<D>) -> String {
-    let often = match supports.is_tiled() {
-        true => "once in a pass over the particles",
-        false => "for every particle: the shape functions are no products, or too wide",
-    };
+fn choice_of_laws<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>) -> String {
     match simulation.bodies.len() {
-        1 => format!("only with several bodies; the law of the only one is looked up {often}"),
-        count => format!("the law of each of {count} bodies is looked up {often}"),
+        1 => "only with several bodies; the law of the only one is looked up once in a pass over the particles"
+            .to_owned(),
+        count => format!("the law of each of {count} bodies is looked up once in a pass over the particles"),
     }
 }
 

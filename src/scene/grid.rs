@@ -55,7 +55,7 @@ impl GridBox {
     }
 
     /// When the grid is reset, if that is given.
-    pub(super) fn reset(&self) -> Option<GridReset> {
+    pub(super) fn given_reset(&self) -> Option<GridReset> {
         self.reset.or(self.renewed)
     }
 
@@ -114,8 +114,10 @@ impl GridBox {
     }
 
     pub(super) fn check(&self, problems: &mut Problems) {
-        if let Some(GridReset::Strain(most)) = self.reset() {
-            problems.positive("grid.reset.strain", most);
+        for (key, given) in [("reset", self.reset), ("renewed", self.renewed)] {
+            if let Some(GridReset::Strain(most)) = given {
+                problems.positive(&format!("grid.{key}.strain"), most);
+            }
         }
         if !(1..=3).contains(&self.size.len()) {
             let found = format!("a vector of length {}", self.size.len());

@@ -234,7 +234,7 @@ impl Scene {
     /// in every step feels a wall from farther away.
     fn grid_reset(&self) -> GridReset {
         let flip = self.transfer.is_none_or(|transfer| transfer == transfer::Transfer::Flip);
-        self.grid.reset().unwrap_or(match self.time.scheme().has_inertia() {
+        self.grid.given_reset().unwrap_or(match self.time.scheme().has_inertia() {
             false => GridReset::Strain(STATIC_STRAIN),
             true if flip && self.is_clamped() => GridReset::Strain(VIBRATION_STRAIN),
             true => GridReset::EveryStep,
@@ -344,7 +344,7 @@ impl Scene {
                 problems.refuse(&format!("prescribed[{i}]"), "a motion", allowed);
             }
         }
-        if self.grid.reset() == Some(GridReset::EveryStep) {
+        if self.grid.given_reset() == Some(GridReset::EveryStep) {
             problems.refuse("grid.reset", "\"every_step\"", allowed);
         }
     }

@@ -27,7 +27,7 @@ use crate::tensor::Vector;
 /// ```
 #[derive(Debug)]
 pub struct NextStep<const D: usize, L = Material, A = Approximation> {
-    /// The copy, with the particles in the reference configuration.
+    /// A copy of the simulation.
     simulation: Simulation<D, L, A>,
     supports: Supports<D>,
     nodal: Nodal<D>,

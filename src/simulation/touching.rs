@@ -1,4 +1,4 @@
-//! Contacts of bodies in a step, with walls and with each other.
+//! Contacts of bodies in a step, with walls and with each other, for reports. `mechanics::reference` decides on resets.
 
 use super::Simulation;
 use crate::approximation::ShapeFunction;

@@ -167,6 +167,57 @@ fn block(dimension: usize, length: f64, change: impl Fn(&mut Value)) -> Value {
     scene
 }
 
+/// The strain energy after three steps of a block on the floor, under gravity, in these units of length, mass and time.
+fn energy_in_units(length: f64, mass: f64, time: f64, scheme: &str) -> f64 {
+    let scene = json!({
+        "grid": {"size": [4.0 * length, 4.0 * length], "spacing": length},
+        "time": {"step": 0.1 * time, "end": 0.3 * time, "scheme": scheme},
+        "gravity": {"acceleration": [0, -0.3 * length / time / time]}, "boundary": {"bottom": "fixed"},
+        "bodies": [{"name": "block", "density": mass / length / length,
+                    "shape": {"box": {"min": [length, 0], "max": [3.0 * length, 2.0 * length]}},
+                    "material": {"neo_hookean": {"young": 10.0 * mass / time / time, "poisson": 0.3}}}]
+    });
+    let mut simulation = built::<2>(&scene).unwrap();
+    (0..3).for_each(|_| drop(simulation.advance().unwrap()));
+    simulation.strain_energy() / (mass * length * length / time / time)
+}
+
+/// Squares of these forces underflow or overflow.
+#[test]
+fn extreme_units_change_no_result() {
+    for scheme in ["newmark", "none"] {
+        let one = energy_in_units(1.0, 1.0, 1.0, scheme);
+        for [length, mass, time] in
+            [[1e-40, 1.0, 1.0], [1e-80, 1e-80, 1e-10], [1e60, 1e60, 1.0], [1.0, 1e-95, 1.0], [1e-50, 1e-20, 1e40]]
+        {
+            let other = energy_in_units(length, mass, time, scheme);
+            assert!((other / one - 1.0).abs() < 1e-12, "{scheme}, {length:e}, {mass:e}, {time:e}: {other} for {one}");
+        }
+    }
+}
+
+/// A block whose masses, forces or energies are beyond floating point has no answer, and says so in its first step at the latest.
+#[test]
+fn numbers_that_do_not_fit_are_an_error() {
+    let set =
+        |path: &'static str, value: Value| move |scene: &mut Value| *scene.pointer_mut(path).unwrap() = value.clone();
+    let add = |key: &'static str, value: Value| move |scene: &mut Value| scene["bodies"][0][key] = value.clone();
+    let gravity = |scene: &mut Value| scene["gravity"] = json!({"acceleration": [0, 1e99, 0], "curve": [[0, 1e50]]});
+    let pull = |scene: &mut Value| {
+        scene["tractions"] = json!([{"body": "block", "traction": [0, 1e90, 0], "curve": [[0, -1e50]]}]);
+    };
+    for (name, scene) in [
+        ("mass", block(3, 1e-75, set("/bodies/0/density", json!(1e-99)))),
+        ("speed", block(3, 1.0, add("velocity", json!([0, 1e70, 0])))),
+        ("gravity", block(3, 1.0, gravity)),
+        ("traction", block(3, 1.0, pull)),
+    ] {
+        let Ok(mut simulation) = built::<3>(&scene) else { continue };
+        let moved = simulation.advance();
+        assert!(moved.is_err(), "{name}: {:?}", simulation.particles.position[0]);
+    }
+}
+
 #[test]
 fn every_face_of_a_box_is_loaded_with_its_whole_area() -> Result<(), Box<dyn std::error::Error>> {
     let pressed = |region: Option<Value>| {

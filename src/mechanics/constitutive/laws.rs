@@ -14,7 +14,7 @@ use crate::scalar::{Real, Single};
 use crate::tensor::{Tensor, identity};
 use std::any::Any;
 
-/// The laws of all particles, and their states at t_n.
+/// The laws of all particles, and their states: F at the last grid reset, internal variables at t_n.
 #[derive(Clone, Copy)]
 pub struct Laws<'a, const D: usize, L> {
     /// The particles.

@@ -16,7 +16,7 @@
 //! Derivatives therefore go through the production kernels.
 //!
 //! `plain.rs` is this loop, and serves shape functions that are not products. For products N = Π_k N_k, `tiled.rs` has the shape functions
-//! of each axis, and `waves.rs` runs the loop over them on all cores. Both give one answer:
+//! of each axis, and `waves.rs` runs the loop over them on all cores. Both agree to round-off. The words:
 //!
 //! - A *lane* is one slot of a vector of eight numbers, and holds one particle.
 //! - A *group* is a batch of up to eight particles that share a window of nodes. They lie in one cell, or in neighbours along x.

@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Passes leap too often in memory if more than one in so many particles does not directly follow the particle before it.
 const LEAPS: usize = 8;
 
-/// The shape-function values and the connectivity of all particles at the last converged positions, and the active nodes.
+/// The shape-function values and the connectivity of all particles at the last grid reset, and the active nodes.
 ///
 /// ```
 /// use bfree::approximation::Lme;
@@ -292,7 +292,7 @@ impl<const D: usize> Supports<D> {
         self.passes.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Whether the loop takes particles in vector lanes, as it does for shape functions that are products.
+    /// Whether shape functions are stored by axis, as products are.
     pub fn is_tiled(&self) -> bool {
         matches!(self.way, Way::Tiled(_))
     }

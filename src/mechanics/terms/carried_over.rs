@@ -18,8 +18,8 @@ impl<'a, const D: usize> CarriedOver<'a, D> {
 }
 
 impl<const D: usize> CarriedOver<'_, D> {
-    fn reasons(Given { scheme, renews, .. }: Given<'_, D>) -> Vec<Reason> {
-        vec![("out-of-balance force", renews && !scheme.has_inertia(), "after a grid reset in load steps".into())]
+    fn reasons(Given { scheme, may_reset, .. }: Given<'_, D>) -> Vec<Reason> {
+        vec![("out-of-balance force", may_reset && !scheme.has_inertia(), "after a grid reset in load steps".into())]
     }
 }
 

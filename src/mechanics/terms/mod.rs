@@ -48,7 +48,7 @@ pub struct Step<'a, const D: usize, L> {
     pub bodies: &'a [Body<L>],
     /// The loads on the bodies.
     pub loads: &'a Loads<D>,
-    /// Shape functions at x_n.
+    /// Shape functions, evaluated at the last grid reset.
     pub supports: &'a Supports<D>,
     /// State at the nodes.
     pub nodal: &'a Nodal<D>,
@@ -75,12 +75,6 @@ impl<'a, const D: usize, L> Step<'a, D, L> {
     pub fn mass(&self) -> Mass<'a, D> {
         let Self { particles, supports, nodal, lumping, .. } = *self;
         Mass { particles, supports, lumped: &nodal.mass, lumping }
-    }
-
-    /// The law of a particle.
-    #[inline(always)]
-    pub fn law(&self, p: usize) -> &'a L {
-        &self.bodies[self.particles.body[p] as usize].law
     }
 }
 
@@ -111,12 +105,13 @@ pub(crate) struct Given<'a, const D: usize> {
     /// Whether a body has mean dilatation.
     pub averages: bool,
     /// Whether the grid may be reset.
-    pub renews: bool,
+    pub may_reset: bool,
 }
 
 /// `(name, used, why)`: whether a term, or a part of a term, is used, and the reason.
 pub(crate) type Reason = (&'static str, bool, String);
-/// The sum of energies.
+
+/// The sum of energies, and the sum of their magnitudes.
 fn summed<T: Number>(energies: impl IntoIterator<Item = T>) -> Sum<T> {
     energies.into_iter().fold((T::zero(), 0.0), |(sum, size), energy| (sum + energy, size + energy.value().abs()))
 }
@@ -176,8 +171,8 @@ pub(crate) trait Linearized<const D: usize>: Sync {
     /// Adds the contribution to the product at the nodes.
     fn add_product_at_nodes(&self, _u: &[Vector<f64, D>], _out: &mut [Vector<f64, D>]) {}
 
-    /// The contribution to the product with `u` at the particles, with its [`Mode`]. `u` is `None` if gradients are the same at all
-    /// particles of a cell.
+    /// The contribution to the product with `u` at the particles, with its [`Mode`]. `u` is `None` where multigrid asks with unit
+    /// gradients, which come from no nodal field. A term that couples particles then leaves the coupling out.
     fn product_at_points(&self, _u: Option<&[Vector<f64, D>]>) -> Option<(Mode, ProductAtPoints<'_, D>)> {
         None
     }

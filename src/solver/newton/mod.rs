@@ -41,9 +41,10 @@ const DIVERGED: f64 = 1e8;
 /// 4. s = 1.
 /// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, with the η that the solve has reached. Accept it also if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
-/// 6. Otherwise halve s and go to 5. Also halve s where x + s d is inadmissible or R is not finite.
-/// 7. If no step is found or accepted, or none of the last 8 reduced ‖R‖ by a percent, evaluate the sensitivity at x. The iteration has
-///    converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, and has failed if not.
+/// 6. The iteration has converged if the full step is not accepted and ‖R‖ ≤ 16 · floor · eps · magnitude. Otherwise halve s and go to 5.
+///    Also halve s where x + s d is inadmissible or R is not finite.
+/// 7. If no step is found or accepted, or 8 steps in a row were accepted by ‖R‖ and none reduced it by a percent, evaluate the sensitivity
+///    at x. The iteration has converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, and has failed if not.
 /// 8. x ← x + s d, and go back to 1.
 ///
 /// Between calls into the problem:

@@ -56,7 +56,7 @@ pub(super) enum Search<E> {
     Failed(Failed<E>),
 }
 
-/// Searches an acceptable step length.
+/// Searches for an acceptable step length.
 pub(super) fn search<E: std::error::Error + 'static>(
     problem: &dyn NonlinearProblem<Inadmissible = E>,
     at: &Step,
