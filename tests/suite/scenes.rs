@@ -187,9 +187,7 @@ fn energy_in_units(length: f64, mass: f64, time: f64, scheme: &str) -> f64 {
 fn extreme_units_change_no_result() {
     for scheme in ["newmark", "none"] {
         let one = energy_in_units(1.0, 1.0, 1.0, scheme);
-        for [length, mass, time] in
-            [[1e-40, 1.0, 1.0], [1e-80, 1e-80, 1e-10], [1e60, 1e60, 1.0], [1.0, 1e-95, 1.0], [1e-50, 1e-20, 1e40]]
-        {
+        for [length, mass, time] in [[1e-40, 1.0, 1.0], [1e-80, 1e-90, 1.0], [1e80, 1e90, 1.0], [1e-50, 1e-20, 1e40]] {
             let other = energy_in_units(length, mass, time, scheme);
             assert!((other / one - 1.0).abs() < 1e-12, "{scheme}, {length:e}, {mass:e}, {time:e}: {other} for {one}");
         }
