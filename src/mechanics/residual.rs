@@ -11,7 +11,7 @@ use crate::mechanics::terms::{Piece, Role, Step, Terms};
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::pooled::Pooled;
-use crate::solver::Stop;
+use crate::solver::{Stop, vector};
 use crate::tensor::Vector;
 
 pub use crate::mechanics::constitutive::{Inadmissible, compose};
@@ -189,7 +189,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
 
     fn free_norm(&self, mut field: Pooled<Vector<f64, D>>) -> f64 {
         self.clear_prescribed(&mut field);
-        field.iter().map(Vector::norm_squared).sum::<f64>().sqrt()
+        vector::norm(bytemuck::cast_slice(&field))
     }
 
     fn magnitudes(&self, dphi: &[Vector<f64, D>]) -> Result<Pooled<Vector<f64, D>>, Inadmissible> {

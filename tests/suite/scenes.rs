@@ -182,7 +182,7 @@ fn energy_in_units(length: f64, mass: f64, time: f64, scheme: &str) -> f64 {
     simulation.strain_energy() / (mass * length * length / time / time)
 }
 
-/// Squares of these forces underflow or overflow.
+/// Forces are from 1e-170 to 1e170, so their squares underflow or overflow.
 #[test]
 fn extreme_units_change_no_result() {
     for scheme in ["newmark", "none"] {
