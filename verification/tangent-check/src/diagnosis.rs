@@ -1,0 +1,1 @@
+//! Frequent mistakes, compared with a wrong tangent.

@@ -1,0 +1,1 @@
+//! Extrapolated differences of a vector function of one variable, with their own error.

@@ -1,0 +1,1 @@
+//! Verdicts: a claimed tangent beside the measured one, and the negative control.

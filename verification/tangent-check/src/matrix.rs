@@ -1,0 +1,40 @@
+//! A dense matrix of any size, in rows.
+
+use std::ops::{Index, IndexMut};
+
+/// A matrix, stored row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix {
+    /// The number of rows: components of the stress or residual.
+    pub rows: usize,
+    /// The number of columns: components of the strain or unknowns.
+    pub columns: usize,
+    /// The entries, row by row.
+    pub entries: Vec<f64>,
+}
+
+impl Matrix {
+    /// A matrix of zeros.
+    pub fn zeros(rows: usize, columns: usize) -> Self {
+        Self { rows, columns, entries: vec![0.0; rows * columns] }
+    }
+
+    /// The greatest absolute value of the entries; 0 for an empty matrix.
+    pub fn greatest(&self) -> f64 {
+        self.entries.iter().fold(0.0, |greatest, entry| greatest.max(entry.abs()))
+    }
+}
+
+impl Index<(usize, usize)> for Matrix {
+    type Output = f64;
+
+    fn index(&self, (row, column): (usize, usize)) -> &f64 {
+        &self.entries[row * self.columns + column]
+    }
+}
+
+impl IndexMut<(usize, usize)> for Matrix {
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
+        &mut self.entries[row * self.columns + column]
+    }
+}

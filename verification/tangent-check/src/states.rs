@@ -1,0 +1,1 @@
+//! States and paths on which laws are checked.
