@@ -3,7 +3,7 @@
 use crate::scalar::{Arithmetic, Single};
 use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 
-/// V₀ δP F_nᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_n N. B, b and c are symmetric.
+/// V₀ δP F_rᵀ = L B + κ (A:L) A − q A Lᵀ A + b L c, with L = Σ u ⊗ ∇_r N. B, b and c are symmetric.
 ///
 /// `N` is a number, or a vector with one particle in each lane.
 ///
@@ -27,7 +27,7 @@ use crate::tensor::{Tensor, Vector, identity, outer, scaled};
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedTangent<N, const D: usize> {
-    /// A: ΔF⁻ᵀ for the neo-Hookean solids, F F_nᵀ for the St. Venant–Kirchhoff solid.
+    /// A: ΔF⁻ᵀ for the neo-Hookean solids, F F_rᵀ for the St. Venant–Kirchhoff solid.
     pub a: [[N; D]; D],
     /// B, times V₀.
     pub right: [[N; D]; D],
@@ -40,7 +40,7 @@ pub struct ClosedTangent<N, const D: usize> {
 }
 
 impl<N: Copy, const D: usize> ClosedTangent<N, D> {
-    /// V₀ δP F_nᵀ from L.
+    /// V₀ δP F_rᵀ from L.
     #[inline(always)]
     pub fn product<A: Arithmetic<N = N>>(&self, with: A, l: &[[N; D]; D]) -> [[N; D]; D] {
         let (zero, a) = (with.zero(), &self.a);
@@ -127,15 +127,15 @@ fn tensor<const D: usize>(a: &[[f64; D]; D]) -> Tensor<f64, D> {
 }
 
 impl<const D: usize> ClosedTangent<f64, D> {
-    /// V₀ δP F_nᵀ from L.
+    /// V₀ δP F_rᵀ from L.
     ///
     /// Example: [`Law::closed`](super::Law::closed).
     pub fn apply(&self, l: &Tensor<f64, D>) -> Tensor<f64, D> {
         tensor(&self.product(Single, &rows(l)))
     }
 
-    /// The block of two nodes with gradients ∇_n N_I and ∇_n N_J:
-    /// κ g_I ⊗ g_J − q g_J ⊗ g_I + (∇N_I·B ∇N_J) I + (∇N_I·c ∇N_J) b,  g = A ∇_n N
+    /// The block of two nodes with gradients ∇_r N_I and ∇_r N_J:
+    /// κ g_I ⊗ g_J − q g_J ⊗ g_I + (∇N_I·B ∇N_J) I + (∇N_I·c ∇N_J) b,  g = A ∇_r N
     pub fn block(&self, grad_i: &Vector<f64, D>, grad_j: &Vector<f64, D>) -> Tensor<f64, D> {
         let a = tensor(&self.a);
         let (g_i, g_j) = (a * grad_i, a * grad_j);
@@ -147,7 +147,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
         }
     }
 
-    /// The geometric part L B alone, with B = V₀ F_n S F_nᵀ, if `geometric`; otherwise the rest.
+    /// The geometric part L B alone, with B = V₀ F_r S F_rᵀ, if `geometric`; otherwise the rest.
     pub(crate) fn part(&self, b: &Tensor<f64, D>, geometric: bool) -> Self {
         if geometric {
             let nothing = [[0.0; D]; D];

@@ -2,7 +2,7 @@
 
 use super::hencky::Radial;
 use super::plastic::round_off;
-use super::{Criterion, Hardening, Lame, LameParameters, Returned};
+use super::{Criterion, Hardening, Lame, LameParameters, ReturnMapped};
 use crate::problems::{Number, Problems};
 use crate::scalar::Real;
 use schemars::JsonSchema;
@@ -141,7 +141,7 @@ impl Criterion for DruckerPrager {
     }
 
     /// Returns to the cone, √J₂ − G Δγ + η (p − K η̄ Δγ) = ξ c(ε̄ + ξ Δγ). If √J₂ < G Δγ, it returns to the apex, η p = ξ c.
-    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
+    fn return_map<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> ReturnMapped<T> {
         let Self { friction: eta, dilatancy: eta_bar, cohesive: xi, cohesion } = self;
         let (shear, bulk, lit) = (solid.shear, solid.bulk_modulus(), T::lit);
         let (before, elastic) = (lit(before), Radial::elastic(solid, v));
@@ -150,7 +150,7 @@ impl Criterion for DruckerPrager {
         let excess = root_j2 + elastic.p * lit(*eta);
         let beyond = excess.value() - xi * cohesion.strength(before.value());
         if beyond <= round_off(shear + bulk * eta, d.value() + v.value().abs(), before.value()) {
-            return Returned::elastic(solid, v, before.value());
+            return ReturnMapped::elastic(solid, v, before.value());
         }
         let (gamma, w) = cohesion.solve(excess, shear + bulk * eta * eta_bar, *xi, before);
         let left = root_j2 - gamma * lit(shear);
@@ -168,15 +168,15 @@ impl Criterion for DruckerPrager {
             };
             // p Δε_v + √J₂ 2Δd/√2 with the stresses at the end of the step, Δε_v = η̄ Δγ and Δd = Δγ/√2
             let dissipated = gamma * (p * lit(*eta_bar) + left);
-            return Returned { radial, plastic_strain: before + gamma * lit(*xi), dissipated };
+            return ReturnMapped { radial, plastic_strain: before + gamma * lit(*xi), dissipated };
         }
         // All shear flows and dilates by η̄. A dilatation η δ follows, until η K (v − η̄ √J₂/G − η δ) = ξ c(ε̄ + ξ √J₂/G + ξ δ).
         let sheared = root_j2 * lit(1.0 / shear);
         let after = before + sheared * lit(*xi);
         let excess = (v - sheared * lit(*eta_bar)) * lit(eta * bulk);
         let (delta, w) = cohesion.solve(excess, bulk * eta * eta, *xi, after);
-        let flowed = sheared * lit(*eta_bar) + delta * lit(*eta);
-        let (p, plastic_strain) = ((v - flowed) * lit(bulk), after + delta * lit(*xi));
+        let plastic_volume = sheared * lit(*eta_bar) + delta * lit(*eta);
+        let (p, plastic_strain) = ((v - plastic_volume) * lit(bulk), after + delta * lit(*xi));
         let hardens = cohesion.slope(plastic_strain) * lit(xi * xi);
         // Derivatives of √J₂/G and δ with respect to d, and of δ with respect to v
         let (s_d, d_v) = (lit(SQRT_2), w * lit(eta * bulk));
@@ -189,7 +189,7 @@ impl Criterion for DruckerPrager {
             t_v: T::zero(),
             t_d: T::zero(),
         };
-        Returned { radial, plastic_strain, dissipated: p * flowed }
+        ReturnMapped { radial, plastic_strain, dissipated: p * plastic_volume }
     }
 }
 

@@ -106,12 +106,12 @@ impl<B: Law> Law for FibreReinforced<B> {
         stretch.map_or(base, |i| base + scaled(&along, self.slope(i) * contract(&along, x)))
     }
 
-    /// The blocks of the base, plus 4 W″ (a·F_nᵀ e_k) (a·F_nᵀ e_l) F a ⊗ F a.
-    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
-        let mut blocks = self.base.tangent_blocks(f_n, at);
+    /// The blocks of the base, plus 4 W″ (a·F_rᵀ e_k) (a·F_rᵀ e_l) F a ⊗ F a.
+    fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let mut blocks = self.base.tangent_blocks(f_r, at);
         if let (_, Some(x)) = self.stretched(at) {
             let a = Vector::<f64, D>::from_fn(|i, _| self.direction[i]);
-            let (now, before) = (at.f * a, f_n * a);
+            let (now, before) = (at.f * a, f_r * a);
             let block = outer(&now, &now) * self.slope(x);
             for (blocks, k) in blocks.iter_mut().zip(before.iter()) {
                 blocks.iter_mut().zip(before.iter()).for_each(|(sum, l)| *sum += block * (k * l));

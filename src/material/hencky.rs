@@ -1,6 +1,6 @@
-//! Hencky's elasticity: the logarithmic strain ε = ½ ln b of b = F G Fᵀ, and S and ℂ of isotropic laws in ε.
+//! Hencky's elasticity: the logarithmic strain ε = ½ ln b of b = F C_i⁻¹ Fᵀ, and S and ℂ of isotropic laws in ε.
 //!
-//! G is the inverse of the plastic (or viscous) right Cauchy–Green tensor, and I where nothing has flowed. G belongs to the reference
+//! C_i is the inelastic (plastic or viscous) right Cauchy–Green tensor, and I before any flow. It belongs to the reference
 //! configuration, so rotations of the body do not change it. A step that flows by Δε multiplies b by e^{−2Δε}, in the same axes: the
 //! exponential map (Weber and Anand, 1990; Simo, 1992). All tensors are in three dimensions, and the missing stretches of F are 1.
 
@@ -26,11 +26,11 @@ fn cut<T: Real, const D: usize>(a: &Tensor<T, 3>) -> Tensor<T, D> {
     Tensor::from_fn(|i, k| a[(i, k)])
 }
 
-/// ½ (b − I) = ½ (H + Hᵀ + H Hᵀ + F (G − I) Fᵀ), with no digit lost at small strain, from the six numbers of G − I.
-fn half_b_less_one<T: Real>(at: &Deformation<T, 3>, flowed: &[f64]) -> Tensor<T, 3> {
-    let flowed = six(flowed).map(T::lit);
+/// ½ (b − I) = ½ (H + Hᵀ + H Hᵀ + F (C_i⁻¹ − I) Fᵀ), with no digit lost at small strain, from the six numbers of C_i⁻¹ − I.
+fn half_b_less_one<T: Real>(at: &Deformation<T, 3>, inverse_inelastic: &[f64]) -> Tensor<T, 3> {
+    let inelastic = six(inverse_inelastic).map(T::lit);
     let elastic = at.h + at.h.transpose() + at.h * at.h.transpose();
-    scaled(&(elastic + at.f * flowed * at.f.transpose()), T::lit(0.5))
+    scaled(&(elastic + at.f * inelastic * at.f.transpose()), T::lit(0.5))
 }
 
 /// The strain ε of a state, split into tr ε and dev ε.
@@ -43,10 +43,10 @@ pub(super) struct Strained<T: Real> {
 }
 
 impl<T: Real> Strained<T> {
-    /// From F and the six numbers of G − I. An empty list means G = I.
-    pub fn new<const D: usize>(at: &Deformation<T, D>, flowed: &[f64]) -> Self {
+    /// From F and the six numbers of C_i⁻¹ − I. An empty list means C_i = I.
+    pub fn new<const D: usize>(at: &Deformation<T, D>, inverse_inelastic: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
-        let strain = function(&Hencky, &half_b_less_one(&at, flowed));
+        let strain = function(&Hencky, &half_b_less_one(&at, inverse_inelastic));
         let volume = trace(&strain);
         Self { at, volume, deviator: strain - scaled(&identity(), volume * T::lit(1.0 / 3.0)) }
     }
@@ -97,9 +97,9 @@ pub(super) struct Principal {
 
 impl Principal {
     /// From the arguments of [`Strained::new`].
-    pub fn new<const D: usize>(at: &Deformation<f64, D>, flowed: &[f64]) -> Self {
+    pub fn new<const D: usize>(at: &Deformation<f64, D>, inverse_inelastic: &[f64]) -> Self {
         let at = Deformation::new(embed(&at.h));
-        let half = half_b_less_one(&at, flowed);
+        let half = half_b_less_one(&at, inverse_inelastic);
         let axes = principal_axes(&half);
         let turned = axes.transpose() * half * axes;
         let x: [f64; 3] = std::array::from_fn(|i| turned[(i, i)]);
@@ -152,12 +152,12 @@ impl Principal {
         self.moduli(deviator.map(|x| p + g * x), slopes, |_, _| g)
     }
 
-    /// Writes the six numbers of G − I after a flow with the principal strains `flow`: G_{n+1} = G_n + F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
-    pub fn flow(&self, flow: [f64; 3], flowed: &[f64], next: &mut [f64]) {
+    /// Writes the six numbers of C_i⁻¹ − I after a flow with the principal strains `flow`: C_i⁻¹ grows by F⁻¹ [b e^{−2Δε} − b] F⁻ᵀ.
+    pub fn flow(&self, flow: [f64; 3], inverse_inelastic: &[f64], next: &mut [f64]) {
         mutant!("laws: plastic flow of half the size": flow = flow.map(|flow| 0.5 * flow));
         let lost = Tensor::from_diagonal(&Vector::from_fn(|i, _| (1.0 + 2.0 * self.x[i]) * (-2.0 * flow[i]).exp_m1()));
         let back = self.at.inverse_transpose().transpose() * self.axes;
-        let after = six(flowed) + back * lost * back.transpose();
+        let after = six(inverse_inelastic) + back * lost * back.transpose();
         next.iter_mut().zip(SIX).for_each(|(next, (i, k))| *next = 0.5 * (after[(i, k)] + after[(k, i)]));
     }
 }
@@ -214,10 +214,10 @@ impl Moduli {
         cut(&(back.transpose() * self.response(&l) * back))
     }
 
-    /// Adds F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_nᵀ e.
-    pub(crate) fn add_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
-        let f_n: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_n[(i, k)] } else { f64::from(i == k) });
-        let a = self.axes.transpose() * self.f_inv_t * f_n.transpose();
+    /// Adds F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ of all pairs k, l. Column j is F (ℂ:X) Fᵀ a_k with F⁻ᵀ X F⁻¹ = e_j ⊗ a_l and a = F⁻ᵀ F_rᵀ e.
+    pub(crate) fn add_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, blocks: &mut TangentBlocks<D>) {
+        let f_r: Tensor<f64, 3> = Tensor::from_fn(|i, k| if i < D && k < D { f_r[(i, k)] } else { f64::from(i == k) });
+        let a = self.axes.transpose() * self.f_inv_t * f_r.transpose();
         for j in 0..D {
             let e_j: Vector<f64, 3> = self.axes.row(j).transpose();
             for l in 0..D {

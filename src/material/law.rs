@@ -142,17 +142,17 @@ pub trait Law: Send + Sync {
         density
     }
 
-    /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ in row
+    /// The material tangent of a law without a closed form, for gradients taken in the configuration n: F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ in row
     /// k and column l. A law that solves equations at each state overrides the default, to solve them once for all pairs.
-    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
-        let unit = |k: usize| f_n.row(k).transpose();
+    fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let unit = |k: usize| f_r.row(k).transpose();
         let block = |k, l| at.f * self.tangent_density(at, &unit(k), &unit(l)) * at.f.transpose();
         mutant!("laws: v and b are swapped in ℂmat": { return std::array::from_fn(|k| std::array::from_fn(|l| block(l, k))); });
         std::array::from_fn(|k| std::array::from_fn(|l| block(k, l)))
     }
 
     /// The closed form of the whole tangent (geometric + material) of a particle, if the law has one. `volume` is the reference volume.
-    /// Gradients are taken in the configuration n with the deformation gradient `f_n`. A law returns `Some` at every state, or `None` at
+    /// Gradients are taken in the configuration n with the deformation gradient `f_r`. A law returns `Some` at every state, or `None` at
     /// every state.
     ///
     /// ```
@@ -160,7 +160,7 @@ pub trait Law: Send + Sync {
     /// use bfree::tensor::{Tensor, identity};
     /// use num_dual::Dual64;
     ///
-    /// // V₀ δP, geometric and material together, is the derivative of V₀ P = V₀ F S. Here F_n = I, so that δF = L.
+    /// // V₀ δP, geometric and material together, is the derivative of V₀ P = V₀ F S. Here F_r = I, so that δF = L.
     /// let law = NeoHookean::ciarlet(Lame::new(1.0, 1.0)?);
     /// let (h, l) = (Tensor::<f64, 2>::new(0.3, 0.1, -0.2, 0.1), Tensor::<f64, 2>::new(0.5, -1.0, 0.25, 2.0));
     /// let closed = law.closed(&identity(), &MaterialState::new(h), 3.0).ok_or("closed")?;
@@ -171,7 +171,7 @@ pub trait Law: Send + Sync {
     /// ```
     fn closed<const D: usize>(
         &self,
-        _f_n: &Tensor<f64, D>,
+        _f_r: &Tensor<f64, D>,
         _at: &MaterialState<f64, D>,
         _volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {

@@ -44,7 +44,7 @@ pub use moduli::{out_of_plane_stress, p_wave_modulus, poissons_ratio, stiffness_
 pub use mooney_rivlin::{MooneyRivlin, MooneyRivlinParameters};
 pub use neo_hookean::NeoHookean;
 pub use ogden::{Ogden, OgdenParameters, OgdenTerm};
-pub use plastic::{Criterion, Plastic, Returned};
+pub use plastic::{Criterion, Plastic, ReturnMapped};
 pub(crate) use spectral::principal_values;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use state::{MaterialState, NonPositiveJacobian};

@@ -113,19 +113,19 @@ impl<U: Volumetric> Law for NeoHookean<U> {
         Some(U::response(self.lame.lambda, at))
     }
 
-    /// V₀ [ G L b_n + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_nᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
+    /// V₀ [ G L b_r + ΛJ² (A:L) A − q A Lᵀ A ],  A = ΔF⁻ᵀ = F⁻ᵀ F_rᵀ: δP = G δF + ΛJ² (F⁻ᵀ:δF) F⁻ᵀ − q F⁻ᵀ δFᵀ F⁻ᵀ pushed
     /// forward to the configuration n.
     #[inline(always)]
     fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<f64, D>,
+        f_r: &Tensor<f64, D>,
         at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         let shear = self.lame.shear;
         Some(ClosedTangent {
-            a: rows(&(at.inverse_transpose() * f_n.transpose())),
-            right: rows(&scaled(&(f_n * f_n.transpose()), shear * volume)),
+            a: rows(&(at.inverse_transpose() * f_r.transpose())),
+            right: rows(&scaled(&(f_r * f_r.transpose()), shear * volume)),
             bulk: U::stiffness::<f64, D>(self.lame.lambda, at) * volume,
             q: (U::stress::<f64, D>(self.lame.lambda, at) - shear) * volume,
             both: None,

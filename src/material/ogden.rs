@@ -90,9 +90,9 @@ impl Law for Ogden {
         Some(Ciarlet::response(self.lambda, at))
     }
 
-    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+    fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
         let mut blocks = [[Tensor::zeros(); D]; D];
-        self.moduli(at).add_blocks(f_n, &mut blocks);
+        self.moduli(at).add_blocks(f_r, &mut blocks);
         blocks
     }
 }

@@ -34,12 +34,12 @@ pub trait Criterion: Clone + Send + Sync + Sized + 'static {
     fn example(solid: &Lame) -> Self;
 
     /// The return map of a step with the trial strain (v, d). `before` is the accumulated plastic strain at t_n.
-    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T>;
+    fn return_map<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> ReturnMapped<T>;
 }
 
 /// The result of a return map.
 #[derive(Clone, Copy, Debug)]
-pub struct Returned<T> {
+pub struct ReturnMapped<T> {
     /// The stress, and its derivatives with respect to the trial strain.
     pub radial: Radial<T>,
     /// The accumulated plastic strain.
@@ -48,7 +48,7 @@ pub struct Returned<T> {
     pub dissipated: T,
 }
 
-impl<T: Real> Returned<T> {
+impl<T: Real> ReturnMapped<T> {
     /// A step without plastic flow.
     pub fn elastic(solid: &Lame, v: T, before: f64) -> Self {
         Self { radial: Radial::elastic(solid, v), plastic_strain: T::lit(before), dissipated: T::zero() }
@@ -58,7 +58,7 @@ impl<T: Real> Returned<T> {
 /// The number of roundings allowed for in a trial strain.
 const ROUNDINGS: f64 = 1024.0;
 
-/// Round-off bound of a stress with this modulus, at the elastic strain `d` after the plastic strain `before`. A state that has flowed lies
+/// Round-off bound of a stress with this modulus, at the elastic strain `d` after the plastic strain `before`. A state after plastic flow lies
 /// on the yield surface, and round-off must not decide whether it flows again.
 pub(super) fn round_off(modulus: f64, d: f64, before: f64) -> f64 {
     ROUNDINGS * f64::EPSILON * modulus * (d + before)
@@ -108,17 +108,17 @@ fn at_start<'a, T: Real, const D: usize>(at: &MaterialState<'a, T, D>) -> (f64, 
 }
 
 impl<Y: Criterion> Plastic<Y> {
-    fn returned<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> (Strained<T>, Returned<T>) {
-        let (before, flowed) = at_start(at);
-        let strained = Strained::new(at, flowed);
-        let returned = self.criterion.returned(&self.solid, strained.volume, strained.norm(), before);
+    fn return_map<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> (Strained<T>, ReturnMapped<T>) {
+        let (before, inverse_inelastic) = at_start(at);
+        let strained = Strained::new(at, inverse_inelastic);
+        let returned = self.criterion.return_map(&self.solid, strained.volume, strained.norm(), before);
         (strained, returned)
     }
 
-    fn principal<const D: usize>(&self, at: &MaterialState<f64, D>) -> (Principal, Returned<f64>) {
-        let (before, flowed) = at_start(at);
-        let principal = Principal::new(at, flowed);
-        let returned = self.criterion.returned(&self.solid, principal.volume(), principal.norm(), before);
+    fn principal<const D: usize>(&self, at: &MaterialState<f64, D>) -> (Principal, ReturnMapped<f64>) {
+        let (before, inverse_inelastic) = at_start(at);
+        let principal = Principal::new(at, inverse_inelastic);
+        let returned = self.criterion.return_map(&self.solid, principal.volume(), principal.norm(), before);
         (principal, returned)
     }
 }
@@ -138,25 +138,25 @@ impl<Y: Criterion> Law for Plastic<Y> {
 
     /// W of the elastic strain plus the dissipation of the step. For associated flow the sum is stationary with respect to the flow.
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
-        let (strained, Returned { radial: Radial { p, g, .. }, dissipated, .. }) = self.returned(at);
+        let (strained, ReturnMapped { radial: Radial { p, g, .. }, dissipated, .. }) = self.return_map(at);
         let (bulk, shear) = (self.solid.bulk_modulus(), self.solid.shear);
         p * p * T::lit(0.5 / bulk) + g * g * strained.square() * T::lit(0.25 / shear) + dissipated
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
-        let (strained, Returned { radial, .. }) = self.returned(at);
+        let (strained, ReturnMapped { radial, .. }) = self.return_map(at);
         strained.stress(radial.p, radial.g)
     }
 
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        let (principal, Returned { radial, .. }) = self.principal(at);
+        let (principal, ReturnMapped { radial, .. }) = self.principal(at);
         principal.radial_moduli(&radial).elasticity(x)
     }
 
-    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
-        let (principal, Returned { radial, .. }) = self.principal(at);
+    fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let (principal, ReturnMapped { radial, .. }) = self.principal(at);
         let mut blocks = [[Tensor::zeros(); D]; D];
-        principal.radial_moduli(&radial).add_blocks(f_n, &mut blocks);
+        principal.radial_moduli(&radial).add_blocks(f_r, &mut blocks);
         blocks
     }
 
@@ -166,8 +166,8 @@ impl<Y: Criterion> Law for Plastic<Y> {
     }
 
     fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
-        let (principal, Returned { radial, plastic_strain, dissipated }) = self.principal(at);
-        let (before, flowed) = at_start(at);
+        let (principal, ReturnMapped { radial, plastic_strain, dissipated }) = self.principal(at);
+        let (before, inverse_inelastic) = at_start(at);
         let mut next = at.internal.to_vec();
         if let [strain, lost, plastic @ ..] = next.as_mut_slice()
             && plastic_strain != before
@@ -178,7 +178,7 @@ impl<Y: Criterion> Law for Plastic<Y> {
             let volume = (principal.volume() - radial.p / self.solid.bulk_modulus()) / 3.0;
             mutant!("laws: the plastic change of volume is forgotten": volume = 0.0);
             let share = 1.0 - radial.g / (2.0 * self.solid.shear);
-            principal.flow(principal.deviator().map(|x| share * x + volume), flowed, plastic);
+            principal.flow(principal.deviator().map(|x| share * x + volume), inverse_inelastic, plastic);
         }
         next
     }

@@ -62,22 +62,22 @@ impl Law for StVenantKirchhoff {
         scaled(&outer(v, b), lambda) + scaled(&identity(), shear * v.dot(b)) + scaled(&outer(b, v), shear)
     }
 
-    /// V₀ [ L F_n S F_nᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_n ],  M = F F_nᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_n, pushed
+    /// V₀ [ L F_r S F_rᵀ + Λ (M:L) M + G M Lᵀ M + G b L b_r ],  M = F F_rᵀ: δF S + F [ℂ : Fᵀ δF] with δF = L F_r, pushed
     /// forward to the configuration n.
     #[inline(always)]
     fn closed<const D: usize>(
         &self,
-        f_n: &Tensor<f64, D>,
+        f_r: &Tensor<f64, D>,
         at: &MaterialState<f64, D>,
         volume: f64,
     ) -> Option<ClosedTangent<f64, D>> {
         let shear = self.lame.shear * volume;
         Some(ClosedTangent {
-            a: rows(&(at.f * f_n.transpose())),
-            right: rows(&scaled(&(f_n * self.stress(at) * f_n.transpose()), volume)),
+            a: rows(&(at.f * f_r.transpose())),
+            right: rows(&scaled(&(f_r * self.stress(at) * f_r.transpose()), volume)),
             bulk: self.lame.lambda * volume,
             q: -shear,
-            both: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_n * f_n.transpose()), shear))]),
+            both: Some([rows(&(at.f * at.f.transpose())), rows(&scaled(&(f_r * f_r.transpose()), shear))]),
         })
     }
 }

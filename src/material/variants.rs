@@ -51,18 +51,18 @@ macro_rules! law_of_variants {
         }
         fn tangent_blocks<const D: usize>(
             &self,
-            f_n: &$crate::tensor::Tensor<f64, D>,
+            f_r: &$crate::tensor::Tensor<f64, D>,
             at: &$crate::material::MaterialState<f64, D>,
         ) -> $crate::material::TangentBlocks<D> {
-            match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_n, at)),+ }
+            match self { $(Self::$variant(law) => $crate::material::Law::tangent_blocks(law, f_r, at)),+ }
         }
         fn closed<const D: usize>(
             &self,
-            f_n: &$crate::tensor::Tensor<f64, D>,
+            f_r: &$crate::tensor::Tensor<f64, D>,
             at: &$crate::material::MaterialState<f64, D>,
             volume: f64,
         ) -> Option<$crate::material::ClosedTangent<f64, D>> {
-            match self { $(Self::$variant(law) => $crate::material::Law::closed(law, f_n, at, volume)),+ }
+            match self { $(Self::$variant(law) => $crate::material::Law::closed(law, f_r, at, volume)),+ }
         }
         fn volumetric<T: $crate::scalar::Real>(
             &self,

@@ -117,23 +117,23 @@ impl<B: Law> Law for Viscoelastic<B> {
     }
 
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
-        let springs = self
-            .branches(at)
-            .map(|(branch, flowed, decay)| Strained::new(at, flowed).square() * T::lit(branch.shear * decay));
+        let springs = self.branches(at).map(|(branch, inverse_inelastic, decay)| {
+            Strained::new(at, inverse_inelastic).square() * T::lit(branch.shear * decay)
+        });
         springs.fold(self.base.energy(at), |sum, energy| sum + energy)
     }
 
     fn stress<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> Tensor<T, D> {
-        let springs = self.branches(at).map(|(branch, flowed, decay)| {
+        let springs = self.branches(at).map(|(branch, inverse_inelastic, decay)| {
             let radial = relaxed(branch, decay);
-            Strained::new(at, flowed).stress(radial.p, radial.g)
+            Strained::new(at, inverse_inelastic).stress(radial.p, radial.g)
         });
         springs.fold(self.base.stress(at), |sum, stress: Tensor<T, D>| sum + stress)
     }
 
     fn elasticity<const D: usize>(&self, at: &MaterialState<f64, D>, x: &Tensor<f64, D>) -> Tensor<f64, D> {
-        let springs = self.branches(at).map(|(branch, flowed, decay)| {
-            Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).elasticity(x)
+        let springs = self.branches(at).map(|(branch, inverse_inelastic, decay)| {
+            Principal::new(at, inverse_inelastic).radial_moduli(&relaxed(branch, decay)).elasticity(x)
         });
         springs.fold(self.base.elasticity(at, x), |sum, stress: Tensor<f64, D>| sum + stress)
     }
@@ -143,10 +143,10 @@ impl<B: Law> Law for Viscoelastic<B> {
         self.base.volumetric(at)
     }
 
-    fn tangent_blocks<const D: usize>(&self, f_n: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
-        let mut blocks = self.base.tangent_blocks(f_n, at);
-        for (branch, flowed, decay) in self.branches(at) {
-            Principal::new(at, flowed).radial_moduli(&relaxed(branch, decay)).add_blocks(f_n, &mut blocks);
+    fn tangent_blocks<const D: usize>(&self, f_r: &Tensor<f64, D>, at: &MaterialState<f64, D>) -> TangentBlocks<D> {
+        let mut blocks = self.base.tangent_blocks(f_r, at);
+        for (branch, inverse_inelastic, decay) in self.branches(at) {
+            Principal::new(at, inverse_inelastic).radial_moduli(&relaxed(branch, decay)).add_blocks(f_r, &mut blocks);
         }
         blocks
     }
@@ -155,10 +155,10 @@ impl<B: Law> Law for Viscoelastic<B> {
     fn updated_variables<const D: usize>(&self, at: &MaterialState<f64, D>) -> Vec<f64> {
         let mut next = at.internal.to_vec();
         if let [dissipated, viscous @ ..] = next.as_mut_slice() {
-            for ((branch, flowed, decay), viscous) in self.branches(at).zip(viscous.chunks_mut(SIX)) {
-                let principal = Principal::new(at, flowed);
+            for ((branch, inverse_inelastic, decay), viscous) in self.branches(at).zip(viscous.chunks_mut(SIX)) {
+                let principal = Principal::new(at, inverse_inelastic);
                 *dissipated += branch.shear * (1.0 - decay * decay) * principal.norm().powi(2);
-                principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), flowed, viscous);
+                principal.flow(principal.deviator().map(|x| x * (1.0 - decay)), inverse_inelastic, viscous);
             }
         }
         next

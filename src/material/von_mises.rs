@@ -2,7 +2,7 @@
 
 use super::hencky::Radial;
 use super::plastic::round_off;
-use super::{Criterion, Hardening, Lame, LameParameters, Returned};
+use super::{Criterion, Hardening, Lame, LameParameters, ReturnMapped};
 use crate::problems::Problems;
 use crate::scalar::Real;
 use schemars::JsonSchema;
@@ -54,12 +54,12 @@ impl Criterion for VonMises {
     }
 
     /// q_trial − 3G Δp = σ_y(p_n + Δp); dev τ is scaled by 1 − 3G Δp/q_trial, and t = √(2/3) q.
-    fn returned<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> Returned<T> {
+    fn return_map<T: Real>(&self, solid: &Lame, v: T, d: T, before: f64) -> ReturnMapped<T> {
         let (shear, p_n) = (solid.shear, T::lit(before));
         let trial = d * T::lit(6.0_f64.sqrt() * shear);
         let beyond = trial.value() - self.yield_stress.strength(before);
         if beyond <= round_off(3.0 * shear, d.value(), before) {
-            return Returned::elastic(solid, v, before);
+            return ReturnMapped::elastic(solid, v, before);
         }
         let (delta, compliance) = self.yield_stress.solve(trial, 3.0 * shear, 1.0, p_n);
         let elastic = Radial::elastic(solid, v);
@@ -71,6 +71,6 @@ impl Criterion for VonMises {
             ..elastic
         };
         let dissipated = self.yield_stress.work(plastic_strain) - self.yield_stress.work(p_n);
-        Returned { radial, plastic_strain, dissipated }
+        ReturnMapped { radial, plastic_strain, dissipated }
     }
 }

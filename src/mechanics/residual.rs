@@ -176,7 +176,7 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
         Ok(self.free_norm(self.magnitudes(dphi)?))
     }
 
-    /// The round-off bound: like [`Self::magnitude`], plus the change of R when Δφ and F_n are rounded.
+    /// The round-off bound: like [`Self::magnitude`], plus the change of R when Δφ and F_r are rounded.
     ///
     /// # Errors
     /// See [`Self::residual`].

@@ -5,7 +5,7 @@ use bfree::material::Law;
 use bfree::mechanics::loads::PrescribedDof;
 use bfree::mechanics::residual::Equilibrium;
 use bfree::mechanics::schemes::Alphas;
-use bfree::mechanics::sweep::{SupportError, Supports};
+use bfree::mechanics::sweep::Supports;
 use bfree::mechanics::transfer::Nodal;
 use bfree::nodes::Nodes;
 use bfree::simulation::{InitialGuess, Simulation, StepError};
@@ -67,16 +67,4 @@ impl<const D: usize> Prepared<D> {
             dphi[dof.node][dof.component] = dof.step.increment;
         }
     }
-}
-
-/// The simulation with its particles in the order of the transfer, as after a step.
-///
-/// # Errors
-/// A particle without shape functions.
-pub fn arranged<const D: usize>(mut simulation: Simulation<D>) -> Result<Simulation<D>, SupportError> {
-    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
-    if let Some(order) = supports.leaping() {
-        simulation.rearrange(&order);
-    }
-    Ok(simulation)
 }

@@ -35,7 +35,7 @@ type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
 pub struct States<'a, T> {
     /// ∇u
     gradient: Rows<T>,
-    h_n: Rows<f64>,
+    h_r: Rows<f64>,
     /// V₀
     volume: [f64; LANES],
     /// Δt
@@ -50,14 +50,14 @@ impl<'a, T: Real> States<'a, T> {
         gradient[..D * D].copy_from_slice(at);
         // Empty lanes take the internal variables of the first particle.
         let internal = [particles.state(group[0] as usize, dt).internal; LANES];
-        let mut states = Self { gradient, h_n: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal };
+        let mut states = Self { gradient, h_r: [[0.0; LANES]; 9], volume: [0.0; LANES], dt, internal };
         let reference = particles.reference();
         for (lane, &p) in group.iter().enumerate().take(LANES) {
             states.internal[lane] = particles.state(p as usize, dt).internal;
-            let h_n = &reference.displacement_gradient[p as usize];
+            let h_r = &reference.displacement_gradient[p as usize];
             for i in 0..D {
                 for k in 0..D {
-                    states.h_n[i * D + k][lane] = h_n[(i, k)];
+                    states.h_r[i * D + k][lane] = h_r[(i, k)];
                 }
             }
             states.volume[lane] = particles.volume[p as usize];
@@ -69,8 +69,8 @@ impl<'a, T: Real> States<'a, T> {
     #[inline(always)]
     fn of_lane<const D: usize>(&self, lane: usize) -> (Tensor<T, D>, MaterialState<'_, f64, D>, f64) {
         let gradient = Tensor::from_fn(|i, k| self.gradient[i * D + k][lane]);
-        let h_n = Tensor::from_fn(|i, k| self.h_n[i * D + k][lane]);
-        (gradient, MaterialState::new(h_n).in_step(self.dt, self.internal[lane]), self.volume[lane])
+        let h_r = Tensor::from_fn(|i, k| self.h_r[i * D + k][lane]);
+        (gradient, MaterialState::new(h_r).in_step(self.dt, self.internal[lane]), self.volume[lane])
     }
 }
 
@@ -115,7 +115,7 @@ impl<T: Real> Chosen<'_, T> {
 }
 
 impl<const D: usize, L: Law> Laws<'_, D, L> {
-    /// The point function that adds σ = V₀ F S F_nᵀ at ∇u, for one pass. Only the F of `part` carry derivatives.
+    /// The point function that adds σ = V₀ F S F_rᵀ at ∇u, for one pass. Only the F of `part` carry derivatives.
     pub(crate) fn stresses<T: Number>(
         &self,
         part: Part,
@@ -196,8 +196,8 @@ fn stresses_of<L: Law, T: Real, const D: usize>(
     // Fixed lengths, so that no index is checked and the loop becomes vector instructions.
     let mut rows: Rows<T> = [[T::zero(); LANES]; 9];
     for lane in 0..LANES {
-        let (gradient, at_n, volume) = states.of_lane::<D>(lane);
-        let (stress, det) = point::internal(law, &at_n, &gradient, volume, part);
+        let (gradient, at_r, volume) = states.of_lane::<D>(lane);
+        let (stress, det) = point::internal(law, &at_r, &gradient, volume, part);
         for i in 0..D {
             for k in 0..D {
                 rows[i * D + k][lane] = stress[(i, k)];
@@ -220,8 +220,8 @@ fn tangents_of<L: Law, const D: usize>(
 ) {
     let mut rows: ClosedRows = [[0.0; LANES]; Form::ClosedWithBoth.rows(3)];
     for lane in 0..LANES {
-        let (gradient, at_n, volume) = states.of_lane::<D>(lane);
-        let (tangent, det) = point::linearize(law, &at_n, &gradient, volume, part);
+        let (gradient, at_r, volume) = states.of_lane::<D>(lane);
+        let (tangent, det) = point::linearize(law, &at_r, &gradient, volume, part);
         det_f[lane] = det;
         match (tangent, form) {
             (point::LocalTangent::Closed(closed), Form::Closed | Form::ClosedWithBoth) => {

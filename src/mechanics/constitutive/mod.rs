@@ -3,7 +3,7 @@
 //! `point.rs` has one particle, in formulas. `laws.rs` calls these formulas for the particles of a group side by side. `tangents.rs` stores
 //! their linearised tangents, and applies them.
 //!
-//! H_n, F_n and ∇_n N are those of the reference configuration, at the last grid reset. With a reset in every step that is t_n. Internal
+//! H_r, F_r and ∇_r N are those of the reference configuration, at the last grid reset. With a reset in every step that is t_n. Internal
 //! variables are always those at t_n.
 
 mod laws;

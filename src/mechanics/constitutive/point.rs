@@ -36,47 +36,47 @@ fn carried<T: Real>(x: T, carries: bool) -> T {
     if carries { x } else { T::lit(x.value()) }
 }
 
-/// H_{n+1} of F = ΔF F_n with ΔF = I + G: H = G + H_n + G H_n, which loses no digits (eq. 45).
+/// H_{n+1} of F = ΔF F_r with ΔF = I + G: H = G + H_r + G H_r, which loses no digits (eq. 45).
 ///
 /// ```
 /// use bfree::mechanics::residual::compose;
 /// use bfree::tensor::{Tensor, identity};
 ///
-/// // I + H_{n+1} = (I + G)(I + H_n); and a strain of 1e-20 is kept beside I.
-/// let (g, h_n) = (Tensor::<f64, 2>::new(0.5, 0.25, 0.0, -0.5), Tensor::<f64, 2>::new(0.0, 0.5, 0.25, 1.0));
-/// assert_eq!(identity() + compose(&g, &h_n), (identity() + g) * (identity() + h_n));
+/// // I + H_{n+1} = (I + G)(I + H_r); and a strain of 1e-20 is kept beside I.
+/// let (g, h_r) = (Tensor::<f64, 2>::new(0.5, 0.25, 0.0, -0.5), Tensor::<f64, 2>::new(0.0, 0.5, 0.25, 1.0));
+/// assert_eq!(identity() + compose(&g, &h_r), (identity() + g) * (identity() + h_r));
 /// assert_eq!(compose(&Tensor::<f64, 1>::zeros(), &Tensor::from_element(1e-20))[(0, 0)], 1e-20);
 /// ```
 #[inline(always)]
-pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_n: &Tensor<f64, D>) -> Tensor<T, D> {
-    let h_n = h_n.map(T::lit);
-    mutant!("deformation: F without G H_n": { return g + h_n; });
-    g + h_n + g * h_n
+pub fn compose<T: Real, const D: usize>(g: &Tensor<T, D>, h_r: &Tensor<f64, D>) -> Tensor<T, D> {
+    let h_r = h_r.map(T::lit);
+    mutant!("deformation: F without G H_r": { return g + h_r; });
+    g + h_r + g * h_r
 }
 
-/// V₀ F S F_nᵀ at ∇u = `g`, from the state `at_n` at t_n; its product with ∇_n N_I is the internal force on node I. Also returns det F, which the caller must check.
+/// V₀ F S F_rᵀ at ∇u = `g`, from the state `at_r` at t_n; its product with ∇_r N_I is the internal force on node I. Also returns det F, which the caller must check.
 /// Where det F ≤ 0, S is that of the undeformed body. Only the F of `part` carry derivatives.
 #[inline(always)]
 pub(super) fn internal<L: Law, T: Real, const D: usize>(
     law: &L,
-    at_n: &MaterialState<f64, D>,
+    at_r: &MaterialState<f64, D>,
     g: &Tensor<T, D>,
     volume: f64,
     part: Part,
 ) -> (Tensor<T, D>, f64) {
-    let h = compose(g, &at_n.h);
+    let h = compose(g, &at_r.h);
     let f_left = identity::<T, D>() + h.map(|x| carried(x, part != Part::Material));
-    let (at, det_f) = at_n.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
+    let (at, det_f) = at_r.deformed(h.map(|x| carried(x, part != Part::Geometric))).admissible_or_rest();
     let piola = first_piola(law, &f_left, &at);
-    let f_n_t = at_n.f.transpose().map(T::lit);
-    mutant!("stress: F_n is transposed": f_n_t = f_n_t.transpose());
-    (scaled(&(piola * f_n_t), T::lit(volume)), det_f)
+    let f_r_t = at_r.f.transpose().map(T::lit);
+    mutant!("stress: F_r is transposed": f_r_t = f_r_t.transpose());
+    (scaled(&(piola * f_r_t), T::lit(volume)), det_f)
 }
 
-/// δσ = V₀ δP F_nᵀ as a linear map of L = Σ u ⊗ ∇_n N.
+/// δσ = V₀ δP F_rᵀ as a linear map of L = Σ u ⊗ ∇_r N.
 pub(super) enum LocalTangent<const D: usize> {
     Closed(ClosedTangent<f64, D>),
-    /// The blocks F ℂmat{F_nᵀe_k, F_nᵀe_l} Fᵀ + (F_nᵀe_k · S F_nᵀe_l) I of all pairs of unit gradients (eqs. 37, 38), times V₀.
+    /// The blocks F ℂmat{F_rᵀe_k, F_rᵀe_l} Fᵀ + (F_rᵀe_k · S F_rᵀe_l) I of all pairs of unit gradients (eqs. 37, 38), times V₀.
     General([[[[f64; D]; D]; D]; D]),
 }
 
@@ -84,22 +84,22 @@ pub(super) enum LocalTangent<const D: usize> {
 #[inline(always)]
 pub(super) fn linearize<L: Law, const D: usize>(
     law: &L,
-    at_n: &MaterialState<f64, D>,
+    at_r: &MaterialState<f64, D>,
     g: &Tensor<f64, D>,
     volume: f64,
     part: Part,
 ) -> (LocalTangent<D>, f64) {
-    let (at, det_f) = at_n.deformed(compose(g, &at_n.h)).admissible_or_rest();
-    let f_n = at_n.f;
-    // δF S F_nᵀ = L B with B = F_n S F_nᵀ
-    let geometric = || f_n * law.stress(&at) * f_n.transpose();
-    let tangent = match law.closed(&f_n, &at, volume) {
+    let (at, det_f) = at_r.deformed(compose(g, &at_r.h)).admissible_or_rest();
+    let f_r = at_r.f;
+    // δF S F_rᵀ = L B with B = F_r S F_rᵀ
+    let geometric = || f_r * law.stress(&at) * f_r.transpose();
+    let tangent = match law.closed(&f_r, &at, volume) {
         Some(closed) if part == Part::Whole => LocalTangent::Closed(closed),
         Some(closed) => LocalTangent::Closed(closed.part(&scaled(&geometric(), volume), part == Part::Geometric)),
         None => {
             let mut blocks = match part {
                 Part::Geometric => [[Tensor::zeros(); D]; D],
-                Part::Whole | Part::Material => law.tangent_blocks(&f_n, &at),
+                Part::Whole | Part::Material => law.tangent_blocks(&f_r, &at),
             };
             if part != Part::Material {
                 let geometric = geometric();

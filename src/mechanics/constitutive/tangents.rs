@@ -1,4 +1,4 @@
-//! Stored tangents of the linearisation, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_n N.
+//! Stored tangents of the linearisation, the particles of a group side by side: δσ = 𝔸 : L with L = Σ u ⊗ ∇_r N.
 
 use crate::lanes::{In, LANES, Lanes, WithLanes, in_dimension};
 use crate::material::ClosedTangent;

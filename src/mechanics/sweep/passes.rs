@@ -10,7 +10,7 @@ use crate::tensor::{Tensor, Vector};
 use std::convert::Infallible;
 
 impl<const D: usize> Supports<D> {
-    /// `f_I += Σ_p q N_I + σ ∇_n N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
+    /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
     /// zero. Without a field u and L are unspecified.
     ///
     /// # Errors
@@ -64,15 +64,15 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, fill));
     }
 
-    /// `out_I +=` Σ_p B_p(∇_n N_I, ∇_n N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
+    /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of
     /// each group.
     pub(crate) fn blocks(&self, out: &mut [Tensor<f64, D>], quadratic: &(dyn Fn(Group<'_>, &mut Quadratic) + Sync)) {
         self.pass();
         either!(self, way => way.blocks(out, quadratic));
     }
 
-    /// `out_I += Σ_p σ_p ∇_n N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
-    /// ∇u_p = Σ u_I ⊗ ∇_n N_I.
+    /// `out_I += Σ_p σ_p ∇_r N_I + q_p N_I` with `(q_p, σ_p) = point(p, u_p, ∇u_p)`, u_p = Σ u_I N_I and
+    /// ∇u_p = Σ u_I ⊗ ∇_r N_I.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};
@@ -109,7 +109,7 @@ impl<const D: usize> Supports<D> {
         self.sweep(Some(field), Mode::BOTH, out, each_lane(point))
     }
 
-    /// The sum of [`Self::assemble`] with |N_I| and |∇_n N_I| in place of N_I and ∇_n N_I.
+    /// The sum of [`Self::assemble`] with |N_I| and |∇_r N_I| in place of N_I and ∇_r N_I.
     ///
     /// ```
     /// use bfree::mechanics::{check::direction, sweep::Supports};

@@ -28,11 +28,11 @@ pub(super) struct Plain<const D: usize> {
     offsets: Vec<usize>,
     /// Active node of each entry.
     nodes: Vec<u32>,
-    /// N and ∇_n N of each entry.
+    /// N and ∇_r N of each entry.
     weights: Vec<(f64, Vector<f64, D>)>,
 }
 
-/// A node, N and ∇_n N.
+/// A node, N and ∇_r N.
 type Entry<N, const D: usize> = (N, f64, Vector<f64, D>);
 
 impl<const D: usize> Plain<D> {
@@ -173,7 +173,7 @@ impl<const D: usize> Plain<D> {
         });
     }
 
-    /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_n N_I of every field at the particles of a group.
+    /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group.
     fn gather<const C: usize>(&self, group: Group<'_>, fields: usize, field: &[f64]) -> Vec<At<f64, C, D>> {
         let mut at = vec![At::<f64, C, D>::zero(); fields];
         for (lane, (node, n, grad_n)) in self.entries_of(group) {

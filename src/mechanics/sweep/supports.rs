@@ -342,12 +342,12 @@ impl<const D: usize> Supports<D> {
         either!(self, way => way.bytes())
     }
 
-    /// The entries (active node, N, ∇_n N) of one particle.
+    /// The entries (active node, N, ∇_r N) of one particle.
     pub fn of(&self, particle: usize) -> impl Iterator<Item = (usize, f64, Vector<f64, D>)> {
         either!(self, way => way.of(particle)).into_iter()
     }
 
-    /// Σ u_I ⊗ ∇_n N_I at one particle.
+    /// Σ u_I ⊗ ∇_r N_I at one particle.
     pub fn gradient_at<T: Real>(&self, particle: usize, field: &[Vector<T, D>]) -> Tensor<T, D> {
         let mut gradient = Tensor::<T, D>::zeros();
         for (node, _, grad_n) in self.of(particle) {

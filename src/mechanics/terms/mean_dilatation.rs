@@ -5,7 +5,7 @@
 //! to W(F) of the law, which contains U(J). A cell then has one pressure, like finite elements with linear motion and constant pressure
 //! (Simo, Taylor and Pister, Comput. Methods Appl. Mech. Eng. 51, 1985). Π is a potential, so the tangent is symmetric.
 //!
-//! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_n N_I, a = V₀ J A, A = ΔF⁻ᵀ:
+//! With T(θ) = θ U' and ∂v/∂Δφ_I = Σ a ∇_r N_I, a = V₀ J A, A = ΔF⁻ᵀ:
 //!
 //! ```text
 //! π = ∂Π/∂v of the first sum = Σ V₀ T(θ) / v          σ = (π − T(J)/J) a
@@ -71,10 +71,10 @@ impl<'a, const D: usize, L: Law> MeanDilatation<'a, D, L> {
 
     /// U at J, which the law contains already.
     fn local<T: Number>(&self, p: usize, g: &Tensor<T, D>) -> Local<T, D> {
-        let h_n = &self.step.particles.reference().displacement_gradient[p];
-        let (at, _) = MaterialState::new(compose(g, h_n)).admissible_or_rest();
-        let f_n_t = (identity::<f64, D>() + h_n).transpose().map(T::lit);
-        let a = scaled(&(cofactor(&at.f) * f_n_t), T::lit(self.step.particles.volume[p]));
+        let h_r = &self.step.particles.reference().displacement_gradient[p];
+        let (at, _) = MaterialState::new(compose(g, h_r)).admissible_or_rest();
+        let f_r_t = (identity::<f64, D>() + h_r).transpose().map(T::lit);
+        let a = scaled(&(cofactor(&at.f) * f_r_t), T::lit(self.step.particles.volume[p]));
         Local { jacobian: at.jacobian, response: self.response(p, at.j), a }
     }
 

@@ -55,12 +55,12 @@ impl<const D: usize> Term<D> for Pressure<'_, D> {
 
     fn linearize(&self, dphi: &[Vector<f64, D>], _: Part) -> LinearizedTerm<'_, D> {
         let linearize = |point: &PressurePoint<D>| {
-            let (p, h_n) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
-            let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_n));
+            let (p, h_r) = (point.particle, &self.particles.reference().displacement_gradient[point.particle]);
+            let at = Deformation::new(compose(&self.supports.gradient_at(p, dphi), h_r));
             let f_inv_t = at.inverse_transpose();
             LinearizedPoint {
                 particle: p,
-                df_inv_t: f_inv_t * (identity::<f64, D>() + h_n).transpose(),
+                df_inv_t: f_inv_t * (identity::<f64, D>() + h_r).transpose(),
                 force: f_inv_t * point.force * at.jacobian,
             }
         };
@@ -95,7 +95,7 @@ impl<const D: usize> Linearized<D> for LinearizedPressure<'_, D> {
         }
     }
 
-    /// N_I (w ⊗ g − g ⊗ w), g = A ∇_n N_I
+    /// N_I (w ⊗ g − g ⊗ w), g = A ∇_r N_I
     fn add_blocks_of_functions(&self, functions: &FunctionsAt<'_, D>, blocks: &mut [Tensor<f64, D>]) {
         for LinearizedPoint { particle, df_inv_t: a, force: w } in &self.points {
             for (node, function) in functions(*particle) {

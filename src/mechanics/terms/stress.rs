@@ -12,7 +12,7 @@ use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
 
-/// Σ_p V₀ F S F_nᵀ ∇_n N_I
+/// Σ_p V₀ F S F_rᵀ ∇_r N_I
 pub struct Stress<'a, const D: usize, L> {
     laws: Laws<'a, D, L>,
     supports: &'a Supports<D>,
@@ -68,8 +68,8 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         let particles = self.laws.particles;
         let energies = self.supports.interpolate(dphi, |p, _, g| {
             let id = particles.id[p] as usize;
-            let h_n = &particles.reference().displacement_gradient[p];
-            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
+            let h_r = &particles.reference().displacement_gradient[p];
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
             let at = at.map_err(|source| Inadmissible { particle: id, source })?;
             mutant!("stress: the energy lacks V_0": { return Ok(self.law(p).energy(&at)); });
             Ok(T::lit(particles.volume[p]) * self.law(p).energy(&at))
@@ -77,18 +77,18 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
         Some(energies.map(summed))
     }
 
-    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_n N| ‖F_n‖. The response to a change of volume stands for all δF.
+    /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
         self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
-            let h_n = &particles.reference().displacement_gradient[p];
+            let h_r = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
-            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_n)).admissible();
+            let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
             let at = at.map_err(|source| Inadmissible { particle: id, source })?;
-            let f_n = (identity::<f64, D>() + h_n).norm();
-            let moved: f64 = self.supports.of(p).map(|(node, _, grad_n)| dphi[node].norm() * grad_n.norm()).sum();
+            let f_r = (identity::<f64, D>() + h_r).norm();
+            let moved: f64 = self.supports.of(p).map(|(node, _, grad_r)| dphi[node].norm() * grad_r.norm()).sum();
             let response = self.law(p).elasticity(&at, &(at.f.transpose() * at.f)).norm();
-            let change = response * (at.h.norm() + moved * f_n) * f_n * particles.volume[p];
+            let change = response * (at.h.norm() + moved * f_r) * f_r * particles.volume[p];
             Ok((Vector::zeros(), Tensor::repeat(change)))
         })
     }

@@ -82,7 +82,7 @@ impl<'a, const D: usize> Update<'a, D> {
     /// a_p += Σ N Δa,  Δa = α₁(Δφ − Δt v_n) − (α₃+1)a_n      (50)
     /// v_p += Σ N Δv,  Δv = α₄(Δφ − Δt v_n) + α₆a_n           (51), both as in [`Alphas`]
     /// x_p += Σ N Δφ                                           (52)
-    /// F_p  = (I + Σ Δφ ⊗ ∇_n N) F_p                            (45)
+    /// F_p  = (I + Σ Δφ ⊗ ∇_r N) F_p                            (45)
     ///
     /// Between two grid resets, x_p and F_p on the right are those of the last reset, and φ_n + Δφ stands for Δφ in (52) and (45).
     pub fn new(
@@ -257,12 +257,12 @@ impl<'a, const D: usize> Update<'a, D> {
             |p, (delta_x, g)| {
                 largest = largest.max((g + g.transpose() + g.transpose() * g).norm() * 0.5);
                 mutant!("transfer: no strain resets the grid": { largest = 0.0; });
-                let (x, h_n) = match reference {
+                let (x, h_r) = match reference {
                     Some(reference) => (reference.position[p], reference.displacement_gradient[p]),
                     None => (position[p], displacement_gradient[p]),
                 };
                 position[p] = x + delta_x;
-                displacement_gradient[p] = compose(&g, &h_n);
+                displacement_gradient[p] = compose(&g, &h_r);
                 if remembered > 0 {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
                     let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();

@@ -80,7 +80,7 @@ pub(super) const FAULTS: &[ShippedFault] = &[
     fault("sweep: the plain loop scatters stresses by one slope", OPERATOR, POINTS),
     fault("sweep: functions beside a wall as if it were far", SWEEP, POINTS),
     fault("inertia: the residual lacks the consistent part", TANGENT, DYNAMICS),
-    fault("deformation: F without G H_n", TANGENT, POINTS),
+    fault("deformation: F without G H_r", TANGENT, POINTS),
     fault("stress: F_n is transposed", TANGENT, POINTS),
     fault("stress: no geometric part without a closed form", TANGENT, POINTS),
     fault("stress: the energy lacks V_0", TANGENT, POINTS),

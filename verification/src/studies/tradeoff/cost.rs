@@ -1,18 +1,14 @@
 //! A run of a simulation, and its cost.
 
-use crate::prepared::{Prepared, arranged};
 use crate::processor::Thread;
 use crate::studies::StudyError;
 use bfree::mechanics::loads::ForceField;
 use bfree::mechanics::sweep::Supports;
-use bfree::mechanics::transfer::Nodal;
 use bfree::plan::Plan;
 use bfree::simulation::Simulation;
 use bfree::solver::NewtonHistory;
 use bfree::tensor::Vector;
-use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// An iteration is quadratic if the linear solver leaves at most this share of the new residual: the rest is the second-order error of
 /// Newton's own step.
@@ -24,8 +20,14 @@ const QUADRATIC_SHARE: f64 = 0.9;
 /// The round-off of a residual over its magnitude.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
-/// The longest interval at which systems update the processor time of a thread.
-const TICK: Duration = Duration::from_millis(10);
+/// The time of each evaluation over that of a product with the tangent: rounded medians over all functions and dimensions.
+const SHAPES: f64 = 4.0;
+const PROJECTION: f64 = 1.6;
+const RESIDUAL: f64 = 1.5;
+const LINEARIZATION: f64 = 1.2;
+
+/// A product takes as long at a particle, apart from its nodes, as at this number of nodes.
+const PARTICLE: f64 = 24.0;
 
 /// The counts of evaluations.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,6 +66,15 @@ impl Tally {
         self.limited += before_last.iter().filter(limited).count();
     }
 
+    /// All evaluations, as a number of products.
+    fn products_worth(&self) -> f64 {
+        SHAPES * self.steps as f64
+            + PROJECTION * self.projections as f64
+            + RESIDUAL * self.residuals as f64
+            + LINEARIZATION * self.linearizations as f64
+            + self.products as f64
+    }
+
     /// Whether Newton's method converged quadratically.
     pub fn quadratic(&self) -> bool {
         self.limited as f64 <= (1.0 - QUADRATIC_SHARE) * self.decisive as f64
@@ -74,24 +85,12 @@ impl Tally {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cost {
     pub tally: Tally,
+    /// Counts times the usual time of each evaluation. The unit is the share of one node in the product of one particle.
+    pub work: f64,
     /// CPU seconds of its one thread, without the evaluation of forces and errors.
     pub seconds: f64,
-    /// The first measured time of each evaluation.
-    pub units: Units,
     /// The peak number of bytes, by the plan.
     pub bytes: u64,
-}
-
-impl Cost {
-    /// The counts times the time of each evaluation, in seconds: independent of other load on the machine.
-    pub fn counted(&self, units: &Units) -> f64 {
-        let tally = &self.tally;
-        units.shapes * tally.steps as f64
-            + units.projection * tally.projections as f64
-            + units.residual * tally.residuals as f64
-            + units.linearization * tally.linearizations as f64
-            + units.product * tally.products as f64
-    }
 }
 
 /// Takes `steps` steps of the nominal length, and shows the simulation to `watch` after each.
@@ -100,7 +99,7 @@ pub(super) fn drive<const D: usize>(
     steps: u64,
     mut watch: impl FnMut(&Simulation<D>) -> Result<(), StudyError>,
 ) -> Result<Cost, StudyError> {
-    let (units, bytes) = Units::of(simulation)?;
+    let (product, bytes) = (product_work(simulation)?, Plan::of(simulation)?.bytes());
     let mut tally = Tally::default();
     let mut seconds = 0.0;
     let field = simulation.loads.field.take();
@@ -114,7 +113,13 @@ pub(super) fn drive<const D: usize>(
         watch(simulation)?;
     }
     simulation.loads.field = field;
-    Ok(Cost { tally, seconds, units, bytes })
+    Ok(Cost { tally, work: tally.products_worth() * product, seconds, bytes })
+}
+
+/// The work of one product at the start of a run.
+fn product_work<const D: usize>(simulation: &Simulation<D>) -> Result<f64, StudyError> {
+    let (supports, _) = Supports::new(&simulation.approximation, &simulation.grid, &simulation.particles.position)?;
+    Ok((0..supports.particles()).map(|p| PARTICLE + supports.of(p).count() as f64).sum())
 }
 
 /// A force field with tabulated values for the next step, so that they cost the step nothing.
@@ -129,65 +134,4 @@ fn tabulated<const D: usize>(field: &ForceField<D>, simulation: &Simulation<D>) 
         Some((_, table)) => table[id],
         None => field.0(id, x, t),
     }))
-}
-
-/// Seconds of one evaluation of each kind, at the start of a run.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Units {
-    shapes: f64,
-    projection: f64,
-    residual: f64,
-    linearization: f64,
-    /// One product with the tangent.
-    product: f64,
-    /// One product with the tangent for one particle.
-    pub product_of_one: f64,
-}
-
-impl Units {
-    /// The shorter time of each evaluation.
-    pub fn least(&self, other: &Self) -> Self {
-        Self {
-            shapes: self.shapes.min(other.shapes),
-            projection: self.projection.min(other.projection),
-            residual: self.residual.min(other.residual),
-            linearization: self.linearization.min(other.linearization),
-            product: self.product.min(other.product),
-            product_of_one: self.product_of_one.min(other.product_of_one),
-        }
-    }
-
-    /// Measures the evaluations, and asks the plan for the peak number of bytes.
-    pub fn of<const D: usize>(simulation: &Simulation<D>) -> Result<(Self, u64), StudyError> {
-        let simulation = &arranged(simulation.clone())?;
-        let prepared = Prepared::new(simulation)?;
-        let equilibrium = prepared.equilibrium(simulation);
-        let (count, lumping) = (prepared.nodes.len(), simulation.settings.lumping);
-        let positions = &simulation.particles.position;
-        let mut dphi = vec![Vector::zeros(); count];
-        prepared.prescribe(&mut dphi);
-        let u: Vec<Vector<f64, D>> = vec![Vector::repeat(1e-3); count];
-        let mut out = vec![Vector::zeros(); count];
-        let shapes = best(|| Supports::new(&simulation.approximation, &simulation.grid, positions).map(drop));
-        let projection = best(|| Nodal::project(&simulation.particles, &prepared.supports, lumping).map(drop));
-        let residual = best(|| equilibrium.residual::<f64>(&dphi).map(drop));
-        let bytes = Plan::of(simulation)?.bytes();
-        let linearization = best(|| equilibrium.tangent(&dphi).map(drop));
-        let tangent = equilibrium.tangent(&dphi)?;
-        let product = best(|| tangent.product(&u, &mut out));
-        let projection = projection / prepared.nodal.iterations.max(1) as f64;
-        let product_of_one = product / simulation.particles.len() as f64;
-        Ok((Self { shapes, projection, residual, linearization, product, product_of_one }, bytes))
-    }
-}
-
-/// The shortest of a few runs, in seconds.
-fn best<R>(mut run: impl FnMut() -> R) -> f64 {
-    (0..4).fold(f64::INFINITY, |best: f64, _| {
-        let start = Thread::now();
-        black_box(run());
-        let wall = start.wall();
-        // Every long run is interrupted by other processes, and the processor clock is too coarse for short runs.
-        best.min(if wall < TICK { wall.as_secs_f64() } else { start.elapsed() })
-    })
 }

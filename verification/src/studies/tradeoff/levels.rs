@@ -64,7 +64,7 @@ pub(super) fn report(all: &[Measured], effort: Effort) -> Report {
             let name = accuracy.to_string();
             if let Some(before) = before {
                 report.push(&["error over that of the word before", &name, measured.problem], point.error / before.error, Bound::AtMost(1.0));
-                report.push(&["work over that of the word before", &name, measured.problem], point.work / before.work, Bound::AtLeast(1.0));
+                report.push(&["work over that of the word before", &name, measured.problem], point.cost.work / before.cost.work, Bound::AtLeast(1.0));
             }
             before = Some(point);
         }

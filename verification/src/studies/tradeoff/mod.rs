@@ -45,7 +45,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         threads.into_iter().map(|thread| thread.join().unwrap_or_else(lost)).collect()
     });
     let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut outcome = Outcome { reports: vec![defaults(&all, effort), levels::report(&all, effort)], ..Outcome::default() };
+    let mut outcome = Outcome { reports: vec![defaults(&all), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
     outcome.remarks.push(base(&problems));
     outcome.tables.extend(all.iter().map(front));
@@ -67,31 +67,28 @@ fn base(problems: &[Box<dyn Problem>]) -> String {
     let sizes: Vec<_> = problems.iter().map(|one| format!("h = 1/{:.4} ({})", one.cells()[BASE_LEVEL], one.name())).collect();
     format!(
         "The base: what a scene has that gives no knob, at cΔt/h = {COURANT} and {}. Errors are relative to the size of the answer. Work is \
-         what was counted (shape functions, residuals, linearisations, products with the tangent, iterations of the projection), each times what it \
-         took at the start of that run, the best of four at five times; its unit is the product with the tangent of one particle with the defaults. It has no part in \
-         it for the vectors of the Krylov method. CPU seconds are those of one thread. Bytes are those of the plan. A knob of shape functions that \
+         counted: shape functions, residuals, linearisations, products with the tangent and iterations of the projection, each times its usual \
+         time. The unit is the share of one node in the product of one particle. The vectors of the Krylov method are left out. CPU seconds are those of one thread. Bytes are those of the plan. A knob of shape functions that \
          are not the default is turned from the defaults of those.",
         sizes.join(", ")
     )
 }
 
 /// Whether any setting dominates the defaults: one knob at a time, and the combinations.
-fn defaults(all: &[Measured], effort: Effort) -> Report {
-    // Seconds decide this; in the short set runs are short, so the value is only shown.
-    let bound = if effort == Effort::Full { Bound::AtLeast(1.0) } else { Bound::Reported };
-    let title = "the defaults are on the front: how far they are from being dominated in error and work, beyond the scatter of work, by what keeps \
-                 Newton's method quadratic";
+fn defaults(all: &[Measured]) -> Report {
+    let title = "the defaults are on the front: how far they are from being dominated in error and work, by settings that keep Newton's method \
+                 quadratic";
     let mut report = Report::new(title, &["knob", "problem", "by"]);
     for measured in all {
-        let (base, scatter) = (&measured.base, measured.scatter());
+        let base = measured.base();
         let mut least = |what: &str, base: Option<&Point>, chosen: &dyn Fn(&Point) -> bool| {
             let others = measured.points.iter().filter(|point| point.cost.tally.quadratic() && chosen(point));
             // Every setting dominates defaults that fail.
-            let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other, scatter));
+            let dominated = |other: &Point| base.map_or(0.0, |base| base.dominated(other));
             let nearest = others.min_by(|a, b| dominated(a).total_cmp(&dominated(b)));
             if let Some(nearest) = nearest {
                 let by = base.map_or_else(|| nearest.setting.name(), |base| by_how_much(base, nearest));
-                report.push(&[what, measured.problem, &by], dominated(nearest), bound);
+                report.push(&[what, measured.problem, &by], dominated(nearest), Bound::AtLeast(1.0));
             }
         };
         for knob in KNOBS {
@@ -99,16 +96,15 @@ fn defaults(all: &[Measured], effort: Effort) -> Report {
         }
         least("combinations", Some(base), &|point| matches!(point.setting.origin, Origin::Design(..)));
         let quadratic = if base.cost.tally.quadratic() { 1.0 } else { 0.0 };
-        report.push(&["how well the least of a setting's five times is found again", measured.problem, "-"], scatter, Bound::Reported);
         report.push(&["Newton quadratic with the defaults", measured.problem, "-"], quadratic, Bound::AtLeast(1.0));
     }
     report
 }
 
-/// A setting, with its error and work over those of the defaults, and the scatter of the work.
+/// A setting, with its error and work over those of the defaults.
 fn by_how_much(base: &Point, other: &Point) -> String {
-    let [least, greatest] = [other.scatter[0] / base.scatter[1], other.scatter[1] / base.scatter[0]];
-    format!("{} (error ×{:.6}, work ×{least:.2} to {greatest:.2})", other.setting.name(), other.error / base.error)
+    let (error, work) = (other.error / base.error, other.cost.work / base.cost.work);
+    format!("{} (error ×{error:.6}, work ×{work:.2})", other.setting.name())
 }
 
 const HEADER: [&str; 8] = ["setting", "error", "work (1e6)", "CPU s", "KiB", "steps", "products / step", "Newton"];
@@ -118,7 +114,7 @@ fn row(point: &Point) -> [String; 8] {
     [
         point.setting.name(),
         format!("{:.3e}", point.error),
-        format!("{:.3}", point.work / 1e6),
+        format!("{:.3}", point.cost.work / 1e6),
         format!("{:.3}", point.cost.seconds),
         (point.cost.bytes / 1024).to_string(),
         tally.steps.to_string(),

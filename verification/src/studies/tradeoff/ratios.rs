@@ -63,10 +63,10 @@ fn values(all: &[Measured], knob: &str, default: &str) -> Vec<Value> {
             let matches = |setting: &Setting| setting.of_knob(knob) == Some(name);
             let base = measured.base_of(knob);
             let found = if name == default { base } else { measured.points.iter().find(|point| matches(&point.setting)) };
-            if let (Some(Point { error, work, cost, .. }), Some(base)) = (found, base) {
+            if let (Some(Point { error, cost, .. }), Some(base)) = (found, base) {
                 let pairs = [
                     (*error, base.error),
-                    (*work, base.work),
+                    (cost.work, base.cost.work),
                     (cost.seconds, base.cost.seconds),
                     (cost.bytes as f64, base.cost.bytes as f64),
                 ];

@@ -2,7 +2,7 @@
 
 use super::{LEVELS, Problem, steps, whole_steps};
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, Units, drive};
+use crate::studies::tradeoff::cost::{Cost, drive};
 use bfree::material::Lame;
 use bfree::particles::Particles;
 use bfree::scene::Scene;
@@ -109,10 +109,6 @@ impl Problem for Compaction {
 
     fn scene(&self) -> Value {
         scene()
-    }
-
-    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
-        Ok(Units::of(&scene.build::<2>(Path::new("."))?)?.0)
     }
 
     fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {

@@ -3,7 +3,7 @@
 use super::{LEVELS, Problem, steps};
 use crate::manufactured::{AxisAligned, force_field, state};
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, Units, drive};
+use crate::studies::tradeoff::cost::{Cost, drive};
 use bfree::material::Lame;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
@@ -69,10 +69,6 @@ impl<const D: usize> Problem for Manufactured<D> {
             }],
             "boundary": walls,
         })
-    }
-
-    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
-        Ok(Units::of(&self.start(scene)?)?.0)
     }
 
     fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {

@@ -8,7 +8,7 @@ pub(super) use compaction::Compaction;
 pub(super) use manufactured::Manufactured;
 pub(super) use riemann::Bar;
 
-use super::cost::{Cost, Units};
+use super::cost::Cost;
 use super::setting::Setting;
 use crate::report::chain;
 use crate::studies::StudyError;
@@ -47,14 +47,6 @@ pub(super) trait Problem: Sync {
     }
     /// Runs a prepared scene. Returns the relative error and the cost.
     fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError>;
-
-    /// The times of the evaluations at the start of a run.
-    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError>;
-
-    /// The times of the evaluations for a setting.
-    fn units(&self, setting: &Setting) -> Result<Units, StudyError> {
-        self.units_of(&self.set(setting)?)
-    }
 
     /// h of a level.
     fn spacing(&self, level: usize) -> f64 {

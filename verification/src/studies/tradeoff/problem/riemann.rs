@@ -4,7 +4,7 @@ use super::{LEVELS, Problem, steps};
 use crate::riemann::{PSystem, State};
 use crate::start::velocity_by_masses;
 use crate::studies::StudyError;
-use crate::studies::tradeoff::cost::{Cost, Units, drive};
+use crate::studies::tradeoff::cost::{Cost, drive};
 use bfree::material::Lame;
 use bfree::scene::Scene;
 use bfree::simulation::Simulation;
@@ -79,10 +79,6 @@ impl Problem for Bar {
         let between_fronts = 2.0 * self.speed() * self.end;
         let common = 0.5 * ROOM;
         Some(common / (common * cells / between_fronts).ceil())
-    }
-
-    fn units_of(&self, scene: &Scene) -> Result<Units, StudyError> {
-        Ok(Units::of(&self.start(scene)?)?.0)
     }
 
     fn solve(&self, scene: &Scene) -> Result<(f64, Cost), StudyError> {
