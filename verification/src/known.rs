@@ -32,20 +32,14 @@ pub struct KnownCell {
     pub labels: &'static [&'static str],
     /// The value measured.
     pub value: f64,
-    /// Whether the value is a time in seconds.
-    pub timed: bool,
 }
 
 const fn short_effort(labels: &'static [&'static str], value: f64) -> KnownCell {
-    KnownCell { effort: Effort::Short, labels, value, timed: false }
+    KnownCell { effort: Effort::Short, labels, value }
 }
 
 const fn full_effort(labels: &'static [&'static str], value: f64) -> KnownCell {
-    KnownCell { effort: Effort::Full, labels, value, timed: false }
-}
-
-const fn timed(labels: &'static [&'static str], value: f64) -> KnownCell {
-    KnownCell { effort: Effort::Full, labels, value, timed: true }
+    KnownCell { effort: Effort::Full, labels, value }
 }
 
 /// All known failures.
@@ -261,7 +255,7 @@ pub(crate) fn mark(known: &[Known], study: &str, effort: Effort, reports: &mut V
     let mut astray = Report::new("known failures that are not exactly one cell of the study: cells found", &["cell"]);
     for entry in known.iter().filter(|entry| entry.study == study) {
         for cell in entry.cells.iter().filter(|cell| cell.effort <= effort) {
-            let listed = Listed { value: cell.value, factor: entry.factor, timed: cell.timed };
+            let listed = Listed { value: cell.value, factor: entry.factor };
             let found: usize = reports.iter_mut().map(|report| report.list_known(cell.labels, listed)).sum();
             if found != 1 {
                 astray.push(&[&cell.labels.join(", ")], found as f64, Bound::Between(1.0, 1.0));
@@ -292,7 +286,6 @@ pub fn markdown() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::Verdict;
 
     const LIST: &[Known] = &[Known {
         study: "one",
@@ -302,23 +295,6 @@ mod tests {
         factor: 2.0,
         cells: &[short_effort(&["a", "b"], 3.0), full_effort(&["c"], 3.0)],
     }];
-
-    /// A timed cell may pass, but must not get much worse. Any other cell must not pass either.
-    #[test]
-    fn seconds_may_be_kind() {
-        for (timed, value, verdict) in [
-            (true, 3.5, Verdict::Known),
-            (true, 0.5, Verdict::Met),
-            (true, 6.5, Verdict::Failed),
-            (false, 3.5, Verdict::Known),
-            (false, 0.5, Verdict::Failed),
-        ] {
-            let mut report = Report::new("", &["what"]);
-            report.push(&["a"], value, Bound::AtMost(1.0));
-            report.list_known(&["a"], Listed { value: 3.0, factor: 2.0, timed });
-            assert_eq!(report.cells()[0].verdict(), verdict, "{timed} {value}");
-        }
-    }
 
     fn marked(study: &str, effort: Effort, labels: &[&[&str]]) -> bool {
         let mut report = Report::new("", &["what", "where", "how"]);

@@ -273,8 +273,8 @@ mod tests {
         let mut report = Report::new("known", &["what", "where"]);
         report.push(&["a", "here"], 1.0, Bound::AtMost(2.0));
         report.push(&["b", "there"], value, bound);
-        assert_eq!(report.list_known(&["b"], Listed { value: 30.0, factor: 10.0, timed: false }), 1);
-        assert_eq!(report.list_known(&["c"], Listed { value: 30.0, factor: 10.0, timed: false }), 0);
+        assert_eq!(report.list_known(&["b"], Listed { value: 30.0, factor: 10.0 }), 1);
+        assert_eq!(report.list_known(&["c"], Listed { value: 30.0, factor: 10.0 }), 0);
         report
     }
 

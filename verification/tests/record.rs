@@ -60,7 +60,7 @@ fn findings() -> Vec<Finding> {
     report.push(&["met"], 1.0, Bound::AtMost(2.0));
     report.push(&["shown"], 1.0, Bound::Reported);
     report.push(&["bad"], 3.0, Bound::AtMost(2.0));
-    report.list_known(&["bad"], Listed { value: 3.0, factor: 2.0, timed: false });
+    report.list_known(&["bad"], Listed { value: 3.0, factor: 2.0 });
     let outcome = Outcome { reports: vec![report], ..Outcome::default() };
     vec![Finding::of("one", &Ok(outcome), 1.0), Finding::of("two", &Err("no luck\nand more".into()), 2.0)]
 }

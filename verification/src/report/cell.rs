@@ -96,8 +96,6 @@ pub struct Listed {
     pub value: f64,
     /// A value that misses the bound by this factor more is a new failure.
     pub factor: f64,
-    /// Whether the value is a time in seconds. On a busy machine the scatter is larger, and the cell may pass.
-    pub timed: bool,
 }
 
 /// The verdict on a cell.
@@ -147,9 +145,6 @@ impl Cell {
             None => Verdict::Met,
             Some(listed) => {
                 let allowed = listed.factor * self.bound.used(listed.value);
-                if holds && listed.timed {
-                    return Verdict::Met;
-                }
                 if !holds && self.bound.used(self.value) <= allowed { Verdict::Known } else { Verdict::Failed }
             }
         }

@@ -6,6 +6,7 @@
 //! frequent mistakes ([`diagnosis`]).
 
 pub mod convention;
+pub mod convergence;
 pub mod diagnosis;
 pub mod difference;
 pub mod finding;

@@ -1,0 +1,123 @@
+//! The order of convergence of Newton's method, from the norms of its residuals.
+//!
+//! Far from round-off, the norms of a method of order p obey r_{k+1} ≈ C r_k^p. Two successive contractions q_k = r_k/r_{k−1} give
+//!
+//! p_k = ln q_{k+1} / ln q_k
+//!
+//! without C. A norm at round-off is larger than the method alone would leave it, so p_k is then a lower bound.
+
+/// Orders from here on count as quadratic. The exact order is reached in the limit; a last contraction from 1e-3 shows 2 within 15 %.
+const QUADRATIC: f64 = 1.7;
+
+/// Orders up to here count as linear.
+const LINEAR: f64 = 1.2;
+
+/// A contraction above this ratio belongs to the search for the solution, not to the convergence.
+const CONVERGES: f64 = 0.5;
+
+/// The residuals of one solution by Newton's method.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// The name in tables: "step 12, t = 0.6".
+    pub name: String,
+    /// ‖R‖ at the initial guess and after each iteration.
+    pub norms: Vec<f64>,
+    /// The norm that round-off leaves. Without it, a norm below 1e-14 of the greatest norm counts as round-off.
+    pub round_off: Option<f64>,
+}
+
+/// The order that the norms show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// Quadratic: the order seen last above round-off, or its lower bound.
+    Quadratic(f64),
+    /// Between linear and quadratic.
+    Superlinear(f64),
+    /// Linear.
+    Linear(f64),
+    /// The first iterations reach round-off: the equations are linear there, or nearly so.
+    Immediate,
+    /// Too few norms fall to tell.
+    Unknown,
+    /// A norm is not finite.
+    NotFinite,
+}
+
+impl Order {
+    /// Whether the norms do not contradict quadratic convergence.
+    pub fn is_quadratic(self) -> bool {
+        matches!(self, Self::Quadratic(_) | Self::Immediate)
+    }
+}
+
+impl std::fmt::Display for Order {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Quadratic(order) => write!(f, "quadratic ({order:.1})"),
+            Self::Superlinear(order) => write!(f, "superlinear ({order:.1})"),
+            Self::Linear(order) => write!(f, "linear ({order:.1})"),
+            Self::Immediate => f.write_str("round-off at once"),
+            Self::Unknown => f.write_str("unknown"),
+            Self::NotFinite => f.write_str("not finite"),
+        }
+    }
+}
+
+impl Solution {
+    /// The norm at and below which round-off decides.
+    pub fn floor(&self) -> f64 {
+        self.round_off.unwrap_or_else(|| 1e-14 * self.norms.iter().fold(0.0, |most: f64, norm| most.max(*norm)))
+    }
+
+    /// The order p_k that each iteration shows, from the second on; `None` where the norms do not fall, or lie at round-off before.
+    ///
+    /// ```
+    /// use tangent_check::convergence::Solution;
+    ///
+    /// // The norms 10^−1, 10^−2, 10^−4, 10^−8, and round-off at 10^−14. The last order is a lower bound.
+    /// let norms = [-1, -2, -4, -8, -16].map(|power| 10_f64.powi(power)).to_vec();
+    /// let newton = Solution { name: "step 1".into(), norms, round_off: Some(1e-14) };
+    /// let orders: Vec<_> = newton.orders().into_iter().flatten().map(|order| (order * 10.0).round() / 10.0).collect();
+    /// assert_eq!(orders, [2.0, 2.0, 1.5]);
+    /// ```
+    pub fn orders(&self) -> Vec<Option<f64>> {
+        let floor = self.floor();
+        let order = |three: &[f64]| {
+            let (before, now) = (three[1] / three[0], three[2].max(floor) / three[1]);
+            let falls = three[1] > floor && before <= CONVERGES && now < 1.0;
+            falls.then(|| now.ln() / before.ln())
+        };
+        self.norms.windows(3).map(order).collect()
+    }
+
+    /// The order of convergence: the greatest of the last two orders. The last one may be limited by the tolerance of the linear solver
+    /// where round-off is near.
+    ///
+    /// ```
+    /// use tangent_check::convergence::{Order, Solution};
+    ///
+    /// let of = |norms: &[f64]| Solution { name: String::new(), norms: norms.to_vec(), round_off: None }.order();
+    /// assert!(matches!(of(&[0.1, 1e-2, 1e-4, 1e-8]), Order::Quadratic(order) if (order - 2.0).abs() < 1e-6));
+    /// assert!(matches!(of(&[1.0, 1e-2, 1e-4, 1e-6, 1e-8]), Order::Linear(order) if (order - 1.0).abs() < 1e-6));
+    /// assert_eq!(of(&[1.0, 1e-15]), Order::Immediate);
+    /// assert_eq!(of(&[1.0, 0.9]), Order::Unknown);
+    /// assert_eq!(of(&[1.0, f64::NAN]), Order::NotFinite);
+    /// ```
+    pub fn order(&self) -> Order {
+        if self.norms.iter().any(|norm| !norm.is_finite()) {
+            return Order::NotFinite;
+        }
+        let floor = self.floor();
+        let reached = self.norms.iter().position(|norm| *norm <= floor);
+        let shown = self.orders();
+        let last = shown.iter().rev().flatten().take(2).copied().reduce(f64::max);
+        match (last, reached) {
+            (None, Some(..=2)) => Order::Immediate,
+            (None, _) => Order::Unknown,
+            (Some(order), _) if order >= QUADRATIC => Order::Quadratic(order),
+            (Some(_), Some(..=2)) => Order::Immediate,
+            (Some(order), _) if order > LINEAR => Order::Superlinear(order),
+            (Some(order), _) => Order::Linear(order),
+        }
+    }
+}
