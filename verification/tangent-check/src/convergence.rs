@@ -121,3 +121,83 @@ impl Solution {
         }
     }
 }
+
+/// The forms of a table of solutions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableForm {
+    /// Aligned columns, for a terminal.
+    Text,
+    /// A table of GitHub's Markdown.
+    Markdown,
+    /// A `tabular` with the rules of the package booktabs.
+    Latex,
+    /// Comma-separated values, with all digits. Names should have no commas.
+    Csv,
+}
+
+/// The norms of all solutions and their orders: a column for each iteration, a row for each solution.
+///
+/// ```
+/// use tangent_check::convergence::{Solution, TableForm, table};
+///
+/// let solution = Solution { name: "step 1".into(), norms: vec![0.1, 1e-2, 1e-4, 1e-8], round_off: None };
+/// assert_eq!(
+///     table(&[solution], TableForm::Markdown),
+///     "|  | 0 | 1 | 2 | 3 | order |\n|---|---|---|---|---|---|\n| step 1 | 1.0e-1 | 1.0e-2 | 1.0e-4 | 1.0e-8 | quadratic (2.0) |\n"
+/// );
+/// ```
+pub fn table(solutions: &[Solution], form: TableForm) -> String {
+    let most = solutions.iter().map(|solution| solution.norms.len()).max().unwrap_or(0);
+    let mut rows = vec![Vec::from([String::new()])];
+    rows[0].extend((0..most).map(|k| k.to_string()).chain(["order".to_owned()]));
+    for solution in solutions {
+        let norm = |k: usize| solution.norms.get(k).map_or_else(String::new, |norm| number(*norm, form));
+        let mut row = vec![solution.name.clone()];
+        row.extend((0..most).map(norm).chain([solution.order().to_string()]));
+        rows.push(row);
+    }
+    match form {
+        TableForm::Text => aligned(&rows),
+        TableForm::Markdown => markdown(&rows),
+        TableForm::Latex => latex(&rows),
+        TableForm::Csv => rows.iter().map(|row| row.join(",") + "\n").collect(),
+    }
+}
+
+fn number(x: f64, form: TableForm) -> String {
+    match form {
+        TableForm::Csv => format!("{x:e}"),
+        TableForm::Latex if x.is_finite() => {
+            let (digits, power) =
+                format!("{x:.1e}").split_once('e').map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap_or_default();
+            format!("${digits}\\cdot10^{{{power}}}$")
+        }
+        _ => format!("{x:.1e}"),
+    }
+}
+
+fn aligned(rows: &[Vec<String>]) -> String {
+    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells: Vec<String> = row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:width$}")).collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
+}
+
+fn markdown(rows: &[Vec<String>]) -> String {
+    let line = |row: &Vec<String>| format!("| {} |\n", row.join(" | "));
+    let rule = "|---".repeat(rows[0].len());
+    format!("{}{rule}|\n{}", line(&rows[0]), rows[1..].iter().map(line).collect::<String>())
+}
+
+fn latex(rows: &[Vec<String>]) -> String {
+    let line = |row: &Vec<String>| row.join(" & ").replace('%', "\\%") + " \\\\\n";
+    let columns = "r".repeat(rows[0].len() - 2);
+    let body: String = rows[1..].iter().map(line).collect();
+    format!(
+        "\\begin{{tabular}}{{l{columns}l}}\n\\toprule\n{}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n",
+        line(&rows[0])
+    )
+}

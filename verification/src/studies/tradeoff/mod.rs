@@ -45,7 +45,7 @@ pub(super) fn run(effort: &Effort) -> Result<Outcome, StudyError> {
         threads.into_iter().map(|thread| thread.join().unwrap_or_else(lost)).collect()
     });
     let all = all.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut outcome = Outcome { reports: vec![defaults(&all), levels::report(&all, effort)], ..Outcome::default() };
+    let mut outcome = Outcome { reports: vec![defaults(&all, effort), levels::report(&all, effort)], ..Outcome::default() };
     let defaults = problems.first().map(|problem| knobs(&**problem)).unwrap_or_default();
     outcome.remarks.push(base(&problems));
     outcome.tables.extend(all.iter().map(front));
@@ -75,7 +75,9 @@ fn base(problems: &[Box<dyn Problem>]) -> String {
 }
 
 /// Whether any setting dominates the defaults: one knob at a time, and the combinations.
-fn defaults(all: &[Measured]) -> Report {
+fn defaults(all: &[Measured], effort: Effort) -> Report {
+    // Short runs are too few to choose defaults by.
+    let bound = if effort == Effort::Full { Bound::AtLeast(1.0) } else { Bound::Reported };
     let title = "the defaults are on the front: how far they are from being dominated in error and work, by settings that keep Newton's method \
                  quadratic";
     let mut report = Report::new(title, &["knob", "problem", "by"]);
@@ -88,7 +90,7 @@ fn defaults(all: &[Measured]) -> Report {
             let nearest = others.min_by(|a, b| dominated(a).total_cmp(&dominated(b)));
             if let Some(nearest) = nearest {
                 let by = base.map_or_else(|| nearest.setting.name(), |base| by_how_much(base, nearest));
-                report.push(&[what, measured.problem, &by], dominated(nearest), Bound::AtLeast(1.0));
+                report.push(&[what, measured.problem, &by], dominated(nearest), bound);
             }
         };
         for knob in KNOBS {
