@@ -6,7 +6,7 @@ use bfree::causes;
 use bfree::output::plot::{Look, PlotError, View, plot_frames, plot_run};
 use bfree::scene;
 use clap::{Parser, Subcommand};
-use program::{Failure, INTERRUPTED, New, Run, SceneArguments, print, tell};
+use program::{Failure, INTERRUPTED, New, Newton, Run, SceneArguments, print, tell};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,6 +27,8 @@ enum Command {
     Check(SceneArguments),
     /// Write a starter scene and explain its keys. Without a problem, list the problems.
     New(New),
+    /// Show the residuals of Newton's method in each step of a scene, and the order of convergence.
+    Newton(Newton),
     /// Draw energies, iterations and particles of a run as SVG and PNG. The page report.html also has a player of the snapshots.
     Plot {
         /// The directory of the run's results.
@@ -62,6 +64,7 @@ fn main() -> ExitCode {
         Command::Run(run) => run.execute(),
         Command::Check(arguments) => arguments.check(),
         Command::New(new) => new.execute(),
+        Command::Newton(newton) => newton.execute(),
         Command::Plot { directory, movie, field, view, time, format } => {
             let mut look = Look { field, view, time, ..Look::default() };
             look.formats.retain(|one| format.as_deref().is_none_or(|format| format == *one));

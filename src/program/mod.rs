@@ -2,12 +2,14 @@
 
 mod directory;
 mod new;
+mod newton;
 mod probes;
 mod run;
 mod scene_arguments;
 mod steps;
 
 pub use new::New;
+pub use newton::Newton;
 pub use run::Run;
 pub use scene_arguments::SceneArguments;
 

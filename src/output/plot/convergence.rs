@@ -1,7 +1,7 @@
 //! Residuals of Newton's method: a sample of all steps, and the step with the most iterations.
 
 use super::axes::rounded;
-use super::chart::{Line, Panel};
+use super::chart::{self, Heading, Line, Panel};
 use super::{PlotError, palette};
 use serde::Deserialize;
 use serde_json::Value;
@@ -24,6 +24,25 @@ fn fall(step: &Step) -> Vec<(f64, f64)> {
     let first = residuals.first().copied().unwrap_or(1.0);
     let ratio = residuals.iter().enumerate().map(|(k, r)| (k as f64, (r / first).log10()));
     ratio.filter(|point| point.1.is_finite()).collect()
+}
+
+/// The norms of several solutions against the iterations, as SVG.
+///
+/// ```
+/// use bfree::output::plot::newton_norms;
+///
+/// let svg = newton_norms("Two steps", &[("step 1", &[1.0, 1e-2, 1e-5]), ("step 2", &[0.1, 1e-4])]);
+/// assert!(svg.starts_with("<svg") && svg.contains("step 2"));
+/// ```
+pub fn newton_norms(title: &str, solutions: &[(&str, &[f64])]) -> String {
+    let line = |(k, (name, norms)): (usize, &(&str, &[f64]))| {
+        let points = norms.iter().enumerate().map(|(k, norm)| (k as f64, norm.log10()));
+        let points = points.filter(|point| point.1.is_finite()).collect();
+        Line { label: (*name).to_owned(), color: palette::viridis(0.9 * k as f64 / solutions.len() as f64), points }
+    };
+    let lines = solutions.iter().enumerate().map(line).collect();
+    let panel = Panel { x: ("Newton iteration", true), ..Panel::over_time("log₁₀ |R|", lines) };
+    chart::draw(&Heading { what: title.to_owned(), run: String::new() }, super::HEIGHT, &[panel])
 }
 
 /// The panel; `None` where no step was taken.

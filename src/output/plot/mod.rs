@@ -23,6 +23,7 @@ mod svg;
 mod table;
 mod view;
 
+pub use convergence::newton_norms;
 pub use error::PlotError;
 pub use view::View;
 

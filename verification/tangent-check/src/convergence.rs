@@ -69,29 +69,30 @@ impl Solution {
         self.round_off.unwrap_or_else(|| 1e-14 * self.norms.iter().fold(0.0, |most: f64, norm| most.max(*norm)))
     }
 
-    /// The order p_k that each iteration shows, from the second on; `None` where the norms do not fall, or lie at round-off before.
+    /// The order p_k that each iteration shows, from the second on; `None` where it shows none. The norms must fall, and the norm before
+    /// must be above round-off. If the last norm is round-off, p_k is a lower bound, and shows nothing unless it is quadratic.
     ///
     /// ```
     /// use tangent_check::convergence::Solution;
     ///
-    /// // The norms 10^−1, 10^−2, 10^−4, 10^−8, and round-off at 10^−14. The last order is a lower bound.
-    /// let norms = [-1, -2, -4, -8, -16].map(|power| 10_f64.powi(power)).to_vec();
+    /// // The norms 10^−1, 10^−2, 10^−4, 10^−8, and round-off at 10^−14.
+    /// let norms = [-1, -2, -4, -8, -14].map(|power| 10_f64.powi(power)).to_vec();
     /// let newton = Solution { name: "step 1".into(), norms, round_off: Some(1e-14) };
-    /// let orders: Vec<_> = newton.orders().into_iter().flatten().map(|order| (order * 10.0).round() / 10.0).collect();
-    /// assert_eq!(orders, [2.0, 2.0, 1.5]);
+    /// let orders: Vec<_> = newton.orders().into_iter().map(|order| order.map(|order| (order * 10.0).round() / 10.0)).collect();
+    /// assert_eq!(orders, [Some(2.0), Some(2.0), None]);
     /// ```
     pub fn orders(&self) -> Vec<Option<f64>> {
         let floor = self.floor();
         let order = |three: &[f64]| {
             let (before, now) = (three[1] / three[0], three[2].max(floor) / three[1]);
             let falls = three[1] > floor && before <= CONVERGES && now < 1.0;
-            falls.then(|| now.ln() / before.ln())
+            let order = now.ln() / before.ln();
+            (falls && (three[2] > floor || order >= QUADRATIC)).then_some(order)
         };
         self.norms.windows(3).map(order).collect()
     }
 
-    /// The order of convergence: the greatest of the last two orders. The last one may be limited by the tolerance of the linear solver
-    /// where round-off is near.
+    /// The order of convergence: the greater of the last two orders. The tolerance of the linear solver may limit the last one.
     ///
     /// ```
     /// use tangent_check::convergence::{Order, Solution};
@@ -99,7 +100,7 @@ impl Solution {
     /// let of = |norms: &[f64]| Solution { name: String::new(), norms: norms.to_vec(), round_off: None }.order();
     /// assert!(matches!(of(&[0.1, 1e-2, 1e-4, 1e-8]), Order::Quadratic(order) if (order - 2.0).abs() < 1e-6));
     /// assert!(matches!(of(&[1.0, 1e-2, 1e-4, 1e-6, 1e-8]), Order::Linear(order) if (order - 1.0).abs() < 1e-6));
-    /// assert_eq!(of(&[1.0, 1e-15]), Order::Immediate);
+    /// assert_eq!(of(&[1.0, 1e-7, 1e-15]), Order::Immediate);
     /// assert_eq!(of(&[1.0, 0.9]), Order::Unknown);
     /// assert_eq!(of(&[1.0, f64::NAN]), Order::NotFinite);
     /// ```
@@ -108,16 +109,13 @@ impl Solution {
             return Order::NotFinite;
         }
         let floor = self.floor();
-        let reached = self.norms.iter().position(|norm| *norm <= floor);
-        let shown = self.orders();
-        let last = shown.iter().rev().flatten().take(2).copied().reduce(f64::max);
-        match (last, reached) {
-            (None, Some(..=2)) => Order::Immediate,
-            (None, _) => Order::Unknown,
-            (Some(order), _) if order >= QUADRATIC => Order::Quadratic(order),
-            (Some(_), Some(..=2)) => Order::Immediate,
-            (Some(order), _) if order > LINEAR => Order::Superlinear(order),
-            (Some(order), _) => Order::Linear(order),
+        let reaches_round_off = self.norms.iter().take(3).any(|norm| *norm <= floor);
+        match self.orders().iter().rev().flatten().take(2).copied().reduce(f64::max) {
+            Some(order) if order >= QUADRATIC => Order::Quadratic(order),
+            _ if reaches_round_off => Order::Immediate,
+            Some(order) if order > LINEAR => Order::Superlinear(order),
+            Some(order) => Order::Linear(order),
+            None => Order::Unknown,
         }
     }
 }
