@@ -174,6 +174,17 @@ fn exit_codes() {
     assert_eq!((code(&[NotChecked, Wrong], false), code(&[], true)), (1, 3));
 }
 
+#[test]
+fn an_assertion_fails_with_the_report() {
+    Report::new("law", vec![finding("stretch", Verdict::Consistent, None)]).assert_consistent();
+    for findings in [Vec::new(), vec![wrong("stretch", 0.5, None)], vec![not_checked("zero", None)]] {
+        let report = Report::new("law", findings);
+        let panic = std::panic::catch_unwind(|| report.assert_consistent()).expect_err("the assertion fails");
+        let text = panic.downcast_ref::<String>().expect("a message");
+        assert_eq!(text.trim(), write(&report, Format::Terminal, &Options::default()).trim());
+    }
+}
+
 /// Numbers of the generator SplitMix64.
 struct Random(u64);
 

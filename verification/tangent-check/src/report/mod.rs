@@ -12,7 +12,7 @@ mod severity;
 mod terminal;
 mod words;
 
-use crate::finding::Report;
+use crate::finding::{Finding, Report};
 use std::fmt;
 
 /// A format of a report.
@@ -81,6 +81,32 @@ impl fmt::Display for UnknownFormat {
 }
 
 impl std::error::Error for UnknownFormat {}
+
+impl Report {
+    /// A report over findings, without names of components, notes and diagnoses.
+    pub fn new(subject: &str, findings: Vec<Finding>) -> Self {
+        Self {
+            subject: subject.to_owned(),
+            convention: String::new(),
+            rows: Vec::new(),
+            columns: Vec::new(),
+            seed: 0,
+            findings,
+            diagnoses: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Fails a test unless the tangent is consistent or inexact.
+    ///
+    /// # Panics
+    /// [`Report::exit_code`] is not 0. The message is the report for the terminal.
+    #[track_caller]
+    pub fn assert_consistent(&self) {
+        let text = write(self, Format::Terminal, &Options::default());
+        assert!(self.exit_code(false) == 0, "\n{text}");
+    }
+}
 
 /// A report in a format. The text ends with a line break, unless it is empty: a consistent tangent has no annotations.
 pub fn write(report: &Report, format: Format, options: &Options) -> String {
