@@ -175,6 +175,21 @@ fn exit_codes() {
 }
 
 #[test]
+fn an_inexact_tangent_is_a_warning_and_strictly_an_error() {
+    let report = report(vec![Finding { deviation: 2e-6, ..finding("loose", Verdict::Inexact, None) }]);
+    for (strict, level, failures) in [(false, "warning", 0), (true, "error", 1)] {
+        let options = Options { file: None, strict };
+        let github = write(&report, Format::Github, &options);
+        assert!(github.starts_with(&format!("::{level} title=Inexact tangent%3A loose::")), "{github}");
+        assert_eq!(github.lines().count(), 1, "{github}");
+        assert_eq!(write(&report, Format::Junit, &options).matches("<failure type=\"inexact\"").count(), failures);
+        let sarif: Value = serde_json::from_str(&write(&report, Format::Sarif, &options)).expect("SARIF is JSON");
+        let result = &sarif["runs"][0]["results"][0];
+        assert_eq!((&result["ruleId"], &result["level"]), (&"inexact-tangent".into(), &level.into()));
+    }
+}
+
+#[test]
 fn an_assertion_fails_with_the_report() {
     Report::new("law", vec![finding("stretch", Verdict::Consistent, None)]).assert_consistent();
     for findings in [Vec::new(), vec![wrong("stretch", 0.5, None)], vec![not_checked("zero", None)]] {
