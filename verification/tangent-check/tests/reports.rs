@@ -190,6 +190,16 @@ fn an_inexact_tangent_is_a_warning_and_strictly_an_error() {
 }
 
 #[test]
+fn components_without_a_symbol_are_spelt_out() {
+    let entry = Entry { row: 1, column: 0, claimed: 2.0, measured: 1.0, error: 1e-9 };
+    let mut report = report(vec![wrong("state", 0.5, Some(entry))]);
+    report.rows = vec!["11".to_owned(), "12".to_owned()];
+    report.columns = vec!["13".to_owned()];
+    let text = write(&report, Format::Terminal, &Options::default());
+    assert!(text.contains("\n  component 12 by component 13: claimed 2.0e0, measured 1.0e0 ± 1e-9\n"), "{text}");
+}
+
+#[test]
 fn an_assertion_fails_with_the_report() {
     Report::new("law", vec![finding("stretch", Verdict::Consistent, None)]).assert_consistent();
     for findings in [Vec::new(), vec![wrong("stretch", 0.5, None)], vec![not_checked("zero", None)]] {

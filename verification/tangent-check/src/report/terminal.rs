@@ -6,10 +6,10 @@ use crate::finding::{Finding, Report, Verdict};
 
 /// The greatest width of a line, in characters.
 const WIDTH: usize = 100;
-/// The greatest width of a name in the table.
-const NAME: usize = 40;
+/// The space between two columns.
+const GAP: usize = 2;
 /// The greatest number of findings that are shown with their numbers below the table.
-const DETAILS: usize = 20;
+const DETAILS: usize = 10;
 
 pub(super) fn write(report: &Report, options: &Options) -> String {
     let mut lines = Vec::new();
@@ -45,19 +45,26 @@ fn heading(lines: &mut Vec<String>, report: &Report) {
     blank(lines);
 }
 
+/// A row for each finding. The name takes the room that the other columns leave, at least 40 characters.
 fn table(lines: &mut Vec<String>, report: &Report) {
-    let names: Vec<String> =
-        report.findings.iter().map(|finding| shortened(&words::visible(&finding.name), NAME)).collect();
-    let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max("name".len());
-    let row = |name: &str, label: &str, deviation: &str, error: &str, seen: &str, calls: &str| {
-        format!("{name:width$}  {label:17}  {deviation:>9}  {error:>9}  {seen:>9}  {calls:>6}")
-    };
-    lines.push(row("name", "verdict", "deviation", "error", "seen", "calls"));
-    for (finding, name) in report.findings.iter().zip(&names) {
-        let deviation = words::number(finding.deviation);
-        let error = words::number(finding.error);
-        let calls = words::calls(finding.calls);
-        lines.push(row(name, &words::label(finding), &deviation, &error, &words::control(finding), &calls));
+    let mut rows = vec![["name", "verdict", "deviation", "error", "seen", "calls"].map(str::to_owned)];
+    rows.extend(report.findings.iter().map(cells));
+    let mut widths = [0; 6];
+    for row in &rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    let [name_width, verdict_width, others @ ..] = widths;
+    let taken = verdict_width + others.iter().sum::<usize>() + 5 * GAP;
+    let name_width = name_width.min(WIDTH - taken);
+    for [name, verdict, numbers @ ..] in rows {
+        let name = shortened(&name, name_width);
+        let mut line = format!("{name:name_width$}{:GAP$}{verdict:verdict_width$}", "");
+        for (number, width) in numbers.iter().zip(others) {
+            line += &format!("{:GAP$}{number:>width$}", "");
+        }
+        lines.push(line);
     }
     blank(lines);
     paragraph(
@@ -65,6 +72,18 @@ fn table(lines: &mut Vec<String>, report: &Report) {
         "Deviation of the tangent and error of the differences: relative to the greatest entry. Seen: the smallest \
          planted error that the check saw, relative to the spoiled entry.",
     );
+}
+
+/// The cells of a row. All but the name have at most 17, 9, 9, 9 and 6 characters.
+fn cells(finding: &Finding) -> [String; 6] {
+    [
+        words::visible(&finding.name),
+        words::label(finding),
+        words::number(finding.deviation),
+        words::number(finding.error),
+        words::control(finding),
+        words::calls(finding.calls),
+    ]
 }
 
 fn details(lines: &mut Vec<String>, report: &Report, options: &Options) {

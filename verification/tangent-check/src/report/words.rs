@@ -80,9 +80,11 @@ fn advice(reason: Option<&Reason>) -> &'static str {
     }
 }
 
-/// The name of an entry, ∂row/∂column. A component without a name is counted from 1.
+/// The name of an entry, ∂row/∂column. Names that are indices alone, "12", are spelt out. A component without a name is counted from 1.
 fn entry_name(report: &Report, entry: &Entry) -> String {
+    let index = |name: &str| name.starts_with(|first: char| first.is_ascii_digit());
     match (report.rows.get(entry.row), report.columns.get(entry.column)) {
+        (Some(row), Some(column)) if index(row) => format!("component {row} by component {column}"),
         (Some(row), Some(column)) => format!("∂{row}/∂{column}"),
         _ => format!("row {}, column {}", entry.row.saturating_add(1), entry.column.saturating_add(1)),
     }
