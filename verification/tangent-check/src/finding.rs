@@ -125,11 +125,13 @@ impl Report {
         }
     }
 
-    /// The exit code of a program: 0 consistent or inexact, 1 wrong, 3 not checked.
-    pub fn exit_code(&self) -> u8 {
+    /// The exit code of a program: 0 consistent, 1 wrong, 3 not checked. An inexact tangent gives 0, and 1 if `strict`.
+    pub fn exit_code(&self, strict: bool) -> u8 {
+        let inexact = self.findings.iter().any(|finding| finding.verdict == Verdict::Inexact);
         match self.verdict() {
-            Verdict::Consistent | Verdict::Inexact => 0,
             Verdict::Wrong => 1,
+            _ if strict && inexact => 1,
+            Verdict::Consistent | Verdict::Inexact => 0,
             Verdict::NotChecked => 3,
         }
     }

@@ -1,0 +1,121 @@
+//! Reports for people and machines: a [`Report`] in six formats.
+//!
+//! All formats agree about failure: the JUnit report has a failed test, the annotations an `::error` and the SARIF log a result of level
+//! `error` if and only if [`Report::exit_code`] is not 0. The same report gives the same bytes.
+
+mod github;
+mod json;
+mod junit;
+mod markdown;
+mod sarif;
+mod severity;
+mod terminal;
+mod words;
+
+use crate::finding::{Finding, Report};
+use std::fmt;
+
+/// A format of a report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// A table and sentences in plain text, at most 100 characters wide.
+    Terminal,
+    /// Markdown for the summary of a job: append it to the file `$GITHUB_STEP_SUMMARY`.
+    Markdown,
+    /// JUnit XML after the schema of Jenkins' xUnit plugin (junit-10.xsd).
+    Junit,
+    /// Annotations of GitHub Actions: workflow commands for the standard output.
+    Github,
+    /// A SARIF 2.1.0 log, for code scanning.
+    Sarif,
+    /// All numbers, for programs. [`JSON_SCHEMA`] describes it.
+    Json,
+}
+
+/// The JSON Schema of [`Format::Json`].
+pub const JSON_SCHEMA: &str = include_str!("json.schema.json");
+
+/// What a report needs beside the findings.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The source file of the law, relative to the root of the repository. Annotations and SARIF results point to it.
+    pub file: Option<String>,
+    /// Whether an inexact tangent counts as wrong.
+    pub strict: bool,
+}
+
+/// A name that is not a format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownFormat(pub String);
+
+impl Format {
+    /// All formats.
+    pub const ALL: [Self; 6] = [Self::Terminal, Self::Markdown, Self::Junit, Self::Github, Self::Sarif, Self::Json];
+
+    /// The name on a command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Terminal => "terminal",
+            Self::Markdown => "markdown",
+            Self::Junit => "junit",
+            Self::Github => "github",
+            Self::Sarif => "sarif",
+            Self::Json => "json",
+        }
+    }
+
+    /// The format with this name.
+    ///
+    /// # Errors
+    /// No format has this name. The error lists the names.
+    pub fn from_name(name: &str) -> Result<Self, UnknownFormat> {
+        Self::ALL.into_iter().find(|format| format.name() == name).ok_or_else(|| UnknownFormat(name.to_owned()))
+    }
+}
+
+impl fmt::Display for UnknownFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = Format::ALL.map(Format::name).join(", ");
+        write!(f, "There is no report format \"{}\". Allowed are: {names}.", self.0.escape_debug())
+    }
+}
+
+impl std::error::Error for UnknownFormat {}
+
+impl Report {
+    /// A report over findings, without names of components, notes and diagnoses.
+    pub fn new(subject: &str, findings: Vec<Finding>) -> Self {
+        Self {
+            subject: subject.to_owned(),
+            convention: String::new(),
+            rows: Vec::new(),
+            columns: Vec::new(),
+            seed: 0,
+            findings,
+            diagnoses: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Fails a test unless the tangent is consistent or inexact.
+    ///
+    /// # Panics
+    /// [`Report::exit_code`] is not 0. The message is the report for the terminal.
+    #[track_caller]
+    pub fn assert_consistent(&self) {
+        let text = write(self, Format::Terminal, &Options::default());
+        assert!(self.exit_code(false) == 0, "\n{text}");
+    }
+}
+
+/// A report in a format. The text ends with a line break, unless it is empty: a consistent tangent has no annotations.
+pub fn write(report: &Report, format: Format, options: &Options) -> String {
+    match format {
+        Format::Terminal => terminal::write(report, options),
+        Format::Markdown => markdown::write(report, options),
+        Format::Junit => junit::write(report, options),
+        Format::Github => github::write(report, options),
+        Format::Sarif => sarif::write(report, options),
+        Format::Json => json::write(report, options),
+    }
+}

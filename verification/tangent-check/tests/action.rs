@@ -1,0 +1,117 @@
+//! The action of `.github/actions/tangent-check`, run with a program in place of bfree that records its arguments.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const ACTION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.github/actions/tangent-check");
+
+/// A program that writes its arguments to the file `arguments` and the summary that it was asked for, and ends with a code.
+const BFREE: &str = r#"#!/usr/bin/env bash
+printf '%s\n' "$@" >arguments
+for argument in "$@"; do
+    case $argument in markdown=*) [ -n "$TEXT" ] && echo "$TEXT" >"${argument#markdown=}" ;; esac
+done
+exit "$CODE"
+"#;
+
+/// Runs the check with inputs, in an empty directory. The summary of an earlier step lies there.
+fn check(directory: &str, inputs: &[(&str, &str)], text: &str, code: u8) -> (PathBuf, Output) {
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(directory);
+    let _ = fs::remove_dir_all(&directory);
+    fs::create_dir_all(directory.join("tangent-check")).expect("a directory");
+    fs::write(directory.join("tangent-check/summary.md"), "an earlier step\n").expect("a file");
+    let program = directory.join("bfree");
+    fs::write(&program, BFREE).expect("a file");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a program");
+    let path = format!("{}:{}", directory.display(), std::env::var("PATH").unwrap_or_default());
+    let defaults = [
+        ("INTERFACE", "umat"),
+        ("NAME", ""),
+        ("PROPERTIES", ""),
+        ("STATE", ""),
+        ("SOURCE", ""),
+        ("STRICT", "false"),
+        ("REPORTS", "tangent-check"),
+        ("LIBRARY", "libmine.so"),
+    ];
+    let output = Command::new("bash")
+        .arg(Path::new(ACTION).join("check.sh"))
+        .envs(defaults)
+        .envs(inputs.iter().copied())
+        .envs([
+            ("PATH", path.as_str()),
+            ("TEXT", text),
+            ("CODE", &code.to_string()),
+            ("GITHUB_OUTPUT", "output"),
+            ("GITHUB_STEP_SUMMARY", "job.md"),
+        ])
+        .current_dir(&directory)
+        .output()
+        .expect("bash runs");
+    (directory, output)
+}
+
+fn read(directory: &Path, file: &str) -> String {
+    fs::read_to_string(directory.join(file)).unwrap_or_default()
+}
+
+#[test]
+fn inputs_become_arguments_and_never_commands() {
+    let inputs =
+        [("PROPERTIES", "-1e3,0.3"), ("STATE", "12"), ("SOURCE", "my law $(touch bad).f90"), ("STRICT", "true")];
+    let (directory, output) = check("arguments", &inputs, "## A summary", 0);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let expected = "check-law libmine.so --umat --strict --properties=-1e3,0.3 --state=12 --source=my_law --report terminal --report github \
+                    --report markdown=tangent-check/summary.md --report junit=tangent-check/junit.xml --report sarif=tangent-check/results.sarif";
+    let expected = expected.replace(' ', "\n").replace("my_law", "my law $(touch bad).f90") + "\n";
+    assert_eq!(read(&directory, "arguments"), expected);
+    assert!(!directory.join("bad").exists());
+    assert_eq!(read(&directory, "job.md"), "## A summary\n");
+    assert_eq!(read(&directory, "output"), "exit-code=0\n");
+    let (directory, _) = check("name", &[("INTERFACE", "mfront"), ("NAME", "Plasticity")], "text", 0);
+    assert!(read(&directory, "arguments").starts_with("check-law\nlibmine.so\n--mfront\nPlasticity\n--report\n"));
+}
+
+#[test]
+fn failures_stay_failures() {
+    for code in [1, 2, 3, 101] {
+        let (directory, output) = check("failures", &[], "text", code);
+        assert_eq!(output.status.code(), Some(i32::from(code)));
+        assert_eq!(read(&directory, "output"), format!("exit-code={code}\n"));
+        assert_eq!(read(&directory, "job.md"), "text\n");
+    }
+    let (directory, output) = check("silent", &[], "", 0);
+    assert_eq!(output.status.code(), Some(3), "no report is no success");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("::error title=tangent-check::"));
+    assert_eq!(read(&directory, "job.md"), "", "the summary of an earlier step is not shown");
+}
+
+#[test]
+fn inputs_that_are_not_allowed() {
+    for inputs in [[("INTERFACE", "vumat")], [("INTERFACE", "c")], [("STRICT", "yes")]] {
+        let (directory, output) = check("inputs", &inputs, "text", 0);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&output.stdout).starts_with("::error title=tangent-check::The in"));
+        assert!(!directory.join("arguments").exists());
+    }
+}
+
+/// The description of the action and the script agree about the variables.
+#[test]
+fn the_script_reads_what_the_action_gives() {
+    let action = fs::read_to_string(Path::new(ACTION).join("action.yml")).expect("the action");
+    let script = fs::read_to_string(Path::new(ACTION).join("check.sh")).expect("the script");
+    let (inputs, rest) = action.split_once("\noutputs:").expect("outputs follow inputs");
+    let declared: Vec<&str> = inputs.lines().filter_map(|line| line.strip_prefix("  ")?.strip_suffix(':')).collect();
+    let declared: Vec<&str> = declared.into_iter().filter(|name| !name.starts_with(' ')).collect();
+    let given: BTreeMap<&str, &str> =
+        rest.lines().filter_map(|line| line.trim().strip_suffix(" }}")?.split_once(": ${{ inputs.")).collect();
+    assert_eq!(declared.len(), 8, "{declared:?}");
+    for (variable, input) in &given {
+        assert!(declared.contains(input) && script.contains(&format!("${variable}")), "{variable}");
+    }
+    assert_eq!(given.len(), declared.len());
+}
