@@ -397,6 +397,59 @@ fn mfront_small_strain() {
     }
 }
 
+/// A UMAT that writes what it was given into STATEV, in the order of [`every_argument`].
+const PROBE: &str = "
+subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
+    temp, dtemp, predef, dpred, cmname, ndi, nshr, ntens, nstatv, props, nprops, coords, drot, pnewdt, celent, &
+    dfgrd0, dfgrd1, noel, npt, layer, kspt, jstep, kinc)
+  implicit none
+  integer :: ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep(4), kinc
+  double precision :: stress(ntens), statev(nstatv), ddsdde(ntens, ntens), sse, spd, scd, rpl, ddsddt(ntens)
+  double precision :: drplde(ntens), drpldt, stran(ntens), dstran(ntens), time(2), dtime, temp, dtemp, predef(1)
+  double precision :: dpred(1), props(nprops), coords(3), drot(3, 3), pnewdt, celent, dfgrd0(3, 3), dfgrd1(3, 3)
+  character(len=*) :: cmname
+  statev = [stress, stran, dstran, time, dtime, temp, dtemp, transpose(drot), transpose(dfgrd0), transpose(dfgrd1), &
+    props, dble([ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep, kinc, len(cmname), &
+    len_trim(cmname), ichar(cmname(1:1)), ichar(cmname(5:5))]), sum(abs(ddsdde)) + sse + spd + scd + rpl + drpldt &
+    + sum(abs(ddsddt)) + sum(abs(drplde)) + sum(abs(coords)) + predef + dpred, celent]
+  if (pnewdt < 1e10) statev = -1
+end subroutine umat
+";
+
+/// Each argument of a UMAT arrives: its value, its order of components, the length of CMNAME.
+#[test]
+fn every_argument() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let [source, library] = ["probe.f90", "libprobe.so"].map(|name| folder.join(name));
+    std::fs::write(&source, PROBE).unwrap();
+    let mut compiler = Command::new("gfortran");
+    let Ok(status) = compiler.args(["-shared", "-fPIC", "-o"]).arg(&library).arg(&source).status() else {
+        std::io::stderr().write_all(b"\n*** NOT TESTED: every_argument, there is no gfortran ***\n").unwrap();
+        return;
+    };
+    assert!(status.success());
+    let state = umat::state(72);
+    let kind = Kind::Umat { material: "STEEL".into(), tangent: Measure::JaumannKirchhoff, temperature: 20.0 };
+    let description = Description { library, kind, properties: vec![7.0, 8.0], state, plane_strain: false };
+    let mut law = LibraryLaw::new(Box::new(Child::start(host(), description, LIMIT).unwrap()));
+    let mut step = general_step(law.signature(), false);
+    step.stress = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    let [stress, engineering] = [1.0, 2.0].map(|shear| umat::components(false, shear));
+    let turned = product(&product(&step.rotation, &tensor(&step.stress, &stress)), &transpose(&step.rotation));
+    let wanted = [
+        &vector(&turned, &stress)[..],
+        &vector(&step.strain, &engineering),
+        &vector(&step.strain_increment, &engineering),
+        &[0.25, 0.25, 0.5, 20.0, 0.0],
+        step.rotation.as_flattened(),
+        step.gradient_before.as_flattened(),
+        step.gradient.as_flattened(),
+        &[7.0, 8.0, 3.0, 3.0, 6.0, 72.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 3.0],
+        &[80.0, 5.0, f64::from(b'S'), f64::from(b'L'), 0.0, 1.0],
+    ];
+    assert_close(&law.respond(&step).unwrap().state, &wanted.concat(), 1e-15, "arguments");
+}
+
 /// Each fault of a library gives its sentence with the step, and the next call works. The library also prints in every call.
 #[test]
 fn faults() {

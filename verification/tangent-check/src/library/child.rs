@@ -225,10 +225,10 @@ impl Process {
 
     /// The exit status of a child that closed the connection or lost it; the child may take a moment to end.
     fn status(&mut self) -> Option<ExitStatus> {
-        for _ in 0..200 {
+        for _ in 0..2000 {
             match self.child.try_wait() {
                 Ok(Some(status)) => return Some(status),
-                Ok(None) => thread::sleep(Duration::from_millis(5)),
+                Ok(None) => thread::sleep(Duration::from_micros(500)),
                 Err(_) => return None,
             }
         }
