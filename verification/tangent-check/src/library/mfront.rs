@@ -3,7 +3,7 @@
 //! Source: the structures of `BehaviourDataView.hxx` and `StateView.hxx` of MGIS 3.1 (December 2025), which are those of
 //! `GenericBehaviour/BehaviourData.h` and `State.h` of TFEL 5.1.0, API version 1. The structure has been the same since TFEL 3.4.1 and 4.0.
 //!
-//! A finite strain behaviour gives P and ∂P/∂F (K[1] = 2, K[2] = 2). A small strain behaviour gives σ and ∂σ/∂ε; its stress and symmetric
+//! A finite strain behaviour gives P and ∂P/∂F (`K[1] = 2`, `K[2] = 2`). A small strain behaviour gives σ and ∂σ/∂ε; its stress and symmetric
 //! internal variables are rotated by DROT before the call. Components are in MFront's order: 11, 22, 33, 12, 21, 13, 31, 23, 32; symmetric
 //! tensors 11, 22, 33, √2·12, √2·13, √2·23. The axes of an orthotropic material are those of the scene.
 
