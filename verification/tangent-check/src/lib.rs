@@ -12,6 +12,8 @@ pub mod difference;
 pub mod finding;
 pub mod judge;
 pub mod law;
+#[cfg(all(unix, feature = "libraries"))]
+pub mod library;
 pub mod matrix;
 pub mod report;
 pub mod states;
