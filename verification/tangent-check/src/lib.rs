@@ -13,4 +13,6 @@ pub mod judge;
 pub mod law;
 pub mod matrix;
 pub mod report;
+pub mod roads;
 pub mod states;
+pub mod tensor;
