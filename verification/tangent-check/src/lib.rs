@@ -16,4 +16,6 @@ pub mod law;
 pub mod library;
 pub mod matrix;
 pub mod report;
+pub mod roads;
 pub mod states;
+pub mod tensor;

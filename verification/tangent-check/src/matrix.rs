@@ -23,6 +23,12 @@ impl Matrix {
     pub fn greatest(&self) -> f64 {
         self.entries.iter().fold(0.0, |greatest, entry| greatest.max(entry.abs()))
     }
+
+    /// The product with a vector, which has a component for each column.
+    pub fn times(&self, vector: &[f64]) -> Vec<f64> {
+        let row = |row: usize| (0..self.columns).map(|column| self[(row, column)] * vector[column]).sum();
+        (0..self.rows).map(row).collect()
+    }
 }
 
 impl Index<(usize, usize)> for Matrix {
