@@ -218,6 +218,11 @@ pub trait Law: Send + Sync {
         true
     }
 
+    /// A sentence about the last state at which the law gave no answer, once. Its stress is NaN there.
+    fn last_failure(&self) -> Option<String> {
+        None
+    }
+
     /// This law as a [`Material`](super::Material), whose loops over particles are compiled once, in the library. `None` for any other type.
     ///
     /// ```

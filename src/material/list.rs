@@ -1,5 +1,6 @@
 //! The list of shipped laws, from which [`Material`] and [`Parameters`] are made.
 
+use super::foreign::{CLawParameters, Foreign, MfrontParameters, Outside, UmatParameters};
 use super::{
     Ciarlet, DruckerPrager, FibreReinforced, Lame, Law, Listed, Logarithmic, MooneyRivlin, NeoHookean, Ogden, Plastic,
     StVenantKirchhoff, Viscoelastic, VonMises,
@@ -19,18 +20,22 @@ pub(crate) trait LawVisitor {
 
 /// Generates [`Material`], [`Parameters`] and the conversions from the list of laws.
 macro_rules! materials {
-    ($($(#[$sentence:meta])+ $key:literal, $name:literal => $law:ident($formula:ty);)*) => {
-        /// One of the shipped laws.
+    ($($(#[$sentence:meta])+ $key:literal, $name:literal => $law:ident($formula:ty);)*
+     outside { $($(#[$of:meta])+ $kind:literal => $library:ident($keys:ty);)* }) => {
+        /// One of the shipped laws, or a law from a shared library.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Material {
-            $($(#[$sentence])+ $law($formula)),*
+            $($(#[$sentence])+ $law($formula),)*
+            /// A law from a shared library.
+            Foreign(Foreign),
         }
 
         /// A law with its constants.
         #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
         #[schemars(rename = "Material")]
         pub enum Parameters {
-            $($(#[$sentence])+ #[serde(rename = $key)] $law(<$formula as Listed>::Parameters)),*
+            $($(#[$sentence])+ #[serde(rename = $key)] $law(<$formula as Listed>::Parameters),)*
+            $($(#[$of])+ #[serde(rename = $kind)] $library($keys)),*
         }
 
         impl Parameters {
@@ -50,12 +55,13 @@ macro_rules! materials {
                     $(Self::$law(given) => {
                         <$formula>::build(given, problems, &format!("{path}.{}", $key)).map(Material::$law)
                     })*
+                    $(Self::$library(given) => given.open(problems, &format!("{path}.{}", $kind)).map(Material::Foreign),)*
                 }
             }
         }
 
         impl Law for Material {
-            $crate::law_of_variants!(Self: $($law),*);
+            $crate::law_of_variants!(Self: $($law,)* Foreign);
 
             fn shipped(&self) -> Option<&dyn Any> {
                 Some(self)
@@ -76,7 +82,7 @@ macro_rules! materials {
         }
 
         impl Material {
-            /// An example of every law, with its name, for tests and studies. At small strain each is Hooke's law of Λ and G; fibres add
+            /// An example of every shipped law, with its name, for tests and studies. At small strain each is Hooke's law of Λ and G; fibres add
             /// their stiffness.
             pub fn examples(lame: Lame) -> Vec<(&'static str, Self)> {
                 vec![$(($name, Self::$law(Listed::example(lame)))),*]
@@ -84,7 +90,10 @@ macro_rules! materials {
 
             /// Calls `visitor` with the concrete law, so that a loop over particles does not branch on the type of the law.
             pub(crate) fn with<V: LawVisitor>(&self, visitor: V) -> V::Output {
-                match self { $(Self::$law(law) => visitor.visit(law.clone())),* }
+                match self {
+                    $(Self::$law(law) => visitor.visit(law.clone()),)*
+                    Self::Foreign(law) => visitor.visit(law.clone()),
+                }
             }
         }
 
@@ -117,4 +126,12 @@ materials! {
     "von_mises", "von Mises" => VonMises(Plastic<VonMises>);
     /// Soil: linear elasticity in logarithmic strains, and Drucker and Prager's yield cone with cohesion, friction and dilatancy.
     "drucker_prager", "Drucker-Prager" => DruckerPrager(Plastic<DruckerPrager>);
+    outside {
+        /// A UMAT of Abaqus/Standard, from a shared library.
+        "umat" => Umat(UmatParameters);
+        /// A behaviour of MFront, built with the interface `generic`, from a shared library.
+        "mfront" => Mfront(MfrontParameters);
+        /// A law with the C header `bfree_law.h`, from a shared library.
+        "c" => CLaw(CLawParameters);
+    }
 }

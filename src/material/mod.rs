@@ -9,6 +9,7 @@
 mod closed_tangent;
 mod drucker_prager;
 mod fibres;
+mod foreign;
 mod from_energy;
 mod hardening;
 mod hencky;
@@ -32,6 +33,9 @@ mod von_mises;
 pub use closed_tangent::ClosedTangent;
 pub use drucker_prager::{Cone, DruckerPrager, DruckerPragerParameters};
 pub use fibres::{FibreReinforced, FibreReinforcedParameters};
+pub use foreign::{
+    CLawParameters, Foreign, InternalVariables, MfrontParameters, TangentOf, UmatParameters, allow_library,
+};
 pub use from_energy::{Energy, FromEnergy};
 pub use hardening::Hardening;
 pub use hencky::Radial;

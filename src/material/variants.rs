@@ -82,5 +82,8 @@ macro_rules! law_of_variants {
         fn has_potential(&self) -> bool {
             match self { $(Self::$variant(law) => $crate::material::Law::has_potential(law)),+ }
         }
+        fn last_failure(&self) -> Option<String> {
+            match self { $(Self::$variant(law) => $crate::material::Law::last_failure(law)),+ }
+        }
     };
 }

@@ -2,6 +2,7 @@
 
 use super::probes::bound_probes;
 use super::{Failure, print, tell};
+use bfree::material::allow_library;
 use bfree::memory;
 use bfree::particles::Particles;
 use bfree::plan::Plan;
@@ -20,6 +21,9 @@ pub struct SceneArguments {
     /// Override one key of the scene, for example time.step=0.01 or approximation='"linear"'.
     #[arg(long = "set", value_name = "KEY.PATH=JSON")]
     pub overrides: Vec<String>,
+    /// Let the scene load this shared library, a UMAT for example. Libraries run code, so no scene loads one by itself.
+    #[arg(long = "allow-library", value_name = "PATH")]
+    libraries: Vec<PathBuf>,
 }
 
 /// A scene that cannot be used.
@@ -33,6 +37,7 @@ struct Unusable {
 impl SceneArguments {
     /// Reads the scene, applies the overrides and validates the result.
     pub fn read(&self) -> Result<Scene, Failure> {
+        self.libraries.iter().for_each(|path| allow_library(path));
         let overrides: Result<Vec<Override>, _> = self.overrides.iter().map(|text| text.parse()).collect();
         scene::read_file(&self.scene, &overrides.map_err(Failure::scene)?).map_err(|error| match error {
             // `File` names the file already, and `Override` concerns an option: neither needs the path of the scene.

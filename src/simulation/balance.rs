@@ -91,6 +91,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         supports: &Supports<D>,
     ) -> StepError {
+        if let Some(sentence) = self.bodies.iter().find_map(|body| body.law.last_failure()) {
+            return StepError::LawFailed { sentence, source: error };
+        }
         if !equilibrium.step.nodal.is_static() || matches!(error.cause, NewtonFailure::Stopped { .. }) {
             return StepError::Newton(error);
         }

@@ -74,9 +74,10 @@ impl FailedAttempt {
     pub(super) fn new(dt: f64, mut spent: Spent, error: &StepError) -> Self {
         spent.watch.give_up();
         let newton = match error {
-            StepError::Newton(source) | StepError::Unbalanced { source } | StepError::Loose { source, .. } => {
-                (*source.history).clone()
-            }
+            StepError::Newton(source)
+            | StepError::LawFailed { source, .. }
+            | StepError::Unbalanced { source }
+            | StepError::Loose { source, .. } => (*source.history).clone(),
             StepError::Inaccurate { newton, .. } => (**newton).clone(),
             _ => NewtonHistory::default(),
         };
@@ -104,6 +105,14 @@ pub enum StepError {
          motion there, follow the path (time.scheme = \"arc_length\"), or give the scene inertia"
     )]
     Unbalanced {
+        /// The error of Newton's method.
+        source: NewtonError<Inadmissible>,
+    },
+    /// A law gave no stress, and Newton's method found no equilibrium.
+    #[error("a law gave no stress: {sentence}")]
+    LawFailed {
+        /// The law and its state.
+        sentence: String,
         /// The error of Newton's method.
         source: NewtonError<Inadmissible>,
     },

@@ -186,7 +186,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
             failed.push(FailedAttempt::new(dt, spent, &cause));
             let mended = match cause {
                 ref stopped if stopped.is_stopped() => false,
-                StepError::Newton(_) | StepError::Unbalanced { .. } | StepError::Inaccurate { .. } => true,
+                StepError::Newton(_)
+                | StepError::LawFailed { .. }
+                | StepError::Unbalanced { .. }
+                | StepError::Inaccurate { .. } => true,
                 // The step may be too long to meet a wall.
                 StepError::LeftGrid { .. } => self.settings.error_tolerance.is_some(),
                 // Forces are in balance before the end of the step, but det F ≤ 0 at its end.

@@ -2,6 +2,7 @@
 
 use crate::convention::{Convention, Tensor};
 use crate::matrix::Matrix;
+use crate::tensor::{IDENTITY, ZERO};
 
 /// The inputs of a law in one step, in the words of Abaqus. A law reads what it needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +27,24 @@ pub struct Step {
     pub stress: Vec<f64>,
     /// The internal variables at the start of the step (STATEV).
     pub state: Vec<f64>,
+}
+
+impl Step {
+    /// The first step of a body that stays at rest, in no time, without stress and internal variables.
+    pub fn at_rest() -> Self {
+        Self {
+            time: 0.0,
+            length: 0.0,
+            number: 1,
+            gradient_before: IDENTITY,
+            gradient: IDENTITY,
+            strain: ZERO,
+            strain_increment: ZERO,
+            rotation: IDENTITY,
+            stress: Vec::new(),
+            state: Vec::new(),
+        }
+    }
 }
 
 /// The answer of a law.

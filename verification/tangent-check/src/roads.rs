@@ -189,19 +189,18 @@ impl History {
 
     /// The step to a deformation gradient in a time Δt; `None` unless det F > 0.
     pub fn step_to(&self, gradient: &Tensor, length: f64) -> Option<Step> {
-        let step = Step {
+        let mut step = Step {
             time: self.time,
             length,
             number: self.steps + 1,
             gradient_before: self.gradient,
             gradient: self.gradient,
             strain: self.strain,
-            strain_increment: ZERO,
-            rotation: IDENTITY,
             stress: self.stress.clone(),
             state: self.state.clone(),
+            ..Step::at_rest()
         };
-        with_gradient(&step, gradient)
+        step.turn_to(gradient).then_some(step)
     }
 
     /// The body after a step with its response.
@@ -219,20 +218,24 @@ impl History {
 
 /// The step to another F₁: Δε = ln ΔV, ΔR, and the turned strain follow. `None` unless det F₁ > 0.
 pub fn with_gradient(step: &Step, gradient: &Tensor) -> Option<Step> {
-    let increment = product(gradient, &inverse(&step.gradient_before)?);
-    let (rotation, stretch) = polar(&increment)?;
-    let strain_increment = logarithm(&stretch);
-    if !finite(&strain_increment) {
-        return None;
+    let mut step = step.clone();
+    step.turn_to(gradient).then_some(step)
+}
+
+impl Step {
+    /// Changes F₁; Δε = ln ΔV, ΔR, and the turned strain follow. False, with the step unchanged, unless det F₁ > 0.
+    pub fn turn_to(&mut self, gradient: &Tensor) -> bool {
+        let increment = inverse(&self.gradient_before).map(|inverse| product(gradient, &inverse));
+        let Some((rotation, stretch)) = increment.and_then(|increment| polar(&increment)) else { return false };
+        let strain_increment = logarithm(&stretch);
+        if !finite(&strain_increment) {
+            return false;
+        }
+        let turn = product(&rotation, &transposed(&self.rotation));
+        self.strain = product3(&turn, &self.strain, &transposed(&turn));
+        (self.gradient, self.strain_increment, self.rotation) = (*gradient, strain_increment, rotation);
+        true
     }
-    let turn = product(&rotation, &transposed(&step.rotation));
-    Some(Step {
-        gradient: *gradient,
-        strain: product3(&turn, &step.strain, &transposed(&turn)),
-        strain_increment,
-        rotation,
-        ..step.clone()
-    })
 }
 
 /// A response as a function of the perturbation: column k perturbed by h.

@@ -316,7 +316,7 @@ pub fn serve() -> io::Result<()> {
     answer.byte(ANSWERED);
     answer.signature(caller.signature());
     send(&mut socket, answer.bytes())?;
-    let mut step = super::empty_step();
+    let mut step = Step::at_rest();
     let mut response = super::empty_response();
     while received(receive(&mut socket, &mut request, None))? {
         Reader::new(&request).step(&mut step).ok_or(ErrorKind::InvalidData)?;

@@ -149,23 +149,6 @@ pub fn empty_response() -> Response {
     Response { stress: Vec::new(), tangent: Matrix::zeros(0, 0), state: Vec::new() }
 }
 
-/// A step of a body at rest, without stress and state.
-fn empty_step() -> Step {
-    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    Step {
-        time: 0.0,
-        length: 0.0,
-        number: 1,
-        gradient_before: identity,
-        gradient: identity,
-        strain: [[0.0; 3]; 3],
-        strain_increment: [[0.0; 3]; 3],
-        rotation: identity,
-        stress: Vec::new(),
-        state: Vec::new(),
-    }
-}
-
 /// The index pairs of a full tensor, row by row.
 const FULL: [(usize, usize); 9] = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)];
 

@@ -300,7 +300,8 @@ impl<'a> Reader<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::library::{empty_response, empty_step, umat};
+    use crate::law::Step;
+    use crate::library::{empty_response, umat};
 
     /// What is written is read again; a message that is cut anywhere gives `None` instead of a panic.
     #[test]
@@ -318,12 +319,12 @@ mod tests {
         for length in 0..writer.bytes().len() {
             assert_eq!(Reader::new(&writer.bytes()[..length]).description(), None);
         }
-        let mut step = empty_step();
+        let mut step = Step::at_rest();
         step.number = 13;
         step.stress = vec![1.0; 6];
         writer.clear();
         writer.step(&step);
-        let mut read = empty_step();
+        let mut read = Step::at_rest();
         assert_eq!(Reader::new(writer.bytes()).step(&mut read), Some(()));
         assert_eq!(read, step);
         let mut response = empty_response();
