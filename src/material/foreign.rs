@@ -59,7 +59,7 @@ struct Layout {
     stress: usize,
     /// The end of the accumulated strain.
     strain: usize,
-    /// The end of F, which is followed by the time and the work of the stress.
+    /// The end of F, which is followed by the time, the number of steps, and the work of the stress.
     gradient: usize,
 }
 
@@ -74,8 +74,12 @@ impl Layout {
         self.gradient
     }
 
-    fn work(&self) -> usize {
+    fn steps(&self) -> usize {
         self.gradient + 1
+    }
+
+    fn work(&self) -> usize {
+        self.gradient + 2
     }
 }
 
@@ -98,7 +102,7 @@ fn variables(signature: &Signature) -> Vec<InternalVariable> {
     };
     let stress = all("stress", &signature.convention.stress);
     let (strain, gradient) = (all("strain", &strains()), all("gradient", &Components::rows()));
-    let others = ["law_time", "law_work"].map(|name| InternalVariable { name, at_rest: 0.0 });
+    let others = ["law_time", "law_steps", "law_work"].map(|name| InternalVariable { name, at_rest: 0.0 });
     own.chain(stress).chain(strain).chain(gradient).chain(others).collect()
 }
 
@@ -147,6 +151,8 @@ impl Calls {
         step.rotation = tangent_check::tensor::IDENTITY;
         step.time = internal[at.time()];
         step.length = dt;
+        // Laws may prepare their variables in the first step.
+        step.number = 1 + internal[at.steps()] as usize;
         if step.turn_to(f) { Ok(()) } else { Err(CallFailed("F has no polar decomposition.".to_owned())) }
     }
 
@@ -310,7 +316,7 @@ impl Law for Foreign {
             let mut next = [&response.state[..], &response.stress[..]].concat();
             next.extend(strains().vector(&tangent_check::tensor::sum(&step.strain, 1.0, &step.strain_increment)));
             next.extend(f.as_flattened());
-            next.extend([internal[layout.time()] + at.dt, work]);
+            next.extend([internal[layout.time()] + at.dt, internal[layout.steps()] + 1.0, work]);
             Ok(next)
         });
         next.unwrap_or_else(|| vec![f64::NAN; internal.len()])

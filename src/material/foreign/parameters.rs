@@ -28,7 +28,7 @@ fn allowed(name: &Path) -> Option<PathBuf> {
     allowed.iter().find(|path| path.ends_with(name)).cloned()
 }
 
-/// Internal variables that a law names itself not.
+/// The internal variables of a law that does not name them itself.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InternalVariables {
@@ -156,7 +156,11 @@ pub(crate) trait Outside {
         let opened = Foreign::open(Description { library, ..named.clone() }, self.symmetric());
         opened
             .map_err(|CallFailed(why)| {
-                problems.refuse(&path, format_args!("{shown}"), format_args!("cannot be used: {why}"))
+                problems.refuse(
+                    &path,
+                    format_args!("{shown}"),
+                    format_args!("must be a library that can be used: {why}"),
+                )
             })
             .ok()
     }
