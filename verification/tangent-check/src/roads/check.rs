@@ -19,6 +19,8 @@ pub type CheckColumns<'a> = dyn FnMut(&str, &Matrix, &[f64], &mut Perturbation) 
 const DIAGNOSED: usize = 10;
 /// From so many steps it is taken which inputs the law reads.
 const PROBED: usize = 6;
+/// Derivatives to both sides that differ by more than this, relative to the greatest entry, are a kink.
+const SIDES: f64 = 1e-6;
 
 /// A step of a path with its response.
 #[derive(Clone, Debug)]
@@ -222,7 +224,8 @@ fn observations(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled) -> V
     let rest = if chosen.is_empty() { None } else { at_rest(law, travelled.road, &flowing) };
     let mut observations = Vec::new();
     for (index, (visit, finding)) in visits.iter().zip(&travelled.findings).enumerate() {
-        let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Consistent | Verdict::Inexact);
+        let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Consistent | Verdict::Inexact)
+            && (wrong.is_empty() || smooth(law, &visit.step, travelled.road, finding));
         let Some(stress) =
             cauchy_stress(&convention, &visit.response.stress, &visit.step.gradient).ok().filter(|_| judged)
         else {
@@ -251,6 +254,24 @@ fn observations(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled) -> V
         });
     }
     observations
+}
+
+/// Whether the derivatives to both sides are the measured one. At a kink the law may rightly claim either of them, so that the state
+/// tells nothing about a mistake.
+fn smooth(law: &mut dyn Law, step: &Step, road: Road, finding: &Finding) -> bool {
+    let (measured, errors) = (&finding.measured, &finding.errors);
+    let mut perturbed = Perturbed::new(law, step, road);
+    (0..measured.columns).all(|column| {
+        [1.0, -1.0].into_iter().all(|sign| {
+            let side = one_sided(measured.rows, sign, &mut |h| perturbed.value(column, h).ok());
+            side.is_some_and(|(derivative, error)| {
+                (0..measured.rows).all(|row| {
+                    let tolerance = SIDES * measured.greatest() + 10.0 * (errors[(row, column)] + error[row]);
+                    (derivative[row] - measured[(row, column)]).abs() <= tolerance
+                })
+            })
+        })
+    })
 }
 
 /// The tangent at rest.
@@ -321,13 +342,15 @@ fn one_sided(rows: usize, sign: f64, f: &mut dyn FnMut(f64) -> Option<Vec<f64>>)
         let h = sign * GREATEST * 0.5_f64.powi(level as i32);
         let value = f(h)?;
         let mut line = vec![(0..rows).map(|row| (value[row] - origin[row]) / h).collect::<Vec<f64>>()];
+        // Rounding of F moves the stress by ε times the tangent.
+        let size = origin.iter().chain(&line[0]).fold(0.0_f64, |size, entry| size.max(entry.abs()));
         for order in 1..=level.min(ORDERS) {
             let factor = 2.0_f64.powi(order as i32);
             let extrapolated = |row: usize| (factor * line[order - 1][row] - above[order - 1][row]) / (factor - 1.0);
             let next: Vec<f64> = (0..rows).map(extrapolated).collect();
             for row in 0..rows {
                 let change = (next[row] - line[order - 1][row]).abs().max((next[row] - above[order - 1][row]).abs());
-                let noise = 2.0 * f64::EPSILON * origin[row].abs().max(value[row].abs()) / h.abs();
+                let noise = 4.0 * f64::EPSILON * size / h.abs();
                 if change.max(noise) < best.1[row] {
                     best.0[row] = next[row];
                     best.1[row] = change.max(noise);
