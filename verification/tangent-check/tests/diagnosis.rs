@@ -5,10 +5,14 @@ mod laws;
 use laws::central::{Known, check};
 use laws::planted::{Mistake, Planted};
 use laws::shipped::*;
-use tangent_check::convention::{Convention, Measure};
+use tangent_check::convention::{Components, Configuration, Convention, Measure, Tensor};
+use tangent_check::diagnosis::{Measured, Observation, diagnose};
 use tangent_check::finding::{Report, Verdict};
-use tangent_check::roads::check_law;
-use tangent_check::states::{Path, for_law};
+use tangent_check::law::{CallFailed, Law, Response, Step};
+use tangent_check::matrix::Matrix;
+use tangent_check::roads::{History, check_law};
+use tangent_check::states::{Path, for_law, paths, yielding_paths};
+use tangent_check::tensor;
 
 const SEED: u64 = 7;
 
@@ -47,6 +51,9 @@ fn listed() -> Vec<Row> {
         (Mistake::JacobianPower(-1), "factor 1/J"),
         (Mistake::StepBefore, "step before"),
         (Mistake::Elastic, "elastic one in place of the algorithmic"),
+        (Mistake::Continuum, "continuum tangent in place of the algorithmic"),
+        (Mistake::AtRest, "elastic one at rest"),
+        (Mistake::Rate(Measure::SecondPiolaByGreen), "the material one, ∂S/∂E"),
         (Mistake::Sign, "opposite sign"),
         (Mistake::Times(1.1), "times 1.100000"),
         (dyad(-0.4, false, false), "less the term 0.400000 times I ⊗ I"),
@@ -74,7 +81,7 @@ fn planted<'a>(formula: &'a dyn Formula, mistake: Mistake, convention: &Conventi
     Planted { formula, convention: convention.clone(), mistake, asked: Vec::new() }
 }
 
-fn paths(formula: &dyn Formula, convention: &Convention) -> Vec<Path> {
+fn all_paths(formula: &dyn Formula, convention: &Convention) -> Vec<Path> {
     for_law(&mut planted(formula, Mistake::None, convention), SEED).unwrap()
 }
 
@@ -106,7 +113,7 @@ fn outcome(report: &Report, words: &str) -> Outcome {
 
 /// Plants all mistakes in one law and prints a line for each.
 fn table(formula: &dyn Formula, convention: &Convention, rows: &[Row]) -> [usize; 4] {
-    let paths = paths(formula, convention);
+    let paths = all_paths(formula, convention);
     let mut known = Known::new();
     let right = run(&mut planted(formula, Mistake::None, convention), &paths, &mut known);
     let checked = right.findings.iter().filter(|finding| finding.verdict == Verdict::Consistent).count();
@@ -199,7 +206,7 @@ fn mistakes_outside_the_list_stay_unnamed() {
     for formula in formulas() {
         let formula = formula.as_ref();
         let convention = Convention::abaqus(Measure::JaumannKirchhoff);
-        let paths = paths(formula, &convention);
+        let paths = all_paths(formula, &convention);
         let mut known = Known::new();
         for mistake in OUTSIDE {
             let report = run(&mut planted(formula, mistake, &convention), &paths, &mut known);
@@ -207,4 +214,144 @@ fn mistakes_outside_the_list_stay_unnamed() {
             assert!(report.diagnoses.is_empty(), "{} {mistake:?}: {:?}", formula.name(), report.diagnoses);
         }
     }
+}
+
+/// A law given by a function of the step: stress and tangent.
+struct Given<F: FnMut(&Step) -> (Vec<f64>, Matrix)>(F, Measure);
+
+impl<F: FnMut(&Step) -> (Vec<f64>, Matrix)> Law for Given<F> {
+    fn name(&self) -> String {
+        "given".to_string()
+    }
+    fn convention(&self) -> Convention {
+        Convention::abaqus(self.1)
+    }
+    fn state_at_rest(&self) -> Vec<f64> {
+        Vec::new()
+    }
+    fn respond(&mut self, step: &Step) -> Result<Response, CallFailed> {
+        let (stress, tangent) = (self.0)(step);
+        Ok(Response { stress, tangent, state: Vec::new() })
+    }
+}
+
+fn isotropic(lambda: f64, shear: f64) -> Matrix {
+    let mut tangent = Matrix::zeros(6, 6);
+    for i in 0..3 {
+        (0..3).for_each(|j| tangent[(i, j)] = lambda);
+        tangent[(i, i)] += 2.0 * shear;
+        tangent[(3 + i, 3 + i)] = shear;
+    }
+    tangent
+}
+
+fn stress(tangent: &Matrix, strain: &Tensor) -> Vec<f64> {
+    tangent.times(&Components::abaqus(2.0).vector(strain))
+}
+
+fn plain_check(law: &mut dyn Law, paths: &[Path]) -> Report {
+    // Nothing is kept from road to road.
+    check_law(law, paths, SEED, &mut |name, claimed, value, f| check(&mut Known::new(), name, claimed, value, f))
+}
+
+#[test]
+fn a_law_of_strain_and_gradient_is_checked_on_both_roads() {
+    // The stress grows with J as well, and the tangent knows Δε only: right on one road.
+    let elastic = isotropic(1.5, 1.0);
+    let respond = |step: &Step| {
+        let tangent = isotropic(1.5, 1.0);
+        let mut given = stress(&elastic, &step.strain_increment);
+        given[0] += 0.1 * tensor::determinant(&step.gradient);
+        (given, tangent)
+    };
+    let mut law = Given(respond, Measure::CauchyByStrain);
+    let report = plain_check(&mut law, &paths(SEED, false)[2..4]);
+    assert_eq!(report.verdict(), Verdict::Consistent, "{:?}", report.notes);
+    assert!(report.notes[0].contains("DSTRAN") && report.notes[0].contains("DFGRD1"), "{}", report.notes[0]);
+    let roads = "8 of 8 states are wrong through F, 0 of 8 states are wrong through the strain increment";
+    assert!(report.notes[1].contains(roads), "{}", report.notes[1]);
+}
+
+#[test]
+fn the_small_strain_tangent_lacks_a_term_at_finite_strain() {
+    let respond = |step: &Step| (stress(&isotropic(1.5, 1.0), &step.strain_increment), isotropic(1.5, 1.0));
+    let right = plain_check(&mut Given(respond, Measure::CauchyByStrain), &paths(SEED, false));
+    assert_eq!(right.verdict(), Verdict::Consistent);
+    let wrong = plain_check(&mut Given(respond, Measure::JaumannKirchhoff), &paths(SEED, false));
+    assert_eq!(wrong.verdict(), Verdict::Wrong);
+    let sentences = &wrong.diagnoses[0].candidates;
+    assert!(sentences.iter().any(|sentence| sentence.contains("the term σ ⊗ I is missing")), "{sentences:?}");
+}
+
+#[test]
+fn a_law_that_gives_nonsense_is_not_checked() {
+    let good = isotropic(1.0, 1.0);
+    let answers: [(Vec<f64>, Matrix); 5] = [
+        (vec![f64::NAN; 6], good.clone()),
+        (vec![0.0; 4], good.clone()),
+        (vec![0.0; 6], Matrix::zeros(4, 4)),
+        (vec![0.0; 6], Matrix { rows: 6, columns: 6, entries: Vec::new() }),
+        (vec![], Matrix { entries: vec![f64::INFINITY; 36], ..good }),
+    ];
+    for answer in answers {
+        let report = plain_check(&mut Given(|_: &Step| answer.clone(), Measure::JaumannKirchhoff), &paths(SEED, false));
+        assert_eq!(report.exit_code(), 3, "{answer:?}");
+        assert_eq!(report.findings.len(), 12);
+    }
+    let bad = [
+        Path::new("collapsed", vec![tensor::ZERO], 1.0),
+        Path::new("not a number", vec![[[f64::NAN; 3]; 3]], 1.0),
+        Path { lengths: Vec::new(), ..Path::new("without times", vec![tensor::IDENTITY], 1.0) },
+    ];
+    let respond = |step: &Step| (stress(&isotropic(1.5, 1.0), &step.strain_increment), isotropic(1.5, 1.0));
+    assert_eq!(plain_check(&mut Given(respond, Measure::JaumannKirchhoff), &bad).exit_code(), 3);
+    assert_eq!(plain_check(&mut Given(respond, Measure::JaumannKirchhoff), &[]).exit_code(), 3);
+}
+
+#[test]
+fn states_are_deterministic_and_reach_far() {
+    assert_eq!(paths(SEED, false), paths(SEED, false));
+    assert_ne!(paths(SEED, false), paths(SEED + 1, false));
+    for plane in [false, true] {
+        let all: Vec<Tensor> = (0..20).flat_map(|seed| paths(seed, plane)).flat_map(|path| path.gradients).collect();
+        let volumes: Vec<f64> = all.iter().map(tensor::determinant).collect();
+        let [least, greatest] =
+            [volumes.iter().copied().fold(9.0, f64::min), volumes.iter().copied().fold(0.0, f64::max)];
+        assert!((0.499..0.51).contains(&least) && (1.8..2.001).contains(&greatest), "J from {least} to {greatest}");
+        let out = |f: &Tensor| [f[0][2], f[1][2], f[2][0], f[2][1], f[2][2] - 1.0].iter().all(|x| *x == 0.0);
+        assert_eq!(all.iter().all(out), plane);
+    }
+}
+
+#[test]
+fn yielding_is_found() {
+    let convention = Convention::abaqus(Measure::JaumannKirchhoff);
+    let mut law = planted(&J2Finite, Mistake::None, &convention);
+    let yielding = yielding_paths(&mut law, SEED).unwrap();
+    assert_eq!(yielding.len(), 15);
+    for path in &yielding {
+        let mut history = History::at_rest(&law);
+        for (gradient, length) in path.gradients.iter().zip(&path.lengths) {
+            let step = history.step_to(gradient, *length).unwrap();
+            history = History::after(&step, &law.respond(&step).unwrap());
+        }
+        // At yielding, round-off decides.
+        let at = path.name.contains("(at yielding)");
+        assert!(at || (history.state[6] > 0.0) != path.name.contains("just below"), "{}", path.name);
+    }
+    assert!(yielding_paths(&mut planted(&NeoHookean, Mistake::None, &convention), SEED).unwrap().is_empty());
+}
+
+#[test]
+fn a_mistake_below_the_errors_is_not_named() {
+    // Too small a deviation fits everything: nothing is said.
+    let right = isotropic(1.5, 1.0);
+    let mut claimed = right.clone();
+    claimed[(0, 0)] += 1e-10;
+    let errors = Matrix { entries: vec![1e-11; 36], ..right.clone() };
+    let at = Configuration { gradient_before: tensor::IDENTITY, gradient: tensor::IDENTITY, stress: tensor::ZERO };
+    let measured = Measured { tangent: right, errors };
+    let observation = Observation { name: String::new(), at, claimed, measured, elsewhere: Vec::new() };
+    assert_eq!(diagnose(&Convention::abaqus(Measure::JaumannKirchhoff), &[observation]), None);
+    assert_eq!(diagnose(&Convention::abaqus(Measure::JaumannKirchhoff), &[]), None);
 }

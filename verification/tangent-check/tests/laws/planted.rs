@@ -6,7 +6,7 @@ use super::shipped::{Flow, Formula, Inputs};
 use tangent_check::convention::{Convention, Measure, Tensor, cauchy_stress, stress_vector};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
-use tangent_check::roads::with_gradient;
+use tangent_check::roads::{History, with_gradient};
 use tangent_check::tensor;
 
 /// A law whose tangent has a mistake.
@@ -44,6 +44,9 @@ pub enum Mistake {
     JacobianPower(i32),
     StepBefore,
     Elastic,
+    /// In an infinitesimal step from the end of this one, forced to flow.
+    Continuum,
+    AtRest,
     Sign,
     Times(f64),
     /// A term a ⊗ b with a coefficient: I ⊗ I, σ ⊗ I, I ⊗ σ.
@@ -195,6 +198,8 @@ impl Planted<'_> {
             Mistake::Rate(rate) => other_rate(self.formula, step, convention, rate, sigma),
             Mistake::JacobianPower(n) => mapped(&own, |i, j| jacobian.powi(n) * c(i, j)),
             Mistake::Elastic => right(self.formula, step, convention, Flow::Frozen),
+            Mistake::Continuum => self.continuum(step, sigma),
+            Mistake::AtRest => right(self.formula, &self.rest(), convention, Flow::Frozen),
             Mistake::Sign => mapped(&own, |i, j| -c(i, j)),
             Mistake::Times(x) => mapped(&own, |i, j| x * c(i, j)),
             Mistake::Dyad { coefficient, stress_left, stress_right } => {
@@ -222,6 +227,34 @@ impl Planted<'_> {
                 mapped(&own, |i, j| c(i, j) + 0.2 * at(rows[i]) * at(columns[j]))
             }
         }
+    }
+}
+
+impl Planted<'_> {
+    /// A step of no deformation at rest.
+    fn rest(&self) -> Step {
+        Step { length: 1e-10, ..History::at_rest(self).step_to(&tensor::IDENTITY, 1.0).unwrap() }
+    }
+
+    /// The tangent of a tiny step that goes on in the direction of this one.
+    fn continuum(&self, step: &Step, sigma: &Tensor) -> Matrix {
+        let (stress, state) = constants(step, &self.convention);
+        let known = self.formula.state_at_rest().len();
+        let (_, new) = self.formula.respond(&plain(step, &stress, &state[..known]), Flow::Algorithmic);
+        if new.last() == state.get(known.wrapping_sub(1)) {
+            return right(self.formula, step, &self.convention, Flow::Algorithmic);
+        }
+        // The least strain that flows surely, along the stress.
+        let push = tensor::scaled(1e-13 / tensor::norm(sigma), sigma);
+        let next = Step {
+            stress: stress_vector(&self.convention, sigma, &step.gradient).unwrap(),
+            state: new,
+            gradient_before: step.gradient,
+            length: 1e-10,
+            ..step.clone()
+        };
+        let next = with_gradient(&next, &tensor::product(&tensor::exponential(&push), &step.gradient)).unwrap();
+        right(self.formula, &next, &self.convention, Flow::Algorithmic)
     }
 }
 
