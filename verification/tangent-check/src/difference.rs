@@ -27,11 +27,17 @@ const FIRST_STOP: usize = 8;
 /// Levels without half the error after which the ladder stops.
 const PATIENCE: usize = 5;
 
+/// The ladder does not stop for lack of progress before the errors are below this multiple of the noise.
+const NEAR: f64 = 100.0;
+
 /// A kink is a difference between two derivatives of more than this number of errors.
 pub(crate) const ERRORS: f64 = 10.0;
 
 /// The spacings of the tables that measure the noise, over h₀: 1e-10, 1e-8 and 1e-6 for h₀ = 0.04.
 const SPACINGS: [f64; 3] = [2.5e-9, 2.5e-7, 2.5e-5];
+
+/// A table whose fifth differences are below this multiple of the third shows a smooth function, not noise.
+const DECAY: f64 = 0.25;
 
 /// The points of a table that measures the noise.
 const POINTS: usize = 6;
@@ -186,7 +192,11 @@ pub fn derivative(
                 }
             }
         }
-        if [&central, &forward, &backward].iter().all(|tableau| tableau.finished(level, &floor)) {
+        let tableaux = [&central, &forward, &backward];
+        if tableaux.iter().all(|tableau| tableau.within(2.0, &floor)) {
+            break;
+        }
+        if level >= FIRST_STOP && tableaux.iter().all(|tableau| tableau.idle >= PATIENCE && tableau.within(NEAR, &floor)) {
             break;
         }
     }
@@ -230,8 +240,10 @@ impl Tableau {
             power *= self.ratio;
             let (coarse, fine) = (&last[j - 1], &self.row[j - 1]);
             let next: Vec<f64> = fine.iter().zip(coarse).map(|(fine, coarse)| fine + (fine - coarse) / (power - 1.0)).collect();
+            let before = last.get(j);
             for i in 0..next.len() {
-                let error = (next[i] - fine[i]).abs().max((next[i] - coarse[i]).abs()).max(floor[i]);
+                let third = before.map_or(if cfg!(feature = "x") {0.0} else {f64::INFINITY}, |before| (next[i] - before[i]).abs());
+                let error = (next[i] - fine[i]).abs().max((next[i] - coarse[i]).abs()).max(third).max(floor[i]);
                 if error < self.best.error[i] {
                     self.best.error[i] = error;
                     self.best.value[i] = next[i];
@@ -249,10 +261,9 @@ impl Tableau {
         }
     }
 
-    /// Whether further levels are in vain: their noise 4 u / h exceeds all errors, or the error has not halved for some levels.
-    fn finished(&self, level: usize, floor: &[f64]) -> bool {
-        let settled = self.best.error.iter().zip(floor).all(|(error, floor)| *error <= 2.0 * floor);
-        settled || (level >= FIRST_STOP && self.idle >= PATIENCE)
+    /// Whether all errors are below `factor` times the noise.
+    fn within(&self, factor: f64, floor: &[f64]) -> bool {
+        self.best.error.iter().zip(floor).all(|(error, floor)| *error <= factor * floor)
     }
 }
 
@@ -335,7 +346,7 @@ fn table_noise(
     for point in 1..POINTS {
         table.push(finite(f(point as f64 * spacing), size)?);
     }
-    let mut noise = vec![0.0_f64; size];
+    let mut orders: Vec<Vec<f64>> = vec![];
     let mut gamma = 1.0;
     for k in 1..POINTS {
         let order = k as f64;
@@ -346,14 +357,16 @@ fn table_noise(
                 table[row][i] = table[row + 1][i] - table[row][i];
             }
         }
-        if k < 3 {
-            continue;
-        }
-        let count = (POINTS - k) as f64;
-        for i in 0..size {
+        let deviation = |i: usize| {
             let squares: f64 = table[..POINTS - k].iter().map(|values| values[i] * values[i]).sum();
-            noise[i] = noise[i].max((gamma * squares / count).sqrt());
-        }
+            (gamma * squares / (POINTS - k) as f64).sqrt()
+        };
+        orders.push((0..size).map(deviation).collect());
     }
-    Ok(noise)
+    let [.., third, fourth, fifth] = &orders[..] else { return Ok(vec![0.0; size]) };
+    let length = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+    if length(fifth) < DECAY * length(third) {
+        return Ok(vec![0.0; size]);
+    }
+    Ok((0..size).map(|i| third[i].max(fourth[i]).max(fifth[i])).collect())
 }

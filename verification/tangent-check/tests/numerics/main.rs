@@ -54,3 +54,23 @@ fn survey() {
         println!("{law:36} verdicts {verdicts:?} kink {kink} noisy {noisy} other {other} calls {} {most} margin {margin:.1} err {error:.0e} smooth {:?} kink {:?}", calls / states, &controls[0][3..], &controls[1][3..]);
     }
 }
+
+#[test]
+#[ignore]
+fn show() {
+    use tangent_check::difference::{Ladder, derivative, noise};
+    for (law, number, column, row) in [("Drucker-Prager, small strain", 32, 1, 4), ("Drucker-Prager, P(F)", 136, 7, 0), ("Drucker-Prager apex, small strain", 10, 0, 5), ("J2 Voce, P(F)", 31, 2, 3)] {
+        let case = case(law, number);
+        let mut f = |h: f64| Ok((case.respond)(column, h));
+        let u = noise(&mut f, &case.value, Ladder::default()).unwrap();
+        println!("{law} {number} value {:?} noise {u:?}", case.value);
+        let d = derivative(&mut f, &case.value, &u, Ladder::default()).unwrap();
+        println!("{d:?}");
+        println!("claimed {}", case.claimed[(row, column)]);
+        for i in 0..22 {
+            let h = 0.04 * 0.5f64.powi(i);
+            let (p, m) = (f(h).unwrap()[row], f(-h).unwrap()[row]);
+            println!("{h:e} {} {} {}", (p - m) / 2.0 / h, (p - case.value[row]) / h, (case.value[row] - m) / h);
+        }
+    }
+}
