@@ -22,10 +22,13 @@ const CENTRAL_ORDER: usize = 5;
 const SIDE_ORDER: usize = 6;
 
 /// The level before which the ladder does not stop for lack of progress.
-const FIRST_STOP: usize = 8;
+const FIRST_STOP: usize = 6;
+const RATIO: f64 = 2.5;
+const LEVELS: usize = 15;
+
 
 /// Levels without half the error after which the ladder stops.
-const PATIENCE: usize = 5;
+const PATIENCE: usize = 4;
 
 /// The ladder does not stop for lack of progress before the errors are below this multiple of the noise.
 const NEAR: f64 = 100.0;
@@ -54,14 +57,14 @@ pub struct Ladder {
 
 impl Default for Ladder {
     fn default() -> Self {
-        Self { first: 0.04, levels: 22 }
+        Self { first: 0.04, levels: LEVELS }
     }
 }
 
 impl Ladder {
     /// The perturbations from the greatest to the smallest.
     pub(crate) fn perturbations(self) -> impl Iterator<Item = f64> {
-        (0..self.levels).map(move |level| self.first * 0.5_f64.powi(i32::try_from(level).unwrap_or(i32::MAX)))
+        (0..self.levels).map(move |level| self.first * (1.0/RATIO).powi(i32::try_from(level).unwrap_or(i32::MAX)))
     }
 
     fn check(self) -> Result<(), CallFailed> {
@@ -168,9 +171,9 @@ pub fn derivative(
     if noise.len() != size {
         return Err(sizes(noise.len(), size));
     }
-    let mut central = Tableau::new(4.0, CENTRAL_ORDER, size);
-    let mut forward = Tableau::new(2.0, SIDE_ORDER, size);
-    let mut backward = Tableau::new(2.0, SIDE_ORDER, size);
+    let mut central = Tableau::new(RATIO*RATIO, CENTRAL_ORDER, size);
+    let mut forward = Tableau::new(RATIO, SIDE_ORDER, size);
+    let mut backward = Tableau::new(RATIO, SIDE_ORDER, size);
     let mut failure = None;
     let mut calls = 0;
     for (level, h) in ladder.perturbations().enumerate() {
@@ -193,7 +196,7 @@ pub fn derivative(
             }
         }
         let tableaux = [&central, &forward, &backward];
-        if tableaux.iter().all(|tableau| tableau.within(2.0, &floor)) {
+        if tableaux.iter().all(|tableau| tableau.within(RATIO, &floor)) {
             break;
         }
         if level >= FIRST_STOP && tableaux.iter().all(|tableau| tableau.idle >= PATIENCE && tableau.within(NEAR, &floor)) {

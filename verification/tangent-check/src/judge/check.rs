@@ -97,7 +97,7 @@ fn explain(claimed: &Matrix, measured: &mut Measured, ladder: Ladder, f: Respons
             if measured.jump.is_none_or(|before| jump.size / jump.distance > before.size / before.distance) {
                 measured.jump = Some(jump);
             }
-            if loose::explained(jump, evidence.scale()) >= worst {
+            if loose::explained(jump, evidence.scale) >= worst {
                 return;
             }
         }

@@ -21,7 +21,7 @@ pub(super) fn smallest_seen(evidence: &Evidence, claimed: &Matrix, verdicts: &[C
     for k in 0..claimed.columns {
         let claimed = column(claimed, k);
         let nearest = evidence.nearest(k, &claimed);
-        for i in (0..claimed.len()).filter(|i| claimed[*i].abs() > LARGE * evidence.scale()) {
+        for i in (0..claimed.len()).filter(|i| claimed[*i].abs() > LARGE * evidence.scale) {
             for sign in [1.0, -1.0] {
                 let away = (claimed[i] - nearest.value[i]) * claimed[i] * sign >= 0.0;
                 if away || verdicts[k] != ColumnVerdict::Inexact {

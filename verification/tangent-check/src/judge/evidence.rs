@@ -1,6 +1,6 @@
 //! What the measurements say about one column of a claimed tangent.
 
-use super::{ERRORS, Entry, Estimate, Matrix, Measured, greatest, loose};
+use super::{Derivative, ERRORS, Entry, Estimate, Matrix, Measured, NOISY, greatest, loose};
 
 /// The round-off of a claimed tangent over ‖C‖, in units of ε.
 const ROUND_OFF: f64 = 4.0;
@@ -14,12 +14,21 @@ pub(super) enum ColumnVerdict {
     Wrong,
 }
 
+/// The measurements of one column.
+pub(super) struct Column {
+    /// The derivatives that the column may match: the best, or those to both sides of a kink that are sharp.
+    accepted: Vec<Estimate>,
+    /// The derivatives to both sides. While one of them could be the claimed column, a kink cannot be excluded.
+    sides: Vec<Estimate>,
+    kink: bool,
+}
+
 /// The measured tangent in the form in which columns are judged.
 pub(super) struct Evidence {
-    /// The derivatives that a column may match: one, or those to both sides of a kink.
-    pub columns: Vec<Vec<Estimate>>,
+    /// The columns.
+    pub columns: Vec<Column>,
     /// ‖C‖, the greatest entry of the measured tangent.
-    scale: f64,
+    pub scale: f64,
     /// The accepted deviation in errors.
     errors: f64,
     /// The deviation that a loose local iteration explains; 0 without a trace of one.
@@ -29,19 +38,16 @@ pub(super) struct Evidence {
 impl Evidence {
     /// The evidence of differences.
     pub fn of(measured: &Measured) -> Self {
-        let mut columns: Vec<Vec<Estimate>> = measured
-            .columns
-            .iter()
-            .map(|column| match column.has_kink() {
-                true => vec![column.forward.clone(), column.backward.clone()],
-                false => vec![column.best()],
-            })
-            .collect();
-        let finite = |value: &&f64| value.is_finite();
-        let values = columns.iter().flatten().flat_map(|estimate| estimate.value.iter().filter(finite));
-        let scale = values.fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
-        for error in columns.iter_mut().flatten().flat_map(|estimate| &mut estimate.error) {
-            *error += ROUND_OFF * f64::EPSILON * scale;
+        let mut columns: Vec<Column> = measured.columns.iter().map(Column::of).collect();
+        let values = columns.iter().flat_map(|column| &column.accepted).flat_map(|estimate| &estimate.value);
+        let scale = values.filter(|value| value.is_finite()).fold(0.0_f64, |greatest, value| greatest.max(value.abs()));
+        for Column { accepted, sides, kink } in &mut columns {
+            for error in accepted.iter_mut().chain(&mut *sides).flat_map(|estimate| &mut estimate.error) {
+                *error += ROUND_OFF * f64::EPSILON * scale;
+            }
+            if *kink {
+                accepted.retain(|side| side.greatest_error() <= NOISY * scale);
+            }
         }
         let explained = measured.jump.map_or(0.0, |jump| loose::explained(jump, scale));
         Self { columns, scale, errors: ERRORS, explained }
@@ -51,9 +57,8 @@ impl Evidence {
     pub fn exact(exact: &Matrix, bound: f64) -> Self {
         let scale = exact.greatest();
         let error = vec![bound * scale; exact.rows];
-        let columns = (0..exact.columns)
-            .map(|k| vec![Estimate { value: super::column(exact, k), error: error.clone() }])
-            .collect();
+        let column = |k| Estimate { value: super::column(exact, k), error: error.clone() };
+        let columns = (0..exact.columns).map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false }).collect();
         Self { columns, scale, errors: 1.0, explained: 0.0 }
     }
 
@@ -62,27 +67,26 @@ impl Evidence {
         if self.scale > 0.0 { self.scale } else { claimed.greatest() }
     }
 
-    /// ‖C‖.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// The verdict over column `k`, if the law claims `claimed`.
     pub fn verdict(&self, k: usize, claimed: &[f64]) -> ColumnVerdict {
-        let sides = &self.columns[k];
-        let within = |explained: f64| {
-            sides.iter().any(|side| {
-                let entries = claimed.iter().zip(side.value.iter().zip(&side.error));
-                // An entry that could not be measured deviates by NaN, which no comparison calls too great.
-                !entries.into_iter().any(|(c, (d, e))| (c - d).abs() > (self.errors * e).max(explained))
-            })
-        };
-        match (within(0.0), within(self.explained), sides.len()) {
-            (true, _, _) => ColumnVerdict::Consistent,
-            (_, true, _) => ColumnVerdict::Inexact,
-            (_, _, 1) => ColumnVerdict::Wrong,
-            _ => ColumnVerdict::Kink,
+        let Column { accepted, sides, kink } = &self.columns[k];
+        let any = |estimates: &[Estimate], explained| estimates.iter().any(|side| self.matches(side, claimed, explained));
+        if any(accepted, 0.0) {
+            ColumnVerdict::Consistent
+        } else if any(accepted, self.explained) {
+            ColumnVerdict::Inexact
+        } else if *kink || any(sides, 0.0) {
+            ColumnVerdict::Kink
+        } else {
+            ColumnVerdict::Wrong
         }
+    }
+
+    /// Whether no entry deviates by more than its error allows, or than `explained`.
+    fn matches(&self, side: &Estimate, claimed: &[f64], explained: f64) -> bool {
+        let mut entries = claimed.iter().zip(side.value.iter().zip(&side.error));
+        // An entry that could not be measured has an infinite error, and deviates by NaN, which is not greater.
+        !entries.any(|(c, (d, e))| (c - d).abs() > (self.errors * e).max(explained))
     }
 
     /// The estimate of column `k` from which the claimed column deviates least, in errors.
@@ -91,7 +95,9 @@ impl Evidence {
             let entries = claimed.iter().zip(side.value.iter().zip(&side.error));
             entries.fold(0.0_f64, |greatest, (c, (d, e))| greatest.max((c - d).abs() / e))
         };
-        let nearest = self.columns[k].iter().min_by(|a, b| excess(a).total_cmp(&excess(b)));
+        let Column { accepted, sides, .. } = &self.columns[k];
+        let candidates = if accepted.is_empty() { sides } else { accepted };
+        let nearest = candidates.iter().min_by(|a, b| excess(a).total_cmp(&excess(b)));
         nearest.cloned().unwrap_or_else(|| Estimate::none(claimed.len()))
     }
 
@@ -102,10 +108,11 @@ impl Evidence {
 
     /// Whether the claimed and the measured tangent are zero within the errors.
     pub fn is_zero(&self, claimed: &Matrix) -> bool {
-        let small = |value: f64, error: f64| value.abs() <= self.errors * error;
         (0..claimed.columns).all(|k| {
-            self.columns[k].iter().all(|side| {
-                (0..claimed.rows).all(|i| small(side.value[i], side.error[i]) && small(claimed[(i, k)], side.error[i]))
+            let nearest = self.nearest(k, &super::column(claimed, k));
+            (0..claimed.rows).all(|i| {
+                let small = |value: f64| value.abs() <= self.errors * nearest.error[i];
+                small(nearest.value[i]) && small(claimed[(i, k)])
             })
         })
     }
@@ -115,5 +122,14 @@ impl Evidence {
         let column = super::column(claimed, k);
         let nearest = self.nearest(k, &column);
         greatest(&column.iter().zip(&nearest.value).map(|(c, d)| c - d).collect::<Vec<f64>>())
+    }
+}
+
+impl Column {
+    fn of(derivative: &Derivative) -> Self {
+        let measured = |side: &&Estimate| side.value.iter().any(|value| value.is_finite());
+        let sides: Vec<Estimate> = [&derivative.forward, &derivative.backward].into_iter().filter(measured).cloned().collect();
+        let kink = derivative.has_kink();
+        Self { accepted: if kink { sides.clone() } else { vec![derivative.best()] }, sides, kink }
     }
 }

@@ -48,6 +48,10 @@ fn survey() {
                     margin = margin.max((finding.claimed.entries[i] - finding.measured.entries[i]).abs() / finding.errors.entries[i]);
                 }
             }
+            if finding.verdict == Verdict::Consistent && finding.worst.is_some() {
+                let m = (0..finding.claimed.entries.len()).map(|i| (finding.claimed.entries[i] - finding.measured.entries[i]).abs() / finding.errors.entries[i]).fold(0.0, f64::max);
+                if m > 3.0 { println!("   Wrongish {law} {number} kink {:?} margin {m} {:?}", case.kink, finding.worst); }
+            }
             calls += finding.calls;
             most = most.max(finding.calls);
         }
