@@ -15,6 +15,9 @@
 
 use crate::law::CallFailed;
 
+/// An entry has at least this part of the greatest error of its column: a small difference of one entry may be luck.
+const SHARE: f64 = 0.1;
+
 /// The greatest number of extrapolations of the central difference.
 const CENTRAL_ORDER: usize = 5;
 
@@ -244,12 +247,16 @@ impl Tableau {
             let (coarse, fine) = (&last[j - 1], &self.row[j - 1]);
             let next: Vec<f64> = fine.iter().zip(coarse).map(|(fine, coarse)| fine + (fine - coarse) / (power - 1.0)).collect();
             let before = last.get(j);
-            for i in 0..next.len() {
-                let third = before.map_or(if cfg!(feature = "x") {0.0} else {f64::INFINITY}, |before| (next[i] - before[i]).abs());
-                let error = (next[i] - fine[i]).abs().max((next[i] - coarse[i]).abs()).max(third).max(floor[i]);
-                if error < self.best.error[i] {
-                    self.best.error[i] = error;
-                    self.best.value[i] = next[i];
+            if let Some(before) = last.get(j) {
+                let apart = |i: usize| [fine[i], coarse[i], before[i]].iter().fold(0.0_f64, |apart, value| apart.max((next[i] - value).abs()));
+                let errors: Vec<f64> = (0..next.len()).map(apart).collect();
+                let shared = SHARE * errors.iter().fold(0.0_f64, |greatest, error| greatest.max(*error));
+                for i in 0..next.len() {
+                    let error = errors[i].max(floor[i]).max(shared);
+                    if error < self.best.error[i] {
+                        self.best.error[i] = error;
+                        self.best.value[i] = next[i];
+                    }
                 }
             }
             self.row.push(next);

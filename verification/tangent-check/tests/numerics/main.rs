@@ -20,7 +20,7 @@ fn survey() {
         let mut verdicts = [0; 4];
         let (mut kink, mut noisy, mut other) = (0, 0, 0);
         let mut controls = [[0usize; 14]; 2];
-        let (mut calls, mut most) = (0, 0);
+        let (mut calls, mut most) = (0, 0); let mut over = 0; let mut over = 0;
         let mut margin = 0.0_f64;
         let mut error = 0.0_f64;
         for number in 0..states {
@@ -52,10 +52,12 @@ fn survey() {
                 let m = (0..finding.claimed.entries.len()).map(|i| (finding.claimed.entries[i] - finding.measured.entries[i]).abs() / finding.errors.entries[i]).fold(0.0, f64::max);
                 if m > 3.0 { println!("   Wrongish {law} {number} kink {:?} margin {m} {:?}", case.kink, finding.worst); }
             }
+            over += usize::from(finding.calls > 300);
+            over += usize::from(finding.calls > 300);
             calls += finding.calls;
             most = most.max(finding.calls);
         }
-        println!("{law:36} verdicts {verdicts:?} kink {kink} noisy {noisy} other {other} calls {} {most} margin {margin:.1} err {error:.0e} smooth {:?} kink {:?}", calls / states, &controls[0][3..], &controls[1][3..]);
+        println!("{law:36} verdicts {verdicts:?} kink {kink} noisy {noisy} other {other} calls {} {most} {over} {over} margin {margin:.1} err {error:.0e} smooth {:?} kink {:?}", calls / states, &controls[0][3..], &controls[1][3..]);
     }
 }
 
