@@ -1,22 +1,26 @@
 //! Extrapolated differences of a vector function of one variable, with their own error.
 //!
-//! The derivative f′(0) is measured on a ladder of perturbations h_i = h₀ 2⁻ⁱ, by the central difference and by both one-sided
+//! The derivative f′(0) is measured on a ladder of perturbations h_i = h₀ r⁻ⁱ, by the central difference and by both one-sided
 //! differences. Each is extrapolated to h = 0 (Richardson, in Ridders' tableau). The tableau and the noise u of f give the error:
 //!
 //! ```text
-//! T_i0 = (f(h_i) − f(−h_i)) / 2 h_i                    central, r = 4
-//! T_i0 = ±(f(±h_i) − f(0)) / h_i                       one-sided, r = 2
-//! T_ij = T_i,j−1 + (T_i,j−1 − T_i−1,j−1) / (rʲ − 1)
-//! e_ij = max(|T_ij − T_i,j−1|, |T_ij − T_i−1,j−1|, 2 u / h_i)
+//! T_i0 = (f(h_i) − f(−h_i)) / 2 h_i                    central, p = 2
+//! T_i0 = ±(f(±h_i) − f(0)) / h_i                       one-sided, p = 1
+//! T_ij = T_i,j−1 + (T_i,j−1 − T_i−1,j−1) / (rᵖʲ − 1)
+//! e_ij = max(|T_ij − T_i,j−1|, |T_ij − T_i−1,j−1|, |T_ij − T_i−1,j|, 2 u / h_i, a tenth of the greatest e_ij of the column)
 //! ```
 //!
-//! The entry with the smallest error is taken, component by component. Sources: C. J. F. Ridders, *Adv. Eng. Softw.* 4 (1982) 75–76;
+//! The T_ij with the smallest error is taken, component by component. Sources: C. J. F. Ridders, *Adv. Eng. Softw.* 4 (1982) 75–76;
 //! J. J. Moré and S. M. Wild, *SIAM J. Sci. Comput.* 33 (2011) 1292–1314 for the noise.
+//!
+//! # Measured
+//!
+//! Over 2,500 states of ten laws with consistent tangents (`tests/numerics`), the true error is at most 9 e, and at most 3 e on the coarser
+//! ladder. Without |T_ij − T_i−1,j| there are two to five false alarms, because two estimates agree by luck. Without the share of the
+//! column's error, single entries next to kinks are trusted by luck. A ladder that ends at 2e-6 gives three false alarms: if a state lies
+//! 1e-9 before a yield surface and the direction is almost tangential, both sides cross the surface within √1e-9. So the ladder ends near √ε.
 
 use crate::law::CallFailed;
-
-/// An entry has at least this part of the greatest error of its column: a small difference of one entry may be luck.
-const SHARE: f64 = 0.1;
 
 /// The greatest number of extrapolations of the central difference.
 const CENTRAL_ORDER: usize = 5;
@@ -24,59 +28,68 @@ const CENTRAL_ORDER: usize = 5;
 /// The greatest number of extrapolations of a one-sided difference.
 const SIDE_ORDER: usize = 6;
 
-/// The level before which the ladder does not stop for lack of progress.
-const FIRST_STOP: usize = 6;
-const RATIO: f64 = 2.5;
-const LEVELS: usize = 15;
+/// An entry has at least this part of the greatest error of its column: a small difference in one entry may be luck.
+const SHARE: f64 = 0.1;
 
+/// The ladder does not stop for lack of progress before h is below h₀ over this.
+const FIRST_STOP: f64 = 200.0;
 
-/// Levels without half the error after which the ladder stops.
-const PATIENCE: usize = 4;
+/// Lack of progress: while h fell by this factor, the error did not halve.
+const PATIENCE: f64 = 32.0;
 
-/// The ladder does not stop for lack of progress before the errors are below this multiple of the noise.
+/// The ladder does not stop for lack of progress before the errors are below this multiple of the noise 2 u / h.
 const NEAR: f64 = 100.0;
 
-/// A kink is a difference between two derivatives of more than this number of errors.
+/// Derivatives that differ by more than this number of errors differ.
 pub(crate) const ERRORS: f64 = 10.0;
 
-/// The spacings of the tables that measure the noise, over h₀: 1e-10, 1e-8 and 1e-6 for h₀ = 0.04.
+/// The spacings of the tables that measure the noise, over h₀: 1e-10, 1e-8 and 1e-6 for h₀ = 0.04. Single precision shows at the widest.
 const SPACINGS: [f64; 3] = [2.5e-9, 2.5e-7, 2.5e-5];
-
-/// A table whose fifth differences are below this multiple of the third shows a smooth function, not noise.
-const DECAY: f64 = 0.25;
 
 /// The points of a table that measures the noise.
 const POINTS: usize = 6;
 
-/// The perturbations h_i = h₀ 2⁻ⁱ.
+/// A table whose fifth differences are below this multiple of the third shows a smooth function, not noise.
+const DECAY: f64 = 0.25;
+
+/// The perturbations h_i = h₀ r⁻ⁱ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ladder {
     /// The greatest perturbation h₀, in the unit of the variable. The default 0.04 suits strains. For other unknowns take about 0.04 of
     /// the change over which the function changes its nature.
     pub first: f64,
+    /// The ratio r of successive perturbations.
+    pub ratio: f64,
     /// The greatest number of levels.
     pub levels: usize,
 }
 
 impl Default for Ladder {
+    /// 0.04, 0.02, 0.01, … to 2e-8 in 22 levels.
     fn default() -> Self {
-        Self { first: 0.04, levels: LEVELS }
+        Self { first: 0.04, ratio: 2.0, levels: 22 }
     }
 }
 
 impl Ladder {
+    /// From 0.04 to 1e-7 in 15 levels: at most 30 calls, and half to one digit less than the default.
+    pub fn coarse() -> Self {
+        Self { first: 0.04, ratio: 2.5, levels: 15 }
+    }
+
     /// The perturbations from the greatest to the smallest.
     pub(crate) fn perturbations(self) -> impl Iterator<Item = f64> {
-        (0..self.levels).map(move |level| self.first * (1.0/RATIO).powi(i32::try_from(level).unwrap_or(i32::MAX)))
+        std::iter::successors(Some(self.first), move |h| Some(h / self.ratio)).take(self.levels)
     }
 
     fn check(self) -> Result<(), CallFailed> {
-        if self.first.is_finite() && self.first > 0.0 && self.levels > 0 {
+        let Self { first, ratio, levels } = self;
+        if first.is_finite() && first > 0.0 && ratio.is_finite() && ratio > 1.0 && levels > 0 {
             return Ok(());
         }
         Err(CallFailed(format!(
-            "The ladder of perturbations starts at {} and has {} levels; the start must be positive and there must be levels.",
-            self.first, self.levels
+            "The ladder of perturbations starts at {first}, with ratio {ratio} and {levels} levels. The start must be positive, the ratio \
+             greater than 1, and there must be levels."
         )))
     }
 }
@@ -99,6 +112,20 @@ impl Estimate {
     /// The greatest error.
     pub fn greatest_error(&self) -> f64 {
         self.error.iter().fold(0.0, |greatest, error| greatest.max(*error))
+    }
+
+    /// Takes the components of `next` whose error is smaller: the greatest difference from its `neighbours` in the tableau.
+    fn improve(&mut self, next: &[f64], neighbours: [&Vec<f64>; 3], floor: &[f64]) {
+        let difference = |i: usize| neighbours.iter().fold(0.0_f64, |greatest, t| greatest.max((next[i] - t[i]).abs()));
+        let differences: Vec<f64> = (0..next.len()).map(difference).collect();
+        let shared = SHARE * differences.iter().fold(0.0_f64, |greatest, difference| greatest.max(*difference));
+        for i in 0..next.len() {
+            let error = differences[i].max(floor[i]).max(shared);
+            if next[i].is_finite() && error < self.error[i] {
+                self.value[i] = next[i];
+                self.error[i] = error;
+            }
+        }
     }
 
     /// Whether a component differs from that of `other` by more than ten of the errors of both.
@@ -174,104 +201,91 @@ pub fn derivative(
     if noise.len() != size {
         return Err(sizes(noise.len(), size));
     }
-    let mut central = Tableau::new(RATIO*RATIO, CENTRAL_ORDER, size);
-    let mut forward = Tableau::new(RATIO, SIDE_ORDER, size);
-    let mut backward = Tableau::new(RATIO, SIDE_ORDER, size);
+    let mut central = Tableau::new(ladder.ratio * ladder.ratio, CENTRAL_ORDER, size);
+    let mut forward = Tableau::new(ladder.ratio, SIDE_ORDER, size);
+    let mut backward = Tableau::new(ladder.ratio, SIDE_ORDER, size);
     let mut failure = None;
     let mut calls = 0;
-    for (level, h) in ladder.perturbations().enumerate() {
+    for h in ladder.perturbations() {
         calls += 2;
-        let [plus, minus] = [finite(f(h), size), finite(f(-h), size)];
         let floor: Vec<f64> = noise.iter().map(|u| 2.0 * u / h).collect();
-        let quotient = |a: &[f64], b: &[f64], h: f64| a.iter().zip(b).map(|(a, b)| (a - b) / h).collect::<Vec<f64>>();
+        let [plus, minus] = [finite(f(h), size), finite(f(-h), size)];
         match (&plus, &minus) {
-            (Ok(plus), Ok(minus)) => central.add(quotient(plus, minus, 2.0 * h), &floor),
-            _ => central.restart(),
+            (Ok(plus), Ok(minus)) => central.add(h, quotient(plus, minus, 2.0 * h), &floor),
+            _ => central.row.clear(),
         }
-        for (side, value, h) in [(&mut forward, plus, h), (&mut backward, minus, -h)] {
+        for (side, value, sign) in [(&mut forward, plus, 1.0), (&mut backward, minus, -1.0)] {
             match value {
-                Ok(value) => side.add(quotient(&value, value_at_zero, h), &floor),
+                Ok(value) => side.add(h, quotient(&value, value_at_zero, sign * h), &floor),
                 Err(Refused::Size(failed)) => return Err(failed),
                 Err(Refused::Level(failed)) => {
-                    side.restart();
+                    side.row.clear();
                     failure = Some(failed);
                 }
             }
         }
         let tableaux = [&central, &forward, &backward];
-        if tableaux.iter().all(|tableau| tableau.within(RATIO, &floor)) {
-            break;
-        }
-        if level >= FIRST_STOP && tableaux.iter().all(|tableau| tableau.idle >= PATIENCE && tableau.within(NEAR, &floor)) {
+        let settled = tableaux.iter().all(|tableau| tableau.within(ladder.ratio, &floor));
+        let stalled = tableaux.iter().all(|tableau| tableau.halved >= PATIENCE * h && tableau.within(NEAR, &floor));
+        if settled || (stalled && ladder.first >= FIRST_STOP * h) {
             break;
         }
     }
-    let measured = [&forward, &backward].iter().any(|side| side.added > 0);
     match failure {
-        Some(failure) if !measured => Err(failure),
+        Some(failure) if forward.is_empty() && backward.is_empty() => Err(failure),
         _ => Ok(Derivative { central: central.best, forward: forward.best, backward: backward.best, calls }),
     }
 }
 
+/// (a − b) / h.
+fn quotient(a: &[f64], b: &[f64], h: f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| (a - b) / h).collect()
+}
+
 /// Ridders' tableau of one difference quotient.
 struct Tableau {
-    /// The factor rʲ by which the j-th extrapolation reduces the leading error.
-    ratio: f64,
+    /// The factor rᵖ by which the first extrapolation reduces the leading error.
+    factor: f64,
     order: usize,
-    /// The last row T_i0, T_i1, …
+    /// The last row T_i0, T_i1, … It is empty if the level before is missing.
     row: Vec<Vec<f64>>,
     best: Estimate,
-    added: usize,
-    /// The greatest error when it last halved, and the levels since.
+    /// The greatest error when it last halved, and the perturbation at that level.
     mark: f64,
-    idle: usize,
+    halved: f64,
 }
 
 impl Tableau {
-    fn new(ratio: f64, order: usize, size: usize) -> Self {
-        Self { ratio, order, row: vec![], best: Estimate::none(size), added: 0, mark: f64::INFINITY, idle: 0 }
+    fn new(factor: f64, order: usize, size: usize) -> Self {
+        Self { factor, order, row: vec![], best: Estimate::none(size), mark: f64::INFINITY, halved: f64::INFINITY }
     }
 
-    /// Forgets the rows, because a level is missing.
-    fn restart(&mut self) {
-        self.row.clear();
-        self.idle += 1;
+    /// Whether nothing was measured.
+    fn is_empty(&self) -> bool {
+        self.best.error.iter().all(|error| error.is_infinite())
     }
 
-    /// Adds the row of the next level. `floor` is 2 u / h.
-    fn add(&mut self, quotient: Vec<f64>, floor: &[f64]) {
+    /// Adds the row of the next level h. `floor` is 2 u / h.
+    fn add(&mut self, h: f64, quotient: Vec<f64>, floor: &[f64]) {
         let last = std::mem::replace(&mut self.row, vec![quotient]);
-        let mut power = 1.0;
+        let mut factor = 1.0;
         for j in 1..=last.len().min(self.order) {
-            power *= self.ratio;
-            let (coarse, fine) = (&last[j - 1], &self.row[j - 1]);
-            let next: Vec<f64> = fine.iter().zip(coarse).map(|(fine, coarse)| fine + (fine - coarse) / (power - 1.0)).collect();
-            let before = last.get(j);
+            factor *= self.factor;
+            let [fine, coarse] = [&self.row[j - 1], &last[j - 1]];
+            let next: Vec<f64> = fine.iter().zip(coarse).map(|(t, before)| t + (t - before) / (factor - 1.0)).collect();
             if let Some(before) = last.get(j) {
-                let apart = |i: usize| [fine[i], coarse[i], before[i]].iter().fold(0.0_f64, |apart, value| apart.max((next[i] - value).abs()));
-                let errors: Vec<f64> = (0..next.len()).map(apart).collect();
-                let shared = SHARE * errors.iter().fold(0.0_f64, |greatest, error| greatest.max(*error));
-                for i in 0..next.len() {
-                    let error = errors[i].max(floor[i]).max(shared);
-                    if error < self.best.error[i] {
-                        self.best.error[i] = error;
-                        self.best.value[i] = next[i];
-                    }
-                }
+                self.best.improve(&next, [fine, coarse, before], floor);
             }
             self.row.push(next);
         }
-        self.added += 1;
         let error = self.best.greatest_error();
         if error <= 0.5 * self.mark {
             self.mark = error;
-            self.idle = 0;
-        } else {
-            self.idle += 1;
+            self.halved = h;
         }
     }
 
-    /// Whether all errors are below `factor` times the noise.
+    /// Whether all errors are below `factor` times the noise. With factor r, no further level can be better.
     fn within(&self, factor: f64, floor: &[f64]) -> bool {
         self.best.error.iter().zip(floor).all(|(error, floor)| *error <= factor * floor)
     }

@@ -6,6 +6,9 @@ use crate::difference::{Derivative, Ladder, derivative, noise};
 use crate::law::CallFailed;
 use std::cell::Cell;
 
+/// The number of columns above which the ladder is coarse, so that nine columns cost no more than 300 calls.
+const FEW: usize = 6;
+
 /// The columns in which a jump is looked for.
 const SEARCHED: usize = 3;
 
@@ -39,7 +42,8 @@ pub fn check_columns(
     value: &[f64],
     f: &mut dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed>,
 ) -> Finding {
-    check_columns_on(name, claimed, value, Ladder::default(), f)
+    let ladder = if claimed.columns > FEW { Ladder::coarse() } else { Ladder::default() };
+    check_columns_on(name, claimed, value, ladder, f)
 }
 
 /// [`check_columns`] with a ladder of the caller's choice, for columns that are not strains.
