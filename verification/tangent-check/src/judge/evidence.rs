@@ -49,7 +49,7 @@ impl Evidence {
                 accepted.retain(|side| side.greatest_error() <= NOISY * scale);
             }
         }
-        let explained = measured.jump.map_or(0.0, |jump| loose::explained(jump, scale));
+        let explained = measured.jump.map_or(0.0, |jump| jump.slope().min(loose::LOOSE * scale));
         Self { columns, scale, errors: ERRORS, explained }
     }
 
@@ -58,7 +58,8 @@ impl Evidence {
         let scale = exact.greatest();
         let error = vec![bound * scale; exact.rows];
         let column = |k| Estimate { value: super::column(exact, k), error: error.clone() };
-        let columns = (0..exact.columns).map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false }).collect();
+        let columns =
+            (0..exact.columns).map(|k| Column { accepted: vec![column(k)], sides: vec![], kink: false }).collect();
         Self { columns, scale, errors: 1.0, explained: 0.0 }
     }
 
@@ -70,7 +71,8 @@ impl Evidence {
     /// The verdict over column `k`, if the law claims `claimed`.
     pub fn verdict(&self, k: usize, claimed: &[f64]) -> ColumnVerdict {
         let Column { accepted, sides, kink } = &self.columns[k];
-        let any = |estimates: &[Estimate], explained| estimates.iter().any(|side| self.matches(side, claimed, explained));
+        let any =
+            |estimates: &[Estimate], explained| estimates.iter().any(|side| self.matches(side, claimed, explained));
         if any(accepted, 0.0) {
             ColumnVerdict::Consistent
         } else if any(accepted, self.explained) {
@@ -128,7 +130,8 @@ impl Evidence {
 impl Column {
     fn of(derivative: &Derivative) -> Self {
         let measured = |side: &&Estimate| side.value.iter().any(|value| value.is_finite());
-        let sides: Vec<Estimate> = [&derivative.forward, &derivative.backward].into_iter().filter(measured).cloned().collect();
+        let sides: Vec<Estimate> =
+            [&derivative.forward, &derivative.backward].into_iter().filter(measured).cloned().collect();
         let kink = derivative.has_kink();
         Self { accepted: if kink { sides.clone() } else { vec![derivative.best()] }, sides, kink }
     }

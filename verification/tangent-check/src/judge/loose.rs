@@ -6,23 +6,29 @@
 //! same deviation without jumps. So a jump is the evidence: its size T, at the distance d from the state, is the size of the error, and
 //! T / d is the size of its derivative.
 
-use crate::difference::{Ladder, Refused, finite};
+use crate::difference::finite;
 use crate::law::CallFailed;
 
 /// The greatest deviation, over ‖C‖, that a loose local iteration may explain.
 pub(super) const LOOSE: f64 = 1e-5;
 
-/// The derivative of the error of a loose iteration, over T / d.
+/// The derivative of the error of a loose iteration is at most this multiple of T / d.
 const SLOPE: f64 = 30.0;
 
-/// The inner values from which the next one is predicted.
-const NODES: usize = 6;
+/// The values from which the next one is predicted.
+const NODES: usize = 7;
 
 /// A value that differs from its prediction by this many times the noise shows a jump or a kink.
 const MISFIT: f64 = 30.0;
 
-/// Halvings of the interval with the jump.
-const HALVINGS: usize = 40;
+/// The first step of the walk, over its length.
+const FIRST: f64 = 1e-3;
+
+/// A step of the walk below this part of its distance holds nothing but a jump or a kink.
+const FINEST: f64 = 1e-13;
+
+/// The greatest number of calls on one side.
+const CALLS: usize = 200;
 
 /// A jump of the response.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,64 +39,79 @@ pub struct Jump {
     pub distance: f64,
 }
 
-/// The deviation that a jump explains: 30 T / d, at most 1e-5 ‖C‖.
-pub(super) fn explained(jump: Jump, scale: f64) -> f64 {
-    (SLOPE * jump.size / jump.distance).min(LOOSE * scale)
+impl Jump {
+    /// The deviation that the jump explains: 30 T / d.
+    pub(super) fn slope(self) -> f64 {
+        SLOPE * self.size / self.distance
+    }
 }
 
-/// Looks for the jump nearest to 0 on one side; `side` is 1 or −1.
-///
-/// The values at h_i are predicted from the inner ones, from the smallest perturbation outwards. The first interval whose outer value differs
-/// from the prediction is halved until it holds nothing but the jump. At a kink nothing is left then.
-pub(super) fn nearest_jump(
-    f: &mut dyn FnMut(f64) -> Result<Vec<f64>, CallFailed>,
-    value_at_zero: &[f64],
-    noise: &[f64],
-    ladder: Ladder,
-    side: f64,
-) -> Option<Jump> {
-    let mut f = |h: f64| finite(f(side * h), value_at_zero.len());
-    let mut nodes = vec![(0.0, value_at_zero.to_vec())];
-    let perturbations: Vec<f64> = ladder.perturbations().collect();
-    for h in perturbations.into_iter().rev() {
-        let value = f(h).ok()?;
-        if nodes.len() > NODES {
-            let prediction = Prediction { nodes: &nodes, noise };
-            if prediction.misfit(h, &value) > 1.0 {
-                let (inside, _) = nodes.last()?;
-                return halve(&mut f, &prediction, *inside, h).ok()?;
+/// The response along a straight line, and what is known of it.
+pub(super) struct Line<'a> {
+    /// f(0).
+    pub value: &'a [f64],
+    /// The greatest noise of f.
+    pub noise: f64,
+    /// The length of the walk.
+    pub length: f64,
+    /// The deviation that a jump must explain.
+    pub deviation: f64,
+}
+
+impl Line<'_> {
+    /// Looks for the nearest jump that explains the deviation.
+    ///
+    /// The walk goes outwards from 0. It predicts each value from the last seven. If a value fits, the step grows, otherwise it is halved.
+    /// When the step is next to nothing, the misfit is a jump or a kink. A kink ends the walk, because the response is continuous there.
+    pub fn nearest_jump(&self, f: &mut dyn FnMut(f64) -> Result<Vec<f64>, CallFailed>) -> Option<Jump> {
+        let mut step = FIRST * self.length;
+        let mut nodes = vec![(0.0, self.value.to_vec())];
+        for _ in 0..CALLS {
+            let (last, ref before) = nodes[nodes.len() - 1];
+            if last >= self.length {
+                return None;
             }
-            nodes.remove(1);
+            step = step.min(self.length - last);
+            let h = last + step;
+            let value = finite(f(h), self.value.len()).ok()?;
+            if nodes.len() < NODES || self.fits(&nodes, h, &value) {
+                nodes.push((h, value));
+                if nodes.len() > NODES {
+                    nodes.remove(0);
+                    step *= 1.5;
+                }
+            } else if step > FINEST * h {
+                step *= 0.5;
+            } else {
+                let size = value.iter().zip(before).fold(0.0_f64, |size, (a, b)| size.max((a - b).abs()));
+                let jump = Jump { size, distance: h };
+                let continuous = MISFIT * self.noise + 10.0 * steepest(&nodes) * step;
+                return (size > continuous && jump.slope() > self.deviation).then_some(jump);
+            }
         }
-        nodes.push((h, value));
+        None
     }
-    None
+
+    /// Whether `value` is near the polynomial through `nodes`: as near as the noise allows, or nearer than a jump that explains anything.
+    fn fits(&self, nodes: &[(f64, Vec<f64>)], h: f64, value: &[f64]) -> bool {
+        let weights = weights(nodes, h);
+        let amplification: f64 = weights.iter().map(|weight| weight.abs()).sum();
+        let allowed = (MISFIT * amplification * self.noise).max(0.1 * self.deviation * h / SLOPE);
+        (0..value.len()).all(|i| {
+            let predicted: f64 = weights.iter().zip(nodes).map(|(weight, (_, value))| weight * value[i]).sum();
+            (value[i] - predicted).abs() <= allowed
+        })
+    }
 }
 
-/// The polynomial through values near 0.
-struct Prediction<'a> {
-    nodes: &'a [(f64, Vec<f64>)],
-    noise: &'a [f64],
-}
-
-impl Prediction<'_> {
-    /// The greatest difference between `value` and the prediction at h, over what noise and truncation allow.
-    fn misfit(&self, h: f64, value: &[f64]) -> f64 {
-        let all = weights(self.nodes, h);
-        let fewer = weights(&self.nodes[1..], h);
-        let amplification: f64 = all.iter().map(|weight| weight.abs()).sum();
-        let mut misfit = 0.0_f64;
-        for i in 0..value.len() {
-            let predict = |weights: &[f64], nodes: &[(f64, Vec<f64>)]| -> f64 {
-                weights.iter().zip(nodes).map(|(weight, (_, value))| weight * value[i]).sum()
-            };
-            let predicted = predict(&all, self.nodes);
-            let truncation = (predicted - predict(&fewer, &self.nodes[1..])).abs();
-            let allowed = MISFIT * amplification * self.noise[i] + truncation;
-            misfit = misfit.max((value[i] - predicted).abs() / allowed);
-        }
-        misfit
+/// The steepest slope between the nodes.
+fn steepest(nodes: &[(f64, Vec<f64>)]) -> f64 {
+    let mut steepest = 0.0_f64;
+    for ((a, before), (b, after)) in nodes.iter().zip(nodes.iter().skip(1)) {
+        let greatest = before.iter().zip(after).fold(0.0_f64, |greatest, (x, y)| greatest.max((y - x).abs()));
+        steepest = steepest.max(greatest / (b - a));
     }
+    steepest
 }
 
 /// The weights of Lagrange's interpolation: L_j(h) = Π_{m ≠ j} (h − h_m) / (h_j − h_m).
@@ -100,33 +121,4 @@ fn weights(nodes: &[(f64, Vec<f64>)], h: f64) -> Vec<f64> {
         others.map(|m| (h - nodes[m].0) / (nodes[j].0 - nodes[m].0)).product()
     };
     (0..nodes.len()).map(weight).collect()
-}
-
-/// Halves the interval between a value that fits and one that does not.
-fn halve(
-    f: &mut dyn FnMut(f64) -> Result<Vec<f64>, Refused>,
-    prediction: &Prediction<'_>,
-    mut inside: f64,
-    mut outside: f64,
-) -> Result<Option<Jump>, Refused> {
-    let (mut fits, mut differs) = (f(inside)?, f(outside)?);
-    let mut slope = 0.0;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (inside + outside);
-        let value = f(middle)?;
-        if prediction.misfit(middle, &value) > 1.0 {
-            (outside, differs) = (middle, value);
-        } else {
-            slope = distance(&value, &fits) / (middle - inside);
-            (inside, fits) = (middle, value);
-        }
-    }
-    let size = distance(&fits, &differs);
-    let noise = prediction.noise.iter().fold(0.0_f64, |greatest, noise| greatest.max(*noise));
-    let jumps = size > MISFIT * noise + 10.0 * slope * (outside - inside);
-    Ok(jumps.then_some(Jump { size, distance: outside }))
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |greatest, (a, b)| greatest.max((a - b).abs()))
 }

@@ -2,10 +2,12 @@
 
 mod check;
 mod control;
+mod directions;
 mod evidence;
 mod loose;
 
-pub use check::{check_columns, check_columns_on};
+pub use check::{Loading, check_columns, check_columns_on};
+pub use directions::{Directions, check_directions};
 pub use loose::Jump;
 
 use crate::difference::{Derivative, ERRORS, Estimate};
@@ -133,9 +135,8 @@ fn fault(claimed: &Matrix, rows: usize, columns: usize, measured: bool) -> Optio
 
 /// The verdict over all columns, with its numbers and the negative control.
 fn conclude(mut finding: Finding, evidence: &Evidence, no_response: bool) -> Finding {
-    let verdicts: Vec<ColumnVerdict> = (0..evidence.columns.len())
-        .map(|k| evidence.verdict(k, &column(&finding.claimed, k)))
-        .collect();
+    let verdicts: Vec<ColumnVerdict> =
+        (0..evidence.columns.len()).map(|k| evidence.verdict(k, &column(&finding.claimed, k))).collect();
     describe(&mut finding, evidence);
     let any = |verdict| verdicts.contains(&verdict);
     if any(ColumnVerdict::Wrong) {

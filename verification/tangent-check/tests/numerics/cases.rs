@@ -63,7 +63,13 @@ pub fn case(law: &'static str, number: usize) -> Case {
     }
 }
 
-fn driven(law: &'static str, kink: Option<f64>, material: impl Law + 'static, strain: &T2, random: &mut Random) -> Case {
+fn driven(
+    law: &'static str,
+    kink: Option<f64>,
+    material: impl Law + 'static,
+    strain: &T2,
+    random: &mut Random,
+) -> Case {
     if law.contains("small") {
         return small_strain(law, kink, material, *strain);
     }

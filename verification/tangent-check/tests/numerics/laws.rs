@@ -62,7 +62,9 @@ impl Law for Ogden {
         // x_a = λ_a², s_a = (Σ_p μ_p (x_a^{α_p/2} − 1) + Λ ln J) / x_a
         let (x, n) = eigen(&combine(2.0, strain, 1.0, &I));
         let log_j = 0.5 * (x[0] * x[1] * x[2]).ln();
-        let t = |a: usize| OGDEN.iter().map(|(mu, alpha)| mu * (x[a].powf(0.5 * alpha) - 1.0)).sum::<f64>() + LAMBDA * log_j;
+        let t = |a: usize| {
+            OGDEN.iter().map(|(mu, alpha)| mu * (x[a].powf(0.5 * alpha) - 1.0)).sum::<f64>() + LAMBDA * log_j
+        };
         let s: [f64; 3] = std::array::from_fn(|a| t(a) / x[a]);
         // 2 ∂s_a/∂x_b, and 2 (s_b − s_a)/(x_b − x_a) from divided differences without cancellation
         let slope = |a: usize, b: usize| {
@@ -74,7 +76,8 @@ impl Law for Ogden {
             let growth = (gap / x[a]).ln_1p();
             let quotient = |p: f64| x[a].powf(p) * if gap == 0.0 { p / x[a] } else { (p * growth).exp_m1() / gap };
             let constant: f64 = LAMBDA * log_j - OGDEN.iter().map(|(mu, _)| mu).sum::<f64>();
-            2.0 * (OGDEN.iter().map(|(mu, alpha)| mu * quotient(0.5 * alpha - 1.0)).sum::<f64>() + constant * quotient(-1.0))
+            2.0 * (OGDEN.iter().map(|(mu, alpha)| mu * quotient(0.5 * alpha - 1.0)).sum::<f64>()
+                + constant * quotient(-1.0))
         };
         let stress = tensor(|i, j| (0..3).map(|a| s[a] * n[i][a] * n[j][a]).sum());
         let mut tangent = [[[[0.0; 3]; 3]; 3]; 3];
@@ -83,7 +86,8 @@ impl Law for Ogden {
                 let (normal, shear) = (slope(a, b), if a == b { 0.0 } else { 0.5 * secant(a, b) });
                 for (i, j, k, l) in quadruples() {
                     let mixed = n[k][a] * n[l][b] + n[k][b] * n[l][a];
-                    tangent[i][j][k][l] += normal * n[i][a] * n[j][a] * n[k][b] * n[l][b] + shear * n[i][a] * n[j][b] * mixed;
+                    tangent[i][j][k][l] +=
+                        normal * n[i][a] * n[j][a] * n[k][b] * n[l][b] + shear * n[i][a] * n[j][b] * mixed;
                 }
             }
         }
@@ -147,7 +151,8 @@ impl Law for Voce {
         let theta_bar = 2.0 * SHEAR / (2.0 * SHEAR + 2.0 / 3.0 * slope) - (1.0 - theta);
         let n = combine(1.0 / size, &trial, 0.0, &I);
         let tangent = tensor4(|i, j, k, l| {
-            BULK * I[i][j] * I[k][l] + 2.0 * SHEAR * (theta * deviatoric_identity(i, j, k, l) - theta_bar * n[i][j] * n[k][l])
+            BULK * I[i][j] * I[k][l]
+                + 2.0 * SHEAR * (theta * deviatoric_identity(i, j, k, l) - theta_bar * n[i][j] * n[k][l])
         });
         (combine(pressure, &I, theta, &trial), tangent)
     }
