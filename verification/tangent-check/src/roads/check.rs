@@ -1,0 +1,320 @@
+//! The check of a law along paths.
+
+use super::{History, Input, Perturbed, Road, inputs_read, roads};
+use crate::convention::{Configuration, Convention, cauchy_stress};
+use crate::diagnosis::{Elsewhere, Measured, Observation, diagnose, invisible};
+use crate::finding::{Finding, Reason, Report, Verdict};
+use crate::law::{CallFailed, Law, Response, Step};
+use crate::matrix::Matrix;
+use crate::states::Path;
+
+/// The response with column k perturbed by h.
+pub type Perturbation<'a> = dyn FnMut(usize, f64) -> Result<Vec<f64>, CallFailed> + 'a;
+
+/// A check of a claimed tangent at a response: `judge::check_columns`, or another of the same signature.
+pub type CheckColumns<'a> = dyn FnMut(&str, &Matrix, &[f64], &mut Perturbation) -> Finding + 'a;
+
+/// In so many wrong states the tangents elsewhere are measured for the diagnosis.
+const DIAGNOSED: usize = 10;
+/// From so many steps it is taken which inputs the law reads.
+const PROBED: usize = 6;
+
+/// A step of a path with its response.
+#[derive(Clone, Debug)]
+struct Visit {
+    name: String,
+    step: Step,
+    response: Response,
+    /// The visit one step earlier on the same path.
+    before: Option<usize>,
+}
+
+/// The findings of one road, one for each visit.
+struct Travelled {
+    road: Road,
+    findings: Vec<Finding>,
+}
+
+impl Travelled {
+    fn wrong(&self) -> usize {
+        self.findings.iter().filter(|finding| finding.verdict == Verdict::Wrong).count()
+    }
+}
+
+/// Checks the tangent of a law at every step of the paths, and diagnoses a wrong one.
+///
+/// Every step takes stress and internal variables from the response before. A law that reads both F and Δε is checked on both roads;
+/// the report has the findings of the road on which fewer states are wrong, and a note about the other.
+pub fn check_law(law: &mut dyn Law, paths: &[Path], seed: u64, check: &mut CheckColumns) -> Report {
+    let convention = law.convention();
+    let mut report = Report {
+        subject: law.name(),
+        convention: convention.words(),
+        rows: convention.stress.names(),
+        columns: convention.strain.names(),
+        seed,
+        findings: Vec::new(),
+        diagnoses: Vec::new(),
+        notes: Vec::new(),
+    };
+    if !convention.stress.valid() || !convention.strain.valid() || convention.strain.count() == 0 {
+        let text =
+            "The convention of the law has no components, or names one twice or outside of 11 to 33.".to_string();
+        report.findings.push(not_checked("convention", CallFailed(text)));
+        return report;
+    }
+    let mut visits = Vec::new();
+    for path in paths {
+        walk(law, path, &mut visits, &mut report.findings);
+    }
+    let read = inputs_of(law, &visits);
+    if !visits.is_empty() {
+        report.notes.push(note_of_inputs(&read));
+    }
+    let travelled: Vec<Travelled> =
+        roads(&read, convention.measure).into_iter().map(|road| travel(law, road, &visits, check)).collect();
+    report.notes.extend(note_of_roads(&travelled));
+    if let Some(chosen) = travelled.into_iter().min_by_key(Travelled::wrong) {
+        diagnose_into(law, &visits, &chosen, &mut report);
+        report.findings.extend(chosen.findings);
+    }
+    report
+}
+
+/// A finding without a check, because a call failed.
+fn not_checked(name: &str, failed: CallFailed) -> Finding {
+    Finding {
+        name: name.to_string(),
+        verdict: Verdict::NotChecked,
+        reason: Some(Reason::CallFailed(format!("{name}: {}", failed.0))),
+        worst: None,
+        deviation: 0.0,
+        error: 0.0,
+        noise: 0.0,
+        control: None,
+        calls: 1,
+        claimed: Matrix::zeros(0, 0),
+        measured: Matrix::zeros(0, 0),
+        errors: Matrix::zeros(0, 0),
+    }
+}
+
+/// Walks along a path to its end or to the first call that fails.
+fn walk(law: &mut dyn Law, path: &Path, visits: &mut Vec<Visit>, findings: &mut Vec<Finding>) {
+    let convention = law.convention();
+    let mut history = History::at_rest(law);
+    let mut before = None;
+    for (index, (gradient, length)) in path.gradients.iter().zip(&path.lengths).enumerate() {
+        let name = format!("{}, step {} of {}", path.name, index + 1, path.steps());
+        let no_step = || CallFailed("det F is not positive.".to_string());
+        let step = history.step_to(gradient, *length).ok_or_else(no_step);
+        let answer = step.and_then(|step| {
+            let response = law.respond(&step)?;
+            fits(&convention, &response)?;
+            Ok((step, response))
+        });
+        match answer {
+            Ok((step, response)) => {
+                history = History::after(&step, &response);
+                visits.push(Visit { name, step, response, before });
+                before = Some(visits.len() - 1);
+            }
+            Err(failed) => {
+                findings.push(not_checked(&name, failed));
+                return;
+            }
+        }
+    }
+}
+
+/// Whether a response has the components of the convention, all finite.
+fn fits(convention: &Convention, response: &Response) -> Result<(), CallFailed> {
+    let [rows, columns] = [convention.stress.count(), convention.strain.count()];
+    let tangent = &response.tangent;
+    if response.stress.len() != rows {
+        return Err(CallFailed(format!("The law returned {} stresses in place of {rows}.", response.stress.len())));
+    }
+    if (tangent.rows, tangent.columns, tangent.entries.len()) != (rows, columns, rows * columns) {
+        let size = format!("{} × {}", tangent.rows, tangent.columns);
+        return Err(CallFailed(format!(
+            "The law returned a tangent of {size} in place of {rows} × {columns} entries."
+        )));
+    }
+    if !response.stress.iter().all(|value| value.is_finite()) {
+        return Err(CallFailed("The law returned a stress that is not finite.".to_string()));
+    }
+    if !tangent.entries.iter().all(|value| value.is_finite()) {
+        return Err(CallFailed("The law returned a tangent with an entry that is not finite.".to_string()));
+    }
+    Ok(())
+}
+
+/// The inputs that the law reads in any of a few steps, from all over the paths.
+fn inputs_of(law: &mut dyn Law, visits: &[Visit]) -> Vec<Input> {
+    let mut read: Vec<Input> = Vec::new();
+    for visit in visits.iter().step_by(visits.len().div_ceil(PROBED).max(1)) {
+        read.extend(inputs_read(law, &visit.step).unwrap_or_default());
+    }
+    read.sort_unstable();
+    read.dedup();
+    read
+}
+
+fn note_of_inputs(read: &[Input]) -> String {
+    let names: Vec<&str> = read.iter().map(|input| input.words()).collect();
+    if names.is_empty() {
+        "The stress depends on no input.".to_string()
+    } else {
+        format!("The law reads {}.", names.join(", "))
+    }
+}
+
+fn note_of_roads(travelled: &[Travelled]) -> Option<String> {
+    let [gradient, strain] = travelled else {
+        return None;
+    };
+    let words = |road: &Travelled| {
+        format!("{} of {} states are wrong {}", road.wrong(), road.findings.len(), road.road.words())
+    };
+    let text = "The law reads both F and the strain increment and was perturbed through both";
+    Some(format!("{text}: {}, {}. The findings are those of the road with fewer.", words(gradient), words(strain)))
+}
+
+/// Checks all visits on a road.
+fn travel(law: &mut dyn Law, road: Road, visits: &[Visit], check: &mut CheckColumns) -> Travelled {
+    let mut findings = Vec::new();
+    for visit in visits {
+        let mut perturbed = Perturbed::new(law, &visit.step, road);
+        findings.push(match perturbed.value(0, 0.0) {
+            Ok(value) => check(&visit.name, &visit.response.tangent, &value, &mut |k, h| perturbed.value(k, h)),
+            Err(failed) => not_checked(&visit.name, failed),
+        });
+    }
+    Travelled { road, findings }
+}
+
+/// Adds what explains wrong tangents, and the mistakes that the states cannot show.
+fn diagnose_into(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled, report: &mut Report) {
+    let convention = law.convention();
+    let observations = observations(law, visits, travelled);
+    let hidden = invisible(&convention, &observations);
+    if !hidden.is_empty() {
+        report.notes.push(format!("These states cannot show: {}.", hidden.join("; ")));
+    }
+    if travelled.wrong() == 0 {
+        return;
+    }
+    match diagnose(&convention, &observations) {
+        Some(diagnosis) => report.diagnoses.push(diagnosis),
+        None => report.notes.push("No frequent mistake explains the wrong tangent.".to_string()),
+    }
+}
+
+/// The measured states; for some wrong ones also the tangents elsewhere.
+fn observations(law: &mut dyn Law, visits: &[Visit], travelled: &Travelled) -> Vec<Observation> {
+    let convention = law.convention();
+    let measured = |finding: &Finding| Measured { tangent: finding.measured.clone(), errors: finding.errors.clone() };
+    let wrong: Vec<usize> =
+        (0..visits.len()).filter(|index| travelled.findings[*index].verdict == Verdict::Wrong).collect();
+    let chosen: Vec<usize> = wrong.iter().step_by(wrong.len().div_ceil(DIAGNOSED).max(1)).copied().collect();
+    let rest = if chosen.is_empty() { None } else { at_rest(law, travelled.road) };
+    let mut observations = Vec::new();
+    for (index, (visit, finding)) in visits.iter().zip(&travelled.findings).enumerate() {
+        let judged = matches!(finding.verdict, Verdict::Wrong | Verdict::Consistent | Verdict::Inexact);
+        let Some(stress) =
+            cauchy_stress(&convention, &visit.response.stress, &visit.step.gradient).ok().filter(|_| judged)
+        else {
+            continue;
+        };
+        let [gradient_before, gradient] = [visit.step.gradient_before, visit.step.gradient];
+        let mut elsewhere = Vec::new();
+        if let Some(before) = visit.before {
+            elsewhere.push((Elsewhere::StepBefore, measured(&travelled.findings[before])));
+        }
+        elsewhere.extend(rest.clone().map(|rest| (Elsewhere::AtRest, rest)));
+        if chosen.contains(&index)
+            && let Some([elastic, continuum]) =
+                both_sides(law, &History::after(&visit.step, &visit.response), visit.step.length, travelled.road)
+        {
+            elsewhere.extend([(Elsewhere::Elastic, elastic), (Elsewhere::Continuum, continuum)]);
+        }
+        let at = Configuration { gradient_before, gradient, stress };
+        let claimed = finding.claimed.clone();
+        observations.push(Observation {
+            name: visit.name.clone(),
+            at,
+            claimed,
+            measured: measured(finding),
+            elsewhere,
+        });
+    }
+    observations
+}
+
+/// The tangent at rest.
+fn at_rest(law: &mut dyn Law, road: Road) -> Option<Measured> {
+    let history = History::at_rest(law);
+    both_sides(law, &history, 1.0, road).map(|[elastic, _]| elastic)
+}
+
+/// The one-sided derivatives of a step of no deformation and nearly no time: on the side where internal variables rest (elastic), and on
+/// the other (continuum). `None` if a call fails.
+fn both_sides(law: &mut dyn Law, history: &History, length: f64, road: Road) -> Option<[Measured; 2]> {
+    let step = history.step_to(&history.gradient, 1e-10 * length)?;
+    let convention = law.convention();
+    let [rows, columns] = [convention.stress.count(), convention.strain.count()];
+    let zeros = Measured { tangent: Matrix::zeros(rows, columns), errors: Matrix::zeros(rows, columns) };
+    let mut sides = [zeros.clone(), zeros];
+    for column in 0..columns {
+        let forward = rest_count(law, &step, road, column, 1e-5)?;
+        let backward = rest_count(law, &step, road, column, -1e-5)?;
+        let elastic = if forward >= backward { 1.0 } else { -1.0 };
+        for (side, sign) in sides.iter_mut().zip([elastic, -elastic]) {
+            let mut perturbed = Perturbed::new(law, &step, road);
+            let (derivative, errors) = one_sided(rows, sign, &mut |h| perturbed.value(column, h).ok())?;
+            for row in 0..rows {
+                side.tangent[(row, column)] = derivative[row];
+                side.errors[(row, column)] = errors[row];
+            }
+        }
+    }
+    Some(sides)
+}
+
+/// The number of internal variables that a perturbation leaves as they are.
+fn rest_count(law: &mut dyn Law, step: &Step, road: Road, column: usize, h: f64) -> Option<usize> {
+    let perturbed = Perturbed::new(law, step, road).step(column, h).ok()?;
+    let state = law.respond(&perturbed).ok()?.state;
+    Some(state.iter().zip(&step.state).filter(|(new, old)| new == old).count())
+}
+
+/// The one-sided derivative of a vector function at 0, by Richardson's extrapolation of (f(h) − f(0))/h with h halved
+/// (Ridders, 1982), and the error of each component.
+fn one_sided(rows: usize, sign: f64, f: &mut dyn FnMut(f64) -> Option<Vec<f64>>) -> Option<(Vec<f64>, Vec<f64>)> {
+    const LEVELS: usize = 10;
+    const ORDERS: usize = 6;
+    let origin = f(0.0)?;
+    let mut best = (vec![f64::NAN; rows], vec![f64::INFINITY; rows]);
+    let mut above: Vec<Vec<f64>> = Vec::new();
+    for level in 0..LEVELS {
+        let h = sign * 2e-3 * 0.5_f64.powi(level as i32);
+        let value = f(h)?;
+        let mut line = vec![(0..rows).map(|row| (value[row] - origin[row]) / h).collect::<Vec<f64>>()];
+        for order in 1..=level.min(ORDERS) {
+            let factor = 2.0_f64.powi(order as i32);
+            let extrapolated = |row: usize| (factor * line[order - 1][row] - above[order - 1][row]) / (factor - 1.0);
+            let next: Vec<f64> = (0..rows).map(extrapolated).collect();
+            for row in 0..rows {
+                let change = (next[row] - line[order - 1][row]).abs().max((next[row] - above[order - 1][row]).abs());
+                let noise = 2.0 * f64::EPSILON * origin[row].abs().max(value[row].abs()) / h.abs();
+                if change.max(noise) < best.1[row] {
+                    best.0[row] = next[row];
+                    best.1[row] = change.max(noise);
+                }
+            }
+            line.push(next);
+        }
+        above = line;
+    }
+    Some(best)
+}
