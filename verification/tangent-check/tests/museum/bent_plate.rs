@@ -1,8 +1,8 @@
 //! panels, pull request 8 (17 September 2026): the shear of a bent plate, twice.
 //!
 //! Source: <https://github.com/saullocastro/panels/pull/8>, "computed the nonlinear shear strain as `2·w,x·w,y` instead of `w,x·w,y`" and
-//! "Newton-Raphson converged only linearly". The source in August 2025 has the doubled product in the strains of `calc_fint` and `fkG_num`.
-//! The virtual strains were right. Hence the internal force had no energy, and the tangent was not its derivative.
+//! "Newton-Raphson converged only linearly". The doubled product stood in the strains of `calc_fint` and `fkG_num` from the first version
+//! of 16 June 2018 on. The virtual strains were right. Hence the internal force had no energy, and the tangent was not its derivative.
 //!
 //! Our residual: one point of von Kármán's plate. The unknowns are the linear membrane strains e_x, e_y, g and the slopes w,x and w,y:
 //!
@@ -12,6 +12,8 @@
 //! Before: 2 w,x w,y for w,x w,y in n alone. Bending is not modelled.
 
 use crate::algebra::Version;
+use crate::check::{all, assert_consistent, assert_wrong, vector_finding};
+use crate::witness;
 use tangent_check::matrix::Matrix;
 
 /// 𝔸 of an unbalanced laminate.
@@ -61,4 +63,24 @@ pub fn tangent(version: Version, u: Unknowns) -> Matrix {
         tangent[(row, column)] += n;
     }
     tangent
+}
+
+#[cfg(test)]
+const STATE: Unknowns = [0.01, 0.02, -0.03, 0.2, 0.3];
+
+#[test]
+fn before_the_columns_of_the_slopes_are_wrong() {
+    let claimed = tangent(Version::Before, STATE);
+    let finding = vector_finding(&claimed, &mut |k, h| force(Version::Before, STATE, k, h));
+    let slopes = all(5, 5).into_iter().filter(|&(_, column)| column >= 3).collect();
+    assert_wrong(&finding, &[(2, 3)], &slopes);
+    assert!((finding.deviation - 0.12).abs() < 1e-9, "{}", finding.deviation);
+}
+
+#[test]
+fn after_the_tangent_is_the_derivative_of_the_force() {
+    let claimed = tangent(Version::After, STATE);
+    assert_consistent(&vector_finding(&claimed, &mut |k, h| force(Version::After, STATE, k, h)));
+    let measured = witness::columns(5, 5, &mut |k, h| force(Version::After, STATE, k, h));
+    assert!(witness::worst(&claimed, &measured).0 < 1e-7);
 }

@@ -11,6 +11,7 @@
 //! In unloading, r is that of the greatest W so far. Before: ∂S/∂E = r ℂ₀ always. State: the greatest W, 1 − r.
 
 use crate::algebra::{RightCauchyGreen, Version, matrix, vector};
+use crate::check::{all, assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use crate::neo_hooke;
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
@@ -54,4 +55,16 @@ impl Law for Damage {
 /// r(W).
 fn reduction(energy: f64) -> f64 {
     1.0 / (1.0 + (SHARPNESS * (energy - HALF_ENERGY)).exp())
+}
+
+#[test]
+fn before_the_tangent_does_not_soften() {
+    let (report, finding) = assert_law_wrong(&mut Damage(Version::Before), &[(0, 0)], &all(6, 6));
+    assert!((0.015..0.016).contains(&finding.deviation), "{}", finding.deviation);
+    assert_diagnosed(&report, "the elastic one in place of the algorithmic one");
+}
+
+#[test]
+fn after_the_tangent_softens() {
+    assert_law_consistent(&mut Damage(Version::After));
 }

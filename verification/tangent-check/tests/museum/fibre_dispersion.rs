@@ -13,6 +13,7 @@
 //! The mixed term I ⊗ A stays without its stress. The library splits off the volume (C̄); our law does not, as the mistake is the same.
 
 use crate::algebra::{RightCauchyGreen, Version, delta, matrix, vector};
+use crate::check::{assert_law_consistent, assert_law_wrong, assert_not_named};
 use crate::neo_hooke;
 use tangent_check::convention::{Convention, Measure, Tensor};
 use tangent_check::law::{CallFailed, Law, Response, Step};
@@ -73,4 +74,19 @@ impl Law for DispersedFibres {
         });
         Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
     }
+}
+
+#[test]
+fn before_the_term_identity_by_fibre_has_no_stress() {
+    // I ⊗ A with a in the plane 1, 2
+    let entries = [0, 1, 2].into_iter().flat_map(|row| [0, 1, 3].map(|column| (row, column))).collect();
+    let (report, finding) =
+        assert_law_wrong(&mut DispersedFibres(Version::Before), &[(0, 0), (1, 0), (2, 0)], &entries);
+    assert!((0.08..0.09).contains(&finding.deviation), "{}", finding.deviation);
+    assert_not_named(&report);
+}
+
+#[test]
+fn after_stress_and_tangent_have_the_dispersion() {
+    assert_law_consistent(&mut DispersedFibres(Version::After));
 }

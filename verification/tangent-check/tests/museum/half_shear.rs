@@ -8,6 +8,7 @@
 //! Before: the entries of the three shears are halved.
 
 use crate::algebra::{Version, delta, matrix, square, vector};
+use crate::check::{assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::tensor::{IDENTITY, from_entries, sum, trace};
@@ -42,4 +43,18 @@ impl Law for LogarithmicVolume {
         });
         Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
     }
+}
+
+#[test]
+fn before_the_shears_have_half_their_stiffness() {
+    let entries = [(3, 3), (4, 4), (5, 5)].into_iter().collect();
+    let (report, _) = assert_law_wrong(&mut LogarithmicVolume(Version::Before), &[(3, 3), (4, 4), (5, 5)], &entries);
+    // An isotropic law has the entries of shear by shear alone, so that four mistakes are the same here.
+    assert_diagnosed(&report, "the entries of shear by shear multiplied by ½ (engineering shear)");
+    assert_eq!(report.diagnoses[0].candidates.len(), 4);
+}
+
+#[test]
+fn after_the_shears_have_their_stiffness() {
+    assert_law_consistent(&mut LogarithmicVolume(Version::After));
 }

@@ -11,6 +11,7 @@
 //! Before: 1 for Δ coth Δ, the secant (τᵢ − τⱼ)/(2GΔ). ℂ is then Hooke's tensor over J. The mistake is of second order in Δ.
 
 use crate::algebra::{Version, delta, matrix, vector};
+use crate::check::{all, assert_law_consistent, assert_law_wrong, assert_not_named};
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::tensor::{IDENTITY, determinant, eigenvalues, from_entries, product, transposed};
@@ -63,4 +64,16 @@ impl Law for Hencky {
 /// Δ coth Δ, by its series near 0.
 fn delta_coth(delta: f64) -> f64 {
     if delta.abs() < 1e-3 { 1.0 + delta * delta / 3.0 - delta.powi(4) / 45.0 } else { delta / delta.tanh() }
+}
+
+#[test]
+fn before_shears_between_the_axes_are_too_soft() {
+    let (report, finding) = assert_law_wrong(&mut Hencky(Version::Before), &[(4, 4)], &all(6, 6));
+    assert!((0.021..0.022).contains(&finding.deviation), "{}", finding.deviation);
+    assert_not_named(&report);
+}
+
+#[test]
+fn after_the_shears_turn_the_axes() {
+    assert_law_consistent(&mut Hencky(Version::After));
 }

@@ -13,6 +13,7 @@
 //! The term N ⊗ I has no counterpart I ⊗ N, because the flow is not associated. Before: the transposed matrix.
 
 use crate::algebra::{Version, delta, matrix, square, symmetric_tensor, vector};
+use crate::check::{all, assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
@@ -71,4 +72,17 @@ fn transposed(matrix: &Matrix) -> Matrix {
         }
     }
     transposed
+}
+
+#[test]
+fn before_rows_and_columns_are_transposed() {
+    // N ⊗ I − I ⊗ N
+    let entries = all(6, 6).into_iter().filter(|&(row, column)| row != column && row.min(column) < 3).collect();
+    let (report, _) = assert_law_wrong(&mut FrictionalUmat(Version::Before), &[(0, 1), (1, 0)], &entries);
+    assert_diagnosed(&report, "rows and columns transposed");
+}
+
+#[test]
+fn after_rows_are_rows() {
+    assert_law_consistent(&mut FrictionalUmat(Version::After));
 }

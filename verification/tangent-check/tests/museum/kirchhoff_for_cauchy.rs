@@ -10,6 +10,7 @@
 //! Before: J ℂ, not divided by J. The factor is invisible where the volume is kept.
 
 use crate::algebra::{Version, matrix, rotation_term, vector};
+use crate::check::{GRADIENT, all, assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use crate::neo_hooke;
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
@@ -39,4 +40,20 @@ impl Law for Rubber {
         });
         Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
     }
+}
+
+#[test]
+fn before_the_tangent_is_j_times_too_large() {
+    // A neo-Hookean tangent has no entry for a normal component and a shear that does not share its index.
+    let zero = [(0, 5), (1, 4), (2, 3)];
+    let entries = all(6, 6).into_iter().filter(|&(row, column)| !zero.contains(&(row.min(column), row.max(column))));
+    let entries = entries.collect();
+    let (report, finding) = assert_law_wrong(&mut Rubber(Version::Before), &[(0, 0)], &entries);
+    assert!((finding.deviation - (determinant(&GRADIENT) - 1.0)).abs() < 1e-9, "{}", finding.deviation);
+    assert_diagnosed(&report, "an additional factor J");
+}
+
+#[test]
+fn after_the_tangent_is_over_j() {
+    assert_law_consistent(&mut Rubber(Version::After));
 }

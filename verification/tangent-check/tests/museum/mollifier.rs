@@ -14,6 +14,8 @@
 //! Before, first mistake: ∂m/∂ε ∇ᵤm for ∂m/∂ε ∇ε. Second mistake: without ∇ᵤf ⊗ ∇ᵤm. Both stand in the rows of r and the columns of P and Q.
 //! In ipc-toolkit, ε has the factor 10⁻³ and r depends on both edges; there the matrix is the transpose of ours.
 
+use crate::check::{all, assert_consistent, assert_wrong, vector_finding};
+use crate::witness;
 use tangent_check::matrix::Matrix;
 
 const THRESHOLD: f64 = 0.5;
@@ -152,4 +154,28 @@ pub fn tangent(repairs: Repairs, shape: &Shape, displacement: &Shape) -> Matrix 
         }
     }
     tangent
+}
+
+#[cfg(test)]
+const SHAPE: Shape = [1.0, 0.1, 0.0, 1.1, 0.2, 0.1, 0.2, 0.3, 1.1];
+#[cfg(test)]
+const DISPLACEMENT: Shape = [0.1, 0.05, -0.1, 0.0, 0.1, 0.2, 0.1, 0.0, 0.05];
+
+#[test]
+fn before_the_rows_of_the_gap_are_wrong() {
+    let block = all(9, 9).into_iter().filter(|&(row, column)| row >= 6 && column < 6).collect();
+    for (factor, term, deviation) in [(false, false, 1.72), (true, false, 1.00), (false, true, 0.72)] {
+        let claimed = tangent(Repairs { factor, term }, &SHAPE, &DISPLACEMENT);
+        let finding = vector_finding(&claimed, &mut |k, h| force(&SHAPE, &DISPLACEMENT, k, h));
+        assert_wrong(&finding, &[(8, 2)], &block);
+        assert!((finding.deviation - deviation).abs() < 0.01, "{}", finding.deviation);
+    }
+}
+
+#[test]
+fn after_both_repairs_the_derivative_is_right() {
+    let claimed = tangent(Repairs { factor: true, term: true }, &SHAPE, &DISPLACEMENT);
+    assert_consistent(&vector_finding(&claimed, &mut |k, h| force(&SHAPE, &DISPLACEMENT, k, h)));
+    let measured = witness::columns(9, 9, &mut |k, h| force(&SHAPE, &DISPLACEMENT, k, h));
+    assert!(witness::worst(&claimed, &measured).0 < 1e-7);
 }

@@ -13,9 +13,11 @@
 //!
 //! ε = ε₁₁ c² + ε₂₂ s² + γ₁₂ c s, σ₁₁ = σ c², σ₂₂ = σ s², σ₁₂ = σ c s, tangent = σ'(ε) v ⊗ v with v = (c², s², c s).
 
+use crate::check::{assert_consistent, assert_wrong, vector_finding};
+use crate::witness;
 use tangent_check::matrix::Matrix;
 
-const STIFFNESS: f64 = 200.0;
+const STIFFNESS: f64 = 2.0;
 const STRENGTH: f64 = 1.0;
 
 /// The repairs, by their year.
@@ -59,4 +61,48 @@ pub fn tangent(year: Year, angle: f64, strain: Strain) -> Matrix {
         Year::Y2022 => [c4, c2s2, c3s, c2s2, s4, cs3, c3s, cs3, c2s2],
     };
     Matrix { rows: 3, columns: 3, entries: entries.map(|entry| modulus * entry).to_vec() }
+}
+
+#[cfg(test)]
+const OBLIQUE: f64 = 0.5;
+#[cfg(test)]
+const STATE: Strain = [0.1, 0.2, -0.1];
+
+#[cfg(test)]
+fn check(year: Year, angle: f64) -> tangent_check::finding::Finding {
+    vector_finding(&tangent(year, angle, STATE), &mut |k, h| stress(angle, STATE, k, h))
+}
+
+#[test]
+fn in_2013_and_2021_the_order_is_another() {
+    let entries = [(0, 1), (0, 2), (1, 0), (1, 1), (2, 0), (2, 2)].into_iter().collect();
+    for year in [Year::Y2013, Year::Y2021] {
+        let finding = check(year, OBLIQUE);
+        assert_wrong(&finding, &[(0, 1), (0, 2), (1, 0), (2, 0)], &entries);
+        assert!((0.24..0.25).contains(&finding.deviation), "{}", finding.deviation);
+    }
+}
+
+#[test]
+fn in_2016_four_entries_are_wrong() {
+    let entries = [(1, 0), (1, 2), (2, 0), (2, 2)].into_iter().collect();
+    let finding = check(Year::Y2016, OBLIQUE);
+    assert_eq!(crate::check::wrong_entries(&finding), entries);
+    assert_eq!(finding.verdict, tangent_check::finding::Verdict::Wrong);
+}
+
+#[test]
+fn at_45_degrees_the_order_does_not_show() {
+    let angle = std::f64::consts::FRAC_PI_4;
+    for year in [Year::Y2013, Year::Y2021, Year::Y2022] {
+        assert_consistent(&check(year, angle));
+    }
+    assert_wrong(&check(Year::Y2016, angle), &[(1, 2)], &[(1, 2)].into_iter().collect());
+}
+
+#[test]
+fn in_2022_the_tangent_is_right() {
+    assert_consistent(&check(Year::Y2022, OBLIQUE));
+    let measured = witness::columns(3, 3, &mut |k, h| stress(OBLIQUE, STATE, k, h));
+    assert!(witness::worst(&tangent(Year::Y2022, OBLIQUE, STATE), &measured).0 < 1e-7);
 }

@@ -10,6 +10,7 @@
 //! reads DDSDDE in Abaqus' order.
 
 use crate::algebra::{ORDER, Version, vector};
+use crate::check::{assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
 use tangent_check::matrix::Matrix;
@@ -64,4 +65,17 @@ fn modulus(row: usize, column: usize) -> f64 {
         _ if row == column => SHEARS[row - 3],
         _ => 0.0,
     }
+}
+
+#[test]
+fn before_two_shears_are_exchanged() {
+    let (report, finding) =
+        assert_law_wrong(&mut Orthotropic(Version::Before), &[(3, 3), (5, 5)], &[(3, 3), (5, 5)].into_iter().collect());
+    assert!((finding.deviation - 0.3).abs() < 1e-9, "{}", finding.deviation);
+    assert_diagnosed(&report, "the shear components 12 and 23 exchanged");
+}
+
+#[test]
+fn after_the_shears_are_in_order() {
+    assert_law_consistent(&mut Orthotropic(Version::After));
 }

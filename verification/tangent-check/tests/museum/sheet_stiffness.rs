@@ -14,6 +14,7 @@
 //! the active stress. With fibres in compression, the historical `g1` kept the value of the ground substance; ours is 0 there.
 
 use crate::algebra::{RightCauchyGreen, Version, matrix, vector};
+use crate::check::{assert_law_consistent, assert_law_wrong, assert_not_named};
 use crate::neo_hooke;
 use tangent_check::convention::{Convention, Measure, Tensor};
 use tangent_check::law::{CallFailed, Law, Response, Step};
@@ -81,4 +82,18 @@ impl Law for HeartMuscle {
         });
         Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
     }
+}
+
+#[test]
+fn before_the_sheets_are_as_stiff_as_the_fibres() {
+    // s ⊗ s ⊗ s ⊗ s with s in the plane 2, 3
+    let entries = [1, 2, 5].into_iter().flat_map(|row| [1, 2, 5].map(|column| (row, column))).collect();
+    let (report, finding) = assert_law_wrong(&mut HeartMuscle(Version::Before), &[(1, 1)], &entries);
+    assert!((0.35..0.36).contains(&finding.deviation), "{}", finding.deviation);
+    assert_not_named(&report);
+}
+
+#[test]
+fn after_each_family_has_its_own_stiffness() {
+    assert_law_consistent(&mut HeartMuscle(Version::After));
 }

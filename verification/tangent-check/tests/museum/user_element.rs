@@ -7,7 +7,8 @@
 //! Our law: the spatial tangent c (Truesdell rate) of a neo-Hookean solid, as the element asks for it. Before: DDSDDE, which is
 //! c + ½ (δᵢₖ σⱼₗ + σᵢₖ δⱼₗ + δᵢₗ σⱼₖ + σᵢₗ δⱼₖ). The element itself is not modelled.
 
-use crate::algebra::{Version, matrix, rotation_term, vector};
+use crate::algebra::{ORDER, Version, matrix, rotation_term, vector};
+use crate::check::{all, assert_diagnosed, assert_law_consistent, assert_law_wrong};
 use crate::neo_hooke;
 use tangent_check::convention::{Convention, Measure};
 use tangent_check::law::{CallFailed, Law, Response, Step};
@@ -37,4 +38,22 @@ impl Law for ElementLaw {
         });
         Ok(Response { stress: vector(&stress), tangent, state: Vec::new() })
     }
+}
+
+#[test]
+fn before_the_element_gets_the_jaumann_rate() {
+    // δᵢₖ σⱼₗ: components that share an index
+    let shares = |&(row, column): &(usize, usize)| {
+        let ((i, j), (k, l)) = (ORDER[row], ORDER[column]);
+        i == k || i == l || j == k || j == l
+    };
+    let entries = all(6, 6).into_iter().filter(shares).collect();
+    let (report, finding) = assert_law_wrong(&mut ElementLaw(Version::Before), &[(0, 0)], &entries);
+    assert!((0.6..0.7).contains(&finding.deviation), "{}", finding.deviation);
+    assert_diagnosed(&report, "another rate: the Jaumann rate of the Kirchhoff stress over J");
+}
+
+#[test]
+fn after_the_element_gets_the_spatial_tangent() {
+    assert_law_consistent(&mut ElementLaw(Version::After));
 }

@@ -26,8 +26,7 @@ pub fn worst(claimed: &Matrix, measured: &Matrix) -> (f64, usize, usize) {
     for row in 0..measured.rows {
         for column in 0..measured.columns {
             let deviation = (claimed[(row, column)] - measured[(row, column)]).abs() / measured.greatest();
-            // Not `>`: a NaN is the worst deviation.
-            if !(deviation <= worst.0) {
+            if deviation.is_nan() || deviation > worst.0 {
                 worst = (deviation, row, column);
             }
         }
