@@ -2,13 +2,12 @@
 
 use super::{Failure, print};
 use bfree::material::TangentOf;
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use serde::Deserialize;
 use std::path::{Path as FilePath, PathBuf};
 use std::time::Duration;
 use tangent_check::convention::Tensor;
 use tangent_check::finding::Report;
-use tangent_check::judge::check_columns;
 use tangent_check::law::CallFailed;
 use tangent_check::library::child::{Child, Host};
 use tangent_check::library::{Description, Kind, LibraryLaw, umat};
@@ -20,18 +19,18 @@ use tangent_check::states::{Path, for_law};
 #[derive(Args)]
 #[command(after_help = "The library runs in a child process: a crash, an endless loop or a STOP is a finding.\n\
                         Exit codes: 0 consistent or inexact, 1 wrong, 2 the law cannot be called, 3 not checked.")]
-#[group(id = "kind", required = true, multiple = false, args = ["umat", "mfront", "c"])]
+#[command(group(ArgGroup::new("kind").required(true)))]
 pub struct CheckLaw {
     /// The shared library: libmine.so. This command runs its code.
     library: PathBuf,
     /// The law is a UMAT of Abaqus/Standard.
-    #[arg(long)]
+    #[arg(long, group = "kind")]
     umat: bool,
     /// The law is this behaviour of MFront, built with the interface `generic`.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", group = "kind")]
     mfront: Option<String>,
     /// The law is this law with the C header bfree_law.h.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", group = "kind")]
     c: Option<String>,
     /// The properties (PROPS), in the order of the law.
     #[arg(long, value_name = "X,X,…", value_delimiter = ',', allow_negative_numbers = true)]
@@ -152,10 +151,7 @@ impl CheckLaw {
             Some(file) => own_paths(file)?,
             None => for_law(&mut law, self.seed).map_err(refused)?,
         };
-        let mut check = |name: &str, claimed: &_, value: &[f64], f: &mut dyn FnMut(usize, f64) -> _| {
-            check_columns(name, claimed, value, f)
-        };
-        let report = check_law(&mut law, &paths, self.seed, &mut check);
+        let report = check_law(&mut law, &paths, self.seed);
         self.write(&report)?;
         match report.exit_code(self.strict) {
             0 => Ok(()),
@@ -190,7 +186,7 @@ impl CheckLaw {
     }
 
     fn write(&self, report: &Report) -> Result<(), Failure> {
-        let options = Options { file: self.source.as_deref(), strict: self.strict };
+        let options = Options { file: self.source.clone(), strict: self.strict };
         let terminal = [Wanted { format: Format::Terminal, file: None }];
         let all = if self.report.is_empty() { &terminal[..] } else { &self.report };
         for Wanted { format, file } in all {

@@ -24,7 +24,7 @@ const ERRORS: f64 = 10.0;
 /// The report over all states that the checker makes itself.
 pub fn report(law: &mut dyn Law) -> Report {
     let paths = for_law(law, SEED).expect("paths");
-    check_law(law, &paths, SEED, &mut |name, claimed, value, f| check_columns(name, claimed, value, f))
+    check_law(law, &paths, SEED)
 }
 
 /// The check in one general state from rest.
