@@ -1,5 +1,6 @@
 //! Progress of a run on standard error: a bar on a terminal, a line now and then elsewhere, or lines of JSON for a program.
 
+use super::history::Cost;
 use super::report::Number;
 use super::warnings::Warning;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -46,19 +47,6 @@ impl Pace {
     }
 }
 
-/// Numbers shown besides the time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Shown {
-    /// Steps taken.
-    pub step: u64,
-    /// Newton iterations of the last step.
-    pub newton: usize,
-    /// Krylov iterations of the last step.
-    pub krylov: usize,
-    /// Energy balance so far, gained (> 0) or lost; `None` without inertia.
-    pub balance: Option<f64>,
-}
-
 /// The reader of the progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Audience {
@@ -71,25 +59,15 @@ pub enum Audience {
     Program,
 }
 
-/// Form of the progress.
-#[derive(Debug)]
-enum Display {
-    Bar(ProgressBar),
-    Lines {
-        last: Instant,
-    },
-    Json {
-        last: Option<Instant>,
-        /// A line held back because it came too soon.
-        held: Option<String>,
-    },
-    Silent,
-}
-
 /// Shows the progress of a run.
 #[derive(Debug)]
 pub(crate) struct Progress {
-    display: Display,
+    audience: Audience,
+    /// The bar, for a person at a terminal.
+    bar: Option<ProgressBar>,
+    /// The last line for a log or a program, and a line for a program that came too soon after it.
+    last: Option<Instant>,
+    held: Option<String>,
     pace: Pace,
     since: Instant,
     start: f64,
@@ -101,65 +79,63 @@ fn line(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
+/// The progress bar of a person at a terminal.
+fn bar() -> ProgressBar {
+    let bar = ProgressBar::new(BAR_LENGTH as u64);
+    // If indicatif refuses the constant template, its own style is shown.
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
 impl Progress {
     /// Starts now, at simulated time `start`, towards `end`.
     pub fn new(start: f64, end: f64, audience: Audience) -> Self {
-        let now = Instant::now();
-        let display = match audience {
-            Audience::Nobody => Display::Silent,
-            Audience::Program => Display::Json { last: None, held: None },
-            Audience::Person if std::io::stderr().is_terminal() => {
-                let bar = ProgressBar::new(BAR_LENGTH as u64);
-                // If indicatif refuses the constant template, its own style is shown.
-                if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3}%  {elapsed_precise}  {msg}") {
-                    bar.set_style(style);
-                }
-                Display::Bar(bar)
-            }
-            Audience::Person => Display::Lines { last: now },
-        };
+        let since = Instant::now();
+        let bar = (audience == Audience::Person && std::io::stderr().is_terminal()).then(bar);
+        // A program is told of the first step, a log only after a while.
+        let last = (audience == Audience::Person).then_some(since);
         let mut pace = Pace::default();
         pace.mark(0.0, start);
-        Self { display, pace, since: now, start, end }
+        Self { audience, bar, last, held: None, pace, since, start, end }
     }
 
-    /// Shows that `time` is reached.
-    pub fn show(&mut self, time: f64, shown: Shown) {
-        if matches!(self.display, Display::Silent) {
-            return;
-        }
-        let Shown { step, newton, krylov, balance } = shown;
-        let elapsed = self.since.elapsed().as_secs_f64();
+    /// Shows that `time` is reached, with the energy `balance` so far, gained (> 0) or lost; `None` without inertia.
+    pub fn show(&mut self, time: f64, step: u64, cost: &Cost, balance: Option<f64>) {
+        let Cost { newton, krylov, .. } = *cost;
+        let (elapsed, end) = (self.since.elapsed().as_secs_f64(), self.end);
         self.pace.mark(elapsed, time);
-        let (left, end) = (self.pace.left(self.end), self.end);
+        let left = self.pace.left(end);
         let text = || {
             let left = left.map_or_else(|| "unknown".to_owned(), readable);
             let balance = balance.map_or_else(String::new, |balance| format!("balance {balance:+.1e}, "));
             format!("t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, {balance}{left} left")
         };
-        match &mut self.display {
-            Display::Bar(bar) => {
-                bar.set_position((BAR_LENGTH * (time - self.start) / (self.end - self.start)) as u64);
+        let is_due = |interval| self.last.is_none_or(|last| last.elapsed() >= interval);
+        match (self.audience, &self.bar) {
+            (Audience::Person, Some(bar)) => {
+                bar.set_position((BAR_LENGTH * (time - self.start) / (end - self.start)) as u64);
                 bar.set_message(text());
             }
-            Display::Lines { last } if last.elapsed() >= LINE_INTERVAL => {
+            (Audience::Person, None) if is_due(LINE_INTERVAL) => {
                 line(&text());
-                *last = Instant::now();
+                self.last = Some(Instant::now());
             }
-            Display::Json { last, held } => {
+            (Audience::Program, _) => {
                 let text = json!({
                     "event": "step", "step": step, "time": Number(time), "end": Number(end), "newton": newton, "krylov": krylov,
                     "balance": balance.map(Number), "seconds": elapsed, "seconds_left": left,
                 })
                 .to_string();
-                if last.is_none_or(|last| last.elapsed() >= JSON_INTERVAL) {
+                if is_due(JSON_INTERVAL) {
                     line(&text);
-                    (*last, *held) = (Some(Instant::now()), None);
+                    (self.last, self.held) = (Some(Instant::now()), None);
                 } else {
-                    *held = Some(text);
+                    self.held = Some(text);
                 }
             }
-            Display::Lines { .. } | Display::Silent => {}
+            _ => {}
         }
     }
 
@@ -167,25 +143,24 @@ impl Progress {
     pub(crate) fn warn(&self, warning: &Warning) {
         let Warning { kind, time, step, message } = warning;
         let text = format!("warning: t = {time}, step {step}: {message}");
-        match &self.display {
-            Display::Bar(bar) => bar.suspend(|| line(&text)),
-            Display::Json { .. } => {
-                let (kind, time) = (json!(kind), Number(*time));
-                line(
-                    &json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message})
-                        .to_string(),
-                );
+        match (self.audience, &self.bar) {
+            (Audience::Program, _) => {
+                let time = Number(*time);
+                let text = json!({"event": "warning", "kind": kind, "time": time, "step": step, "message": message});
+                line(&text.to_string());
             }
-            Display::Lines { .. } | Display::Silent => line(&text),
+            (_, Some(bar)) => bar.suspend(|| line(&text)),
+            _ => line(&text),
         }
     }
 
     /// Removes the bar, or shows the line that was held back.
     pub fn finish(self) {
-        match self.display {
-            Display::Bar(bar) => bar.finish_and_clear(),
-            Display::Json { held: Some(text), .. } => line(&text),
-            _ => {}
+        if let Some(bar) = self.bar {
+            bar.finish_and_clear();
+        }
+        if let Some(text) = self.held {
+            line(&text);
         }
     }
 }

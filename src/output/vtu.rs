@@ -9,22 +9,13 @@ use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
 use std::fmt::Write as _;
 use std::io::{Read, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Bytes of an uncompressed block.
 const BLOCK: usize = 1 << 16;
 
 /// VTK's type of a cell that is one point.
 const VERTEX: u8 = 1;
-
-/// The numbers of an array.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// `Float64`
-    Float(Vec<f64>),
-    /// `UInt32`
-    Index(Vec<u32>),
-}
 
 /// An array with one tuple for each point.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +25,9 @@ pub struct Array {
     /// Names of the components; one empty name for a scalar.
     pub components: Vec<String>,
     /// All components of the first point, then of the next.
-    pub values: Values,
+    pub values: Vec<f64>,
+    /// Whether all values are whole numbers, which the file holds as `UInt32` instead of `Float64`.
+    pub is_index: bool,
 }
 
 /// The background grid of a snapshot, kept as field data so that a picture can show the grid.
@@ -62,9 +55,9 @@ impl Background {
 /// Points with arrays, at one time.
 ///
 /// ```
-/// use bfree::output::vtu::{Array, Background, Snapshot, Values};
+/// use bfree::output::vtu::{Array, Background, Snapshot};
 ///
-/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: Values::Float(vec![0.1 + 0.2, -0.0]) };
+/// let speed = Array { name: "speed".into(), components: vec!["".into()], values: vec![0.1 + 0.2, -0.0], is_index: false };
 /// let snapshot = Snapshot {
 ///     time: 1.0 / 3.0,
 ///     background: Background { dimension: 1, origin: [0.0; 3], spacing: 0.5, cells: [4, 0, 0] },
@@ -87,27 +80,6 @@ pub struct Snapshot {
     pub points: Vec<[f64; 3]>,
     /// Arrays of the points.
     pub arrays: Vec<Array>,
-}
-
-/// A file cannot be read as a snapshot of bfree.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// The operating system refused.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Reason given by the operating system.
-        source: std::io::Error,
-    },
-    /// The content does not have the format of [`Snapshot::write`].
-    #[error("{} is not a snapshot written by bfree: {what}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Description of the missing or wrong part.
-        what: String,
-    },
 }
 
 /// The appended data, to which the XML refers by offsets.
@@ -148,13 +120,6 @@ fn compressed(block: &[u8]) -> Vec<u8> {
     out
 }
 
-fn bytes_of(values: &Values) -> (&'static str, Vec<u8>) {
-    match values {
-        Values::Float(values) => ("Float64", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Values::Index(values) => ("UInt32", values.iter().flat_map(|x| x.to_le_bytes()).collect()),
-    }
-}
-
 /// An array of field data, as text.
 fn field_data(xml: &mut String, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
     let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
@@ -186,8 +151,14 @@ impl Snapshot {
         let _ =
             writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
         for array in &self.arrays {
-            let (vtk_type, bytes) = bytes_of(&array.values);
-            data.array(&mut xml, vtk_type, &array.name, &array.components, &bytes);
+            let Array { name, components, values, is_index } = array;
+            if *is_index {
+                let bytes: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
+                data.array(&mut xml, "UInt32", name, components, &bytes);
+            } else {
+                let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+                data.array(&mut xml, "Float64", name, components, &bytes);
+            }
         }
         xml.push_str("</PointData>\n<Points>\n");
         let points: Vec<u8> = self.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
@@ -210,9 +181,10 @@ impl Snapshot {
     ///
     /// # Errors
     /// The operating system refuses, or the file is not a snapshot, or is damaged.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let content = std::fs::read(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
-        Self::parse(&content).map_err(|what| ReadError::Format { path: path.to_owned(), what })
+    pub fn read(path: &Path) -> Result<Self, OutputError> {
+        let content = std::fs::read(path).map_err(OutputError::io("read", path))?;
+        Self::parse(&content)
+            .map_err(|what| OutputError::content(path, format!("is not a snapshot written by bfree: {what}")))
     }
 
     fn parse(content: &[u8]) -> Result<Self, String> {
@@ -239,19 +211,13 @@ impl Snapshot {
             .split_once("<Piece")
             .and_then(|(_, piece)| attribute(piece.split('>').next()?, "NumberOfPoints")?.parse::<usize>().ok())
             .ok_or("no number of points")?;
-        let mut points = None;
-        let mut arrays = Vec::new();
-        for (tag, _) in elements(xml).filter(|(tag, _)| attribute(tag, "format") == Some("appended")) {
-            let array = read_array(tag, data, count)?;
-            match array {
-                Some(Array { name, values: Values::Float(values), .. }) if name == "Points" => {
-                    points = Some(values.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect());
-                }
-                Some(array) => arrays.push(array),
-                None => {}
-            }
-        }
-        Ok(Self { time, background, points: points.ok_or("no points")?, arrays })
+        // The arrays of the cells have other types and hold no information.
+        let holds_numbers = |tag: &str| matches!(attribute(tag, "type"), Some("Float64" | "UInt32"));
+        let appended = |tag: &str| attribute(tag, "format") == Some("appended") && holds_numbers(tag);
+        let tags = elements(xml).map(|(tag, _)| tag).filter(|tag| appended(tag));
+        let mut arrays = tags.map(|tag| read_array(tag, data, count)).collect::<Result<Vec<_>, _>>()?;
+        let points = arrays.pop_if(|array| array.name == "Points").ok_or("no points")?;
+        Ok(Self { time, background, points: points.values.as_chunks().0.to_vec(), arrays })
     }
 }
 
@@ -274,29 +240,25 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     None
 }
 
-/// An appended array of floats or indices; `None` for the cells, which hold no information.
-fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Option<Array>, String> {
+/// An appended array of floats or indices.
+fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Array, String> {
     let get = |name: &str| attribute(tag, name).ok_or(format!("an array without {name}"));
-    let (name, vtk_type) = (get("Name")?, get("type")?);
-    if !matches!(vtk_type, "Float64" | "UInt32") {
-        return Ok(None);
-    }
+    let name = get("Name")?;
     let number = |text: &str| text.parse::<usize>().map_err(|_| format!("{name}: {text:?} is no number"));
-    let (width, offset) = (number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?, number(get("offset")?)?);
+    let width = number(attribute(tag, "NumberOfComponents").unwrap_or("1"))?;
+    let offset = number(get("offset")?)?;
     let bytes = data.get(offset..).and_then(inflated).ok_or(format!("{name}: damaged data"))?;
-    let values = match vtk_type {
-        "Float64" => Values::Float(bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()),
-        _ => Values::Index(bytes.as_chunks().0.iter().map(|&x| u32::from_le_bytes(x)).collect()),
+    let is_index = get("type")? == "UInt32";
+    let values: Vec<f64> = if is_index {
+        bytes.as_chunks().0.iter().map(|&x| f64::from(u32::from_le_bytes(x))).collect()
+    } else {
+        bytes.as_chunks().0.iter().map(|&x| f64::from_le_bytes(x)).collect()
     };
-    let found = match &values {
-        Values::Float(values) => values.len(),
-        Values::Index(values) => values.len(),
-    };
-    if Some(found) != count.checked_mul(width) {
-        return Err(format!("{name}: {found} numbers for {count} points of {width} components"));
+    if Some(values.len()) != count.checked_mul(width) {
+        return Err(format!("{name}: {} numbers for {count} points of {width} components", values.len()));
     }
     let component = |k| attribute(tag, &format!("ComponentName{k}")).unwrap_or_default().to_owned();
-    Ok(Some(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values }))
+    Ok(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values, is_index })
 }
 
 /// Decompresses the data of [`Appended::push`].
@@ -327,15 +289,16 @@ mod tests {
             name: name.to_owned(),
             components: components.iter().map(|&c| c.to_owned()).collect(),
             values,
+            is_index: name == "body",
         };
         Snapshot {
             time: 0.1 + 0.2,
             background: Background { dimension: 2, origin: [-0.5, 1e-9, 0.0], spacing: 0.1, cells: [20, 15, 0] },
             points: (0..count).map(|k| [x(k), x(k + 1), 0.0]).collect(),
             arrays: vec![
-                array("velocity", &["x", "y", "z"], Values::Float((0..3 * count).map(x).collect())),
-                array("jacobian", &[""], Values::Float((0..count).map(x).collect())),
-                array("body", &[""], Values::Index((0..count as u32).collect())),
+                array("velocity", &["x", "y", "z"], (0..3 * count).map(x).collect()),
+                array("jacobian", &[""], (0..count).map(x).collect()),
+                array("body", &[""], (0..count).map(|k| k as f64).collect()),
             ],
         }
     }
