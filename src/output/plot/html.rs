@@ -9,33 +9,10 @@ use serde_json::Value;
 const PLAYER: &str = include_str!("player.js");
 
 /// Controls of the player.
-const CONTROLS: &str = "<noscript>particles.png shows the last snapshot; the player needs JavaScript.</noscript>
-<div id=\"player\"><div class=\"stage\"><canvas id=\"scene\"></canvas><canvas id=\"above\"></canvas></div>
-<p><button id=\"play\">▶</button><input id=\"frame\" type=\"range\" min=\"0\" value=\"0\" aria-label=\"snapshot\"><output id=\"time\"></output></p>
-<p><label>colour <select id=\"field\"></select></label>
-<label><input id=\"now\" type=\"checkbox\"> range of this time</label>
-<label><input id=\"outline\" type=\"checkbox\" checked> undeformed outline</label>
-<label>deformation × <input id=\"deformation\" type=\"number\" value=\"1\" step=\"any\"></label>
-<button id=\"home\">whole view</button></p></div>";
+const CONTROLS: &str = include_str!("player.html");
 
-const STYLE: &str = "
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; background: #fff; max-width: 960px; margin: 2em auto; padding: 0 1em }
-h1 { font-size: 1.5em; margin-bottom: .2em } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ddd }
-.lead { color: #555; margin-top: 0 }
-.outcome { padding: .6em .9em; border-radius: 6px; background: #e8f4ee }
-.outcome.failed, .warnings li { background: #fbeee6 } .outcome.interrupted, .outcome.killed { background: #fdf6dd }
-.warnings { padding: 0; list-style: none } .warnings li { padding: .4em .9em; margin: .3em 0; border-radius: 6px }
-.tables { display: flex; flex-wrap: wrap; gap: 0 3em; align-items: flex-start }
-table { border-collapse: collapse; margin: .5em 0 } caption { text-align: left; font-weight: 600; padding: .3em 0 }
-td { padding: .15em 1.2em .15em 0; border-bottom: 1px solid #eee } td.number { text-align: right; font-variant-numeric: tabular-nums }
-.bar { display: inline-block; height: .7em; background: #0072b2; vertical-align: baseline }
-figure { margin: 1em 0 } svg { max-width: 100%; height: auto }
-.stage { position: relative; height: 560px } .stage canvas { position: absolute; width: 100%; height: 100% }
-#above { touch-action: none; cursor: grab } #above:active { cursor: grabbing }
-#player p { display: flex; flex-wrap: wrap; gap: .5em 1.2em; align-items: center; margin: .4em 0 } #frame { flex: 1; min-width: 12em }
-#play { width: 3em } #time { min-width: 15em; font-variant-numeric: tabular-nums } #deformation { width: 6em }
-details td { vertical-align: top; font-size: 13px } .note { color: #555 }
-";
+/// Style of the page.
+const STYLE: &str = include_str!("page.css");
 
 /// The page of a run: its report, the player of its snapshots, and its pictures (name and SVG). The report is null for a run that goes on
 /// or was killed.
