@@ -10,7 +10,7 @@ use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
 use super::report::{self, Counts, Outcome, Seconds};
 use super::snapshots::Snapshots;
-use super::warnings::{Watch, Watched};
+use super::warnings::Watched;
 use super::{OutputError, Reference, Summary, reactions};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
@@ -65,10 +65,9 @@ pub struct Recorder<const D: usize> {
     snapshots: Option<Snapshots>,
     newton: Stream,
     progress: Progress,
-    watch: Watch,
-    counts: Counts,
-    /// Seconds of all steps. The total counts the time before `since`.
-    seconds: Seconds,
+    /// The warnings, counts and seconds so far; the total of the seconds counts the time before `since`. Ends of files are those of the last
+    /// mark.
+    so_far: Mark,
     since: Instant,
     /// Whether a run may resume from a mark.
     marked: bool,
@@ -118,8 +117,12 @@ impl<const D: usize> Recorder<D> {
         let OutputSettings { directory, fields, snapshot_every, probes, end_time, audience } = settings;
         std::fs::create_dir_all(&directory).map_err(OutputError::io("create", &directory))?;
         remove_later_files(&directory, mark)?;
+        let so_far = mark.cloned().unwrap_or_else(|| {
+            let particles = simulation.particles.solid_places().len();
+            Mark { counts: Counts { particles, ..Counts::default() }, ..Mark::default() }
+        });
         // A file that is not in the mark is created anew.
-        let kept = |name: &str| mark.and_then(|mark| mark.files.get(name).copied());
+        let kept = |name: &str| so_far.files.get(name).copied();
         let table = |name: &str, row: &Row| Table::open(directory.join(name), row, kept(name));
         let energies = Energies::of(simulation, &reference);
         let history = table("history.csv", &history::row(simulation, &energies, Cost::default()))?;
@@ -131,10 +134,9 @@ impl<const D: usize> Recorder<D> {
         let probed = (!probes.is_empty())
             .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
             .transpose()?;
-        let written = mark.and_then(|mark| mark.snapshots).unwrap_or_default();
+        let written = so_far.snapshots.unwrap_or_default();
         let snapshots =
             snapshot_every.map(|every| Snapshots::new(directory.clone(), &fields, every, written)).transpose()?;
-        let begun = Counts { particles: simulation.particles.solid_places().len(), ..Counts::default() };
         Ok(Self {
             history,
             reactions,
@@ -143,9 +145,7 @@ impl<const D: usize> Recorder<D> {
             snapshots,
             newton: Stream::open(directory.join("newton.jsonl"), kept("newton.jsonl"))?,
             progress: Progress::new(simulation.clock.time(), end_time, audience),
-            watch: mark.map_or_else(Watch::default, |mark| mark.watch.clone()),
-            counts: mark.map_or(begun, |mark| mark.counts),
-            seconds: mark.map_or_else(Seconds::default, |mark| mark.seconds),
+            so_far,
             since: Instant::now(),
             marked: mark.is_some(),
             reference,
@@ -162,20 +162,19 @@ impl<const D: usize> Recorder<D> {
     /// The operating system refuses.
     pub fn mark(&mut self) -> Result<Mark, OutputError> {
         self.marked = true;
-        let files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
-        let snapshots = self.snapshots.as_ref().map(|snapshots| snapshots.mark);
-        let (watch, counts, seconds) = (self.watch.clone(), self.counts, self.seconds_so_far());
-        Ok(Mark { files, snapshots, watch, counts, seconds })
+        self.so_far.files = self.streams().map(Stream::mark).collect::<Result<_, _>>()?;
+        self.so_far.snapshots = self.snapshots.as_ref().map(|snapshots| snapshots.mark);
+        Ok(Mark { seconds: self.seconds_so_far(), ..self.so_far.clone() })
     }
 
     /// Adds the seconds in which the simulation was built, before the recorder started.
     pub fn count_set_up(&mut self, seconds: f64) {
-        self.seconds.set_up += seconds;
-        self.seconds.total += seconds;
+        self.so_far.seconds.set_up += seconds;
+        self.so_far.seconds.total += seconds;
     }
 
     fn seconds_so_far(&self) -> Seconds {
-        Seconds { total: self.seconds.total + self.since.elapsed().as_secs_f64(), ..self.seconds }
+        Seconds { total: self.so_far.seconds.total + self.since.elapsed().as_secs_f64(), ..self.so_far.seconds }
     }
 
     /// Records a successful step.
@@ -189,8 +188,8 @@ impl<const D: usize> Recorder<D> {
     ) -> Result<(), OutputError> {
         let (time, number) = (simulation.clock.time(), simulation.clock.steps());
         let settings = &simulation.settings;
-        self.counts.add(step);
-        self.seconds.add(step);
+        self.so_far.counts.add(step);
+        self.so_far.seconds.add(step);
         let line = report::newton_line(time, step).map_err(std::io::Error::from);
         self.newton.line(&line.map_err(OutputError::io("write", self.newton.path()))?)?;
         if let Some(reactions) = &mut self.reactions {
@@ -213,14 +212,14 @@ impl<const D: usize> Recorder<D> {
             limited: attempts().map(|one| one.counts.krylov_limited).sum(),
             stagnated: attempts().map(|one| one.counts.krylov_stagnated).sum(),
         };
-        let known = self.watch.warnings.len();
-        self.watch.see(&seen);
+        let known = self.so_far.watch.warnings.len();
+        self.so_far.watch.see(&seen);
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
-        self.watch.see_contact(&seen, &step.sharing, &names);
+        self.so_far.watch.see_contact(&seen, &step.sharing, &names);
         if settings.scheme.follows_path() {
-            self.watch.see_path(&seen, simulation, &self.reference, step.straight);
+            self.so_far.watch.see_path(&seen, simulation, &self.reference, step.straight);
         }
-        self.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
+        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
         Ok(())
     }
@@ -237,16 +236,16 @@ impl<const D: usize> Recorder<D> {
         outcome: Outcome<'_>,
     ) -> Result<Summary, OutputError> {
         if let Outcome::Failed(error) = outcome {
-            self.counts.add_failed(&error.failed);
-            self.seconds.add_failed(&error.failed);
+            self.so_far.counts.add_failed(&error.failed);
+            self.so_far.seconds.add_failed(&error.failed);
         }
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.write(simulation, &self.reference)?;
         }
         self.flush()?;
-        let (time, known) = (simulation.clock.time(), self.watch.warnings.len());
-        self.watch.end(time, self.counts.steps);
-        self.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
+        let (time, known) = (simulation.clock.time(), self.so_far.watch.warnings.len());
+        self.so_far.watch.end(time, self.so_far.counts.steps);
+        self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         let particles = &simulation.particles;
         let summary = Summary {
             time,
@@ -257,9 +256,9 @@ impl<const D: usize> Recorder<D> {
             momentum_scale: particles.mass.iter().zip(&particles.velocity).fold(0.0, |sum, (m, v)| sum + m * v.norm()),
             krylov: simulation.krylov().0,
             seconds: self.seconds_so_far(),
-            contact: self.watch.contacts,
-            warnings: self.watch.warnings,
-            counts: self.counts,
+            contact: self.so_far.watch.contacts,
+            warnings: self.so_far.watch.warnings,
+            counts: self.so_far.counts,
         };
         self.progress.finish();
         let log = self.newton.path();
