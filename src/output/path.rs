@@ -18,14 +18,14 @@ const RETURN_DISTANCE: f64 = 0.2;
 /// A point of the path: the load, and moments of the displacement that distinguish states.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Point {
+pub(crate) struct Point {
     load: f64,
     /// Σ V₀ u and Σ V₀ u ⊗ (X − X̄)/L, in one list (length times volume).
     moments: Vec<f64>,
 }
 
 impl Point {
-    fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
+    pub(crate) fn of<const D: usize, L, A>(simulation: &Simulation<D, L, A>, reference: &Reference<D>) -> Self {
         let particles = &simulation.particles;
         let first = |p: usize| &reference.position[particles.id[p] as usize];
         let volume: f64 = particles.volume.iter().sum();
@@ -73,17 +73,8 @@ pub(crate) enum Event {
 }
 
 impl Followed {
-    /// Adds a step. `straight` is the cosine of the angle between the displacements of this step and the previous step.
-    pub fn see<const D: usize, L, A>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-        straight: Option<f64>,
-    ) -> Vec<Event> {
-        self.add(Point::of(simulation, reference), straight)
-    }
-
-    fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
+    /// Adds a step to `point`. `straight` is the cosine of the angle between the displacements of this step and the previous step.
+    pub(crate) fn add(&mut self, point: Point, straight: Option<f64>) -> Vec<Event> {
         let mut events = Vec::new();
         if let Some(cosine) = straight.filter(|&cosine| cosine < SHARP_BEND_COSINE) {
             events.push(Event::Bent(cosine.clamp(-1.0, 1.0).acos().to_degrees()));

@@ -6,6 +6,7 @@ use super::files::Stream;
 use super::history::{self, Cost, Energies};
 use super::losses::Cause;
 use super::mark::Mark;
+use super::path::Point;
 use super::probes::{self, Probe};
 use super::progress::{Audience, Progress};
 use super::report::{self, Counts, Outcome, Seconds};
@@ -217,7 +218,7 @@ impl<const D: usize> Recorder<D> {
         let names: Vec<&str> = simulation.bodies.iter().map(|body| body.name.as_str()).collect();
         self.so_far.watch.see_contact(&seen, &step.sharing, &names);
         if settings.scheme.follows_path() {
-            self.so_far.watch.see_path(&seen, simulation, &self.reference, step.straight);
+            self.so_far.watch.see_path(&seen, Point::of(simulation, &self.reference), step.straight);
         }
         self.so_far.watch.warnings[known..].iter().for_each(|warning| self.progress.warn(warning));
         self.progress.show(time, number, &cost, settings.scheme.has_inertia().then_some(energies.balance));
@@ -279,8 +280,10 @@ impl<const D: usize> Recorder<D> {
         if let Some(table) = &mut self.probed {
             table.write(&probes::row(&self.probes, simulation, &self.reference)?)?;
         }
-        if let Some(snapshots) = &mut self.snapshots {
-            snapshots.write_if_due(simulation, &self.reference)?;
+        if let Some(snapshots) = &mut self.snapshots
+            && snapshots.is_due(&simulation.clock)
+        {
+            snapshots.write(simulation, &self.reference)?;
         }
         Ok(energies)
     }

@@ -86,18 +86,14 @@ impl Snapshots {
         Ok(Self { fields: unique.map(|(_, &field)| field).collect(), directory, entries, every, mark })
     }
 
-    /// Writes the present state if the time has reached a multiple of `every` since the last snapshot, or if there is none yet.
-    pub(crate) fn write_if_due<const D: usize, L: Law, A>(
-        &mut self,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-    ) -> Result<(), OutputError> {
-        let passed = multiples(&simulation.clock, self.every);
-        if self.mark.passed.is_none_or(|before| passed > before) {
+    /// Whether the time has reached a multiple of `every` since the last call that was due, or there was no such call.
+    pub(crate) fn is_due(&mut self, clock: &Clock) -> bool {
+        let passed = multiples(clock, self.every);
+        let is_due = self.mark.passed.is_none_or(|before| passed > before);
+        if is_due {
             self.mark.passed = Some(passed);
-            self.write(simulation, reference)?;
         }
-        Ok(())
+        is_due
     }
 
     /// Writes the present state, unless it is already written.

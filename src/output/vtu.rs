@@ -7,8 +7,7 @@ use super::OutputError;
 use super::files::write_atomically;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
-use std::fmt::Write as _;
-use std::io::{Read, Write as _};
+use std::io::{Read, Write};
 use std::path::Path;
 
 /// Bytes of an uncompressed block.
@@ -82,34 +81,40 @@ pub struct Snapshot {
     pub arrays: Vec<Array>,
 }
 
-/// The appended data, to which the XML refers by offsets.
+/// A file under construction: the XML, and the appended data to which it refers by offsets.
 #[derive(Default)]
-struct Appended(Vec<u8>);
+struct Parts {
+    xml: String,
+    data: Vec<u8>,
+}
 
-impl Appended {
-    /// Appends `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the compressed blocks; returns the offset.
-    fn push(&mut self, bytes: &[u8]) -> usize {
-        let offset = self.0.len();
-        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
-        let mut header = vec![blocks.len() as u64, BLOCK as u64, (bytes.len() % BLOCK) as u64];
-        header.extend(blocks.iter().map(|block| block.len() as u64));
-        self.0.extend(header.iter().flat_map(|word| word.to_le_bytes()));
-        self.0.extend(blocks.iter().flatten());
-        offset
-    }
-
-    /// Appends an array and writes its XML element.
-    fn array(&mut self, xml: &mut String, vtk_type: &str, name: &str, components: &[String], bytes: &[u8]) {
-        let offset = self.push(bytes);
-        let _ = write!(xml, r#"<DataArray type="{vtk_type}" Name="{name}""#);
+impl Parts {
+    /// An array: its XML element, and as data `[blocks, block size, size of the last block if smaller, compressed sizes …]` and the
+    /// compressed blocks.
+    fn array(&mut self, vtk_type: &str, name: &str, components: &[impl AsRef<str>], bytes: &[u8]) {
+        self.xml += &format!(r#"<DataArray type="{vtk_type}" Name="{name}""#);
         // Without NumberOfComponents, readers give a scalar as a plain list.
         if components.len() != 1 {
-            let _ = write!(xml, r#" NumberOfComponents="{}""#, components.len());
+            self.xml += &format!(r#" NumberOfComponents="{}""#, components.len());
         }
-        for (k, component) in components.iter().enumerate().filter(|(_, component)| !component.is_empty()) {
-            let _ = write!(xml, r#" ComponentName{k}="{component}""#);
+        for (k, component) in components.iter().map(AsRef::as_ref).enumerate().filter(|(_, name)| !name.is_empty()) {
+            self.xml += &format!(r#" ComponentName{k}="{component}""#);
         }
-        let _ = writeln!(xml, r#" format="appended" offset="{offset}"/>"#);
+        self.xml += &format!(" format=\"appended\" offset=\"{}\"/>\n", self.data.len());
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect();
+        let header = [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len));
+        self.data.extend(header.flat_map(|word| (word as u64).to_le_bytes()));
+        self.data.extend(blocks.iter().flatten());
+    }
+
+    /// An array of field data, as text.
+    fn field(&mut self, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
+        let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+        self.xml += &format!(
+            "<DataArray type=\"{vtk_type}\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">{}</DataArray>\n",
+            numbers.len(),
+            text.join(" ")
+        );
     }
 }
 
@@ -120,14 +125,8 @@ fn compressed(block: &[u8]) -> Vec<u8> {
     out
 }
 
-/// An array of field data, as text.
-fn field_data(xml: &mut String, vtk_type: &str, name: &str, numbers: &[impl std::fmt::Debug]) {
-    let text: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
-    let (count, text) = (numbers.len(), text.join(" "));
-    let _ = writeln!(
-        xml,
-        r#"<DataArray type="{vtk_type}" Name="{name}" NumberOfTuples="{count}" format="ascii">{text}</DataArray>"#
-    );
+fn bytes(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
 impl Snapshot {
@@ -136,43 +135,37 @@ impl Snapshot {
     /// # Errors
     /// The operating system refuses.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
-        let mut data = Appended::default();
-        let mut xml = String::from(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n",
-        );
-        let background = &self.background;
-        field_data(&mut xml, "Float64", "TimeValue", &[self.time]);
-        field_data(&mut xml, "UInt32", "grid_dimension", &[background.dimension]);
-        field_data(&mut xml, "Float64", "grid_origin", &background.origin);
-        field_data(&mut xml, "Float64", "grid_spacing", &[background.spacing]);
-        field_data(&mut xml, "UInt32", "grid_cells", &background.cells);
+        let mut parts = Parts::default();
+        parts.xml += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<FieldData>\n";
+        let Background { dimension, origin, spacing, cells } = &self.background;
+        parts.field("Float64", "TimeValue", &[self.time]);
+        parts.field("UInt32", "grid_dimension", &[dimension]);
+        parts.field("Float64", "grid_origin", origin);
+        parts.field("Float64", "grid_spacing", &[spacing]);
+        parts.field("UInt32", "grid_cells", cells);
         let count = self.points.len();
-        let _ =
-            writeln!(xml, "</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>");
-        for array in &self.arrays {
-            let Array { name, components, values, is_index } = array;
+        parts.xml +=
+            &format!("</FieldData>\n<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{count}\">\n<PointData>\n");
+        for Array { name, components, values, is_index } in &self.arrays {
             if *is_index {
-                let bytes: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
-                data.array(&mut xml, "UInt32", name, components, &bytes);
+                let whole: Vec<u8> = values.iter().flat_map(|&x| (x as u32).to_le_bytes()).collect();
+                parts.array("UInt32", name, components, &whole);
             } else {
-                let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
-                data.array(&mut xml, "Float64", name, components, &bytes);
+                parts.array("Float64", name, components, &bytes(values));
             }
         }
-        xml.push_str("</PointData>\n<Points>\n");
-        let points: Vec<u8> = self.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-        data.array(&mut xml, "Float64", "Points", &["x", "y", "z"].map(str::to_owned), &points);
-        xml.push_str("</Points>\n<Cells>\n");
-        let scalar = [String::new()];
+        parts.xml += "</PointData>\n<Points>\n";
+        parts.array("Float64", "Points", &["x", "y", "z"], &bytes(self.points.as_flattened()));
+        parts.xml += "</Points>\n<Cells>\n";
         let integers = |first: i64| (first..first + count as i64).flat_map(i64::to_le_bytes).collect::<Vec<u8>>();
-        data.array(&mut xml, "Int64", "connectivity", &scalar, &integers(0));
-        data.array(&mut xml, "Int64", "offsets", &scalar, &integers(1));
-        data.array(&mut xml, "UInt8", "types", &scalar, &vec![VERTEX; count]);
-        xml.push_str("</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_");
+        parts.array("Int64", "connectivity", &[""], &integers(0));
+        parts.array("Int64", "offsets", &[""], &integers(1));
+        parts.array("UInt8", "types", &[""], &vec![VERTEX; count]);
+        parts.xml += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
         write_atomically(path, |file| {
-            file.write_all(xml.as_bytes())?;
-            file.write_all(&data.0)?;
+            file.write_all(parts.xml.as_bytes())?;
+            file.write_all(&parts.data)?;
             file.write_all(b"\n</AppendedData>\n</VTKFile>\n")
         })
     }
@@ -261,7 +254,7 @@ fn read_array(tag: &str, data: &[u8], count: usize) -> Result<Array, String> {
     Ok(Array { name: name.to_owned(), components: (0..width).map(component).collect(), values, is_index })
 }
 
-/// Decompresses the data of [`Appended::push`].
+/// Decompresses the data of [`Parts::array`].
 fn inflated(data: &[u8]) -> Option<Vec<u8>> {
     let word = |k: usize| {
         let bytes = data.get(k.checked_mul(8)?..)?.first_chunk::<8>()?;
@@ -323,16 +316,18 @@ mod tests {
     /// header holds the block count, the block size, the size of a partial last block (0 if it is whole) and the compressed sizes.
     #[test]
     fn the_layout_is_that_of_vtk() -> Result<(), Box<dyn std::error::Error>> {
-        let mut appended = Appended::default();
-        appended.push(b"before");
+        let mut parts = Parts::default();
+        parts.array("UInt8", "before", &[""], b"before");
         let bytes: Vec<u8> = (0..2 * BLOCK + 5).map(|k| (k % 251) as u8).collect();
-        let offset = appended.push(&bytes);
+        let offset = parts.data.len();
+        parts.array("UInt8", "bytes", &[""], &bytes);
+        assert!(parts.xml.ends_with(&format!("Name=\"bytes\" format=\"appended\" offset=\"{offset}\"/>\n")));
         let words: Vec<u64> =
-            appended.0[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
+            parts.data[offset..].as_chunks().0.iter().take(6).map(|&word| u64::from_le_bytes(word)).collect();
         assert_eq!(words[..3], [3, BLOCK as u64, 5]);
-        assert_eq!(words[3..].iter().sum::<u64>() as usize, appended.0.len() - offset - 6 * 8);
+        assert_eq!(words[3..].iter().sum::<u64>() as usize, parts.data.len() - offset - 6 * 8);
         let mut first = Vec::new();
-        ZlibDecoder::new(&appended.0[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
+        ZlibDecoder::new(&parts.data[offset + 48..][..words[3] as usize]).read_to_end(&mut first)?;
         assert_eq!(first, bytes[..BLOCK]);
         Ok(())
     }

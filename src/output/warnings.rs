@@ -1,11 +1,10 @@
 //! Warnings during a run: each kind once, with time and value.
 
-use super::Reference;
 use super::contact::{self, Contact};
 use super::history::{Cost, Energies};
 use super::losses::{Cause, Losses};
-use super::path::{Event, Followed};
-use crate::simulation::{Settings, Sharing, Simulation};
+use super::path::{self, Event, Followed};
+use crate::simulation::{Settings, Sharing};
 use crate::solver::NewtonSettings;
 use serde::{Deserialize, Serialize};
 
@@ -203,16 +202,10 @@ impl Watch {
         self.warnings.extend(said.into_iter().map(warning));
     }
 
-    /// Warns of events in a step along the equilibrium path. `straight` is the cosine of the angle between the displacements of this step
-    /// and the previous step.
-    pub(crate) fn see_path<const D: usize, L, A>(
-        &mut self,
-        step: &Watched,
-        simulation: &Simulation<D, L, A>,
-        reference: &Reference<D>,
-        straight: Option<f64>,
-    ) {
-        for event in self.path.see(simulation, reference, straight) {
+    /// Warns of events in a step along the equilibrium path, to `point`. `straight` is the cosine of the angle between the displacements of
+    /// this step and the previous step.
+    pub(crate) fn see_path(&mut self, step: &Watched, point: path::Point, straight: Option<f64>) {
+        for event in self.path.add(point, straight) {
             let (kind, text) = match event {
                 Event::Turned(load) => (
                     Kind::PathTurned,

@@ -1,7 +1,7 @@
 //! Lines against time, in panels one above the other.
 
 use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, range};
-use super::palette::{BLACK, Color, GREY};
+use super::palette::{BLACK, GREY};
 use super::svg::{Anchor, Point, Svg, shortened, width};
 
 /// Width of a figure, in SVG units.
@@ -26,12 +26,12 @@ const SUBTITLE: f64 = 13.0;
 pub(super) struct Line {
     /// Name; empty for a line that is not in the legend.
     pub label: String,
-    pub color: Color,
+    pub color: &'static str,
     pub points: Vec<Point>,
 }
 
 impl Line {
-    pub(super) fn new(label: &str, color: Color, points: Vec<Point>) -> Self {
+    pub(super) fn new(label: &str, color: &'static str, points: Vec<Point>) -> Self {
         Self { label: label.to_owned(), color, points }
     }
 }

@@ -12,7 +12,7 @@ const MOST: usize = 8;
 pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Colours of components. A tensor with more components repeats the first colours.
-const COLORS: [palette::Color; 6] =
+const COLORS: [&str; 6] =
     [palette::BLUE, palette::VERMILLION, palette::GREEN, palette::PURPLE, palette::SKY, palette::BLACK];
 
 /// One panel for each name in the columns of `table`, in order, at most [`MOST`]. Returns the panels, and a text with the number of panels

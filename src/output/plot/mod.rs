@@ -31,7 +31,6 @@ use axes::extremes;
 use chart::{Heading, Line, Panel};
 use colouring::Colouring;
 use histories::ROUND_OFF;
-use palette::Color;
 use player::Recording;
 use run_report::{has_inertia, quantity, title};
 use serde_json::Value;
@@ -200,8 +199,9 @@ fn charts(directory: &Path, report: &Value) -> Result<Vec<(&'static str, String)
 }
 
 /// Columns of the history as lines: each with its name, label and colour.
-fn lines(history: &Columns, columns: &[(&str, &str, Color)]) -> Result<Vec<Line>, OutputError> {
-    let line = |(name, label, color): &(&str, &str, Color)| Ok(Line::new(label, *color, history.pairs("time", name)?));
+fn lines(history: &Columns, columns: &[(&str, &str, &'static str)]) -> Result<Vec<Line>, OutputError> {
+    let line =
+        |(name, label, color): &(&str, &str, &'static str)| Ok(Line::new(label, *color, history.pairs("time", name)?));
     columns.iter().map(line).collect()
 }
 

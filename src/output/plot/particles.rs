@@ -4,7 +4,7 @@ use super::axes::{AXIS_NAME, Axes, LABEL, TICK_LABELS, Ticks, extremes, range};
 use super::chart::Heading;
 use super::colouring::Colouring;
 use super::neighbours::Neighbours;
-use super::palette::{BLACK, BLUE, Color, GREY, LIGHT, viridis};
+use super::palette::{BLACK, BLUE, GREY, LIGHT, viridis};
 use super::svg::{Anchor, Point, Svg, width};
 use super::view::Directions;
 use crate::output::history::AXES;
@@ -80,7 +80,7 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     }
     let color = |p: usize| {
         let value = colouring.and_then(|one| one.values.get(p).copied());
-        value.map_or(BLUE, |value| viridis((value - span.0) / (span.1 - span.0)))
+        value.map_or_else(|| BLUE.to_owned(), |value| viridis((value - span.0) / (span.1 - span.0)))
     };
     bodies(&mut svg, snapshot, scene, &axes, &ids, &color);
     if colouring.is_some() {
@@ -190,7 +190,7 @@ struct Beside {
     point: Point,
     left: bool,
     far: f64,
-    color: Color,
+    color: &'static str,
     text: String,
 }
 
@@ -225,7 +225,7 @@ fn bodies(
     scene: &Scene,
     axes: &Axes,
     ids: &[usize],
-    color: &dyn Fn(usize) -> Color,
+    color: &dyn Fn(usize) -> String,
 ) {
     let neighbours = Neighbours::new(snapshot, ids);
     let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
@@ -233,7 +233,7 @@ fn bodies(
     if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
         for p in order {
             let cell = neighbours.cell(p);
-            svg.polygon(cell.into_iter().map(|[x, y]| axes.place((x, y))), color(p));
+            svg.polygon(cell.iter().map(|corner| axes.place((corner[0], corner[1]))), &color(p));
         }
         return;
     }
@@ -242,8 +242,9 @@ fn bodies(
     let scale = axes.size.0 / (axes.x.1 - axes.x.0);
     for p in order {
         let at = axes.place(scene.directions.project(snapshot.points[p]));
-        let rim = if snapshot.background.dimension == 3 { GREY } else { color(p) };
-        svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), color(p), rim);
+        let color = color(p);
+        let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
+        svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
     }
 }
 
@@ -256,7 +257,7 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
         let (from, to) = (k as f64 / STEPS as f64, (k + 1) as f64 / STEPS as f64);
         let corners =
             [(left, height(from)), (left + 16.0, height(from)), (left + 16.0, height(to)), (left, height(to))];
-        svg.polygon(corners, viridis((from + to) / 2.0));
+        svg.polygon(corners, &viridis((from + to) / 2.0));
     }
     for &at in &ticks.at {
         let y = height((at - low) / (high - low));

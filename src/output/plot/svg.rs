@@ -1,6 +1,5 @@
 //! The few elements of SVG that pictures need, with coordinates to a hundredth of a unit.
 
-use super::palette::Color;
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider};
 
@@ -30,7 +29,7 @@ impl Svg {
     }
 
     /// A line through `points`.
-    pub(super) fn line(&mut self, points: impl IntoIterator<Item = Point>, color: Color, width: f64) {
+    pub(super) fn line(&mut self, points: impl IntoIterator<Item = Point>, color: &str, width: f64) {
         let points = listed(points);
         self.body += &format!(
             "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"/>\n"
@@ -38,21 +37,21 @@ impl Svg {
     }
 
     /// A filled polygon. Its rim has the same colour, so that neighbours leave no seam.
-    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: Color) {
+    pub(super) fn polygon(&mut self, points: impl IntoIterator<Item = Point>, color: &str) {
         let points = listed(points);
         self.body +=
             &format!("<polygon points=\"{points}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.5\"/>\n");
     }
 
     /// A disc with a rim.
-    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: Color, rim: Color) {
+    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, color: &str, rim: &str) {
         self.body += &format!(
             "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{color}\" stroke=\"{rim}\" stroke-width=\"0.4\"/>\n"
         );
     }
 
     /// A text with the font size `size`. The point lies on the base line.
-    pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: Color, text: &str) {
+    pub(super) fn text(&mut self, (x, y): Point, anchor: Anchor, size: f64, color: &str, text: &str) {
         let (place, turned) = match anchor {
             Anchor::Start => ("start", String::new()),
             Anchor::Middle => ("middle", String::new()),
