@@ -4,7 +4,8 @@ use super::OutputError;
 use super::files::TEMPORARY;
 use super::mark::Mark;
 use super::plot::is_picture;
-use super::snapshots::{SERIES, SnapshotMark};
+use super::pvd::SERIES;
+use super::snapshots::SnapshotMark;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

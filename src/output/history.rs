@@ -1,10 +1,11 @@
-//! `history.csv`: energies, momentum and iterations of every step.
+//! The rows of every step in `history.csv`, with energies, momentum and iterations, and in `reactions.csv`.
 
 use super::Reference;
 use super::csv::{Row, cell};
 use super::fields::padded;
 use crate::approximation::ShapeFunction;
 use crate::material::{DISSIPATED, Law, PLASTIC_STRAIN};
+use crate::mechanics::loads::{Loads, Reaction};
 use crate::simulation::Simulation;
 
 /// Axis names at the ends of column names.
@@ -103,4 +104,16 @@ pub(crate) fn row<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, e
         (simulation.has_internal_variable(PLASTIC_STRAIN), "yielding", cell(cost.yielding)),
     ];
     columns.into_iter().filter(|(is_there, ..)| *is_there).map(|(_, name, cell)| (name.to_owned(), cell)).collect()
+}
+
+/// The row of a step that ended at `time` in `reactions.csv`. Every prescribed condition has one column per axis, such as `name_x`. A rotation also has the
+/// column `name_torque`.
+pub(crate) fn reactions<const D: usize>(time: f64, loads: &Loads<D>, reactions: &[Reaction<D>]) -> Row {
+    let mut row = vec![("time".to_owned(), cell(time))];
+    for (condition, reaction) in loads.prescribed.iter().zip(reactions) {
+        let name = &condition.name;
+        row.extend(AXES.iter().zip(&reaction.force).map(|(axis, force)| (format!("{name}_{axis}"), cell(force))));
+        row.extend(condition.rotation().map(|_| (format!("{name}_torque"), cell(reaction.torque))));
+    }
+    row
 }

@@ -3,7 +3,7 @@
 use super::history::Cost;
 use super::report::Number;
 use super::warnings::Warning;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -70,9 +70,9 @@ impl Progress {
     pub fn show(&mut self, time: f64, step: u64, cost: &Cost, balance: Option<f64>) {
         let (Cost { newton, krylov, .. }, end) = (*cost, self.end);
         self.bar.set_position((BAR_LENGTH * (time - self.start) / (end - self.start)) as u64);
-        let left = (self.bar.per_sec() > 0.0).then(|| self.bar.eta().as_secs_f64());
+        let left = (self.bar.per_sec() > 0.0).then(|| self.bar.eta());
         let text = || {
-            let left = left.map_or_else(|| "unknown".to_owned(), readable);
+            let left = left.map_or_else(|| "unknown".to_owned(), |left| HumanDuration(left).to_string());
             let balance = balance.map_or_else(String::new, |balance| format!("balance {balance:+.1e}, "));
             format!("t = {time:.6} of {end:.6}, step {step}, Newton {newton}, Krylov {krylov}, {balance}{left} left")
         };
@@ -86,7 +86,7 @@ impl Progress {
             Audience::Program => {
                 let text = json!({
                     "event": "step", "step": step, "time": Number(time), "end": Number(end), "newton": newton, "krylov": krylov,
-                    "balance": balance.map(Number), "seconds": self.since.elapsed().as_secs_f64(), "seconds_left": left,
+                    "balance": balance.map(Number), "seconds": self.since.elapsed().as_secs_f64(), "seconds_left": left.as_ref().map(Duration::as_secs_f64),
                 })
                 .to_string();
                 if is_due(JSON_INTERVAL) {
@@ -117,15 +117,5 @@ impl Progress {
     pub fn finish(self) {
         self.bar.finish_and_clear();
         self.held.iter().for_each(|text| line(text));
-    }
-}
-
-/// Seconds in a readable unit.
-fn readable(seconds: f64) -> String {
-    match seconds {
-        s if s < 100.0 => format!("{s:.0} s"),
-        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
-        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
-        s => format!("{:.1} days", s / 86_400.0),
     }
 }

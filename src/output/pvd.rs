@@ -1,9 +1,12 @@
 //! The series of snapshots as ParaView's `.pvd`: a list of times and files.
 
 use super::OutputError;
-use super::files::write_atomically;
+use super::files::{read_if_there, write_atomically};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The file of the series, in the directory of the run.
+pub(crate) const SERIES: &str = "particles.pvd";
 
 /// Text before and after the entries.
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
@@ -28,6 +31,19 @@ pub(crate) fn first_entries(path: &Path, count: usize) -> Result<String, OutputE
         return Err(OutputError::content(path, "ends before the place where it was to be continued"));
     }
     Ok(kept.concat())
+}
+
+/// The existing files of the series in `directory`, in order of time; empty if there is no series.
+pub(crate) fn files(directory: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let path = directory.join(SERIES);
+    let Some(series) = read_if_there(&path)? else { return Ok(Vec::new()) };
+    let series = String::from_utf8_lossy(&series);
+    let names = series.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
+    let files: Vec<_> = names.map(|name| directory.join(name)).collect();
+    if files.is_empty() {
+        return Err(OutputError::content(&path, "lists no snapshots"));
+    }
+    Ok(files.into_iter().filter(|file| file.is_file()).collect())
 }
 
 #[cfg(test)]
@@ -55,6 +71,19 @@ mod tests {
         assert_eq!(std::fs::read_dir(directory.path())?.count(), 1, "no temporary file stays");
         assert_eq!(first_entries(&path, 2)? + &entry(times[2], "particles_2.vtu"), entries);
         assert!(matches!(first_entries(&path, 4), Err(OutputError::Content { .. })));
+        Ok(())
+    }
+
+    #[test]
+    fn a_series_without_files_is_damaged_and_none_is_none() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        assert!(files(folder.path())?.is_empty());
+        std::fs::write(folder.path().join(SERIES), "<VTKFile>")?;
+        assert!(files(folder.path()).is_err());
+        std::fs::write(folder.path().join(SERIES), r#"<DataSet file="a.vtu"/><DataSet part="0" file="b.vtu"/>"#)?;
+        assert!(files(folder.path())?.is_empty());
+        std::fs::write(folder.path().join("b.vtu"), "")?;
+        assert_eq!(files(folder.path())?, [folder.path().join("b.vtu")]);
         Ok(())
     }
 }

@@ -12,7 +12,7 @@ use super::progress::{Audience, Progress};
 use super::report::{self, Counts, Outcome, Seconds};
 use super::snapshots::Snapshots;
 use super::warnings::Watched;
-use super::{OutputError, Reference, Summary, reactions};
+use super::{OutputError, Reference, Summary};
 use crate::approximation::ShapeFunction;
 use crate::field::Field;
 use crate::material::Law;
@@ -130,7 +130,7 @@ impl<const D: usize> Recorder<D> {
         let loads = &simulation.loads;
         let no_reactions = vec![Reaction::NONE; loads.prescribed.len()];
         let reactions = (!loads.prescribed.is_empty())
-            .then(|| table("reactions.csv", &reactions::row(0.0, loads, &no_reactions)))
+            .then(|| table("reactions.csv", &history::reactions(0.0, loads, &no_reactions)))
             .transpose()?;
         let probed = (!probes.is_empty())
             .then(|| table("probes.csv", &probes::row(&probes, simulation, &reference)?))
@@ -194,7 +194,7 @@ impl<const D: usize> Recorder<D> {
         let line = report::newton_line(time, step).map_err(std::io::Error::from);
         self.newton.line(&line.map_err(OutputError::io("write", self.newton.path()))?)?;
         if let Some(reactions) = &mut self.reactions {
-            reactions.write(&reactions::row(time, &simulation.loads, &step.reactions))?;
+            reactions.write(&history::reactions(time, &simulation.loads, &step.reactions))?;
         }
         let newton = &step.newton.history;
         let (iterations, krylov) = (newton.iterations.len(), newton.counts.krylov_iterations);

@@ -1,17 +1,15 @@
 //! Snapshots of the particles: `particles_*.vtu`, and the series `particles.pvd`.
 
 use super::fields::padded;
+use super::pvd::{self, SERIES};
 use super::vtu::{Array, Background, Snapshot};
-use super::{OutputError, Reference, pvd};
+use super::{OutputError, Reference};
 use crate::clock::Clock;
 use crate::field::{Field, Kind};
 use crate::material::Law;
 use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-/// The file of the series, in the directory of the run.
-pub(crate) const SERIES: &str = "particles.pvd";
 
 /// Writes snapshots.
 #[derive(Debug)]

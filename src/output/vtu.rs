@@ -5,6 +5,7 @@
 
 use super::OutputError;
 use super::files::write_atomically;
+use crate::field::column;
 use flate2::Compression;
 use flate2::read::{ZlibDecoder, ZlibEncoder};
 use std::io::{Read, Write};
@@ -27,6 +28,13 @@ pub struct Array {
     pub values: Vec<f64>,
     /// Whether all values are whole numbers, which the file holds as `UInt32` instead of `Float64`.
     pub is_index: bool,
+}
+
+impl Array {
+    /// The names of the components, as in a table.
+    pub(crate) fn columns(&self) -> Vec<String> {
+        self.components.iter().map(|component| column(&self.name, component)).collect()
+    }
 }
 
 /// The background grid of a snapshot, kept as field data so that a picture can show the grid.

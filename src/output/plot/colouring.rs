@@ -32,10 +32,10 @@ impl Colouring {
             let stress = array("stress").or(array("principal_stress"))?;
             return Some(Self { label, values: tuples(stress, von_mises) });
         }
-        let (name, component) = field.rsplit_once('_')?;
-        let array = array(name)?;
-        let place = array.components.iter().position(|one| one == component)?;
-        Some(Self { label, values: tuples(array, |tuple| tuple[place]) })
+        snapshot.arrays.iter().find_map(|array| {
+            let place = array.columns().iter().position(|column| column == field)?;
+            Some(Self { label: label.clone(), values: tuples(array, |tuple| tuple[place]) })
+        })
     }
 
     /// The field that is asked for. The default is the plastic strain, else the von Mises stress, else the first field. In one dimension,
@@ -50,7 +50,7 @@ impl Colouring {
         }
         let floats = || snapshot.arrays.iter().filter(|array| !array.is_index);
         if snapshot.background.dimension == 1 {
-            return Ok(floats().find_map(|array| Self::of(snapshot, &component(array, 0))));
+            return Ok(floats().find_map(|array| Self::of(snapshot, array.columns().first()?)));
         }
         let worth = ["plastic_strain", "von_mises"].iter().find_map(|field| Self::of(snapshot, field));
         Ok(worth.or_else(|| floats().find_map(|array| Self::of(snapshot, &array.name))))
@@ -59,23 +59,15 @@ impl Colouring {
 
 /// All names that [`Colouring::of`] knows.
 fn names(snapshot: &Snapshot) -> Vec<String> {
-    let of_array = |array: &Array| {
-        let components = (0..array.components.len()).map(|k| component(array, k)).collect::<Vec<_>>();
-        if components.len() > 1 { [vec![array.name.clone()], components].concat() } else { components }
-    };
-    let mut names: Vec<String> = snapshot.arrays.iter().flat_map(of_array).collect();
+    let mut names = Vec::new();
+    for array in &snapshot.arrays {
+        names.extend((array.components.len() > 1).then(|| array.name.clone()));
+        names.extend(array.columns());
+    }
     if Colouring::of(snapshot, "von_mises").is_some() && !names.iter().any(|name| name == "von_mises") {
         names.push("von_mises".to_owned());
     }
     names
-}
-
-/// The name of a component of a field.
-fn component(array: &Array, place: usize) -> String {
-    match array.components.get(place).filter(|component| !component.is_empty()) {
-        Some(component) => format!("{}_{component}", array.name),
-        None => array.name.clone(),
-    }
 }
 
 /// A name in readable words.
