@@ -46,6 +46,14 @@ pub(super) struct Scene {
     pub run: String,
 }
 
+/// A picture under construction: the particles `ids` of a snapshot.
+struct Frame<'a> {
+    snapshot: &'a Snapshot,
+    scene: &'a Scene,
+    colouring: Option<&'a Colouring>,
+    ids: Vec<usize>,
+}
+
 /// The picture as SVG. In one dimension the field is drawn over x.
 pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colouring>) -> String {
     let span = range([scene.span.0, scene.span.1].into_iter(), 0.0);
@@ -56,9 +64,9 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
     let rest: String = label.chars().skip(1).collect();
     let what = format!("{first}{rest}, t = {}{part}", super::axes::rounded(snapshot.time));
     let heading = Heading { what, run: scene.run.clone() };
-    let ids: Vec<usize> = (0..snapshot.points.len()).step_by(stride).collect();
+    let frame = Frame { snapshot, scene, colouring, ids: (0..snapshot.points.len()).step_by(stride).collect() };
     if snapshot.background.dimension == 1 {
-        return over_x(snapshot, scene, &heading, &ids, colouring);
+        return frame.over_x(&heading);
     }
     let (mut x, mut y) = scene.window(snapshot);
     let scale = (MAX_WIDTH / (x.1 - x.0)).min(MAX_HEIGHT / (y.1 - y.0));
@@ -78,11 +86,7 @@ pub(super) fn draw(snapshot: &Snapshot, scene: &Scene, colouring: Option<&Colour
         }
         None => edges(&mut svg, scene, &axes),
     }
-    let color = |p: usize| {
-        let value = colouring.and_then(|one| one.values.get(p).copied());
-        value.map_or_else(|| BLUE.to_owned(), |value| viridis((value - span.0) / (span.1 - span.0)))
-    };
-    bodies(&mut svg, snapshot, scene, &axes, &ids, &color);
+    frame.bodies(&mut svg, &axes, span);
     if colouring.is_some() {
         colour_bar(&mut svg, &axes, span, &bar, label);
     }
@@ -218,33 +222,55 @@ impl Beside {
     }
 }
 
-/// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
-fn bodies(
-    svg: &mut Svg,
-    snapshot: &Snapshot,
-    scene: &Scene,
-    axes: &Axes,
-    ids: &[usize],
-    color: &dyn Fn(usize) -> String,
-) {
-    let neighbours = Neighbours::new(snapshot, ids);
-    let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
-    let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
-    if snapshot.background.dimension == 2 && scene.directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
-        for p in order {
-            let cell = neighbours.cell(p);
-            svg.polygon(cell.iter().map(|corner| axes.place((corner[0], corner[1]))), &color(p));
-        }
-        return;
+impl Frame<'_> {
+    /// The value that colours a particle.
+    fn value(&self, p: usize) -> Option<f64> {
+        self.colouring?.values.get(p).copied()
     }
-    let depth = |p: usize| scene.directions.depth(snapshot.points[p]);
-    order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
-    let scale = axes.size.0 / (axes.x.1 - axes.x.0);
-    for p in order {
-        let at = axes.place(scene.directions.project(snapshot.points[p]));
-        let color = color(p);
-        let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
-        svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
+
+    /// Draws the particles: cells in the plane, discs in space. The disc nearest to the eye is drawn last.
+    fn bodies(&self, svg: &mut Svg, axes: &Axes, (low, high): (f64, f64)) {
+        let Self { snapshot, scene: Scene { directions, .. }, ids, .. } = self;
+        let part = |p: usize| self.value(p).map(|value| (value - low) / (high - low));
+        let color = |p: usize| part(p).map_or_else(|| BLUE.to_owned(), viridis);
+        let neighbours = Neighbours::new(snapshot, ids);
+        let finite = |p: &usize| snapshot.points[*p].iter().all(|x| x.is_finite());
+        let mut order: Vec<usize> = ids.iter().copied().filter(finite).collect();
+        if snapshot.background.dimension == 2 && directions.plane() == Some([0, 1]) && ids.len() <= MAX_CELLS {
+            for p in order {
+                let cell = neighbours.cell(p);
+                svg.polygon(cell.iter().map(|corner| axes.place((corner[0], corner[1]))), &color(p));
+            }
+            return;
+        }
+        let depth = |p: usize| directions.depth(snapshot.points[p]);
+        order.sort_by(|&a, &b| depth(a).total_cmp(&depth(b)));
+        let scale = axes.size.0 / (axes.x.1 - axes.x.0);
+        for p in order {
+            let at = axes.place(directions.project(snapshot.points[p]));
+            let color = color(p);
+            let rim = if snapshot.background.dimension == 3 { GREY } else { &color };
+            svg.disc(at, (RADIUS * neighbours.diameter(p) * scale).max(0.7), &color, rim);
+        }
+    }
+
+    /// The picture in one dimension: the field over x.
+    fn over_x(&self, heading: &Heading) -> String {
+        let (x, _) = self.scene.window(self.snapshot);
+        let y = range([self.scene.span.0, self.scene.span.1].into_iter(), 0.05);
+        let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
+        let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
+        let mut svg = heading.picture(left + size.0 + 24.0, Heading::HEIGHT + size.1 + BELOW);
+        let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
+        let label = self.colouring.map_or("", |one| &one.label);
+        axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
+        for &p in &self.ids {
+            let at = (self.snapshot.points[p][0], self.value(p).unwrap_or(0.0));
+            if at.0.is_finite() && at.1.is_finite() {
+                svg.disc(axes.place(at), 2.5, BLUE, BLUE);
+            }
+        }
+        svg.finish()
     }
 }
 
@@ -269,33 +295,6 @@ fn colour_bar(svg: &mut Svg, axes: &Axes, (low, high): (f64, f64), ticks: &Ticks
     // A name longer than the bar is left out, because the heading has it.
     let name = if width(&name, LABEL) > tall { ticks.name("") } else { name };
     svg.text(at, Anchor::Upright, LABEL, BLACK, &name);
-}
-
-/// The picture in one dimension: the field over x.
-fn over_x(
-    snapshot: &Snapshot,
-    scene: &Scene,
-    heading: &Heading,
-    ids: &[usize],
-    colouring: Option<&Colouring>,
-) -> String {
-    let (x, _) = scene.window(snapshot);
-    let y = range([scene.span.0, scene.span.1].into_iter(), 0.05);
-    let ticks = [Ticks::new(x, 10, false), Ticks::new(y, 7, false)];
-    let (left, size) = (Axes::left(&ticks[1]), (MAX_WIDTH, MAX_WIDTH / 2.0));
-    let wide = left + size.0 + 24.0;
-    let mut svg = heading.picture(wide, Heading::HEIGHT + size.1 + BELOW);
-    let axes = Axes { corner: (left, Heading::HEIGHT), size, x, y };
-    let label = colouring.map_or("", |one| &one.label);
-    axes.draw(&mut svg, [&ticks[0], &ticks[1]], ["x", label], true);
-    for &p in ids {
-        let value = colouring.and_then(|one| one.values.get(p).copied()).unwrap_or(0.0);
-        let at = (snapshot.points[p][0], value);
-        if at.0.is_finite() && at.1.is_finite() {
-            svg.disc(axes.place(at), 2.5, BLUE, BLUE);
-        }
-    }
-    svg.finish()
 }
 
 #[cfg(test)]
