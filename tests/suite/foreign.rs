@@ -56,7 +56,8 @@ fn block(dimension: usize, statics: bool, material: &Value) -> Value {
     normal[1] = -1.0;
     let mut top = vec![0.5; dimension];
     top[1] = 1.5;
-    let time = if statics { json!({"step": 0.5, "end": 1, "scheme": "none"}) } else { json!({"step": 0.1, "end": 0.5}) };
+    let time =
+        if statics { json!({"step": 0.5, "end": 1, "scheme": "none"}) } else { json!({"step": 0.1, "end": 0.5}) };
     json!({
         "grid": {"size": corner(3.0), "spacing": 0.5},
         "approximation": {"bspline": {"degree": 2}},
@@ -152,9 +153,11 @@ fn memory_is_restarted_to_the_bit() -> Result<(), Failure> {
 #[test]
 fn refusals_are_told() -> Result<(), Failure> {
     let Some(library) = Library::of("bad.f90")? else { return Ok(()) };
-    let law = |fault: u32| json!({"umat": {
-        "library": library.name(), "properties": [fault, 1.0], "tangent": "strain", "state": {"names": ["a"]}
-    }});
+    let law = |fault: u32| {
+        json!({"umat": {
+            "library": library.name(), "properties": [fault, 1.0], "tangent": "strain", "state": {"names": ["a"]}
+        }})
+    };
     for (fault, word) in REFUSALS {
         let scene = with(block(1, true, &law(fault)), &[("/time/step", json!(0.05))]);
         let mut simulation = built::<1>(&scene)?;
