@@ -82,9 +82,9 @@ fn same_as_ours<const D: usize>(statics: bool, ours: &Value, theirs: &Value) -> 
             report.newton.history.iterations.iter().map(|one| one.residual).collect()
         };
         let (expected, found) = (norms(&expected), norms(&found));
-        assert_eq!(expected.len(), found.len(), "{expected:e?} {found:e?}");
+        assert_eq!(expected.len(), found.len(), "{expected:?} {found:?}");
         let first = expected[0];
-        assert!(expected.iter().zip(&found).all(|(a, b)| (a - b).abs() <= 1e-9 * first), "{expected:e?} {found:e?}");
+        assert!(expected.iter().zip(&found).all(|(a, b)| (a - b).abs() <= 1e-9 * first), "{expected:?} {found:?}");
     }
     let (a, b) = (ours.particles.by_id(), theirs.particles.by_id());
     let apart = a.position.iter().zip(&b.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
@@ -137,7 +137,7 @@ fn memory_is_restarted_to_the_bit() -> Result<(), Failure> {
     run_to(&mut whole, 1.0)?;
     run_to(&mut continued, 1.0)?;
     let (a, b) = (whole.particles.by_id(), continued.particles.by_id());
-    assert!(a.position == b.position && a.internal == b.internal);
+    assert!(a == b);
     let greatest = (0..a.len()).map(|p| a.state(p, 0.0).internal[0]).fold(0.0, f64::max);
     assert!(greatest > 0.01, "nothing yields: {greatest}");
     let threaded = in_threads(2, || {
