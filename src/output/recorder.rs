@@ -125,8 +125,8 @@ impl<const D: usize> Recorder<D> {
         // A file that is not in the mark is created anew.
         let kept = |name: &str| so_far.files.get(name).copied();
         let table = |name: &str, row: &Row| Table::open(directory.join(name), row, kept(name));
-        let energies = Energies::of(simulation, &reference);
-        let history = table("history.csv", &history::row(simulation, &energies, Cost::default()))?;
+        // Only the names of the columns are needed here.
+        let history = table("history.csv", &history::row(simulation, &Energies::default(), Cost::default()))?;
         let loads = &simulation.loads;
         let no_reactions = vec![Reaction::NONE; loads.prescribed.len()];
         let reactions = (!loads.prescribed.is_empty())

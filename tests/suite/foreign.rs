@@ -123,7 +123,7 @@ fn laws_of_the_same_formula_give_the_same_motion() -> Result<(), Failure> {
 fn memory_is_restarted_to_the_bit() -> Result<(), Failure> {
     let Some(library) = Library::of("j2.f90")? else { return Ok(()) };
     let law = json!({"umat": {
-        "library": library.name(), "properties": [1.0, 0.3, 0.05, 0.1, 0.02, 10.0], "tangent": "strain",
+        "library": library.name(), "properties": [1.0, 0.3, 0.1, 0.2, 0.02, 10.0], "tangent": "strain",
         "state": {"names": ["plastic_strain"]}
     }});
     let scene = with(block(2, true, &law), &[("/time/step", json!(0.125))]);
@@ -159,8 +159,8 @@ fn refusals_are_told() -> Result<(), Failure> {
         }})
     };
     for (fault, word) in REFUSALS {
-        let scene = with(block(1, true, &law(fault)), &[("/time/step", json!(0.05))]);
-        let mut simulation = built::<1>(&scene)?;
+        let scene = with(block(2, true, &law(fault)), &[("/time/step", json!(0.05))]);
+        let mut simulation = built::<2>(&scene)?;
         let error = failure(&mut simulation);
         assert_eq!(simulation.clock.steps(), 12, "the fault is in increment 13");
         let message = bfree::causes::on_one_line(&error);
