@@ -266,16 +266,6 @@ pub enum LinearError {
     },
 }
 
-impl LinearError {
-    /// This error with `earlier` iterations added to its iteration number.
-    fn after(self, earlier: usize) -> Self {
-        match self {
-            Self::NotFinite { what, iteration } => Self::NotFinite { what, iteration: iteration + earlier },
-            other => other,
-        }
-    }
-}
-
 /// A setting outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {value:e}; it must be {allowed}")]
@@ -320,11 +310,22 @@ fn finite(value: f64, what: &'static str, iteration: usize) -> Result<f64, Linea
     if value.is_finite() { Ok(value) } else { Err(LinearError::NotFinite { what, iteration }) }
 }
 
-/// `r = b − A x`, and its norm.
-fn true_residual(operator: &dyn LinearOperator, rhs: &[f64], x: &[f64], r: &mut [f64]) -> f64 {
+/// `r = b − A x`, and its norm. Counts the product.
+///
+/// # Errors
+/// x or r is not finite.
+fn true_residual(
+    operator: &dyn LinearOperator,
+    rhs: &[f64],
+    x: &[f64],
+    r: &mut [f64],
+    report: &mut LinearReport,
+) -> Result<f64, LinearError> {
+    finite(vector::norm(x), "the norm of the solution", report.iterations)?;
     operator.apply(x, r);
+    report.products += 1;
     vector::xpby(rhs, -1.0, r);
-    vector::norm(r)
+    finite(vector::norm(r), "the norm of the residual", report.iterations)
 }
 
 #[cfg(test)]

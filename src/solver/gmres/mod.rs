@@ -4,15 +4,15 @@
 mod tests;
 
 use super::vector::{axpy, dot, norm, scaled};
-use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
+use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A vector is orthogonalised a second time if the first time leaves less than this part of it: 1/√2 (Daniel, Gragg, Kaufman,
 /// Stewart 1976).
 const REORTHOGONALISE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The Krylov space is exhausted if orthogonalisation leaves less than this multiple of eps of a vector.
-const EXHAUSTED: f64 = 8.0;
+/// The Krylov space is exhausted if orthogonalisation leaves less than this part of a vector.
+const EXHAUSTED: f64 = 8.0 * f64::EPSILON;
 
 /// A whole cycle that leaves more than this part of the residual is stagnation. A thousand such cycles gain a factor e.
 const STAGNATION: f64 = 0.999;
@@ -103,16 +103,16 @@ pub fn gmres(
             return Ok(report);
         }
         let length = restart.min(settings.max_iterations - report.iterations);
-        let (taken, promised) = cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction)
-            .map_err(|error| error.after(report.iterations))?;
+        let (taken, promised) =
+            cycle(operator, preconditioner, &r, r_norm, target, length, &mut correction).map_err(|at| {
+                LinearError::NotFinite { what: "the norm of a Krylov vector", iteration: report.iterations + at }
+            })?;
         report.iterations += taken;
-        report.products += taken + 1;
+        report.products += taken;
         trial.copy_from_slice(solution);
         mutant!("solver: a restart of GMRES forgets the solution so far": { trial.fill(0.0); });
         axpy(1.0, &correction, &mut trial);
-        finite(norm(&trial), "the norm of the solution", report.iterations)?;
-        let trial_norm =
-            finite(true_residual(operator, rhs, &trial, &mut r), "the norm of the residual", report.iterations)?;
+        let trial_norm = true_residual(operator, rhs, &trial, &mut r, &mut report)?;
         let (before, fell) = (r_norm, trial_norm / r_norm);
         if fell < 1.0 {
             solution.copy_from_slice(&trial);
@@ -134,6 +134,9 @@ pub fn gmres(
 
 /// One cycle of at most `length` iterations on the residual `r` of norm `r_norm`, until its norm is `target`. Writes the correction of x.
 /// Returns the number of iterations and the residual norm that the rotations predict.
+///
+/// # Errors
+/// The iteration at which a Krylov vector is not finite.
 fn cycle(
     operator: &dyn LinearOperator,
     preconditioner: &dyn LinearOperator,
@@ -142,29 +145,25 @@ fn cycle(
     target: f64,
     length: usize,
     correction: &mut [f64],
-) -> Result<(usize, f64), LinearError> {
+) -> Result<(usize, f64), usize> {
     let fresh = || r.pool().filled(r.len(), 0.0);
     let mut v = fresh();
     scaled(1.0 / r_norm, r, &mut v);
     // The basis grows by one vector an iteration, so a cycle that ends early allocates no more than it needs.
     let mut basis: Vec<Pooled<f64>> = Vec::new();
-    let exhausted_below = EXHAUSTED * f64::EPSILON;
-    let mut triangle = Triangle {
-        columns: Vec::new(),
-        rotations: Vec::new(),
-        g: Vec::new(),
-        last: r_norm,
-        negligible: exhausted_below,
-    };
+    let mut triangle = Triangle { last: r_norm, ..Triangle::default() };
     for iteration in 0..length {
         let mut w = fresh();
         // `correction` holds M⁻¹ v meanwhile.
         preconditioner.apply(&v, correction);
         operator.apply(correction, &mut w);
         basis.push(v);
-        let w_norm = finite(norm(&w), "the norm of a Krylov vector", iteration)?;
+        let w_norm = norm(&w);
+        if !w_norm.is_finite() {
+            return Err(iteration);
+        }
         let (column, left) = orthogonalise(&mut w, w_norm, &basis);
-        let exhausted = left <= exhausted_below * w_norm;
+        let exhausted = left <= EXHAUSTED * w_norm;
         triangle.push(column, if exhausted { 0.0 } else { left });
         if exhausted || triangle.residual() <= target {
             break;
@@ -201,6 +200,7 @@ fn orthogonalise(w: &mut [f64], w_norm: f64, basis: &[Pooled<f64>]) -> (Vec<f64>
 }
 
 /// The Hessenberg matrix of a cycle. Givens rotations make it triangular, column by column.
+#[derive(Default)]
 struct Triangle {
     /// Column j has j + 1 entries, the diagonal last.
     columns: Vec<Vec<f64>>,
@@ -210,8 +210,6 @@ struct Triangle {
     g: Vec<f64>,
     /// The entry of the rotated right-hand side below the triangle: the residual norm up to sign.
     last: f64,
-    /// A pivot below this part of the largest one is round-off.
-    negligible: f64,
 }
 
 impl Triangle {
@@ -245,9 +243,9 @@ impl Triangle {
     fn solve(&self) -> Vec<f64> {
         let diagonal = |j: usize| self.columns[j][j];
         let largest = (0..self.columns.len()).map(diagonal).fold(0.0, f64::max);
-        // Only an exhausted space of a singular operator ends in a zero pivot.
+        // Only an exhausted space of a singular operator ends in a pivot that is zero to round-off.
         let mut n = self.columns.len();
-        while n > 0 && diagonal(n - 1) <= self.negligible * largest {
+        while n > 0 && diagonal(n - 1) <= EXHAUSTED * largest {
             n -= 1;
         }
         let mut y = self.g[..n].to_vec();

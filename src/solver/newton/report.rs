@@ -1,6 +1,6 @@
 //! The report of Newton's method.
 
-use crate::solver::LinearReport;
+use crate::solver::{LinearOutcome, LinearReport};
 
 /// The merit function by which the line search accepted a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +51,15 @@ pub struct NewtonCounts {
     pub krylov_limited: usize,
     /// Linear systems left unsolved because their residual no longer fell.
     pub krylov_stagnated: usize,
+}
+
+impl NewtonCounts {
+    pub(super) fn add(&mut self, report: &LinearReport) {
+        self.tangent_products += report.products;
+        self.krylov_iterations += report.iterations;
+        self.krylov_limited += usize::from(report.outcome == LinearOutcome::IterationLimit);
+        self.krylov_stagnated += usize::from(report.outcome == LinearOutcome::Stagnated);
+    }
 }
 
 /// The course of the iteration, complete or not.

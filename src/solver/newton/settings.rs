@@ -99,16 +99,14 @@ impl Default for NewtonSettings {
 
 impl NewtonSettings {
     pub(super) fn check(&self) -> Result<(), InvalidSetting> {
-        InvalidSetting::check_tolerance("relative_tolerance", self.relative_tolerance)?;
-        let floor = self.floor;
+        let Self { relative_tolerance, floor, max_krylov_iterations: krylov, max_halvings: halvings, .. } = *self;
+        InvalidSetting::check_tolerance("relative_tolerance", relative_tolerance)?;
         InvalidSetting::check(floor >= 0.0 && floor.is_finite(), "floor", floor, "finite and at least 0")?;
         self.forcing.check()?;
         if let Krylov::Gmres { restart } = self.krylov {
             InvalidSetting::check_restart(restart as usize)?;
         }
-        let krylov = self.max_krylov_iterations;
         InvalidSetting::check(krylov >= 1, "max_krylov_iterations", krylov as f64, "at least 1")?;
-        let halvings = self.max_halvings;
         InvalidSetting::check(halvings <= 60, "max_halvings", f64::from(halvings), "at most 60")
     }
 }
