@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradients (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., alg. 9.1).
 
 use super::vector::{axpy, dot, norm, xpby};
-use super::{InvalidSetting, LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
+use super::{LinearError, LinearOperator, LinearOutcome, LinearReport, begin, finite, true_residual};
 use crate::pooled::{Pool, Pooled};
 
 /// A curvature below this multiple of eps times the largest curvature so far is round-off in size and sign.
@@ -17,12 +17,6 @@ pub struct ConjugateGradientSettings {
     pub relative_tolerance: f64,
     /// Iterations allowed.
     pub max_iterations: usize,
-}
-
-impl Default for ConjugateGradientSettings {
-    fn default() -> Self {
-        Self { relative_tolerance: 1e-8, max_iterations: 1000 }
-    }
 }
 
 /// Solves A x = b from x = 0 for symmetric positive A and M.
@@ -56,7 +50,8 @@ impl Default for ConjugateGradientSettings {
 ///
 /// // Forces in balance pull the masses apart. Of all solutions x₁ − x₀ = 3, the shortest is found.
 /// let mut x = [0.0; 2];
-/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &ConjugateGradientSettings::default(), &Pool::default())?;
+/// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
+/// let report = conjugate_gradient(&Spring, &Identity, &[-3.0, 3.0], &mut x, &settings, &Pool::default())?;
 /// assert!(report.converged());
 /// assert_eq!(x, [-1.5, 1.5]);
 /// # Ok::<(), bfree::solver::LinearError>(())
@@ -72,8 +67,7 @@ pub fn conjugate_gradient(
     settings: &ConjugateGradientSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
-    let (mut report, b_norm) = begin(rhs, solution)?;
+    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
     if b_norm == 0.0 {
         return Ok(report);
     }
@@ -108,9 +102,8 @@ fn descend(
     max_iterations: usize,
     report: &mut LinearReport,
 ) -> Result<LinearOutcome, LinearError> {
-    let n = r.len();
     let mut x = r.pool().collect(solution.iter().copied());
-    let (mut z, mut q) = (r.pool().filled(n, 0.0), r.pool().filled(n, 0.0));
+    let (mut z, mut q) = (r.pool().filled(r.len(), 0.0), r.pool().filled(r.len(), 0.0));
     preconditioner.apply(r, &mut z);
     let mut p = z.clone();
     let mut rz = dot(r, &z);
@@ -120,23 +113,15 @@ fn descend(
     let (mut best, mut best_at) = (norm(r), report.iterations);
     loop {
         let at = report.iterations;
-        finite(rz, "r·z", at)?;
-        if at >= max_iterations {
-            return Ok(LinearOutcome::IterationLimit);
-        }
-        if at - best_at > n + PATIENCE {
-            return Ok(LinearOutcome::Stagnated);
-        }
-        if rz <= 0.0 {
-            return Ok(LinearOutcome::NegativeCurvature);
+        if let Some(outcome) = ends(finite(rz, "r·z", at)?, at >= max_iterations, at - best_at > r.len() + PATIENCE) {
+            return Ok(outcome);
         }
         operator.apply(&p, &mut q);
         report.products += 1;
         let p_a_p = finite(dot(&p, &q), "p·Ap", at)?;
         let curvature = p_a_p / p_m_p;
         mutant!("solver: negative curvature counts as positive": curvature = curvature.abs());
-        largest = largest.max(curvature);
-        if let Some(outcome) = unusable(curvature, largest) {
+        if let Some(outcome) = unusable(curvature, &mut largest) {
             if outcome == LinearOutcome::NegativeCurvature {
                 if x.iter().all(|x| *x == 0.0) {
                     // The step length for a curvature of the opposite sign.
@@ -168,9 +153,19 @@ fn descend(
     }
 }
 
-/// The outcome at a curvature p·Ap / p·Mp that gives no step: negative, or zero to round-off.
-fn unusable(curvature: f64, largest: f64) -> Option<LinearOutcome> {
-    let unresolved = UNRESOLVED * f64::EPSILON * largest;
+/// The outcome before a product, if the recurrence ends there.
+fn ends(rz: f64, used_up: bool, no_progress: bool) -> Option<LinearOutcome> {
+    match (used_up, no_progress) {
+        (true, _) => Some(LinearOutcome::IterationLimit),
+        (_, true) => Some(LinearOutcome::Stagnated),
+        _ => (rz <= 0.0).then_some(LinearOutcome::NegativeCurvature),
+    }
+}
+
+/// The outcome at a curvature p·Ap / p·Mp that gives no step: negative, or zero to round-off. Updates the largest curvature so far.
+fn unusable(curvature: f64, largest: &mut f64) -> Option<LinearOutcome> {
+    *largest = largest.max(curvature);
+    let unresolved = UNRESOLVED * f64::EPSILON * *largest;
     if curvature < -unresolved {
         Some(LinearOutcome::NegativeCurvature)
     } else {

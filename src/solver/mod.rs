@@ -216,7 +216,7 @@ impl LinearReport {
     ///     }
     /// }
     ///
-    /// let settings = ConjugateGradientSettings::default();
+    /// let settings = ConjugateGradientSettings { relative_tolerance: 1e-8, max_iterations: 10 };
     /// let report = conjugate_gradient(&Mirror, &Identity, &[1.0, 2.0], &mut [0.0; 2], &settings, &Pool::default())?;
     /// assert!(!report.converged());
     /// assert_eq!(report.outcome, LinearOutcome::NegativeCurvature);
@@ -286,17 +286,14 @@ impl InvalidSetting {
     fn check_tolerance(name: &'static str, value: f64) -> Result<(), Self> {
         Self::check((0.0..1.0).contains(&value), name, value, "at least 0 and less than 1")
     }
-
-    fn check_restart(restart: usize) -> Result<(), Self> {
-        Self::check(restart >= 1, "restart", restart as f64, "at least 1")
-    }
 }
 
 /// Sets the solution to 0. Returns the report of no iterations, and ‖b‖.
 ///
 /// # Errors
-/// The lengths differ, or the right-hand side is not finite.
-fn begin(rhs: &[f64], solution: &mut [f64]) -> Result<(LinearReport, f64), LinearError> {
+/// The tolerance is out of range, the lengths differ, or the right-hand side is not finite.
+fn begin(rhs: &[f64], solution: &mut [f64], relative_tolerance: f64) -> Result<(LinearReport, f64), LinearError> {
+    InvalidSetting::check_tolerance("relative_tolerance", relative_tolerance)?;
     if rhs.len() != solution.len() {
         return Err(LinearError::Length { rhs: rhs.len(), solution: solution.len() });
     }

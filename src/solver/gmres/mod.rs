@@ -32,12 +32,6 @@ pub struct GmresSettings {
     pub restart: usize,
 }
 
-impl Default for GmresSettings {
-    fn default() -> Self {
-        Self { relative_tolerance: 1e-8, max_iterations: 1000, restart: 30 }
-    }
-}
-
 /// Solves A x = b from x = 0 by GMRES(m) on A M⁻¹. Its residual is the true residual.
 ///
 /// 1. r = b − A x, v₁ = r/‖r‖.
@@ -66,7 +60,8 @@ impl Default for GmresSettings {
 /// }
 ///
 /// let mut x = [0.0; 2];
-/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &GmresSettings::default(), &Pool::default())?;
+/// let settings = GmresSettings { relative_tolerance: 1e-8, max_iterations: 10, restart: 30 };
+/// let report = gmres(&Turn, &Identity, &[-6.0, 8.0], &mut x, &settings, &Pool::default())?;
 /// // Without rounding, a matrix of order n takes n iterations.
 /// assert!(report.converged() && report.iterations == 2);
 /// assert!((x[0] - 4.0).abs() < 1e-15 && (x[1] - 3.0).abs() < 1e-15, "{x:?}");
@@ -83,9 +78,8 @@ pub fn gmres(
     settings: &GmresSettings,
     workspace: &Pool,
 ) -> Result<LinearReport, LinearError> {
-    InvalidSetting::check_tolerance("relative_tolerance", settings.relative_tolerance)?;
-    InvalidSetting::check_restart(settings.restart)?;
-    let (mut report, b_norm) = begin(rhs, solution)?;
+    InvalidSetting::check(settings.restart >= 1, "restart", settings.restart as f64, "at least 1")?;
+    let (mut report, b_norm) = begin(rhs, solution, settings.relative_tolerance)?;
     if b_norm == 0.0 {
         return Ok(report);
     }

@@ -24,6 +24,12 @@ const SUFFICIENT: f64 = 1e-4;
 /// Round-off of Π in units of eps times the sum of the magnitudes of its contributions.
 const POTENTIAL_ROUND_OFF: f64 = 4.0;
 
+/// Round-off of the residual, relative to its magnitude.
+const FLOOR: f64 = NewtonSettings::FLOOR * f64::EPSILON;
+
+/// Halvings of the step allowed in a line search.
+const MAX_HALVINGS: i32 = 25;
+
 /// A residual that no longer falls is converged if it is below this multiple of the floor.
 const ROUND_OFF_MULTIPLE: f64 = 16.0;
 
@@ -38,7 +44,7 @@ const DIVERGED: f64 = 1e8;
 
 /// Solves R(x) = 0 from the initial guess `x`.
 ///
-/// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, floor · eps · magnitude). The magnitude is evaluated at the initial guess.
+/// 1. Stop when ‖R‖ ≤ max(rtol ‖R_first‖, 4 eps · magnitude). The magnitude is evaluated at the initial guess.
 /// 2. K = linearize(x). The preconditioner is prepared with K.
 /// 3. Solve K d = −R by a Krylov method to ‖R + K d‖ ≤ η ‖R‖, with η from [`Forcing`](super::Forcing). A solve that ends early is
 ///    still used if it reaches η < 0.9. A solve ended by negative curvature is used if there is a potential, which falls along d
@@ -46,10 +52,10 @@ const DIVERGED: f64 = 1e8;
 /// 4. s = 1.
 /// 5. Accept x + s d if η < 1 and ‖R(x + s d)‖ ≤ (1 − 1e-4 s (1 − η)) ‖R‖, with the η that the solve has reached. Accept it also if
 ///    Π(x + s d) ≤ Π(x) + 1e-4 s R·d + 4 eps |Π|, where there is a potential that can resolve the predicted decrease s R·d < 0.
-/// 6. The iteration has converged if the full step is not accepted and ‖R‖ ≤ 16 · floor · eps · magnitude. Otherwise halve s and go to 5.
+/// 6. The iteration has converged if the full step is not accepted and ‖R‖ ≤ 16 · 4 eps · magnitude. Otherwise halve s and go to 5.
 ///    Also halve s where x + s d is inadmissible or R is not finite.
 /// 7. If no step is found or accepted, or 8 steps in a row were accepted by ‖R‖ and none reduced it by a percent, evaluate the sensitivity
-///    at x. The iteration has converged if ‖R‖ ≤ 16 · floor · eps · sensitivity, and has failed if not.
+///    at x. The iteration has converged if ‖R‖ ≤ 16 · 4 eps · sensitivity, and has failed if not.
 /// 8. x ← x + s d, and go back to 1.
 ///
 /// Between calls into the problem:
@@ -100,14 +106,13 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     fn iterate(&mut self, preconditioner: &mut dyn Preconditioner) -> Result<Convergence, NewtonFailure<E>> {
         self.settings.check()?;
         self.begin()?;
-        while self.residual > self.target {
-            let iteration = self.number();
+        let (target, allowed) = (self.target, self.settings.max_iterations);
+        while self.residual > target {
             if self.problem.is_stopped() {
-                return Err(NewtonFailure::Stopped { iteration });
+                return Err(NewtonFailure::Stopped);
             }
-            let (residual, target, allowed) = (self.residual, self.target, self.settings.max_iterations);
-            if iteration > allowed {
-                return Err(NewtonFailure::MaxIterations { allowed, residual, target });
+            if self.history.iterations.len() >= allowed {
+                return Err(NewtonFailure::MaxIterations { allowed, target });
             }
             match self.step(preconditioner) {
                 Ok(Some(taken)) => self.history.iterations.push(taken),
@@ -117,29 +122,18 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
                 Err(_) if self.residual <= self.round_off()? => return Ok(Convergence::RoundOff),
                 Err(cause) => return Err(cause),
             }
-            let residual = self.residual;
-            if residual > DIVERGED * self.first.max(self.magnitude) {
-                return Err(NewtonFailure::Diverged { iteration, residual, first: self.first });
+            if self.residual > DIVERGED * self.first.max(self.magnitude) {
+                return Err(NewtonFailure::Diverged { first: self.first });
             }
-            if self.stalls() && residual > target {
+            if self.stalls() && self.residual > target {
                 let round_off = self.round_off()?;
-                if residual <= round_off {
+                if self.residual <= round_off {
                     return Ok(Convergence::RoundOff);
                 }
-                return Err(NewtonFailure::Stagnated { iteration, residual, target, round_off });
+                return Err(NewtonFailure::Stagnated { target, round_off });
             }
         }
         Ok(Convergence::Tolerance)
-    }
-
-    /// The number of the next iteration.
-    fn number(&self) -> usize {
-        self.history.iterations.len() + 1
-    }
-
-    /// Round-off of the residual, relative to its magnitude.
-    fn floor(&self) -> f64 {
-        self.settings.floor * f64::EPSILON
     }
 
     fn stalls(&self) -> bool {
@@ -156,29 +150,27 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         self.residual = norm(&self.r);
         self.first = self.residual;
         if !self.first.is_finite() {
-            return Err(NewtonFailure::NotFinite { what: "the residual", iteration: 0 });
+            return Err(NewtonFailure::NotFinite("the residual"));
         }
         self.history.first_residual = Some(self.first);
         self.magnitude = self.measured(self.problem.magnitude(self.x))?;
-        self.target = (self.settings.relative_tolerance * self.first).max(self.floor() * self.magnitude);
+        self.target = (self.settings.relative_tolerance * self.first).max(FLOOR * self.magnitude);
         Ok(())
     }
 
     /// Steps 2 to 6, and 8. `None` if the residual is round-off, and the full step does not lower it.
     fn step(&mut self, preconditioner: &mut dyn Preconditioner) -> Result<Option<NewtonIteration>, NewtonFailure<E>> {
-        let (iteration, before) = (self.number(), self.residual);
+        let (iteration, before) = (self.history.iterations.len(), self.residual);
         let last = self.history.iterations.last().map(|last| (last.forcing, last.ratio));
         let forcing = self.settings.forcing.next(last, self.target / before);
         self.history.counts.linearizations += 1;
-        let solved = {
-            let inadmissible = |source| NewtonFailure::Inadmissible { iteration: iteration - 1, source };
+        let (d, krylov) = {
+            let inadmissible = |source| NewtonFailure::Inadmissible { iteration, source };
             let problem = self.problem;
             let tangent = problem.linearize(self.x).map_err(inadmissible)?;
             let inverse = preconditioner.prepare(&*tangent);
-            self.solve(&*tangent, &*inverse, forcing)
+            self.solve(&*tangent, &*inverse, forcing)?
         };
-        let failed = |source| NewtonFailure::LinearSolverFailed { iteration, residual: before, source };
-        let (d, krylov, negative_curvature) = solved.map_err(failed)?;
         let Some((step_length, residual, merit)) = self.search(&d, krylov.relative_residual)? else {
             return Ok(None);
         };
@@ -186,18 +178,18 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         std::mem::swap(&mut self.r, &mut self.r_trial);
         self.residual = residual;
         let ratio = residual / before;
-        Ok(Some(NewtonIteration { residual, ratio, step_length, merit, forcing, krylov, negative_curvature }))
+        Ok(Some(NewtonIteration { residual, ratio, step_length, merit, forcing, krylov }))
     }
 
     /// Step 3, as K d' = −R/ρ with ρ = 2ᵏ ≤ ‖R‖ and d = ρ d'. So the squares of small or large forces neither underflow nor overflow.
     ///
-    /// Returns d and the report of the solve that gave it. If conjugate gradients were abandoned for GMRES, their report comes last.
+    /// Returns d and the report of the solve that gave it.
     fn solve(
         &mut self,
         tangent: &dyn Linearization,
         inverse: &dyn LinearOperator,
         relative_tolerance: f64,
-    ) -> Result<(Pooled<f64>, LinearReport, Option<LinearReport>), LinearSolverFailure> {
+    ) -> Result<(Pooled<f64>, LinearReport), LinearSolverFailure> {
         let pool = self.r.pool();
         let size = self.residual.log2().floor().exp2();
         let rhs = pool.collect(self.r.iter().map(|r| -r / size));
@@ -212,12 +204,11 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
                 (DEFAULT_RESTART, Some(report))
             }
         };
-        let negative = descended.filter(|report| report.outcome == LinearOutcome::NegativeCurvature);
+        let negative = descended.is_some_and(|report| report.outcome == LinearOutcome::NegativeCurvature);
         // −R·d > 0: the potential falls along the truncated step.
-        let truncated = negative.is_some() && dot(&rhs, &d) > 0.0 && self.problem.potential(self.x).is_some();
-        let abandoned = negative.filter(|_| !truncated);
+        let truncated = negative && dot(&rhs, &d) > 0.0 && self.problem.potential(self.x).is_some();
         let krylov = match descended {
-            Some(report) if abandoned.is_none() => report,
+            Some(report) if !negative || truncated => report,
             _ => {
                 let settings = GmresSettings { relative_tolerance, max_iterations, restart: restart as usize };
                 let report = gmres(tangent, inverse, &rhs, &mut d, &settings, pool)?;
@@ -230,7 +221,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
             return Err(LinearSolverFailure::NoProgress { report: krylov, wanted: relative_tolerance });
         }
         d.iter_mut().for_each(|d| *d *= size);
-        Ok((d, krylov, abandoned))
+        Ok((d, krylov))
     }
 
     /// Steps 4 to 6: the step length along d, the ‖R‖ reached and the merit function that accepts it. The accepted iterate and its residual are
@@ -241,8 +232,8 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         let slope = dot(&self.r, d);
         let (mut inadmissible, mut not_finite, mut last, mut start) = (0, 0, None, None);
         let mut length = 1.0;
-        for halvings in 0..=self.settings.max_halvings {
-            length = 0.5_f64.powi(halvings as i32);
+        for halvings in 0..=MAX_HALVINGS {
+            length = 0.5_f64.powi(halvings);
             self.trial.copy_from_slice(d);
             xpby(self.x, length, &mut self.trial);
             self.history.counts.residuals += 1;
@@ -261,27 +252,25 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
                 return Ok(Some((length, residual, Merit::Residual)));
             } else if self.potential_falls(-length * slope, &mut start) {
                 return Ok(Some((length, residual, Merit::Potential)));
-            } else if halvings == 0 && before <= ROUND_OFF_MULTIPLE * self.floor() * self.magnitude {
+            } else if halvings == 0 && before <= ROUND_OFF_MULTIPLE * FLOOR * self.magnitude {
                 return Ok(None);
             }
         }
-        let (iteration, residual) = (self.number(), self.residual);
-        let (trials, shortest) = (self.settings.max_halvings as usize + 1, length);
+        let trials = MAX_HALVINGS as usize + 1;
         if not_finite == trials {
-            return Err(NewtonFailure::NotFinite { what: "the residual at every step length", iteration });
+            return Err(NewtonFailure::NotFinite("the residual at every step length"));
         }
-        Err(NewtonFailure::LineSearchFailed { iteration, residual, trials, shortest, inadmissible, not_finite, last })
+        Err(NewtonFailure::LineSearchFailed { trials, shortest: length, inadmissible, not_finite, last })
     }
 
     /// Π(trial) ≤ Π(x) − c p + round-off, where the predicted decrease p = −s R·d is above that round-off. Evaluated only where the residual
     /// norm does not accept the step.
     ///
     /// `start` keeps Π(x) and its magnitude, once they are evaluated; `Some(None)` if there is no potential.
-    fn potential_falls(&mut self, predicted: f64, start: &mut Option<Option<(f64, f64)>>) -> bool {
-        let mut evaluate = |x: &[f64]| {
-            let value = self.problem.potential(x)?;
-            self.history.counts.potentials += 1;
-            value.ok().filter(|(value, magnitude)| value.is_finite() && magnitude.is_finite())
+    fn potential_falls(&self, predicted: f64, start: &mut Option<Option<(f64, f64)>>) -> bool {
+        let evaluate = |x: &[f64]| {
+            let value = self.problem.potential(x)?.ok();
+            value.filter(|(value, magnitude)| value.is_finite() && magnitude.is_finite())
         };
         let round_off = |magnitude: f64| POTENTIAL_ROUND_OFF * f64::EPSILON * magnitude;
         let Some((start, start_magnitude)) = *start.get_or_insert_with(|| evaluate(self.x)) else {
@@ -299,7 +288,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
     /// The round-off of the residual at x, from its sensitivity (step 7).
     fn round_off(&mut self) -> Result<f64, NewtonFailure<E>> {
         let sensitivity = self.measured(self.problem.sensitivity(self.x))?;
-        Ok(ROUND_OFF_MULTIPLE * self.floor() * sensitivity)
+        Ok(ROUND_OFF_MULTIPLE * FLOOR * sensitivity)
     }
 
     /// Counts and stores the magnitude or sensitivity at an accepted iterate.
@@ -311,7 +300,7 @@ impl<E: std::error::Error + 'static> Newton<'_, E> {
         self.history.counts.magnitudes += 1;
         let magnitude = magnitude.map_err(|source| NewtonFailure::Inadmissible { iteration, source })?;
         if !magnitude.is_finite() {
-            return Err(NewtonFailure::NotFinite { what: "the magnitude of the residual's contributions", iteration });
+            return Err(NewtonFailure::NotFinite("the magnitude of the residual's contributions"));
         }
         self.history.magnitude = Some(magnitude);
         Ok(magnitude)

@@ -26,8 +26,6 @@ pub struct NewtonIteration {
     pub forcing: f64,
     /// The linear solve that gave the step. Its outcome is negative curvature where conjugate gradients ended early and their step is used.
     pub krylov: LinearReport,
-    /// The conjugate gradients that were abandoned for GMRES because of negative curvature, if any.
-    pub negative_curvature: Option<LinearReport>,
 }
 
 /// Numbers of evaluations.
@@ -37,8 +35,6 @@ pub struct NewtonCounts {
     pub residuals: usize,
     /// Residuals at shortened steps.
     pub line_search: usize,
-    /// Potentials.
-    pub potentials: usize,
     /// Magnitudes and sensitivities.
     pub magnitudes: usize,
     /// Linearisations.

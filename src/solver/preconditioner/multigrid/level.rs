@@ -5,7 +5,7 @@ use super::form::LocalForm;
 use crate::aggregation::{Extension, Followers, Occupied, Pieces};
 use crate::solver::LinearOperator;
 use crate::solver::preconditioner::block_jacobi::multiply_blocks;
-use crate::tensor::{Tensor, Vector, inverse};
+use crate::tensor::{Tensor, Vector, identity, inverse};
 use nalgebra::DMatrix;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -114,8 +114,8 @@ impl<const D: usize> Level<D> {
         level.follow(form, &mut next);
         level.hold_empty(&next);
         level.hold();
-        level.invert_blocks(&next);
         next.prescribed.clone_from(&level.held);
+        level.invert_blocks(&next);
         level.largest = largest(&level, &|r, z| level.precondition(r, z), D * next.nodes.len());
         (level, next)
     }
@@ -247,17 +247,14 @@ impl<const D: usize> Level<D> {
                 }
             }
         }
-        for (k, fixed) in self.held.iter().zip(&next.follows).map(|(held, follows)| *held || *follows).enumerate() {
+        for (k, _) in next.fixed().iter().enumerate().filter(|(_, fixed)| **fixed) {
             let (block, i) = (&mut blocks[k / D], k % D);
-            if fixed {
-                block.row_mut(i).fill(0.0);
-                block.column_mut(i).fill(0.0);
-                block[(i, i)] = 1.0;
-            }
+            block.row_mut(i).fill(0.0);
+            block.column_mut(i).fill(0.0);
+            block[(i, i)] = 1.0;
         }
-        let usable =
-            |inverse: Tensor<f64, D>| if inverse.iter().all(|x| x.is_finite()) { inverse } else { Tensor::identity() };
-        self.inverse = blocks.iter().map(|block| usable(inverse(block))).collect();
+        let finite = |inverse: &Tensor<f64, D>| inverse.iter().all(|x| x.is_finite());
+        self.inverse = blocks.iter().map(|block| Some(inverse(block)).filter(finite).unwrap_or(identity())).collect();
     }
 
     /// The block of K for two nodes; zero where they are not neighbours.
@@ -292,16 +289,21 @@ impl<const D: usize> Level<D> {
         multiply_blocks(&self.inverse, r, z);
     }
 
-    /// Eᵀ Pᵀ r
-    pub fn up(&self, r: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; D * self.neighbours.len()];
+    /// Calls `visit` with the entries of P: a value of the finer level that is an unknown, a value of this level, and the weight.
+    fn each_weight(&self, mut visit: impl FnMut(usize, usize, f64)) {
         for (fine, list) in self.above.iter().enumerate() {
             for &(coarse, weight) in list {
                 for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
-                    out[coarse as usize * D + i] += weight * r[fine * D + i];
+                    visit(fine * D + i, coarse as usize * D + i, weight);
                 }
             }
         }
+    }
+
+    /// Eᵀ Pᵀ r
+    pub fn up(&self, r: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; D * self.neighbours.len()];
+        self.each_weight(|fine, coarse, weight| out[coarse] += weight * r[fine]);
         self.followers.restrict::<f64>(bytemuck::cast_slice_mut(&mut out));
         out.iter_mut().zip(&self.held).filter(|(_, held)| **held).for_each(|(out, _)| *out = 0.0);
         out
@@ -310,12 +312,6 @@ impl<const D: usize> Level<D> {
     /// x += P E y
     pub fn down(&self, mut y: Vec<f64>, x: &mut [f64]) {
         self.followers.extend::<f64>(bytemuck::cast_slice_mut(&mut y));
-        for (fine, list) in self.above.iter().enumerate() {
-            for &(coarse, weight) in list {
-                for i in (0..D).filter(|i| !self.fixed_above[fine * D + i]) {
-                    x[fine * D + i] += weight * y[coarse as usize * D + i];
-                }
-            }
-        }
+        self.each_weight(|fine, coarse, weight| x[fine] += weight * y[coarse]);
     }
 }
