@@ -59,7 +59,7 @@ impl Law for MooneyRivlin {
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         at.trace_e_minus_log_jacobian() * T::lit(self.shear())
             + four_minors(at) * T::lit(self.c2)
-            + Ciarlet::energy(at) * T::lit(0.5 * self.volumetric_lambda())
+            + Ciarlet::energy(self.volumetric_lambda(), at)
     }
 
     /// S = 2 (c₁ + 2c₂) (I − C⁻¹) + 4c₂ (tr E I − E) + J U' C⁻¹, with I − C⁻¹ = F⁻¹ (H + F⁻ᵀ Hᵀ) as for the neo-Hookean solids

@@ -56,7 +56,7 @@ impl Law for Ogden {
     fn energy<T: Real, const D: usize>(&self, at: &MaterialState<T, D>) -> T {
         let strain = Strained::new(at, &[]).strain();
         let of = |(power, factor): (Power, f64)| primitive_trace(&power, &strain) * T::lit(factor);
-        let volumetric = Ciarlet::energy(at) * T::lit(0.5 * self.lambda());
+        let volumetric = Ciarlet::energy(self.lambda(), at);
         self.powers().map(of).fold(volumetric, |sum, term| sum + term)
     }
 
