@@ -105,11 +105,12 @@ impl Problems {
         self.list.push(Problem { path, value, allowed, place: None });
     }
 
-    /// Adds a problem unless `ok`.
-    pub(crate) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) {
+    /// Adds a problem unless `ok`. Returns `ok`.
+    pub(crate) fn require(&mut self, ok: bool, path: &str, value: impl Display, allowed: impl Display) -> bool {
         if !ok {
             self.refuse(path, value, allowed);
         }
+        ok
     }
 
     /// Checks that a number has a sensible size.

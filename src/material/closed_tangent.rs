@@ -111,13 +111,7 @@ impl<N: Copy, const D: usize> ClosedTangent<N, D> {
 /// A tensor by rows.
 #[inline(always)]
 pub(super) fn rows<const D: usize>(a: &Tensor<f64, D>) -> [[f64; D]; D] {
-    let mut rows = [[0.0; D]; D];
-    for i in 0..D {
-        for k in 0..D {
-            rows[i][k] = a[(i, k)];
-        }
-    }
-    rows
+    a.transpose().data.0
 }
 
 /// A tensor from its rows.
@@ -141,10 +135,7 @@ impl<const D: usize> ClosedTangent<f64, D> {
         let (g_i, g_j) = (a * grad_i, a * grad_j);
         let block = scaled(&outer(&g_i, &g_j), self.bulk) - scaled(&outer(&g_j, &g_i), self.q)
             + scaled(&identity(), grad_i.dot(&(tensor(&self.right) * grad_j)));
-        match &self.both {
-            Some([b, c]) => block + scaled(&tensor(b), grad_i.dot(&(tensor(c) * grad_j))),
-            None => block,
-        }
+        self.both.map_or(block, |[b, c]| block + scaled(&tensor(&b), grad_i.dot(&(tensor(&c) * grad_j))))
     }
 
     /// The geometric part L B alone, with B = V₀ F_r S F_rᵀ, if `geometric`; otherwise the rest.

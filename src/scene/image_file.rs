@@ -66,7 +66,7 @@ impl ImageFile {
         );
         let path = format!("{path}.size");
         match self.size {
-            None => problems.require(D == 2, &path, "nothing", "must give the voxels along x, y and z"),
+            None => _ = problems.require(D == 2, &path, "nothing", "must give the voxels along x, y and z"),
             Some(size) if D == 2 => {
                 problems.refuse(&path, format_args!("{size:?}"), "must not be given: the picture knows its size");
             }

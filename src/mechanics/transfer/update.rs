@@ -248,6 +248,7 @@ impl<'a, const D: usize> Update<'a, D> {
         let plastic_strain: Vec<Option<usize>> = bodies.iter().map(place).collect();
         let (mut plastic, mut yielding) = (0.0, 0.0);
         particles.dilatation = dilatation::after(particles, bodies, supports, self.motion());
+        let mut next = Vec::with_capacity(remembered);
         let Particles {
             position, velocity, acceleration, displacement_gradient, volume, memory, body, reference, ..
         } = particles;
@@ -267,14 +268,14 @@ impl<'a, const D: usize> Update<'a, D> {
                     let memory = &mut memory[p * remembered..(p + 1) * remembered];
                     let (at, _) = MaterialState::new(displacement_gradient[p]).admissible_or_rest();
                     let body = body[p] as usize;
-                    let next = bodies[body].law.updated_variables(&at.in_step(dt, memory));
+                    next.clear();
+                    next.extend_from_slice(memory);
+                    bodies[body].law.update_variables(&at.in_step(dt, memory), &mut next);
                     if let Some(place) = plastic_strain[body] {
                         plastic += volume[p];
                         yielding += if next.get(place) > memory.get(place) { volume[p] } else { 0.0 };
                     }
-                    for (variable, next) in memory.iter_mut().zip(next) {
-                        *variable = next;
-                    }
+                    memory.copy_from_slice(&next);
                 }
             },
         );
