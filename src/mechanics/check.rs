@@ -5,7 +5,7 @@ use crate::material::{Law, MaterialState};
 use crate::mechanics::constitutive::{Part, compose};
 use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::tangent::Tangent;
-use crate::mechanics::terms::Piece;
+use crate::mechanics::terms::{Piece, Role};
 use crate::tensor::{Tensor, Vector, identity, inverse};
 
 /// The largest accepted relative difference: min(64 eps κ(F)², 1e-10), with κ(F) = ‖F‖ ‖F⁻¹‖.
@@ -156,7 +156,8 @@ impl<const D: usize, L: Law> Equilibrium<'_, D, L> {
     /// The size of a piece's contributions to K u where they may cancel: for loads, the force times |u|/h.
     fn size_of(&self, piece: Piece, dphi: &[Vector<f64, D>], u: &[Vector<f64, D>]) -> Result<f64, Inadmissible> {
         let nodes = self.step.supports.of(0).map(|(_, _, grad_n)| grad_n.norm()).fold(0.0, f64::max);
-        Ok(if self.terms.is_load(piece) { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
+        let is_load = piece.role == Role::Loads;
+        Ok(if is_load { norm(&self.residual_of::<f64>(piece, dphi)?) * norm(u) * nodes } else { 0.0 })
     }
 
     /// Compares the diagonal blocks of a few nodes with the products of unit vectors at these nodes.

@@ -45,10 +45,10 @@ pub(super) fn is_light<const D: usize>(particles: &Particles<D>) -> impl Fn(f64)
 }
 
 impl<const D: usize> Mass<'_, D> {
-    /// (1−ε) m of a particle; `None` if the mass is lumped.
+    /// (1−ε) m of a particle.
     #[inline(always)]
-    pub fn consistent(&self, p: usize) -> Option<f64> {
-        (self.lumping < 1.0).then(|| (1.0 - self.lumping) * self.particles.mass[p])
+    pub(crate) fn consistent(&self, p: usize) -> f64 {
+        (1.0 - self.lumping) * self.particles.mass[p]
     }
 
     /// `out += factor M̃ u`
