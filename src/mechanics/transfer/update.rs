@@ -11,7 +11,7 @@ use crate::mechanics::smoothing::Smoothing;
 use crate::mechanics::sweep::Supports;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::{Body, Particles};
-use crate::pooled::Pooled;
+use crate::pooled::{Pool, Pooled};
 use crate::tensor::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -203,18 +203,23 @@ impl<'a, const D: usize> Update<'a, D> {
         self.kept.as_deref().unwrap_or(self.dphi)
     }
 
-    /// φ, v and a of the nodes at the end of the step, from the state `projected`.
-    pub fn end(&self, projected: &Nodal<D>) -> Nodal<D> {
-        let sum = |field: &Pooled<Vector<f64, D>>, delta: &Pooled<Vector<f64, D>>| {
-            field.pool().collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
+    /// The nodal state at the end of the step, without the mass, from the state `projected`.
+    pub(crate) fn end(&self, projected: &Nodal<D>, pool: &Pool) -> Nodal<D> {
+        let sum = |field: &[Vector<f64, D>], delta: &[Vector<f64, D>]| {
+            pool.collect(field.iter().zip(delta).map(|(field, delta)| field + delta))
         };
         Nodal {
             velocity: sum(&projected.velocity, &self.delta_velocity),
             acceleration: sum(&projected.acceleration, &self.delta_acceleration),
-            motion: projected.velocity.pool().collect(self.motion().iter().copied()),
+            motion: pool.collect(self.motion().iter().copied()),
             out_of_balance: projected.out_of_balance.clone(),
             ..Nodal::default()
         }
+    }
+
+    /// Δφ/Δt
+    pub(crate) fn rate(&self, dt: f64) -> Vec<Vector<f64, D>> {
+        self.dphi.iter().map(|dphi| dphi / dt).collect()
     }
 
     /// The particle with the smallest id of those that would leave the grid: its id, and its position outside.
