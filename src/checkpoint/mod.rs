@@ -339,19 +339,15 @@ pub struct Unfinished {
 /// The killed or interrupted run in `directory`, if it has a readable checkpoint.
 pub fn unfinished(directory: &Path) -> Option<Unfinished> {
     // A killed run wrote no report.
-    let over = outcome(directory).is_some_and(|outcome| outcome != "interrupted");
+    let report = std::fs::read(directory.join("report.json")).ok();
+    let report = report.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
+    let over = report.is_some_and(|report| report["outcome"] != "interrupted");
     let readable = NAMES.iter().filter_map(|name| {
         let path = directory.join(name);
         let (content, _) = read(&path).ok()?;
         Some(Unfinished { path, steps: content.clock.steps() })
     });
     readable.max_by_key(|one| one.steps).filter(|_| !over)
-}
-
-/// The outcome in the report of the run in `directory`.
-fn outcome(directory: &Path) -> Option<Value> {
-    let text = std::fs::read(directory.join("report.json")).ok()?;
-    Some(serde_json::from_slice::<Value>(&text).ok()?["outcome"].take())
 }
 
 /// Removes the checkpoints of an earlier run, so that a new run in the directory is not continued from them.
