@@ -228,4 +228,14 @@ impl<'a, const D: usize, L: Law> Equilibrium<'a, D, L> {
     pub fn potential<T: Number>(&self, dphi: &[Vector<T, D>]) -> Option<Result<(T, f64), Inadmissible>> {
         self.terms.energy(&self.unknowns.extended(dphi))
     }
+
+    /// Whether the tangent is symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        unsymmetric(self.step.bodies, self.step.loads).is_none()
+    }
+
+    /// Sets the prescribed degrees of freedom of a field to zero.
+    pub fn clear_prescribed<T: num_traits::Zero + Copy + nalgebra::Scalar>(&self, field: &mut [Vector<T, D>]) {
+        self.unknowns.clear_prescribed(field);
+    }
 }

@@ -3,7 +3,7 @@
 use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{Form, Laws};
-use crate::mechanics::residual::{Equilibrium, Inadmissible, unsymmetric};
+use crate::mechanics::residual::{Equilibrium, Inadmissible};
 use crate::mechanics::sweep::{Group, Mode, Quadratic, Supports};
 use crate::mechanics::terms::{Linearized, Piece};
 use crate::mechanics::unknowns::Unknowns;
@@ -231,7 +231,7 @@ impl<const D: usize, L: Law> NonlinearProblem for Equilibrium<'_, D, L> {
     }
 
     fn is_symmetric(&self) -> bool {
-        unsymmetric(self.step.bodies, self.step.loads).is_none()
+        Self::is_symmetric(self)
     }
 
     fn is_stopped(&self) -> bool {

@@ -114,11 +114,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
         equilibrium: &Equilibrium<'_, D, L>,
         dphi: &[Vector<f64, D>],
     ) -> Result<(), StepError> {
-        match self.settings.check_tangent {
-            Some(every) if self.clock.steps().is_multiple_of(every.get()) => {
-                Ok(equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?)
-            }
-            _ => Ok(()),
+        if self.settings.check_tangent.is_some_and(|every| self.clock.steps().is_multiple_of(every.get())) {
+            equilibrium.check_tangent(dphi, &direction(dphi.len(), self.clock.steps()))?;
         }
+        Ok(())
     }
 }

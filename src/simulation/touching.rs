@@ -59,13 +59,9 @@ impl<const D: usize, L: Law, A: ShapeFunction> Simulation<D, L, A> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn sharing(&self, supports: &Supports<D>) -> Vec<Sharing> {
-        let interfaces = self.interfaces(supports);
-        let of = |(bodies, sides): (&[u32; 2], &Interface)| Sharing {
-            bodies: *bodies,
-            gap: self.gap(sides),
-            tension: self.tension(*bodies, sides),
-        };
-        interfaces.iter().map(of).collect()
+        let interfaces = self.interfaces(supports).into_iter();
+        let of = |(bodies, sides)| Sharing { bodies, gap: self.gap(&sides), tension: self.tension(bodies, &sides) };
+        interfaces.map(of).collect()
     }
 
     /// The particles that contribute to nodes of another body, by pairs of bodies.

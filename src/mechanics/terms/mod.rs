@@ -18,7 +18,7 @@ mod pressure;
 mod stress;
 
 pub(crate) use mean_dilatation::linearized_rows;
-pub(crate) use planned::{Given, planned};
+pub(crate) use planned::planned;
 
 use damping::Damping;
 use dead_load::DeadLoad;

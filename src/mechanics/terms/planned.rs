@@ -3,25 +3,18 @@
 use crate::mechanics::loads::{Loads, Pressing, Rayleigh};
 use crate::mechanics::schemes::Scheme;
 
-/// The data of a simulation before its first step, from which the terms are planned.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Given<'a, const D: usize> {
-    pub loads: &'a Loads<D>,
-    pub scheme: &'a dyn Scheme,
-    /// ε
-    pub lumping: f64,
-    /// Whether a body has mean dilatation.
-    pub averages: bool,
-    /// Whether the grid may be reset.
-    pub may_reset: bool,
-}
-
 /// `(name, used, why)`: whether a term, or a part of a term, is used, and the reason.
 pub(crate) type Reason = (&'static str, bool, String);
 
-/// The entries of all terms in a plan.
-pub(crate) fn planned<const D: usize>(given: Given<'_, D>) -> Vec<Reason> {
-    let Given { loads, scheme, lumping, averages, may_reset } = given;
+/// The entries of all terms in a plan. `lumping` is ε, `averages` says whether a body has mean dilatation, and `may_reset` whether the grid
+/// may be reset.
+pub(crate) fn planned<const D: usize>(
+    loads: &Loads<D>,
+    scheme: &dyn Scheme,
+    lumping: f64,
+    averages: bool,
+    may_reset: bool,
+) -> Vec<Reason> {
     let moves = scheme.has_inertia();
     let inertia = |why: String| if moves { why } else { format!("time.scheme says none: {scheme}") };
     let mean = match averages {

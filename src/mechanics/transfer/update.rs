@@ -105,14 +105,11 @@ impl<'a, const D: usize> Update<'a, D> {
             mutant!("transfer: the blow of a wall contains the forces": by_forces = 0.0);
             let literal = !dof.moving && walls == WallUpdate::Literal;
             mutant!("transfer: moving walls count as resting ones": literal = walls == WallUpdate::Literal);
-            (*delta_v, *delta_a) = if literal {
-                (0.0, 0.0)
-            } else {
-                (
-                    dof.step.velocity_end - projected.velocity[node][i],
-                    dof.step.acceleration_end - projected.acceleration[node][i],
-                )
-            };
+            (*delta_v, *delta_a) = (0.0, 0.0);
+            if !literal {
+                *delta_v = dof.step.velocity_end - projected.velocity[node][i];
+                *delta_a = dof.step.acceleration_end - projected.acceleration[node][i];
+            }
             *impulse = nodal.mass[node] * (*delta_v - by_forces);
         }
         let mut kept = None;
@@ -277,24 +274,18 @@ impl<'a, const D: usize> Update<'a, D> {
                         plastic += volume[p];
                         yielding += if next.get(place) > memory.get(place) { volume[p] } else { 0.0 };
                     }
-                    for (variable, next) in memory.iter_mut().zip(next) {
-                        *variable = next;
-                    }
+                    memory.iter_mut().zip(next).for_each(|(variable, next)| *variable = next);
                 }
             },
         );
-        let committed = Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } };
-        if self.delta_velocity.is_empty() {
-            return committed;
-        }
-        let [changed_v, changed_a] = self.smoothed.unwrap_or_default();
-        for (field, delta, changed) in
-            [(velocity, &self.delta_velocity, changed_v), (acceleration, &self.delta_acceleration, changed_a)]
-        {
-            supports.each_value(delta, |p, delta| {
+        // Without inertia there are no increments.
+        let increments = [(velocity, self.delta_velocity), (acceleration, self.delta_acceleration)];
+        let with_changes = increments.into_iter().zip(self.smoothed.unwrap_or_default());
+        for ((field, delta), changed) in with_changes.filter(|((_, delta), _)| !delta.is_empty()) {
+            supports.each_value(&delta, |p, delta| {
                 field[p] += changed.get(p).map_or(delta, |changed| delta + changed);
             });
         }
-        committed
+        Committed { strain: largest, yielding: if plastic > 0.0 { yielding / plastic } else { 0.0 } }
     }
 }
