@@ -9,7 +9,7 @@ use crate::material::Law;
 use crate::mechanics::loads::{Motion, PrescribedDof, Pressing, SurfaceLoad};
 use crate::mechanics::reference::GridReset;
 use crate::mechanics::sweep::{SupportError, Supports};
-use crate::mechanics::terms::{Given, Terms};
+use crate::mechanics::terms::planned;
 use crate::mechanics::unknowns::Unknowns;
 use crate::particles::Body;
 use crate::simulation::{Sharing, Simulation};
@@ -212,13 +212,7 @@ fn terms<const D: usize, L: Law, A>(simulation: &Simulation<D, L, A>, supports: 
     let smooths = scheme.has_inertia() && settings.smoothing.is_some();
     let moving = loads.prescribed.iter().flat_map(|one| &one.motion).flatten().any(|motion| *motion != Motion::Rest);
     let averages = simulation.bodies.iter().any(Body::averages);
-    let mut all = Terms::<D, L>::planned(Given {
-        loads,
-        scheme,
-        lumping: settings.lumping,
-        averages,
-        may_reset: simulation.may_reset(),
-    });
+    let mut all = planned(loads, scheme, settings.lumping, averages, simulation.may_reset());
     all.extend([
         ("aggregation", settings.aggregation, aggregated(supports)),
         ("smoothing", smooths, "only with a transfer other than flip".into()),
