@@ -2,7 +2,7 @@
 
 use super::probes::{Bound, bound_probes};
 use super::scene_arguments::{SceneArguments, what_accuracy_sets};
-use super::steps::{Schedule, Steps, Unwritten};
+use super::steps::{Schedule, Steps};
 use super::{Failure, INTERRUPTED, directory, print, tell};
 use bfree::checkpoint::{self, Checkpoints, Identity, Restored};
 use bfree::output::plot::{Look, plot_run};
@@ -82,15 +82,6 @@ enum Form {
     Json,
 }
 
-/// The checkpoint is later than the end of the run.
-#[derive(Debug, thiserror::Error)]
-#[error("{} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until", path.display())]
-struct Past {
-    path: PathBuf,
-    time: f64,
-    end: f64,
-}
-
 impl Run {
     /// Whether messages are written as JSON, for a program.
     pub fn tells_json(&self) -> bool {
@@ -102,12 +93,11 @@ impl Run {
         let start = Instant::now();
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {
-            scene.time =
-                scene.time.until(until, "--until").map_err(|wrong| Failure::scene(SceneError::Values(wrong)))?;
+            let time = scene.time.until(until, "--until").map_err(SceneError::Values);
+            scene.time = time.map_err(Failure::scene)?;
         }
         if let Some(threads) = self.threads {
-            let threads = usize::try_from(threads).unwrap_or(usize::MAX);
-            parallel::use_threads(threads).map_err(Failure::run)?;
+            parallel::use_threads(threads as usize).map_err(Failure::run)?;
         }
         match scene.dimension() {
             1 => self.execute_in::<1>(&scene, start),
@@ -159,7 +149,11 @@ impl Run {
             Checkpoints::new(directory.clone(), identity, self.options(&directory), every, restored.as_ref())
         });
         let mut steps = Steps { simulation, recorder, checkpoints, schedule, interrupted };
-        let failure = steps.take().map_err(|unwritten| self.stopped_by(unwritten, &directory))?;
+        let failure = steps.take().map_err(|error| {
+            let (time, place) = (steps.simulation.clock.time(), directory.display());
+            self.say("stopped", &format!("stopped at t = {time}; {place} holds what was written until then, and no report"));
+            Failure::Run(error)
+        })?;
         self.report(steps, failure, &inputs, &warnings, &directory)
     }
 
@@ -189,31 +183,21 @@ impl Run {
         warnings: &[String],
         directory: &Path,
     ) -> Result<Map<String, Value>, Failure> {
-        let json = |value: Result<Value, serde_json::Error>| value.map_err(Failure::run);
-        let mut inputs = Map::new();
-        inputs.insert("command".to_owned(), self.options(directory));
-        inputs.insert("settings".to_owned(), json(serde_json::to_value(scene))?);
+        let (krylov, why_krylov) = simulation.krylov();
+        let (preconditioner, why_preconditioner) = simulation.preconditioner();
+        let mut inputs = Map::from_iter([
+            ("command".to_owned(), self.options(directory)),
+            ("settings".to_owned(), serde_json::to_value(scene).map_err(Failure::run)?),
+            ("krylov".to_owned(), json!({ "method": krylov.to_string(), "why": why_krylov })),
+            ("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why_preconditioner })),
+            ("scene_warnings".to_owned(), json!(warnings)),
+            ("probes".to_owned(), probes.iter().map(Bound::report).collect()),
+            ("surfaces".to_owned(), serde_json::to_value(SurfaceUse::of(simulation)).map_err(Failure::run)?),
+        ]);
         if let Some(accuracy) = scene.accuracy {
-            let sets = json(serde_json::to_value(&scene.chosen))?;
-            inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": sets }));
+            inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": scene.chosen }));
         }
-        let (method, why) = simulation.krylov();
-        inputs.insert("krylov".to_owned(), json!({ "method": method.to_string(), "why": why }));
-        let (preconditioner, why) = simulation.preconditioner();
-        inputs.insert("preconditioner".to_owned(), json!({ "method": preconditioner.to_string(), "why": why }));
-        inputs.insert("scene_warnings".to_owned(), json!(warnings));
-        inputs.insert("probes".to_owned(), probes.iter().map(Bound::report).collect());
-        inputs.insert("surfaces".to_owned(), json(serde_json::to_value(SurfaceUse::of(simulation)))?);
         Ok(inputs)
-    }
-
-    /// Says that the results of a step could not be written.
-    fn stopped_by(&self, unwritten: Unwritten, directory: &Path) -> Failure {
-        let Unwritten { time, error } = unwritten;
-        let place = directory.display();
-        let text = format!("stopped at t = {time}; {place} holds what was written until then, and no report");
-        self.say("stopped", &text);
-        Failure::Run(error)
     }
 
     /// Writes the report, the summary and the pictures of a run, and says how the run ended.
@@ -245,8 +229,7 @@ impl Run {
         }
         let time = steps.simulation.clock.time();
         if let Some(error) = failure {
-            let text = format!("stopped at t = {time} after the last good step; its state is in {place}");
-            self.say("stopped", &text);
+            self.say("stopped", &format!("stopped at t = {time} after the last good step; its state is in {place}"));
             return Err(Failure::run(error));
         }
         if is_interrupted {
@@ -268,10 +251,13 @@ impl Run {
         let restored = checkpoint::restore(directory, identity, simulation).map_err(Failure::scene)?;
         let time = simulation.clock.time();
         if simulation.clock.nominal_steps() > simulation.clock.whole_steps(end) {
-            return Err(Failure::scene(Past { path: restored.path, time, end }));
+            let path = restored.path.display();
+            let what = format!("{path} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until");
+            return Err(Failure::scene(what));
         }
-        let unusable = restored.unusable.iter();
-        unusable.for_each(|one| self.say("warning", &format!("a checkpoint cannot be used: {one}")));
+        for unusable in &restored.unusable {
+            self.say("warning", &format!("a checkpoint cannot be used: {unusable}"));
+        }
         if !restored.missing.is_empty() {
             let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
             let text = "these snapshots of the run are not there any more, and its pictures leave them out";
@@ -281,8 +267,8 @@ impl Run {
             self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
         }
         if !self.quiet {
-            let (time, path) = (simulation.clock.time(), restored.path.display());
-            self.say("restart", &format!("continues at t = {time}, step {}, from {path}", simulation.clock.steps()));
+            let (step, path) = (simulation.clock.steps(), restored.path.display());
+            self.say("restart", &format!("continues at t = {time}, step {step}, from {path}"));
         }
         Ok(restored)
     }

@@ -1,6 +1,7 @@
 //! Errors of building a simulation from a scene.
 
 use super::Problems;
+use crate::mechanics::loads::CurveError;
 use std::error::Error;
 
 /// Errors of building a simulation from a scene.
@@ -9,6 +10,9 @@ pub enum BuildError {
     /// Values that are not allowed: those of shapes read from files, or of a scene that was changed after it was read.
     #[error("{0}")]
     Values(Problems),
+    /// A table in time that was changed after the scene was read.
+    #[error(transparent)]
+    Curve(#[from] CurveError),
     /// A failure that appears only with the particles, or in a file.
     #[error("{path}: {source}")]
     At {

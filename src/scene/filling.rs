@@ -1,11 +1,11 @@
 //! Fills bodies with particles, finds their surfaces, and reports their volumes and masses.
 
 use super::body::Body;
-use super::boundary::Face;
 use super::particle_file;
 use super::vector::vector;
 use super::{BuildError, Scene};
 use crate::grid::{Grid, indices};
+use crate::mechanics::loads::CurveError;
 use crate::mechanics::reference::GridReset;
 use crate::particles::Particles;
 use crate::shape::{Facet, Filling, Layout, SURFACE_DEPTH, Shape, around, fill};
@@ -59,17 +59,14 @@ impl Means<'_> {
         more: usize,
     ) -> Result<(), BuildError> {
         let count = particles.len() + more;
-        let (needed, memory) = (3 * (count * Particles::<D>::BYTES) as u64, self.memory);
-        if needed > memory {
-            return Err(BuildError::at(
-                path,
-                format!(
-                    "{count} particles so far need at least {} of memory, and {} can be had: use a coarser grid, fewer particles per \
-                     cell or a smaller body",
-                    BinaryBytes(needed),
-                    BinaryBytes(memory)
-                ),
-            ));
+        let needed = 3 * (count * Particles::<D>::BYTES) as u64;
+        if needed > self.memory {
+            let (needed, memory) = (BinaryBytes(needed), BinaryBytes(self.memory));
+            let what = format!(
+                "{count} particles so far need at least {needed} of memory, and {memory} can be had: use a coarser grid, fewer particles \
+                 per cell or a smaller body"
+            );
+            return Err(BuildError::at(path, what));
         }
         particles.reserve(more);
         Ok(())
@@ -87,15 +84,6 @@ impl Scene {
         number: u32,
         particles: &mut Particles<D>,
     ) -> Result<(), BuildError> {
-        let has_inertia = self.time.scheme().has_inertia();
-        let push = |particles: &mut Particles<D>, x: Vector<f64, D>, velocity: Vector<f64, D>, volume: f64| {
-            let mass = body.density * volume;
-            if has_inertia {
-                particles.push(x, velocity, volume, mass, number)
-            } else {
-                particles.push_without_inertia(x, volume, mass, number)
-            }
-        };
         let common = body.velocity.as_ref().map(|v| vector::<D>(v));
         if let Some(shape) = &body.shape {
             let path = format!("{path}.shape");
@@ -104,7 +92,7 @@ impl Scene {
             let seeds = seeds.map_err(|source| BuildError::at(&path, source))?;
             means.make_room(&path, particles, seeds.len())?;
             for seed in seeds {
-                push(particles, seed.position, velocity, seed.volume);
+                self.push(particles, seed.position, velocity, [seed.volume, body.density * seed.volume], number);
             }
         } else if let Some(file) = &body.particles {
             let path = format!("{path}.particles.file");
@@ -123,10 +111,26 @@ impl Scene {
                 }
                 let own = read.velocities.as_ref().map(|velocities| velocities[k]);
                 let velocity = common.or(own).unwrap_or_else(Vector::zeros);
-                push(particles, *x, velocity, volume);
+                self.push(particles, *x, velocity, [volume, body.density * volume], number);
             }
         }
         Ok(())
+    }
+
+    /// Appends a particle. Without inertia, particles have no velocities.
+    pub(super) fn push<const D: usize>(
+        &self,
+        particles: &mut Particles<D>,
+        x: Vector<f64, D>,
+        velocity: Vector<f64, D>,
+        [volume, mass]: [f64; 2],
+        body: u32,
+    ) {
+        if self.time.scheme().has_inertia() {
+            particles.push(x, velocity, volume, mass, body);
+        } else {
+            particles.push_without_inertia(x, volume, mass, body);
+        }
     }
 
     /// The reason why a file of particles must give no velocities, and what to remove.
@@ -194,8 +198,8 @@ impl Scene {
             Some(indices(count).map(|cell| shape.part(&lower(cell), &edges, grid.spacing).0).sum::<f64>())
         };
         let of = |(number, body): (usize, &Body)| {
-            let own =
-                || (0..particles.len()).filter(|&p| particles.body[p] as usize == number && particles.is_solid(p));
+            let is_own = |p: &usize| particles.body[*p] as usize == number && particles.is_solid(*p);
+            let own = || (0..particles.len()).filter(is_own);
             BodyUse {
                 name: body.name.clone(),
                 particles: own().count(),
@@ -215,18 +219,25 @@ impl Scene {
         shape: &Shape<D>,
         region: Option<&Shape<D>>,
         grid: &Grid<D>,
-    ) -> Vec<Facet<D>> {
+    ) -> Result<Vec<Facet<D>>, CurveError> {
         let filling = self.filling(body);
         let (h, n) = (grid.spacing, u64::from(filling.boxes_at_surface()));
         let edges = Vector::repeat(h / n as f64);
         let (first, count) = around(grid, shape);
+        // The planes of symmetry: their axis, coordinate and outward normal.
+        let mut planes = Vec::new();
+        for k in 0..D {
+            for (upper, wall, outward) in [(false, grid.origin[k], -1.0), (true, grid.position(grid.cells)[k], 1.0)] {
+                if self.boundary.face(k, upper).motion::<D>(k)?[k].is_some() {
+                    planes.push((k, wall, outward));
+                }
+            }
+        }
         let goes_on = |facet: &Facet<D>| {
-            (0..2 * D).any(|face| {
-                let (k, upper) = (face / 2, face % 2 == 1);
-                let (wall, outward) = if upper { (grid.position(grid.cells)[k], 1.0) } else { (grid.origin[k], -1.0) };
-                let there = (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5;
-                there && self.boundary.face(k, upper).holds_across(k)
-            })
+            let on = |&(k, wall, outward): &(usize, f64, f64)| {
+                (facet.position[k] - wall).abs() < SURFACE_DEPTH * h && facet.normal[k] * outward > 0.5
+            };
+            planes.iter().any(on)
         };
         let mut facets = Vec::new();
         for cell in indices(count) {
@@ -244,21 +255,6 @@ impl Scene {
             }
         }
         facets.retain(|facet| !goes_on(facet));
-        facets
-    }
-}
-
-impl Face {
-    /// Whether the condition prescribes the component along `axis`, normal to the face.
-    fn holds_across(&self, axis: usize) -> bool {
-        match self {
-            Self::Free => false,
-            Self::Sliding | Self::Fixed => true,
-            Self::Held(components) => components.get(axis) == Some(&true),
-            Self::Displacement(table) | Self::Velocity(table) => {
-                table.0.iter().any(|row| row.1.get(axis).is_some_and(Option::is_some))
-            }
-            Self::Rotation(_) => true,
-        }
+        Ok(facets)
     }
 }

@@ -67,13 +67,13 @@ fn types(schema: &Value) -> Vec<&str> {
 
 /// The alternatives of an enum by name: words, and objects with one key.
 fn variants(schema: &Value) -> Option<Vec<(&str, &Value)>> {
-    let list = schema["oneOf"].as_array()?;
-    Some(list.iter().filter_map(|one| Some((variant_name(one)?, one))).collect())
-}
-
-fn variant_name(one: &Value) -> Option<&str> {
-    let key = one["properties"].as_object().and_then(|keys| keys.keys().next());
-    one["const"].as_str().or(key.map(String::as_str))
+    let mut variants = Vec::new();
+    for variant in schema["oneOf"].as_array()? {
+        let key = variant["properties"].as_object().and_then(|keys| keys.keys().next());
+        let name = variant["const"].as_str().or(key.map(String::as_str));
+        variants.extend(name.map(|name| (name, variant)));
+    }
+    Some(variants)
 }
 
 /// A walk through a scene and its schema, side by side.
@@ -105,19 +105,19 @@ impl Audit {
         let most = if schema["format"] == "uint8" { u8::MAX.into() } else { u32::MAX.into() };
         match (types(schema).first().copied(), value) {
             (Some("object"), Value::Object(object)) => self.object(schema, object),
+            (Some("object"), _) => self.mismatch("an object", value),
             (Some("array"), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
                     self.within(Step::Index(i), schema["prefixItems"].get(i).unwrap_or(&schema["items"]), value);
                 }
             }
-            (Some("object"), _) => self.mismatch("an object", value),
             (Some("array"), _) => self.mismatch("a list", value),
-            (Some("number"), value) if !value.is_number() => self.mismatch("a number", value),
-            (Some("integer"), value) if value.as_u64().is_none_or(|n| n > most) => {
+            (Some("number"), _) if !value.is_number() => self.mismatch("a number", value),
+            (Some("integer"), _) if value.as_u64().is_none_or(|n| n > most) => {
                 self.mismatch(&format!("a whole number from 0 to {most}"), value);
             }
-            (Some("string"), value) if !value.is_string() => self.mismatch("a string", value),
-            (Some("boolean"), value) if !value.is_boolean() => self.mismatch("true or false", value),
+            (Some("string"), _) if !value.is_string() => self.mismatch("a string", value),
+            (Some("boolean"), _) if !value.is_boolean() => self.mismatch("true or false", value),
             _ => {}
         }
     }
@@ -125,12 +125,11 @@ impl Audit {
     fn object(&mut self, schema: &Value, object: &Map<String, Value>) {
         let Some(known) = schema["properties"].as_object() else { return };
         for (key, value) in object {
-            let step = Step::Key(key.clone());
             match known.get(key) {
-                Some(schema) => self.within(step, schema, value),
+                Some(schema) => self.within(Step::Key(key.clone()), schema, value),
                 None => {
-                    self.steps.push(step);
-                    self.unknown("field", key, &known.keys().map(String::as_str).collect::<Vec<_>>());
+                    self.steps.push(Step::Key(key.clone()));
+                    self.unknown("field", key, known.keys().map(String::as_str).collect());
                     self.steps.pop();
                 }
             }
@@ -151,7 +150,7 @@ impl Audit {
             _ => return self.mismatch("a word or an object with one key", value),
         };
         let Some((_, variant)) = variants.iter().find(|(name, _)| name == word) else {
-            return self.unknown("variant", word, &variants.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+            return self.unknown("variant", word, variants.iter().map(|(name, _)| *name).collect());
         };
         match (variant["properties"].get(word), inner) {
             (Some(schema), Some(inner)) => self.within(Step::Key(word.clone()), schema, inner),
@@ -161,10 +160,9 @@ impl Audit {
         }
     }
 
-    fn unknown(&mut self, kind: &str, word: &str, allowed: &[&str]) {
-        let meant = nearest(word, allowed).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
-        let allowed: Vec<String> = allowed.iter().map(|name| format!("`{name}`")).collect();
-        self.say(format!("unknown {kind} `{word}`, expected one of {}{meant}", allowed.join(", ")));
+    fn unknown(&mut self, kind: &str, word: &str, allowed: Vec<&str>) {
+        let meant = nearest(word, &allowed).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+        self.say(format!("unknown {kind} `{word}`, expected one of `{}`{meant}", allowed.join("`, `")));
     }
 
     fn mismatch(&mut self, expected: &str, value: &Value) {

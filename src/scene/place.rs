@@ -30,12 +30,6 @@ impl Place {
             indent: shown.len(),
         }
     }
-
-    /// The place of a line and byte column as counted by serde_json, both from 1 (column 0: before the line).
-    pub(super) fn at_line(text: &str, line: usize, column: usize) -> Self {
-        let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
-        Self::at(text, start + column.saturating_sub(1))
-    }
 }
 
 /// One step of the path to a value.
@@ -128,7 +122,7 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 mod tests {
     use super::*;
 
-    const TEXT: &str = "{\"a\": [1, {\"x\": \"}\\\"\", \"y\": 2}],\n\t\"b\": {\"c\": [[], [3.5e1, null]]}}";
+    const TEXT: &str = "{\"a\": [1, {\"x\": \"}{\\\"\", \"y\": 2}],\n\t\"b\": {\"c\": [[], [3.5e1, null]]}}";
 
     #[test]
     fn a_key_is_found_behind_strings_and_nested_lists() {

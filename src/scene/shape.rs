@@ -124,11 +124,13 @@ impl Shape {
         self.build().ok_or_else(|| BuildError::at(path, format!("does not fit {D} dimensions")))
     }
 
-    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
+    /// The corners of the bounding box; `None` if the shape is not allowed, with the reasons in `problems`, and while its file has not been
+    /// read.
+    pub(super) fn check(&self, problems: &mut Problems, path: &str, dimension: usize) -> Option<[Vec<f64>; 2]> {
         match dimension {
-            1 => drop(self.checked::<1>(problems, path)),
-            2 => drop(self.checked::<2>(problems, path)),
-            _ => drop(self.checked::<3>(problems, path)),
+            1 => self.checked::<1>(problems, path).map(bounds),
+            2 => self.checked::<2>(problems, path).map(bounds),
+            _ => self.checked::<3>(problems, path).map(bounds),
         }
     }
 
@@ -227,6 +229,11 @@ impl Shape {
         let place = folder.join(file);
         read.map_err(|why| BuildError::at(format!("{path}.{key}.file"), format!("{} {why}", place.display())))
     }
+}
+
+fn bounds<const D: usize>(shape: shape::Shape<D>) -> [Vec<f64>; 2] {
+    let (min, max) = shape.bounding_box();
+    [min.as_slice().to_vec(), max.as_slice().to_vec()]
 }
 
 fn numbered<'a>(key: &str, parts: &'a [Shape]) -> Vec<(String, &'a Shape)> {

@@ -311,8 +311,8 @@ fn all_wrong_keys_and_types_are_told_at_once() {
     }
     // Each message has its place in the file, and nothing else.
     assert_eq!(message.matches("--> line").count(), 9, "{message}");
-    let SceneError::Malformed(first) = scene::read(&text, &[]).expect_err("wrong") else { panic!("{message}") };
-    assert_eq!(first.others.len(), 8, "{message}");
+    let SceneError::Malformed(problems) = scene::read(&text, &[]).expect_err("wrong") else { panic!("{message}") };
+    assert_eq!(problems.list.len(), 9, "{message}");
 }
 
 #[test]

@@ -263,7 +263,8 @@ fn wrong_text_is_refused_at_its_place() {
     for (from, to, path, words) in WRONG_TEXT {
         let text = mutated(from, to);
         let error = scene::read(&text, &[]).expect_err(to);
-        let SceneError::Malformed(malformed) = &error else { panic!("{to}: {error}") };
+        let SceneError::Malformed(problems) = &error else { panic!("{to}: {error}") };
+        let malformed = &problems.list[0];
         assert!(path.is_empty() || malformed.path == *path, "{to}: {path} expected, not {}", malformed.path);
         for word in *words {
             assert!(malformed.message.contains(word), "{to}: no {word:?} in\n{error}");
