@@ -68,13 +68,6 @@ impl SurfaceUse {
     }
 }
 
-impl Display for SurfaceUse {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        let Self { load, points, area } = self;
-        write!(f, "{load} on {points} points, area {area:.6} in all")
-    }
-}
-
 /// A run needs more memory than is available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -243,8 +236,8 @@ impl Display for Plan {
         for term in &self.terms {
             writeln!(f, "  {} {:<22} {}", if term.used { "on " } else { "off" }, term.name, term.why)?;
         }
-        for surface in &self.surfaces {
-            writeln!(f, "  surface: {surface}")?;
+        for SurfaceUse { load, points, area } in &self.surfaces {
+            writeln!(f, "  surface: {load} on {points} points, area {area:.6} in all")?;
         }
         for bodies in &self.sharing {
             writeln!(f, "contact       {bodies}")?;

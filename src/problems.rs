@@ -135,11 +135,8 @@ impl Problems {
     /// Checks that a number has a sensible size and is > 0.
     pub(crate) fn positive(&mut self, path: &str, x: f64) -> bool {
         let ok = sensible(x) && x > 1.0 / LARGEST;
-        let allowed = if x > 0.0 {
-            format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST)
-        } else {
-            "must be finite and > 0".into()
-        };
+        let bounds = format!("must be greater than {:e} and at most {LARGEST:e}", 1.0 / LARGEST);
+        let allowed = if x > 0.0 { &bounds } else { "must be finite and > 0" };
         self.require(ok, path, Number(x), allowed);
         ok
     }
@@ -185,10 +182,8 @@ impl Problems {
 
 impl Display for Problems {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, problem) in self.list.iter().enumerate() {
-            let separator = if i == 0 { "" } else { "\n" };
-            write!(f, "{separator}{problem}")?;
-        }
+        let list: Vec<String> = self.list.iter().map(ToString::to_string).collect();
+        f.write_str(&list.join("\n"))?;
         if self.more > 0 { write!(f, "\n… and {} more", self.more) } else { Ok(()) }
     }
 }

@@ -90,10 +90,10 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
     fn nodal_data(&self) -> Vec<Row> {
         let (loads, nodes, particles) = (&self.simulation.loads, self.nodes, self.particles);
         let weighs = self.has_inertia || loads.gravity.is_some();
-        let motion_vectors = if self.has_inertia { 4 } else { 2 };
+        let motion = nodes * Self::VECTOR * if self.has_inertia { 4 } else { 2 };
         let asks = loads.field.is_some() && !self.has_inertia;
         let carries_over = !self.has_inertia && self.simulation.may_reset();
-        let out_of_balance_vectors = if self.keeps_grid { 3 } else { 2 };
+        let out_of_balance = nodes * Self::VECTOR * if self.keeps_grid { 3 } else { 2 };
         let points: usize = loads.surface.iter().map(|load| load.points.len()).sum();
         // In load steps, the points of the last equilibrium are stored, too.
         let copies = if self.has_inertia { 1 } else { 2 };
@@ -104,15 +104,11 @@ impl<const D: usize, L: Law, A: ShapeFunction> Inventory<'_, D, L, A> {
             // v and a, as projected and with prescribed values in place.
             (self.has_inertia, "nodal fields: v, a", nodes * 4 * Self::VECTOR),
             (self.keeps_grid, "particles: x, H at the last grid reset", particles * (Self::VECTOR + Self::TENSOR)),
-            (
-                self.keeps_grid,
-                "nodal fields: motion since the grid reset, its rate",
-                nodes * motion_vectors * Self::VECTOR,
-            ),
+            (self.keeps_grid, "nodal fields: motion since the grid reset, its rate", motion),
             // The positions of the last load step.
             (asks, "particles: x for a field of forces", particles * Self::VECTOR),
             // The out-of-balance force, as computed and with prescribed values in place; a copy with a kept grid. None on the first grid.
-            (carries_over, "nodal fields: out-of-balance force", nodes * out_of_balance_vectors * Self::VECTOR),
+            (carries_over, "nodal fields: out-of-balance force", out_of_balance),
             (points > 0, "loaded surfaces", points * copies * size_of::<SurfacePoint<D>>()),
         ]
     }

@@ -48,7 +48,10 @@ pub fn clear(directory: &Path, discard: bool) -> Result<(), Failure> {
     if let Some(found) = checkpoint::unfinished(directory).filter(|_| !discard) {
         let (steps, path) = (found.steps, found.path.display());
         let run = format!("a run that did not end, with a checkpoint after step {steps} ({path})");
-        return Err(would_be_lost(directory, &format!("{run}: continue it by --restart, give it up by --discard, or ")));
+        return Err(would_be_lost(
+            directory,
+            &format!("{run}: continue it by --restart, give it up by --discard, or "),
+        ));
     }
     if let Some(found) = held(directory).filter(|_| !discard) {
         let (steps, time) = (found.steps, found.time);

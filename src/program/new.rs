@@ -12,17 +12,18 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-/// The names of problems, each with its scene.
+/// Names of problems, each with its scene.
 macro_rules! problems {
-    ($($name:literal),*) => {
-        [$(($name, include_str!(concat!("../../scenes/", $name, ".json")))),*]
+    ($($name:ident)*) => {
+        [$((stringify!($name), include_str!(concat!("../../scenes/", stringify!($name), ".json")))),*]
     };
 }
 
-const PROBLEMS: [(&str, &str); 15] = problems![
-    "rebound", "collision", "cantilever", "compaction", "riemann_jump", "ball_drop", "column_static", "elastica",
-    "cook", "ring", "tube", "cook_plastic", "taylor", "slope", "collapse"
-];
+/// Name and scene of every problem.
+const PROBLEMS: [(&str, &str); 15] = problems! {
+    rebound collision cantilever compaction riemann_jump ball_drop column_static elastica cook ring tube cook_plastic taylor slope
+    collapse
+};
 
 /// File name of the schema beside the scene.
 const SCHEMA: &str = "scene.schema.json";

@@ -9,7 +9,7 @@ use bfree::output::plot::{Look, plot_run};
 use bfree::output::{Audience, Outcome, OutputSettings, Recorder, Reference};
 use bfree::parallel;
 use bfree::plan::SurfaceUse;
-use bfree::scene::{Scene, SceneError, time::MAX_STEPS};
+use bfree::scene::{Scene, time::MAX_STEPS};
 use bfree::simulation::{AdvanceError, Simulation};
 use bfree::solver::Stop;
 use clap::{Args, ValueEnum};
@@ -93,8 +93,12 @@ impl Run {
         let start = Instant::now();
         let mut scene = self.scene.read()?;
         if let Some(until) = self.until {
-            let time = scene.time.until(until, "--until").map_err(SceneError::Values);
-            scene.time = time.map_err(Failure::scene)?;
+            // The end of the scene passed all checks, so every problem is one of the option.
+            scene.time.end = until;
+            let problems = scene.check();
+            if !problems.is_empty() {
+                return Err(Failure::scene(format!("--until: {problems}")));
+            }
         }
         if let Some(threads) = self.threads {
             parallel::use_threads(threads as usize).map_err(Failure::run)?;
@@ -112,8 +116,7 @@ impl Run {
         simulation.settings.check_tangent = self.check_tangent.and_then(NonZeroU64::new);
         let directory = directory::of_results(self.out.as_deref(), &self.scene.scene)?;
         let probes = bound_probes(scene, &simulation);
-        let warnings = self.tell_before_the_run(scene, &simulation, &probes);
-        let inputs = self.inputs(scene, &simulation, &probes, &warnings, &directory)?;
+        let (inputs, warnings) = self.inputs(scene, &simulation, &probes, &directory)?;
         let settings = serde_json::to_value(scene).map_err(Failure::run)?;
         let identity = Identity::new(settings, &simulation.particles);
         let schedule = Schedule::new(&simulation.clock, scene.time.end, self.steps);
@@ -123,7 +126,11 @@ impl Run {
             snapshot_every: scene.output.every,
             probes: probes.iter().map(|bound| bound.probe.clone()).collect(),
             end_time: schedule.end_time(&simulation.clock),
-            audience: self.audience(),
+            audience: match self.progress {
+                _ if self.quiet => Audience::Nobody,
+                Form::Text => Audience::Person,
+                Form::Json => Audience::Program,
+            },
         };
         let interrupted = stop_on_interrupt().map_err(Failure::run)?;
         let asked_to_stop = interrupted.clone();
@@ -151,19 +158,23 @@ impl Run {
         let mut steps = Steps { simulation, recorder, checkpoints, schedule, interrupted };
         let failure = steps.take().map_err(|error| {
             let (time, place) = (steps.simulation.clock.time(), directory.display());
-            self.say("stopped", &format!("stopped at t = {time}; {place} holds what was written until then, and no report"));
+            self.say(
+                "stopped",
+                &format!("stopped at t = {time}; {place} holds what was written until then, and no report"),
+            );
             Failure::Run(error)
         })?;
         self.report(steps, failure, &inputs, &warnings, &directory)
     }
 
-    /// Tells what the scene leads to before the first step, and returns the warnings about the scene.
-    fn tell_before_the_run<const D: usize>(
+    /// The entries of the report that are known before the first step, and the warnings about the scene. Tells them, too.
+    fn inputs<const D: usize>(
         &self,
         scene: &Scene,
         simulation: &Simulation<D>,
         probes: &[Bound<D>],
-    ) -> Vec<String> {
+        directory: &Path,
+    ) -> Result<(Map<String, Value>, Vec<String>), Failure> {
         if let Some(set) = what_accuracy_sets(scene).filter(|_| !self.quiet) {
             self.say("accuracy", &format!("accuracy {set}"));
         }
@@ -171,18 +182,6 @@ impl Run {
         for text in probes.iter().filter_map(Bound::warning).chain(warnings.iter().cloned()) {
             self.say("warning", &text);
         }
-        warnings
-    }
-
-    /// The entries of the report that are known before the first step.
-    fn inputs<const D: usize>(
-        &self,
-        scene: &Scene,
-        simulation: &Simulation<D>,
-        probes: &[Bound<D>],
-        warnings: &[String],
-        directory: &Path,
-    ) -> Result<Map<String, Value>, Failure> {
         let (krylov, why_krylov) = simulation.krylov();
         let (preconditioner, why_preconditioner) = simulation.preconditioner();
         let mut inputs = Map::from_iter([
@@ -197,7 +196,7 @@ impl Run {
         if let Some(accuracy) = scene.accuracy {
             inputs.insert("accuracy".to_owned(), json!({ "asked": accuracy, "sets": scene.chosen }));
         }
-        Ok(inputs)
+        Ok((inputs, warnings))
     }
 
     /// Writes the report, the summary and the pictures of a run, and says how the run ended.
@@ -255,30 +254,22 @@ impl Run {
             let what = format!("{path} is at t = {time}, beyond the end, t = {end}: give a later time.end or --until");
             return Err(Failure::scene(what));
         }
-        for unusable in &restored.unusable {
-            self.say("warning", &format!("a checkpoint cannot be used: {unusable}"));
-        }
-        if !restored.missing.is_empty() {
-            let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
+        let unusable = restored.unusable.iter().map(|one| format!("a checkpoint cannot be used: {one}"));
+        let missing: Vec<_> = restored.missing.iter().map(|path| path.display().to_string()).collect();
+        let missing = (!missing.is_empty()).then(|| {
             let text = "these snapshots of the run are not there any more, and its pictures leave them out";
-            self.say("warning", &format!("{text}: {}", missing.join(", ")));
-        }
-        if let Some(program) = &restored.other_program {
-            self.say("warning", &format!("the checkpoint was written by {program}: the bits may differ from then on"));
+            format!("{text}: {}", missing.join(", "))
+        });
+        let other = restored.other_program.as_ref();
+        let other = other.map(|by| format!("the checkpoint was written by {by}: the bits may differ from then on"));
+        for warning in unusable.chain(missing).chain(other) {
+            self.say("warning", &warning);
         }
         if !self.quiet {
             let (step, path) = (simulation.clock.steps(), restored.path.display());
             self.say("restart", &format!("continues at t = {time}, step {step}, from {path}"));
         }
         Ok(restored)
-    }
-
-    fn audience(&self) -> Audience {
-        match self.progress {
-            _ if self.quiet => Audience::Nobody,
-            Form::Text => Audience::Person,
-            Form::Json => Audience::Program,
-        }
     }
 
     /// Writes a message beside the progress, in the form of the progress.

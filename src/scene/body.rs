@@ -75,7 +75,8 @@ impl Body {
         let law = self.material.law(problems, &format!("{path}.material"));
         if let Some(law) = law.filter(|_| self.volumetric == Dilatation::MeanDilatation) {
             let has_part = law.volumetric(&Deformation::<f64, 1>::new(Tensor::zeros())).is_some();
-            let allowed = "must be of a law whose energy has a part that depends on the volume alone, which this one has not";
+            let allowed =
+                "must be of a law whose energy has a part that depends on the volume alone, which this one has not";
             problems.require(has_part, &format!("{path}.volumetric"), "\"mean_dilatation\"", allowed);
         }
         problems.positive(&format!("{path}.density"), self.density);

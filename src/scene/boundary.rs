@@ -2,6 +2,7 @@
 
 use super::curve::{Curve, check_times};
 use super::shape::Shape;
+use super::vector::check_axis;
 use crate::problems::{Number, Problems};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -126,7 +127,8 @@ impl Boundary {
     /// All faces by name, lower and upper, axis after axis.
     pub(super) fn faces(&self) -> [(&'static str, Option<&Face>); 6] {
         let Self { left, right, bottom, top, back, front } = self;
-        let named = [("left", left), ("right", right), ("bottom", bottom), ("top", top), ("back", back), ("front", front)];
+        let named =
+            [("left", left), ("right", right), ("bottom", bottom), ("top", top), ("back", back), ("front", front)];
         named.map(|(name, face)| (name, face.as_ref()))
     }
 
@@ -170,18 +172,7 @@ impl Prescribed {
 impl Rotation {
     fn check(&self, problems: &mut Problems, path: &str, dimension: usize) {
         problems.vector(&format!("{path}.center"), &self.center, dimension);
-        let axis_path = format!("{path}.axis");
-        match (&self.axis, dimension) {
-            (_, 1) => problems.refuse(path, "a rotation", "a grid of one dimension has none"),
-            (None, 3) => problems.refuse(path, "a rotation without an axis", "give its axis, three numbers"),
-            (Some(_), 2) => problems.refuse(&axis_path, "an axis", "in 2D it is z: remove it"),
-            (Some(axis), _) => {
-                problems.vector(&axis_path, axis, dimension);
-                let some = axis.iter().any(|&x| x != 0.0);
-                problems.require(some, &axis_path, "zero", "must have a length");
-            }
-            (None, _) => {}
-        }
+        check_axis(problems, path, self.axis.as_deref(), dimension);
         let path = format!("{path}.angle");
         self.angle.check(problems, &path);
         if let Some([t, angle]) = self.angle.0.first().filter(|first| **first != [0.0, 0.0]) {
@@ -212,7 +203,12 @@ impl Table {
             }
         }
         let some = first.iter().any(Option::is_some);
-        problems.require(some, &format!("{path}[0][1]"), "a row without numbers", "must prescribe at least one component");
+        problems.require(
+            some,
+            &format!("{path}[0][1]"),
+            "a row without numbers",
+            "must prescribe at least one component",
+        );
     }
 
     /// Refuses displacements that do not start from zero.

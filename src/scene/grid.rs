@@ -143,9 +143,8 @@ impl GridBox {
             problems.refuse(&path, Number(size), allowed);
         }
         let (farthest, spacing) = (self.farthest(), Number(self.spacing));
-        let allowed = format!(
-            "numbers of that size are too coarse to tell nodes {spacing} apart; at most {farthest:e} in size"
-        );
+        let allowed =
+            format!("numbers of that size are too coarse to tell nodes {spacing} apart; at most {farthest:e} in size");
         for (k, &x) in self.origin.iter().flatten().enumerate().filter(|_| spacing_ok) {
             let far = sensible(x) && x.abs() > farthest;
             problems.require(!far, &format!("grid.origin[{k}]"), Number(x), &allowed);

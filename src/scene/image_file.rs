@@ -129,9 +129,8 @@ fn grey(file: BufReader<File>, found: u64) -> Result<([u32; 3], Vec<u8>), FileEr
             depth as u8
         )));
     }
-    let asked = pixels(&[width, height]).ok_or_else(|| {
-        FileError(format!("has {width} × {height} pixels; 1 to {MAX_PIXELS} in all are allowed"))
-    })?;
+    let asked = pixels(&[width, height])
+        .ok_or_else(|| FileError(format!("has {width} × {height} pixels; 1 to {MAX_PIXELS} in all are allowed")))?;
     if asked * depth as u64 / 8 > MAX_COMPRESSION * found {
         return Err(wrong_length(found, asked));
     }

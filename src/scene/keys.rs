@@ -3,9 +3,9 @@
 //! serde stops at the first key or type that does not fit. The schema then finds the others.
 
 use super::place::Step;
-use super::suggest::nearest;
 use serde_json::{Map, Value};
 use std::sync::LazyLock;
+use strsim::damerau_levenshtein;
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(|| super::complete_schema().to_value());
 
@@ -143,11 +143,13 @@ impl Audit {
     fn variant(&mut self, variants: &[(&str, &Value)], value: &Value) {
         let (word, inner) = match value {
             Value::String(word) => (word, None),
-            Value::Object(object) => match (object.iter().next(), object.len()) {
-                (Some((word, inner)), 1) => (word, Some(inner)),
-                _ => return self.mismatch("an object with exactly one key", value),
+            Value::Object(object) if object.len() != 1 => {
+                return self.mismatch("an object with exactly one key", value);
+            }
+            value => match value.as_object().and_then(|object| object.iter().next()) {
+                Some((word, inner)) => (word, Some(inner)),
+                None => return self.mismatch("a word or an object with one key", value),
             },
-            _ => return self.mismatch("a word or an object with one key", value),
         };
         let Some((_, variant)) = variants.iter().find(|(name, _)| name == word) else {
             return self.unknown("variant", word, variants.iter().map(|(name, _)| *name).collect());
@@ -185,7 +187,9 @@ fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
     let variant = |word: &str| variants.iter().find(|(name, _)| *name == word).map(|(_, variant)| *variant);
     match value {
         Value::String(word) => {
-            variant(word).into_iter().for_each(|one| tell(format!("{at} = {word:?}"), one, keys));
+            if let Some(variant) = variant(word) {
+                tell(format!("{at} = {word:?}"), variant, keys);
+            }
         }
         Value::Object(object) => {
             for (key, value) in object {
@@ -195,9 +199,7 @@ fn describe(schema: &Value, value: &Value, at: &str, keys: &mut Vec<Key>) {
                 describe(property, value, &below(key), keys);
             }
         }
-        Value::Array(list) => {
-            list.iter().for_each(|value| describe(&schema["items"], value, &format!("{at}[]"), keys));
-        }
+        Value::Array(list) => list.iter().for_each(|value| describe(&schema["items"], value, &format!("{at}[]"), keys)),
         _ => {}
     }
 }
@@ -208,5 +210,37 @@ fn tell(path: String, schema: &Value, keys: &mut Vec<Key>) {
     let key = Key { path, about: about.split_whitespace().collect::<Vec<_>>().join(" ") };
     if !key.about.is_empty() && !keys.contains(&key) {
         keys.push(key);
+    }
+}
+
+/// Maximum number of letters to change, insert, drop or exchange with a neighbour.
+const MAX_EDITS: usize = 2;
+
+/// Maximum length of a word; no key is longer.
+const MAX_LETTERS: usize = 64;
+
+/// The word of `allowed` nearest to `word`, if it is at most two letters away and shares at least one.
+pub(super) fn nearest<'a>(word: &str, allowed: &[&'a str]) -> Option<&'a str> {
+    let letters = word.chars().count();
+    if letters > MAX_LETTERS {
+        return None;
+    }
+    allowed
+        .iter()
+        .map(|candidate| (damerau_levenshtein(word, candidate), *candidate))
+        .filter(|(edits, candidate)| *edits <= MAX_EDITS && *edits < letters.min(candidate.len()))
+        .min_by_key(|(edits, _)| *edits)
+        .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_near_words_are_suggested() {
+        assert_eq!(nearest("sape", &["name", "shape"]), Some("shape"));
+        assert_eq!(nearest("mass", &["density", "velocity"]), None);
+        assert_eq!(nearest("of", &["by"]), None);
     }
 }

@@ -1,30 +1,35 @@
 //! The loads of a scene: body forces, held faces and regions, loads on surfaces.
 
 use super::boundary::{Face, Table};
-use super::filling::Means;
+use super::filling::Builder;
 use super::load::{Loaded, Pressure, Stress, Traction};
 use super::vector::vector;
 use super::{BuildError, Scene};
-use crate::grid::Grid;
 use crate::mechanics::loads::{
     Curve, CurveError, ForceField, Gravity, Loads, Motion, Prescribed, Pressing, Rotation, Selection, SurfaceLoad,
     SurfacePoint,
 };
-use crate::particles::Particles;
 use crate::shape;
 use crate::tensor::Vector;
 use std::sync::Arc;
 
 impl Scene {
+    /// All loads on surfaces with their paths, tractions first.
+    pub(super) fn surface_loads(&self) -> impl Iterator<Item = (String, Loaded<'_>)> {
+        let tractions = self.tractions.iter().map(Traction::loaded).enumerate();
+        let pressures = self.pressures.iter().map(Pressure::loaded).enumerate();
+        tractions
+            .map(|(i, load)| (format!("tractions[{i}]"), load))
+            .chain(pressures.map(|(i, load)| (format!("pressures[{i}]"), load)))
+    }
+}
+
+impl<const D: usize> Builder<'_, D> {
     /// Builds all loads. Points of loaded surfaces become particles without mass.
-    pub(super) fn loads<const D: usize>(
-        &self,
-        means: &Means<'_>,
-        grid: &Grid<D>,
-        particles: &mut Particles<D>,
-    ) -> Result<Loads<D>, BuildError> {
-        let mut loads = Loads { damping: self.damping, ..Loads::default() };
-        if let Some(gravity) = &self.gravity {
+    pub fn loads(&mut self) -> Result<Loads<D>, BuildError> {
+        let scene = self.scene;
+        let mut loads = Loads { damping: scene.damping, ..Loads::default() };
+        if let Some(gravity) = &scene.gravity {
             let (acceleration, curve) = (vector(&gravity.acceleration), factor(gravity.curve.as_ref())?);
             if let Some(profile) = &gravity.profile {
                 let along = vector::<D>(&profile.along).normalize();
@@ -36,85 +41,69 @@ impl Scene {
                 loads.gravity = Some(Gravity { acceleration, curve });
             }
         }
-        for (k, (name, face)) in self.boundary.faces().into_iter().enumerate().take(2 * D) {
+        for (k, (name, face)) in scene.boundary.faces().into_iter().enumerate().take(2 * D) {
             let (axis, upper) = (k / 2, k % 2 == 1);
             let motion = face.unwrap_or(&Face::Free).motion::<D>(axis)?;
             if motion.iter().any(Option::is_some) {
                 loads.prescribed.push(Prescribed { name: name.into(), on: Selection::Face { axis, upper }, motion });
             }
         }
-        for (i, prescribed) in self.prescribed.iter().enumerate() {
+        for (i, prescribed) in scene.prescribed.iter().enumerate() {
             let region = prescribed.region.built(&format!("prescribed[{i}]"))?;
             // A checked scene gives one motion, and a region has no normal.
             let motion = prescribed.given().first().map_or(&Face::Free, |(_, face)| face).motion(0)?;
             loads.prescribed.push(Prescribed { name: format!("region{i}"), on: Selection::Region(region), motion });
         }
-        for (path, load) in self.surface_loads() {
-            loads.surface.push(self.surface(&path, &load, means, grid, particles)?);
+        for (path, load) in scene.surface_loads() {
+            let points = self.points(&path, &load)?;
+            if points.is_empty() {
+                let body = load.body;
+                let what = "is loaded; enlarge the region or remove the load";
+                return Err(BuildError::at(path, format!("nothing of the surface of body {body:?} {what}")));
+            }
+            let pressing = match load.stress {
+                Stress::Traction(traction) => Pressing::Traction(vector(traction)),
+                Stress::Pressure(pressure) => Pressing::Pressure(pressure),
+            };
+            loads.surface.push(SurfaceLoad { pressing, curve: factor(load.curve.as_ref())?, points });
         }
         Ok(loads)
     }
 
-    /// All loads on surfaces with their paths, tractions first.
-    pub(super) fn surface_loads(&self) -> impl Iterator<Item = (String, Loaded<'_>)> {
-        let tractions = self.tractions.iter().map(Traction::loaded).enumerate();
-        let pressures = self.pressures.iter().map(Pressure::loaded).enumerate();
-        tractions
-            .map(|(i, load)| (format!("tractions[{i}]"), load))
-            .chain(pressures.map(|(i, load)| (format!("pressures[{i}]"), load)))
-    }
-
     /// The points of a loaded surface. With the key `surface`, these are particles of the body; otherwise, new points on the surface of the
     /// shape.
-    fn surface<const D: usize>(
-        &self,
-        path: &str,
-        on: &Loaded<'_>,
-        means: &Means<'_>,
-        grid: &Grid<D>,
-        particles: &mut Particles<D>,
-    ) -> Result<SurfaceLoad<D>, BuildError> {
+    fn points(&mut self, path: &str, on: &Loaded<'_>) -> Result<Vec<SurfacePoint<D>>, BuildError> {
+        let mut bodies = self.scene.bodies.iter().enumerate();
+        let Some((number, body)) = bodies.find(|(_, body)| body.name == on.body) else { return Ok(Vec::new()) };
         let region = on.region.as_ref().map(|region| region.built(path)).transpose()?;
-        let number = self.bodies.iter().position(|body| body.name == on.body);
-        let body = number.and_then(|number| self.bodies.get(number));
+        let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
+        let h = self.grid.spacing;
+        if let Some(given) = on.surface {
+            let (particles, normal) = (&self.particles, vector::<D>(&given.normal).normalize());
+            let spacing = h / f64::from(body.particles_per_cell);
+            let loaded = |&p: &usize| {
+                let x = &particles.position[p];
+                let depth = shape.as_ref().map_or(0.0, |shape| shape.signed_distance(x));
+                particles.is_solid(p)
+                    && particles.body[p] as usize == number
+                    && shape::is_above(depth, spacing)
+                    && region.as_ref().is_none_or(|region| region.holds(x, h))
+            };
+            let point = |particle| SurfacePoint { particle, normal, area: given.area };
+            return Ok((0..particles.len()).filter(loaded).map(point).collect());
+        }
+        let Some(shape) = &shape else { return Ok(Vec::new()) };
+        let facets = self.facets(body, shape, region.as_ref())?;
+        self.make_room(path, facets.len())?;
+        let velocity = body.velocity.as_ref().map_or_else(Vector::zeros, |v| vector(v));
         let mut points = Vec::new();
-        if let (Some(number), Some(body)) = (number, body) {
-            let shape = body.shape.as_ref().and_then(|shape| shape.build::<D>());
-            if let Some(given) = on.surface {
-                let normal = vector::<D>(&given.normal).normalize();
-                let spacing = grid.spacing / f64::from(body.particles_per_cell);
-                let loaded = |&p: &usize| {
-                    let x = &particles.position[p];
-                    let depth = shape.as_ref().map_or(0.0, |shape| shape.signed_distance(x));
-                    particles.is_solid(p)
-                        && particles.body[p] as usize == number
-                        && shape::is_above(depth, spacing)
-                        && region.as_ref().is_none_or(|region| region.holds(x, grid.spacing))
-                };
-                let point = |particle| SurfacePoint { particle, normal, area: given.area };
-                points.extend((0..particles.len()).filter(loaded).map(point));
-            } else if let Some(shape) = &shape {
-                let facets = self.facets(body, shape, region.as_ref(), grid)?;
-                means.make_room(path, particles, facets.len())?;
-                let velocity = body.velocity.as_ref().map_or_else(Vector::zeros, |v| vector(v));
-                for facet in facets {
-                    points.push(SurfacePoint { particle: particles.len(), normal: facet.normal, area: facet.area });
-                    // Each point lies inside the surface by a tolerance, in a cell that holds the body.
-                    let x = facet.position - facet.normal * (shape::SURFACE_DEPTH * grid.spacing);
-                    self.push(particles, x, velocity, [0.0, 0.0], number as u32);
-                }
-            }
+        for facet in facets {
+            points.push(SurfacePoint { particle: self.particles.len(), normal: facet.normal, area: facet.area });
+            // Each point lies inside the surface by a tolerance, in a cell that holds the body.
+            let x = facet.position - facet.normal * (shape::SURFACE_DEPTH * h);
+            self.push(x, velocity, 0.0, 0.0, number);
         }
-        if points.is_empty() {
-            let body = on.body;
-            let what = format!("nothing of the surface of body {body:?} is loaded; enlarge the region or remove the load");
-            return Err(BuildError::at(path, what));
-        }
-        let pressing = match on.stress {
-            Stress::Traction(traction) => Pressing::Traction(vector(traction)),
-            Stress::Pressure(pressure) => Pressing::Pressure(pressure),
-        };
-        Ok(SurfaceLoad { pressing, curve: factor(on.curve.as_ref())?, points })
+        Ok(points)
     }
 }
 

@@ -21,7 +21,6 @@ pub mod time;
 pub mod transfer;
 
 mod build;
-mod build_error;
 mod file;
 mod filling;
 mod json;
@@ -29,12 +28,11 @@ mod loading;
 mod overrides;
 mod place;
 mod read;
-mod suggest;
 mod vector;
 mod warnings;
 
 pub use crate::problems::{Place, Problem, Problems};
-pub use build_error::BuildError;
+pub use build::BuildError;
 pub use file::FileError;
 pub use filling::BodyUse;
 pub use overrides::{Override, OverrideError};
@@ -59,17 +57,10 @@ const STATIC_STRAIN: f64 = 1.0;
 const VIBRATION_STRAIN: f64 = 0.1;
 
 /// Keys that have a meaning only with inertia.
-const OF_INERTIA: [&str; 9] = [
-    "time.beta",
-    "time.gamma",
-    "time.lumping",
-    "time.projection",
-    "time.wall_update",
-    "time.adaptive",
-    "transfer",
-    "initial_velocity",
-    "damping",
-];
+const OF_INERTIA: [&str; 3] = ["transfer", "initial_velocity", "damping"];
+
+/// Keys of `time` that have a meaning only with inertia.
+const TIME_OF_INERTIA: [&str; 6] = ["beta", "gamma", "lumping", "projection", "wall_update", "adaptive"];
 
 /// A body that comes this near to a face of the box, in spacings, touches it.
 const TOUCHES: f64 = 1e-9;
@@ -311,9 +302,10 @@ impl Scene {
         let scheme = time::word(self.time.scheme());
         let allowed = format!("time.scheme is {scheme}, and without inertia it means nothing: remove one of the two");
         let given = serde_json::to_value(self).unwrap_or_default();
-        let value = |key: &str| given.pointer(&format!("/{}", key.replace('.', "/"))).filter(|value| !value.is_null());
-        for (key, value) in OF_INERTIA.iter().filter_map(|key| Some((key, value(key)?))) {
-            problems.refuse(key, value, &allowed);
+        let of_time = TIME_OF_INERTIA.map(|key| (format!("time.{key}"), &given["time"][key]));
+        let others = OF_INERTIA.map(|key| (key.to_owned(), &given[key]));
+        for (key, value) in of_time.into_iter().chain(others).filter(|(_, value)| !value.is_null()) {
+            problems.refuse(&key, value, &allowed);
         }
         if self.time.initial_guess == Some(InitialGuess::Velocity) {
             problems.refuse("time.initial_guess", "\"velocity\"", &allowed);

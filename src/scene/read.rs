@@ -28,11 +28,8 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// The text is too long.
-    #[error(
-        "the scene{} is longer than {MAX_BYTES} bytes, the most that is read; give many particles in a CSV file",
-        .0.map_or(String::new(), |found| format!(", of {found} bytes,"))
-    )]
-    TooLong(Option<u64>),
+    #[error("the scene has {0} bytes or more, and at most {MAX_BYTES} are read; give many particles in a CSV file")]
+    TooLong(u64),
     /// The text is not UTF-8.
     #[error("the scene is not UTF-8 text: byte {byte}, in line {line}, cannot be read")]
     NotText {
@@ -73,14 +70,11 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
         let message = "it is no regular file, and a named pipe may wait for ever";
         return Err(failed(std::io::Error::new(std::io::ErrorKind::InvalidInput, message)));
     }
-    // A file that is too long is refused before it is read. Pipes and devices do not tell their length.
-    if about.len() > MAX_BYTES {
-        return Err(SceneError::TooLong(Some(about.len())));
-    }
     let mut bytes = Vec::new();
     File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    // Pipes and devices do not tell their length.
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong(None));
+        return Err(SceneError::TooLong(about.len().max(bytes.len() as u64)));
     }
     let text = std::str::from_utf8(&bytes).map_err(|wrong| {
         let byte = wrong.valid_up_to();
@@ -114,7 +108,7 @@ pub fn read_file(path: &Path, overrides: &[Override]) -> Result<Scene, SceneErro
 /// The error, its key, and its position in the text or in an override.
 pub fn read(text: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
     if text.len() as u64 > MAX_BYTES {
-        return Err(SceneError::TooLong(None));
+        return Err(SceneError::TooLong(text.len() as u64));
     }
     let text = text.trim_start_matches('\u{feff}');
     let malformed = |list| SceneError::Malformed(Problems { list, more: 0 });

@@ -127,31 +127,6 @@ impl Time {
         }
     }
 
-    /// This section with the end `end`, given on the command line by `option`.
-    ///
-    /// ```
-    /// let time = bfree::scene::read_file("scenes/rebound.json".as_ref(), &[])?.time;
-    /// let shorter = time.until(30.0, "--until").map_err(bfree::scene::SceneError::Values)?;
-    /// assert_eq!((shorter.end, shorter.step), (30.0, time.step));
-    /// // Less than a step is wrong, and it is the option that is.
-    /// let problems = time.until(0.01, "--until").unwrap_err();
-    /// assert_eq!(problems.list[0].path, "--until");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// A value that `time.end` may not have in a scene either.
-    pub fn until(&self, end: f64, option: &str) -> Result<Self, Problems> {
-        let time = Self { end, ..self.clone() };
-        let mut problems = Problems::default();
-        time.check(&mut problems);
-        for problem in &mut problems.list {
-            // The scene's own end passed all checks, so every problem is one of the option.
-            problem.path = option.to_owned();
-        }
-        if problems.is_empty() { Ok(time) } else { Err(problems) }
-    }
-
     pub(super) fn check(&self, problems: &mut Problems) {
         let step_ok = problems.positive("time.step", self.step);
         if problems.positive("time.end", self.end) && step_ok {

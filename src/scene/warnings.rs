@@ -1,6 +1,5 @@
 //! Warnings, with numbers, about scenes that run but may be wrong. `bfree check` and the start of a run print these warnings.
 
-use super::body::Body;
 use super::shape::Shape as Drawn;
 use super::time::word;
 use super::{BodyUse, Scene};
@@ -38,7 +37,6 @@ const LOCKING_POISSON: f64 = 0.45;
 /// The built bodies of a scene.
 struct Bodies<'a, const D: usize> {
     simulation: &'a Simulation<D>,
-    scene: &'a [Body],
     shapes: Vec<Option<Shape<D>>>,
     /// Indices of the particles with a volume, for each body.
     particles: Vec<Vec<usize>>,
@@ -67,7 +65,7 @@ impl Scene {
             }
         }
         let shapes = self.bodies.iter().map(|body| body.shape.as_ref().and_then(Drawn::build)).collect();
-        let bodies = Bodies { simulation, scene: &self.bodies, shapes, particles };
+        let bodies = Bodies { simulation, shapes, particles };
         let numbers = 0..self.bodies.len();
         let pairs = numbers.clone().flat_map(|b| (0..b).map(move |a| (a, b)));
         let mut all: Vec<String> = pairs.filter_map(|(a, b)| bodies.overlap(a, b)).collect();
@@ -98,10 +96,13 @@ impl Scene {
     fn deprecated_keys(&self) -> impl Iterator<Item = String> {
         let ghost_stiffness = self.ghost_stiffness.map(|factor| {
             let is = self.aggregates();
-            format!("ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {is} here. Remove")
+            format!(
+                "ghost_stiffness = {factor} is no longer used: aggregation has replaced it, and is {is} here. Remove"
+            )
         });
         let precision = self.solver.krylov.precision.map(|_| {
-            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove".into()
+            "solver.krylov.precision is no longer used: all linear systems are solved in double precision. Remove"
+                .into()
         });
         let inertia = self.time.inertia.map(|_| {
             let scheme = word(self.time.scheme());
@@ -143,7 +144,7 @@ impl<const D: usize> Bodies<'_, D> {
             }
             _ => found.iter().map(|&p| particles.volume[p]).sum(),
         };
-        let [a, b] = [a, b].map(|body| &self.scene[body].name);
+        let [a, b] = [a, b].map(|body| &self.simulation.bodies[body].name);
         (volume > VOLUME_UNCERTAINTY * cells.len() as f64 * grid.spacing.powi(D as i32)).then(|| {
             format!(
                 "bodies {a:?} and {b:?} overlap: {} particles of one lie in the other, in a volume of {volume:.4e}; there they move as \
@@ -195,7 +196,7 @@ impl<const D: usize> Bodies<'_, D> {
             };
             across = (0..D).map(extent).fold(f64::INFINITY, f64::min) + own.first().map(|&p| width(p))?;
         }
-        let (name, cells) = (&self.scene[body].name, across / h);
+        let (name, cells) = (&self.simulation.bodies[body].name, across / h);
         (across < enough).then(|| {
             format!(
                 "body {name:?} is about {across:.3e} thick where it is thickest, {cells:.2} cells; from {MIN_CELLS_ACROSS} on it bends and \
@@ -217,9 +218,10 @@ impl<const D: usize> Bodies<'_, D> {
         let cure = if body.law.volumetric(&Deformation::new(Tensor::<f64, 1>::zeros())).is_some() {
             format!("bodies[{number}].volumetric = \"mean_dilatation\" cures it")
         } else {
-            "its law knows no \"volumetric\": \"mean_dilatation\"; take \"neo_hookean\" with that, or a finer grid".into()
+            "its law knows no \"volumetric\": \"mean_dilatation\"; take \"neo_hookean\" with that, or a finer grid"
+                .into()
         };
-        let name = &self.scene[number].name;
+        let name = &self.simulation.bodies[number].name;
         Some(format!(
             "body {name:?} {why} (Poisson's ratio {poisson:.6}), and its change of volume is not averaged: it may lock, too stiff by some \
              percent or by a half, with wrong pressures; {cure}"

@@ -371,7 +371,7 @@ fn overrides_replace_add_and_are_named() {
 
 #[test]
 fn text_that_is_too_long_too_deep_or_no_object_is_refused() {
-    assert!(matches!(scene::read(&" ".repeat(scene::MAX_BYTES as usize + 1), &[]), Err(SceneError::TooLong(None))));
+    assert!(matches!(scene::read(&" ".repeat(scene::MAX_BYTES as usize + 1), &[]), Err(SceneError::TooLong(_))));
     assert!(refusal(&"[".repeat(100_000)).contains("recursion limit"));
     let nested = format!("{}{}{}", r#"{"union": ["#.repeat(1000), "1", "]}".repeat(1000));
     assert!(

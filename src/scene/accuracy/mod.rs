@@ -12,6 +12,7 @@ use super::body::Body;
 use super::grid::GridBox;
 use super::overrides::next;
 use super::place::steps;
+use super::time::word;
 use crate::problems::Problems;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -60,12 +61,7 @@ impl Accuracy {
 /// The accuracy as a scene writes it.
 impl Display for Accuracy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Draft => f.write_str("\"draft\""),
-            Self::Standard => f.write_str("\"standard\""),
-            Self::Reference => f.write_str("\"reference\""),
-            Self::Error(error) => write!(f, "{{\"error\": {error}}}"),
-        }
+        f.write_str(&word(self))
     }
 }
 
@@ -100,7 +96,12 @@ pub(super) fn courant(bodies: &[Body], spacing: f64, time: f64) -> Option<f64> {
 /// The target error is outside the table, or a needed length or speed is not in the scene.
 pub(super) fn set_keys(scene: &mut Value) -> Result<Vec<Chosen>, Problems> {
     let Some(accuracy) = part::<Accuracy>(&scene["accuracy"]) else { return Ok(Vec::new()) };
-    let Some(level) = accuracy.level() else { return Err(outside(accuracy)) };
+    let mut problems = Problems::default();
+    if let Accuracy::Error(error) = accuracy {
+        let [least, greatest] = table::range();
+        problems.between("accuracy.error", error, least, greatest);
+    }
+    let Some(level) = accuracy.level() else { return Err(problems) };
     let Some(bodies) = part::<Vec<Body>>(&scene["bodies"]) else { return Ok(Vec::new()) };
     let mut setter = KeySetter { scene, chosen: Vec::new() };
     for (key, value) in level.keys() {
@@ -144,14 +145,6 @@ fn has_load_steps(scene: &Value) -> bool {
 /// A part of a scene; `None` if it does not have the type `T`.
 fn part<T: for<'de> Deserialize<'de>>(value: &Value) -> Option<T> {
     T::deserialize(value).ok()
-}
-
-fn outside(accuracy: Accuracy) -> Problems {
-    let Accuracy::Error(error) = accuracy else { return Problems::default() };
-    let mut problems = Problems::default();
-    let [least, greatest] = table::range();
-    problems.between("accuracy.error", error, least, greatest);
-    problems
 }
 
 fn needed(key: &str, accuracy: Accuracy, why: &str) -> Problems {

@@ -66,14 +66,14 @@ pub(super) fn fitting(grid: &GridBox, bodies: &[Body], cells: f64) -> Result<f64
 
 /// The greatest speed of pressure waves in the undeformed bodies, c = √(M/ρ), M = Λ + 2G in isotropic solids.
 pub(super) fn speed(bodies: &[Body]) -> Result<f64, String> {
-    let mut greatest: f64 = 0.0;
+    let mut greatest = None;
     for body in bodies {
         let law = body.material.law(&mut Problems::default(), "material");
         let speed = law.map_or(f64::NAN, |law| (p_wave_modulus(&law) / body.density).sqrt());
         if !(speed > 0.0 && speed.is_finite()) {
             return Err(format!("the constants or the density of the body {:?} give no speed of sound", body.name));
         }
-        greatest = greatest.max(speed);
+        greatest = Some(speed.max(greatest.unwrap_or(0.0)));
     }
-    if greatest > 0.0 { Ok(greatest) } else { Err(NO_BODY.to_owned()) }
+    greatest.ok_or(NO_BODY.to_owned())
 }
