@@ -45,15 +45,11 @@ impl SceneArguments {
         Failure::scene(Unusable { path: self.scene.clone(), source: Box::new(error) })
     }
 
-    /// The folder in which files named by the scene are looked for.
-    pub fn folder(&self) -> &Path {
-        self.scene.parent().unwrap_or(Path::new("."))
-    }
-
     /// Builds the simulation at t = 0. Too little memory for its particles is an error.
     pub fn build<const D: usize>(&self, scene: &Scene) -> Result<Simulation<D>, Failure> {
         let memory = memory::available().unwrap_or(u64::MAX);
-        scene.build_within::<D>(self.folder(), memory).map_err(|error| self.unusable(error))
+        let folder = self.scene.parent().unwrap_or(Path::new("."));
+        scene.build_within::<D>(folder, memory).map_err(|error| self.unusable(error))
     }
 
     /// The plan of a run: its terms and arrays. Too little memory for the arrays is an error.
