@@ -10,7 +10,7 @@ use crate::lanes::{LANES, Lanes, WithLanes, widest};
 use crate::material::{ClosedTangent, Law, LawVisitor, Material, MaterialState, NonPositiveJacobian};
 use crate::mechanics::sweep::{At, Group, Number};
 use crate::particles::{Body, Particles};
-use crate::scalar::{Real, Single};
+use crate::scalar::Real;
 use crate::tensor::{Tensor, identity};
 use std::any::Any;
 
@@ -231,7 +231,7 @@ fn tangents_of<L: Law, const D: usize>(
                 for k in 0..D {
                     for l in 0..D {
                         let block = match &tangent {
-                            point::LocalTangent::Closed(closed) => closed.unit_block(Single, k, l),
+                            point::LocalTangent::Closed(closed) => closed.unit_block(k, l),
                             point::LocalTangent::General(blocks) => blocks[k][l],
                         };
                         for i in 0..D {
