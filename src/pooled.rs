@@ -97,6 +97,7 @@ impl Pool {
 }
 
 /// A vector on loan from a [`Pool`].
+#[derive(Debug)]
 pub struct Pooled<T: Element> {
     vector: Vec<T>,
     pool: Pool,
@@ -148,12 +149,6 @@ impl<T: Element> Default for Pooled<T> {
 impl<T: Element> Clone for Pooled<T> {
     fn clone(&self) -> Self {
         self.pool.collect(self.iter().copied())
-    }
-}
-
-impl<T: Element + std::fmt::Debug> std::fmt::Debug for Pooled<T> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.vector.fmt(f)
     }
 }
 

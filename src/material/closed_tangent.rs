@@ -34,10 +34,13 @@ pub struct ClosedTangent<N, const D: usize> {
     pub both: Option<[[[N; D]; D]; 2]>,
 }
 
-impl<N: Lane, const D: usize> ClosedTangent<N, D> {
+impl<N, const D: usize> ClosedTangent<N, D> {
     /// V₀ δP F_rᵀ from L.
     #[inline(always)]
-    pub(crate) fn product(&self, l: &[[N; D]; D]) -> [[N; D]; D] {
+    pub(crate) fn product(&self, l: &[[N; D]; D]) -> [[N; D]; D]
+    where
+        N: Lane,
+    {
         let (zero, a) = (self.q.constant(0.0), &self.a);
         let mut contracted = zero;
         for i in 0..D {
@@ -86,7 +89,10 @@ impl<N: Lane, const D: usize> ClosedTangent<N, D> {
 
     /// The block of the unit gradients e_k and e_l: κ A e_k ⊗ A e_l − q A e_l ⊗ A e_k + B_kl I + c_kl b.
     #[inline(always)]
-    pub(crate) fn unit_block(&self, k: usize, l: usize) -> [[N; D]; D] {
+    pub(crate) fn unit_block(&self, k: usize, l: usize) -> [[N; D]; D]
+    where
+        N: Lane,
+    {
         let a = &self.a;
         let mut block = [[self.q.constant(0.0); D]; D];
         for i in 0..D {

@@ -74,17 +74,17 @@ impl<'a, T: Real> States<'a, T> {
     }
 }
 
-/// The loop over the lanes of one law. It fills rows and det F.
-pub(crate) type Loop<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
+/// The evaluation of one law in all lanes. It fills rows and det F.
+type Evaluation<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
-/// The loop over the lanes for each body.
-struct Chosen<'a, T> {
+/// The evaluation of the law of each body.
+struct Evaluations<'a, T> {
     body: &'a [u32],
     ids: &'a [u32],
-    loops: Vec<Box<Loop<'a, T>>>,
+    of_body: Vec<Box<Evaluation<'a, T>>>,
 }
 
-impl<T: Real> Chosen<'_, T> {
+impl<T: Real> Evaluations<'_, T> {
     /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
     ///
     /// # Errors
@@ -92,14 +92,14 @@ impl<T: Real> Chosen<'_, T> {
     fn evaluate(&self, group: &[u32], states: &States<'_, T>, out: &mut [[T; LANES]]) -> Result<(), Inadmissible> {
         let mut det_f = [1.0; LANES];
         let body = |lane: usize| self.body[group[lane] as usize];
-        self.loops[body(0) as usize](states, out, &mut det_f);
+        self.of_body[body(0) as usize](states, out, &mut det_f);
         for lane in 1..group.len() {
             if (0..lane).any(|before| body(before) == body(lane)) {
                 continue;
             }
             let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
-            self.loops[body(lane) as usize](states, &mut other, &mut other_det_f);
-            mutant!("sweep: a second body in a group takes the law of the first": { self.loops[body(0) as usize](states, &mut other, &mut other_det_f); });
+            self.of_body[body(lane) as usize](states, &mut other, &mut other_det_f);
+            mutant!("sweep: a second body in a group takes the law of the first": { self.of_body[body(0) as usize](states, &mut other, &mut other_det_f); });
             for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
                 det_f[same] = other_det_f[same];
                 out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
@@ -122,17 +122,17 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
     ) -> impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) -> Result<(), Inadmissible> + Sync {
         // The loops of shipped laws are compiled for plain numbers. `downcast` finds out whether T is the plain number.
         let in_lanes = |law: &L| {
-            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, What::Stresses));
-            shipped.downcast::<Box<Loop<'static, T>>>().ok()
+            let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, Quantity::Stress));
+            shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
-        let chosen = self.chosen(|law| match in_lanes(law) {
+        let laws = self.evaluations(|law| match in_lanes(law) {
             Some(shipped) => *shipped,
             None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
         });
         move |group, at, sums| {
             let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
             let mut stresses = [[[T::zero(); LANES]; D]; D];
-            chosen.evaluate(group.particles, &states, stresses.as_flattened_mut())?;
+            laws.evaluate(group.particles, &states, stresses.as_flattened_mut())?;
             for (sums, rows) in sums.gradient.as_flattened_mut().iter_mut().zip(stresses.as_flattened()) {
                 sums.iter_mut().zip(rows).for_each(|(sum, &x)| *sum += x);
             }
@@ -151,22 +151,22 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         part: Part,
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
-        let chosen = self.chosen(move |law| match material(law) {
+        let laws = self.evaluations(move |law| match material(law) {
             Some(material) if part == Part::Whole && form != Form::General => {
-                shipped(material, D, What::Tangents(form))
+                shipped(material, D, Quantity::Tangent(form))
             }
             _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, part, form, out, det_f)),
         });
         move |group, at, rows| {
             let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
-            chosen.evaluate(group.particles, &states, rows)
+            laws.evaluate(group.particles, &states, rows)
         }
     }
 
-    /// The loops that `choose` picks for the law of each body.
-    fn chosen<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Loop<'s, T>>) -> Chosen<'s, T> {
+    /// The evaluations that `choose` picks for the law of each body.
+    fn evaluations<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluation<'s, T>>) -> Evaluations<'s, T> {
         let Particles { body, id, .. } = self.particles;
-        Chosen { body, ids: id, loops: self.bodies.iter().map(|body| choose(&body.law)).collect() }
+        Evaluations { body, ids: id, of_body: self.bodies.iter().map(|body| choose(&body.law)).collect() }
     }
 }
 
@@ -281,40 +281,41 @@ fn write_upper<const D: usize>(a: &[[f64; D]; D], out: &mut ClosedRows, first: u
 
 /// The quantity that is evaluated of a law in every lane.
 #[derive(Clone, Copy)]
-enum What {
-    Stresses,
-    Tangents(Form),
+enum Quantity {
+    Stress,
+    Tangent(Form),
 }
 
-/// The loop of a shipped law. It is not generic, so it is compiled here and not by every crate that uses it.
+/// The evaluation of a shipped law, in vector lanes. It is not generic, so it is compiled here and not by every crate that uses it.
 #[inline(never)]
-fn shipped(law: &Material, dimension: usize, what: What) -> Box<Loop<'static, f64>> {
-    law.with(Choose { dimension, what })
+fn shipped(law: &Material, dimension: usize, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
+    law.with(InDimension { dimension, quantity })
 }
 
-struct Choose {
+/// Takes a shipped law, and makes its evaluation in 1, 2 or 3 dimensions.
+struct InDimension {
     dimension: usize,
-    what: What,
+    quantity: Quantity,
 }
 
-impl LawVisitor for Choose {
-    type Output = Box<Loop<'static, f64>>;
+impl LawVisitor for InDimension {
+    type Output = Box<Evaluation<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn in_dimension<L: Law + 'static, const D: usize>(law: L, what: What) -> Box<Loop<'static, f64>> {
-            Box::new(move |states, out, det_f| widest(Evaluate::<L, D> { law: &law, what, states, out, det_f }))
+        fn evaluation<L: Law + 'static, const D: usize>(law: L, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
+            Box::new(move |states, out, det_f| widest(Evaluate::<L, D> { law: &law, quantity, states, out, det_f }))
         }
         match self.dimension {
-            1 => in_dimension::<L, 1>(law, self.what),
-            2 => in_dimension::<L, 2>(law, self.what),
-            _ => in_dimension::<L, 3>(law, self.what),
+            1 => evaluation::<L, 1>(law, self.quantity),
+            2 => evaluation::<L, 2>(law, self.quantity),
+            _ => evaluation::<L, 3>(law, self.quantity),
         }
     }
 }
 
 struct Evaluate<'a, L, const D: usize> {
     law: &'a L,
-    what: What,
+    quantity: Quantity,
     states: &'a States<'a, f64>,
     out: &'a mut [[f64; LANES]],
     det_f: &'a mut [f64; LANES],
@@ -323,10 +324,10 @@ struct Evaluate<'a, L, const D: usize> {
 impl<L: Law, const D: usize> WithLanes for Evaluate<'_, L, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) {
-        let Self { law, what, states, out, det_f } = self;
-        match what {
-            What::Stresses => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
-            What::Tangents(form) => {
+        let Self { law, quantity, states, out, det_f } = self;
+        match quantity {
+            Quantity::Stress => stresses_of::<L, f64, D>(law, states, Part::Whole, out, det_f),
+            Quantity::Tangent(form) => {
                 tangents_of::<L, D>(law, states, Part::Whole, form, out, det_f);
             }
         }
