@@ -32,7 +32,7 @@ type Rows<T> = [[T; LANES]; 9];
 type ClosedRows = [[f64; LANES]; Form::ClosedWithBoth.rows(3)];
 
 /// The states of the particles of a group, a lane each. Empty lanes hold zeros.
-pub struct States<'a, T> {
+struct States<'a, T> {
     /// ∇u
     gradient: Rows<T>,
     h_r: Rows<f64>,
@@ -77,43 +77,6 @@ impl<'a, T: Real> States<'a, T> {
 /// The evaluation of one law in all lanes. It fills rows and det F.
 type Evaluation<'l, T> = dyn Fn(&States<'_, T>, &mut [[T; LANES]], &mut [f64; LANES]) + Sync + 'l;
 
-/// The evaluation of the law of each body.
-struct Evaluations<'a, T> {
-    body: &'a [u32],
-    ids: &'a [u32],
-    of_body: Vec<Box<Evaluation<'a, T>>>,
-}
-
-impl<T: Real> Evaluations<'_, T> {
-    /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
-    ///
-    /// # Errors
-    /// The particle with the smallest id among those with det F ≤ 0.
-    fn evaluate(&self, group: &[u32], states: &States<'_, T>, out: &mut [[T; LANES]]) -> Result<(), Inadmissible> {
-        let mut det_f = [1.0; LANES];
-        let body = |lane: usize| self.body[group[lane] as usize];
-        self.of_body[body(0) as usize](states, out, &mut det_f);
-        for lane in 1..group.len() {
-            if (0..lane).any(|before| body(before) == body(lane)) {
-                continue;
-            }
-            let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
-            self.of_body[body(lane) as usize](states, &mut other, &mut other_det_f);
-            mutant!("sweep: a second body in a group takes the law of the first": { self.of_body[body(0) as usize](states, &mut other, &mut other_det_f); });
-            for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
-                det_f[same] = other_det_f[same];
-                out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
-            }
-        }
-        let check = |(&p, &det_f): (&u32, &f64)| {
-            let error = NonPositiveJacobian::check(det_f).err();
-            error.map(|source| Inadmissible { particle: self.ids[p as usize] as usize, source })
-        };
-        let first = group.iter().zip(&det_f).filter_map(check).min_by_key(|error| error.particle);
-        first.map_or(Ok(()), Err)
-    }
-}
-
 impl<const D: usize, L: Law> Laws<'_, D, L> {
     /// The point function that adds σ = V₀ F S F_rᵀ at ∇u, for one pass. Only the F of `part` carry derivatives.
     pub(crate) fn stresses<T: Number>(
@@ -125,14 +88,13 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
             let shipped: Box<dyn Any> = Box::new(shipped(material(law)?, D, Quantity::Stress));
             shipped.downcast::<Box<Evaluation<'static, T>>>().ok()
         };
-        let laws = self.evaluations(|law| match in_lanes(law) {
+        let of_body = self.evaluations(|law| match in_lanes(law) {
             Some(shipped) => *shipped,
             None => Box::new(move |states, out, det_f| stresses_of::<L, T, D>(law, states, part, out, det_f)),
         });
         move |group, at, sums| {
-            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
             let mut stresses = [[[T::zero(); LANES]; D]; D];
-            laws.evaluate(group.particles, &states, stresses.as_flattened_mut())?;
+            self.evaluate(&of_body, group, at, stresses.as_flattened_mut())?;
             for (sums, rows) in sums.gradient.as_flattened_mut().iter_mut().zip(stresses.as_flattened()) {
                 sums.iter_mut().zip(rows).for_each(|(sum, &x)| *sum += x);
             }
@@ -151,22 +113,53 @@ impl<const D: usize, L: Law> Laws<'_, D, L> {
         part: Part,
         form: Form,
     ) -> impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) -> Result<(), Inadmissible> + Sync {
-        let laws = self.evaluations(move |law| match material(law) {
+        let of_body = self.evaluations(move |law| match material(law) {
             Some(material) if part == Part::Whole && form != Form::General => {
                 shipped(material, D, Quantity::Tangent(form))
             }
             _ => Box::new(move |states, out, det_f| tangents_of::<L, D>(law, states, part, form, out, det_f)),
         });
-        move |group, at, rows| {
-            let states = States::of(self.particles, self.dt, group.particles, at.gradient.as_flattened());
-            laws.evaluate(group.particles, &states, rows)
-        }
+        move |group, at, rows| self.evaluate(&of_body, group, at, rows)
     }
 
     /// The evaluations that `choose` picks for the law of each body.
-    fn evaluations<'s, T: Real>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluation<'s, T>>) -> Evaluations<'s, T> {
-        let Particles { body, id, .. } = self.particles;
-        Evaluations { body, ids: id, of_body: self.bodies.iter().map(|body| choose(&body.law)).collect() }
+    fn evaluations<'s, T>(&'s self, choose: impl Fn(&'s L) -> Box<Evaluation<'s, T>>) -> Vec<Box<Evaluation<'s, T>>> {
+        self.bodies.iter().map(|body| choose(&body.law)).collect()
+    }
+
+    /// Evaluates every law that occurs in the group for all lanes, and keeps the lanes of its own particles.
+    ///
+    /// # Errors
+    /// The particle with the smallest id among those with det F ≤ 0.
+    fn evaluate<T: Real>(
+        &self,
+        of_body: &[Box<Evaluation<'_, T>>],
+        group: Group<'_>,
+        at: &At<T, D, D>,
+        out: &mut [[T; LANES]],
+    ) -> Result<(), Inadmissible> {
+        let (group, mut det_f) = (group.particles, [1.0; LANES]);
+        let states = States::of(self.particles, self.dt, group, at.gradient.as_flattened());
+        let body = |lane: usize| self.particles.body[group[lane] as usize];
+        of_body[body(0) as usize](&states, out, &mut det_f);
+        for lane in 1..group.len() {
+            if (0..lane).any(|before| body(before) == body(lane)) {
+                continue;
+            }
+            let (mut other, mut other_det_f) = (vec![[T::zero(); LANES]; out.len()], [1.0; LANES]);
+            of_body[body(lane) as usize](&states, &mut other, &mut other_det_f);
+            mutant!("sweep: a second body in a group takes the law of the first": { of_body[body(0) as usize](&states, &mut other, &mut other_det_f); });
+            for same in (lane..group.len()).filter(|&same| body(same) == body(lane)) {
+                det_f[same] = other_det_f[same];
+                out.iter_mut().zip(&other).for_each(|(out, other)| out[same] = other[same]);
+            }
+        }
+        let check = |(&p, &det_f): (&u32, &f64)| {
+            let error = NonPositiveJacobian::check(det_f).err();
+            error.map(|source| Inadmissible { particle: self.particles.id[p as usize] as usize, source })
+        };
+        let first = group.iter().zip(&det_f).filter_map(check).min_by_key(|error| error.particle);
+        first.map_or(Ok(()), Err)
     }
 }
 
@@ -289,27 +282,23 @@ enum Quantity {
 /// The evaluation of a shipped law, in vector lanes. It is not generic, so it is compiled here and not by every crate that uses it.
 #[inline(never)]
 fn shipped(law: &Material, dimension: usize, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
-    law.with(InDimension { dimension, quantity })
+    match dimension {
+        1 => law.with(InLanes::<1>(quantity)),
+        2 => law.with(InLanes::<2>(quantity)),
+        _ => law.with(InLanes::<3>(quantity)),
+    }
 }
 
-/// Takes a shipped law, and makes its evaluation in 1, 2 or 3 dimensions.
-struct InDimension {
-    dimension: usize,
-    quantity: Quantity,
-}
+/// Makes the evaluation of a law in D dimensions.
+struct InLanes<const D: usize>(Quantity);
 
-impl LawVisitor for InDimension {
+impl<const D: usize> LawVisitor for InLanes<D> {
     type Output = Box<Evaluation<'static, f64>>;
 
     fn visit<L: Law + 'static>(self, law: L) -> Self::Output {
-        fn evaluation<L: Law + 'static, const D: usize>(law: L, quantity: Quantity) -> Box<Evaluation<'static, f64>> {
-            Box::new(move |states, out, det_f| widest(Evaluate::<L, D> { law: &law, quantity, states, out, det_f }))
-        }
-        match self.dimension {
-            1 => evaluation::<L, 1>(law, self.quantity),
-            2 => evaluation::<L, 2>(law, self.quantity),
-            _ => evaluation::<L, 3>(law, self.quantity),
-        }
+        Box::new(move |states, out, det_f| {
+            widest(Evaluate::<L, D> { law: &law, quantity: self.0, states, out, det_f });
+        })
     }
 }
 

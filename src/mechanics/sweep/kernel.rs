@@ -272,20 +272,17 @@ impl<S: Lanes, const D: usize> Pairs<S, D> {
         for lane in 0..count {
             places[lane] = window.first + y * window.stride[0] + z * window.stride[1];
             mutant!("sweep: a plane of the scatter one node early": { places[lane] -= z; });
-            if D == 1 {
-                products[0][lane] = s.splat(1.0);
-            } else {
-                let (n, dn) = window.axis(1);
-                let (ny, dy) = (s.load(&n[y]), s.load(&dn[y]));
-                if D == 2 {
-                    (products[0][lane], products[D - 1][lane]) = (ny, dy);
-                } else {
-                    let (n, dn) = window.axis(2);
-                    let (nz, dz) = (s.load(&n[z]), s.load(&dn[z]));
-                    products[0][lane] = ny * nz;
-                    products[1 % D][lane] = dy * nz;
-                    products[2 % D][lane] = ny * dz;
+            let at = [0, y, z];
+            let mut product = [s.splat(1.0); D];
+            for axis in 1..D {
+                let (n, dn) = window.axis(axis);
+                let (n, dn) = (s.load(&n[at[axis]]), s.load(&dn[at[axis]]));
+                for k in 0..D {
+                    product[k] = product[k] * if k == axis { dn } else { n };
                 }
+            }
+            for k in 0..D {
+                products[k][lane] = product[k];
             }
             y += 1;
             if y == wy {

@@ -38,18 +38,18 @@ impl<const D: usize> Supports<D> {
     }
 
     /// [`Self::sweep`] of a function that always has a value, such as a product with a tangent.
-    pub(crate) fn product<T: Number>(
+    pub(crate) fn accumulate<T: Number, const C: usize>(
         &self,
-        u: &[Vector<T, D>],
+        field: Option<&[Vector<T, C>]>,
         mode: Mode,
-        out: &mut [Vector<T, D>],
-        point: impl Fn(Group<'_>, &At<T, D, D>, &mut At<T, D, D>) + Sync,
+        out: &mut [Vector<T, C>],
+        point: impl Fn(Group<'_>, &At<T, C, D>, &mut At<T, C, D>) + Sync,
     ) {
         let point = |group: Group<'_>, at: &_, sums: &mut _| -> Result<(), (usize, Infallible)> {
             point(group, at, sums);
             Ok(())
         };
-        let Ok(()) = self.sweep(Some(u), mode, out, point);
+        let Ok(()) = self.sweep(field, mode, out, point);
     }
 
     /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
@@ -120,7 +120,7 @@ impl<const D: usize> Supports<D> {
         point: impl Fn(usize, Vector<T, D>, Tensor<T, D>) -> Result<(Vector<T, D>, Tensor<T, D>), E> + Sync,
     ) -> Result<(), E> {
         let failure = First::none();
-        self.product(field, Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
+        self.accumulate(Some(field), Mode { weights, ..Mode::BOTH }, out, |group, at, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let (value, gradient) = at.lane(lane);
                 match point(p as usize, value, gradient) {
@@ -149,16 +149,12 @@ impl<const D: usize> Supports<D> {
         out: &mut [Vector<f64, C>],
         value: impl Fn(usize) -> Vector<f64, C> + Sync,
     ) {
-        const { assert!(C == 1 || C == D) };
-        self.pass();
-        let point = |group: Group<'_>, _: &[At<f64, C, D>], sums: &mut [At<f64, C, D>]| {
+        self.accumulate(None, Mode { weights, ..Mode::VALUE }, out, |group, _, sums| {
             for (lane, &p) in group.particles.iter().enumerate() {
                 let value = value(p as usize);
-                (0..C).for_each(|c| sums[0].value[c][lane] = value[c]);
+                (0..C).for_each(|c| sums.value[c][lane] = value[c]);
             }
-        };
-        let mode = Mode { weights, ..Mode::VALUE };
-        either!(self, way => way.sweep::<C>(1, None, mode, bytemuck::cast_slice_mut(out), &point));
+        });
     }
 
     /// Σ u_I N_I at every particle.
