@@ -56,10 +56,8 @@ impl<const D: usize> WithLanes for In<ScatterBlocks<'_>, D, D> {
     #[inline(always)]
     fn run<S: Lanes>(self, s: S) {
         let ScatterBlocks { window, from, out } = self.0;
-        let rows = window.width[1] * window.width[2];
-        let at_once = S::ROWS;
-        for chunk in 0..rows.div_ceil(at_once) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
+        for row in (0..window.width[1] * window.width[2]).step_by(S::ROWS) {
+            let pairs = Pairs::<S, D>::new(s, &window, row);
             each_tile!(window, start => blocks_tile::<S, D>(s, &window, start, &pairs, from, out));
         }
     }

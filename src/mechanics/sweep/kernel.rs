@@ -244,10 +244,8 @@ impl<const C: usize, const D: usize> WithLanes for In<Scatter<'_>, C, D> {
         let Scatter { window, mode, value, gradient, out } = self.0;
         // Fixed lengths, so that no index is checked.
         let (Some(value), Some(gradient)) = (value.first_chunk(), gradient.as_chunks().0.first_chunk()) else { return };
-        let rows = window.width[1] * window.width[2];
-        let at_once = S::ROWS;
-        for chunk in 0..rows.div_ceil(at_once) {
-            let pairs = Pairs::<S, D>::new(s, &window, chunk * at_once);
+        for row in (0..window.width[1] * window.width[2]).step_by(S::ROWS) {
+            let pairs = Pairs::<S, D>::new(s, &window, row);
             each_tile!(window, start => scatter_tile::<S, C, D>(s, &window, start, &pairs, mode, value, gradient, out));
         }
     }

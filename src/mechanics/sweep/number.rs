@@ -1,7 +1,6 @@
 //! The number types of nodal fields. Gather and scatter are linear, so a dual number is two fields of plain numbers.
 
 use super::kernel::At;
-use crate::lanes::LANES;
 use crate::scalar::Real;
 use crate::tensor::Vector;
 use num_dual::Dual64;
@@ -43,14 +42,9 @@ pub trait Number: Real + Send + Sync + 'static {
         let mut sum = At::<Self, C, D>::zero();
         let result = point(&at, &mut sum);
         for (i, sums) in sums.iter_mut().enumerate() {
-            for c in 0..C {
-                for lane in 0..LANES {
-                    sums.value[c][lane] = sum.value[c][lane].field(i);
-                    for k in 0..D {
-                        sums.gradient[c][k][lane] = sum.gradient[c][k][lane].field(i);
-                    }
-                }
-            }
+            let field = |x: Self| x.field(i);
+            sums.value = sum.value.map(|row| row.map(field));
+            sums.gradient = sum.gradient.map(|rows| rows.map(|row| row.map(field)));
         }
         result
     }

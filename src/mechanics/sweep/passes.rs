@@ -4,10 +4,9 @@ use super::kernel::At;
 use super::supports::{Way, either};
 use super::{Group, Mode, Number, Quadratic, Supports, Weights};
 use crate::lanes::LANES;
-use crate::parallel::{First, held};
+use crate::parallel::First;
 use crate::tensor::{Tensor, Vector};
 use std::convert::Infallible;
-use std::sync::Mutex;
 
 impl<const D: usize> Supports<D> {
     /// `f_I += Σ_p q N_I + σ ∇_r N_I` for C components: 1 or D. `point(group, u and L, q and σ)` adds to q and σ, which begin with
@@ -61,10 +60,7 @@ impl<const D: usize> Supports<D> {
         fill: impl Fn(Group<'_>, &At<f64, D, D>, &mut [[f64; LANES]]) + Sync,
     ) {
         self.pass();
-        let rows: Vec<_> = rows.chunks_mut(count).map(Mutex::new).collect();
-        let evaluate = |group: Group<'_>, at: &[At<f64, D, D>]| fill(group, &at[0], &mut held(&rows[group.number]));
-        let field = bytemuck::cast_slice(field);
-        either!(self, way => way.gather(1, field, Mode::GRADIENT, &evaluate, &mut |_, ()| {}));
+        either!(self, way => way.fill_rows(bytemuck::cast_slice(field), count, rows, &fill));
     }
 
     /// `out_I +=` Σ_p B_p(∇_r N_I, ∇_r N_I) + m_p N_I² I, the nodal diagonal blocks of quadratic forms. `quadratic` fills in the form of

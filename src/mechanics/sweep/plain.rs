@@ -5,7 +5,7 @@ use super::block::Group;
 use super::blocks::Quadratic;
 use super::kernel::At;
 use super::points::{Points, SupportError};
-use super::{Evaluate, Mode, Point};
+use super::{Evaluate, Fill, Mode, Point};
 use crate::approximation::{Scratch, ShapeFunction, Support};
 use crate::grid::Grid;
 use crate::lanes::LANES;
@@ -154,6 +154,15 @@ impl<const D: usize> Plain<D> {
         take: &mut dyn FnMut(Group<'_>, R),
     ) {
         self.in_order(|group| evaluate(group, &self.gathered(group, fields, field)), take);
+    }
+
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
+        let evaluate = |group: Group<'_>| {
+            let mut rows = vec![[0.0; LANES]; count];
+            fill(group, &self.gathered(group, 1, field)[0], &mut rows);
+            rows
+        };
+        self.in_order(evaluate, |group, filled| rows[group.number * count..][..count].copy_from_slice(&filled));
     }
 
     /// u = Σ u_I N_I and L = Σ u_I ⊗ ∇_r N_I of every field at the particles of a group.

@@ -8,7 +8,7 @@ use super::block::{Block, Group};
 use super::blocks::{Quadratic, ScatterBlocks, scatter_blocks};
 use super::kernel::{self, At, Gather, Scatter, Window};
 use super::tiled::Tiled;
-use super::{Evaluate, Mode, Point};
+use super::{Evaluate, Fill, Mode, Point};
 use crate::lanes::LANES;
 use crate::parallel;
 use crate::tensor::Tensor;
@@ -155,13 +155,7 @@ impl<const D: usize> Tiled<D> {
         take: &mut dyn FnMut(Group<'_>, R),
     ) {
         let one = |scratch: &mut Scratch<C, D>, block: &Block, take: &mut dyn FnMut(Group<'_>, R)| {
-            let Scratch { nodal, at, .. } = scratch;
-            gather_boxes::<C>(block, field, fields, nodal);
-            at.resize(fields, At::zero());
-            for group in 0..block.len() {
-                gather(block.window::<D>(group), nodal, mode, at);
-                take(block.group(group), evaluate(block.group(group), at));
-            }
+            gathered(block, field, fields, mode, scratch, |group, at| take(group, evaluate(group, at)));
         };
         if !self.in_parallel() {
             let mut scratch = Scratch::default();
@@ -176,6 +170,24 @@ impl<const D: usize> Tiled<D> {
             for (block, results) in blocks.iter().zip(&mut waiting) {
                 results.drain(..).enumerate().for_each(|(group, result)| take(block.group(group), result));
             }
+        }
+    }
+
+    /// Calls `fill(group, L, rows)` for every group. Each group has `count` rows of its own.
+    pub(super) fn fill_rows(&self, field: &[f64], count: usize, mut rows: &mut [[f64; LANES]], fill: &Fill<'_, D>) {
+        let of_block = |block| Some((block, rows.split_off_mut(..Block::len(block) * count)?));
+        let one = |scratch: &mut Scratch<D, D>, (block, rows): (&Block, &mut [[f64; LANES]])| {
+            let mut rows = rows.chunks_mut(count);
+            gathered(block, field, 1, Mode::GRADIENT, scratch, |group, at| {
+                rows.next().into_iter().for_each(|rows| fill(group, &at[0], rows));
+            });
+        };
+        let parts = self.blocks.iter().filter_map(of_block);
+        if self.in_parallel() {
+            parallel::for_each_with(parts, &one);
+        } else {
+            let mut scratch = Scratch::default();
+            parts.for_each(|part| one(&mut scratch, part));
         }
     }
 }
@@ -211,5 +223,22 @@ fn gather_boxes<const C: usize>(block: &Block, field: &[f64], fields: usize, nod
 fn gather<const C: usize, const D: usize>(window: Window<'_>, nodal: &[f64], mode: Mode, at: &mut [At<f64, C, D>]) {
     for (nodal, At { value, gradient }) in nodal.chunks(nodal.len() / at.len()).zip(at) {
         kernel::gather(C, Gather { window, nodal, mode, value, gradient: gradient.as_flattened_mut() });
+    }
+}
+
+/// Calls `visit(group, u and L)` for every group of a block.
+fn gathered<const C: usize, const D: usize>(
+    block: &Block,
+    field: &[f64],
+    fields: usize,
+    mode: Mode,
+    Scratch { nodal, at, .. }: &mut Scratch<C, D>,
+    mut visit: impl FnMut(Group<'_>, &[At<f64, C, D>]),
+) {
+    gather_boxes::<C>(block, field, fields, nodal);
+    at.resize(fields, At::zero());
+    for group in 0..block.len() {
+        gather(block.window::<D>(group), nodal, mode, at);
+        visit(block.group(group), at);
     }
 }
