@@ -61,7 +61,7 @@ impl<const D: usize> Tangent<'_, D> {
         let (modes, all): (Vec<_>, Vec<_>) =
             self.terms.iter().filter_map(|term| term.product_at_points(Some(u))).unzip();
         if let Some(mode) = modes.into_iter().reduce(Mode::and) {
-            self.supports.product(u, mode, out, |group, at, sums| {
+            self.supports.accumulate(Some(u), mode, out, |group, at, sums| {
                 all.iter().for_each(|add| add(group, at, sums));
             });
         }

@@ -41,7 +41,7 @@ impl<const D: usize, L: Law> Damping<'_, D, L> {
         self.step.mass().add_product(self.rayleigh.mass, v, &mut force);
         if let Some((mode, add)) = self.stiffness.as_ref().and_then(|of| of.product_at_points(Some(v))) {
             let mut of_stiffness = vec![Vector::<f64, D>::zeros(); v.len()];
-            self.step.supports.product(v, mode, &mut of_stiffness, add);
+            self.step.supports.accumulate(Some(v), mode, &mut of_stiffness, add);
             force.iter_mut().zip(&of_stiffness).for_each(|(force, more)| *force += more * self.rayleigh.stiffness);
         }
         force

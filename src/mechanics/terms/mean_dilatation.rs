@@ -141,7 +141,7 @@ impl<const D: usize, L: Law> Term<D> for MeanDilatation<'_, D, L> {
         let states = self.states(dphi);
         let (closed, count) = (Form::Closed.rows(D), Form::Closed.rows(D) + 1);
         let mut rows = supports.pool().unspecified(supports.groups() * count, [0.0; LANES]);
-        supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+        supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
             rows.fill([0.0; LANES]);
             for (lane, &p) in group.particles.iter().enumerate() {
                 let Some(cell) = self.cells.cell(p) else { continue };
@@ -191,7 +191,7 @@ impl<const D: usize> LinearizedMean<'_, D> {
     /// k δv of every cell, with δv = Σ V₀ J A : ∇u.
     fn coupling(&self, u: &[Vector<f64, D>]) -> Vec<f64> {
         let mut grown = self.supports.pool().unspecified(self.supports.groups(), [0.0; LANES]);
-        self.supports.fill_rows(u, 1, &mut grown, &|group, at, grown| {
+        self.supports.fill_rows(u, 1, &mut grown, |group, at, grown| {
             let (a, weight) = self.of_group(group.number);
             let mut sum = [0.0; LANES];
             for (a, l) in a.iter().zip(at.gradient.as_flattened()) {

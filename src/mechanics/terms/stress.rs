@@ -5,7 +5,7 @@ use crate::lanes::LANES;
 use crate::material::Law;
 use crate::mechanics::constitutive::{AddTo, Form, Laws, Product, add_quadratic, product};
 use crate::mechanics::constitutive::{Inadmissible, Part, compose};
-use crate::mechanics::sweep::{Mode, Number, Supports};
+use crate::mechanics::sweep::{Mode, Number, Supports, Weights};
 use crate::parallel::First;
 use crate::pooled::Pooled;
 use crate::tensor::{Tensor, Vector, identity};
@@ -33,7 +33,7 @@ impl<'a, const D: usize, L: Law> Stress<'a, D, L> {
         let mut rows = self.supports.pool().unspecified(self.supports.groups() * count, [0.0; LANES]);
         let evaluate = self.laws.tangents(part, form);
         let failure = First::none();
-        self.supports.fill_rows(dphi, count, &mut rows, &|group, at, rows| {
+        self.supports.fill_rows(dphi, count, &mut rows, |group, at, rows| {
             if let Err(error) = evaluate(group, at, rows) {
                 failure.keep(error.particle, error);
             }
@@ -75,7 +75,7 @@ impl<const D: usize, L: Law> Term<D> for Stress<'_, D, L> {
     /// ‖δP‖ ≤ ‖F‖ ‖ℂ : Fᵀ δF‖ with ‖δF‖ = ‖H‖ + Σ |Δφ| |∇_r N| ‖F_r‖. The response to a change of volume stands for all δF.
     fn add_sensitivity(&self, dphi: &[Vector<f64, D>], out: &mut [Vector<f64, D>]) -> Result<(), Inadmissible> {
         let particles = self.laws.particles;
-        self.supports.assemble_magnitudes(dphi, out, |p, _, g| {
+        self.supports.assemble(dphi, Weights::Magnitude, out, |p, _, g| {
             let h_r = &particles.reference().displacement_gradient[p];
             let id = particles.id[p] as usize;
             let at = particles.state(p, self.laws.dt).deformed(compose(&g, h_r)).admissible();
