@@ -96,12 +96,6 @@ pub trait Separable: Validate + Send + Sync {
     fn pieces(&self) -> Pieces {
         Pieces::LINEAR
     }
-
-    /// Whether the functions are B-splines away from walls. Block-Jacobi is more effective for B-splines than for other functions of equal
-    /// width.
-    fn is_spline(&self) -> bool {
-        false
-    }
 }
 
 /// The functions at a point x of a loaded surface. Loads must act through functions that balance the internal force. Under uniform stress,
