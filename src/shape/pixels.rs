@@ -1,6 +1,6 @@
 //! Solids of pixels (voxels in 3D), from pictures and scans. Each pixel is a box that belongs to the solid or does not.
 
-use super::{Face, Solid, axis};
+use super::{Face, GridBox, Part, Solid, axis};
 use crate::tensor::Vector;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -109,7 +109,7 @@ impl<const D: usize> Pixels<D> {
     /// The solid of a mask that covers the box from `min` to `max`. `None` in 1D, and in 2D if the mask has more than one layer.
     ///
     /// ```
-    /// use bfree::shape::{Mask, Pixels, Shape};
+    /// use bfree::shape::{GridBox, Mask, Pixels, Shape};
     /// use bfree::tensor::Vector;
     ///
     /// // An L of three squares.
@@ -117,8 +117,9 @@ impl<const D: usize> Pixels<D> {
     /// let corner = Shape::from(Pixels::<2>::new(Vector::zeros(), Vector::from([2.0, 2.0]), mask).ok_or("plane")?);
     /// assert_eq!(corner.signed_distance(&Vector::from([1.5, 1.25])), 0.25);
     /// assert_eq!(corner.normal(&Vector::from([1.5, 0.75])), Vector::from([0.0, 1.0]));
-    /// // What of a box lies in it.
-    /// let (volume, centroid) = corner.part(&Vector::from([0.5, 0.5]), &Vector::from([1.0, 1.0]), 1.0);
+    /// // The part of it in a box.
+    /// let square = GridBox { lower: Vector::from([0.5, 0.5]), edges: Vector::from([1.0, 1.0]), spacing: 1.0 };
+    /// let (volume, centroid) = corner.part(&square);
     /// assert_eq!((volume, centroid), (0.75, Vector::from([2.75 / 3.0, 2.75 / 3.0])));
     /// # Ok::<(), &str>(())
     /// ```
@@ -259,12 +260,13 @@ impl<const D: usize> Solid<D> for Pixels<D> {
     }
 
     /// Sums over the inside pixels: volume and first moment of the overlap of a pixel and a box.
-    fn row(&self, lower: &Vector<f64, D>, edges: &Vector<f64, D>, count: usize) -> Option<Vec<(f64, Vector<f64, D>)>> {
-        let mut across = [const { Vec::new() }; 2];
-        for (k, overlaps) in (1..).zip(&mut across) {
-            let layer = || vec![(0, 1.0, 0.0)];
-            *overlaps = if k < D { self.overlaps(k, lower[k], lower[k] + edges[k]) } else { layer() };
-        }
+    fn row(&self, first: &GridBox<D>, count: usize) -> Option<Vec<Part<D>>> {
+        let GridBox { lower, edges, .. } = first;
+        // A picture in 2D is one layer of voxels.
+        let across = [1, 2].map(|k| match k < D {
+            true => self.overlaps(k, lower[k], lower[k] + edges[k]),
+            false => vec![(0, 1.0, 0.0)],
+        });
         let level = &self.mask.0.levels[0];
         let of_box = |number: usize| {
             let from = lower[0] + number as f64 * edges[0];
