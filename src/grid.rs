@@ -122,13 +122,7 @@ impl<const D: usize> Grid<D> {
     /// Index along each axis of the node numbered `id`.
     #[inline]
     pub fn index(&self, id: u64) -> [u32; D] {
-        let mut rest = id;
-        std::array::from_fn(|k| {
-            let nodes = u64::from(self.cells[k]) + 1;
-            let index = rest % nodes;
-            rest /= nodes;
-            index as u32
-        })
+        digits(id, self.cells.map(|n| u64::from(n) + 1)).map(|index| index as u32)
     }
 
     /// Position of the node with the given index.
@@ -162,23 +156,23 @@ impl<const D: usize> Grid<D> {
     /// assert_eq!(grid.cell(&Vector::from([-0.1, 0.3])), None);
     /// ```
     pub fn cell(&self, x: &Vector<f64, D>) -> Option<[u32; D]> {
-        let mut cell = [0; D];
-        for k in 0..D {
-            cell[k] = (self.axis(k).local(x[k])? as u32).min(self.cells[k].saturating_sub(1));
-        }
-        Some(cell)
+        self.contains(x)
+            .then(|| std::array::from_fn(|k| (self.axis(k).spacings(x[k]) as u32).min(self.cells[k].saturating_sub(1))))
     }
 }
 
 /// All indices below `count`, the first axis fastest.
 pub(crate) fn indices<const D: usize>(count: [u64; D]) -> impl Iterator<Item = [u64; D]> {
-    (0..count.iter().product()).map(move |id| {
-        let mut rest: u64 = id;
-        std::array::from_fn(|k| {
-            let index = rest % count[k];
-            rest /= count[k];
-            index
-        })
+    (0..count.iter().product()).map(move |id| digits(id, count))
+}
+
+/// The index along each axis of the `id`-th of `count` points, the first axis fastest.
+#[inline]
+fn digits<const D: usize>(mut id: u64, count: [u64; D]) -> [u64; D] {
+    count.map(|n| {
+        let index = id % n;
+        id /= n;
+        index
     })
 }
 
