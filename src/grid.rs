@@ -76,20 +76,6 @@ impl Axis {
     pub(crate) fn round_off(&self, x: f64) -> f64 {
         ON_NODE * (x.abs() + self.origin.abs()) / self.spacing
     }
-
-    /// Last node of the axis.
-    ///
-    /// ```
-    /// use bfree::grid::Axis;
-    ///
-    /// // n cells have n + 1 nodes, 0 to n.
-    /// let axis = Axis { origin: 0.0, spacing: 0.5, cells: 4 };
-    /// assert_eq!(axis.origin + axis.last() as f64 * axis.spacing, 2.0);
-    /// ```
-    #[inline]
-    pub fn last(&self) -> i64 {
-        i64::from(self.cells)
-    }
 }
 
 impl<const D: usize> Grid<D> {

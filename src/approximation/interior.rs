@@ -110,9 +110,9 @@ impl<I: Interior, const M: usize> WithLanes for Evaluate<'_, '_, I, M> {
         let column = interior.column::<_, M>(below, above, wide(&starts), points.spacing);
         let mut smallest = below.constant(f64::INFINITY);
         for i in 0..2 * M + 2 {
-            let (n, dn) = (column.values[i], column.derivatives[i]);
+            let n = column.values[i];
             s.store(n.1, &mut out.values[i]);
-            s.store(dn.1, &mut out.derivatives[i]);
+            s.store(column.derivatives[i].1, &mut out.derivatives[i]);
             let (distance, j) = if i <= M { (below, M - i) } else { (above, i - M - 1) };
             let room = below.constant(radius) - distance;
             let size = if j == 0 { n.abs() } else { room.constant(j as f64).where_less(room, n.abs(), smallest) };

@@ -44,7 +44,7 @@ pub(super) fn folded(
     // Nodes cell − lower … cell + upper have |D| < radius, ghosts included.
     let lower = (radius - place.below).ceil() as i64 - 1;
     let upper = (radius - place.above).ceil() as i64;
-    let (cell, last) = (i64::from(place.cell), axis.last());
+    let (cell, last) = (i64::from(place.cell), i64::from(axis.cells));
     let (first, end) = ((cell - lower).max(0), (cell + upper).min(last));
     out.start(first as u32);
     (first..=end).for_each(|_| out.push(0.0, 0.0));
@@ -54,9 +54,7 @@ pub(super) fn folded(
         out.derivatives[slot] += factor * slope / axis.spacing;
     };
     for node in cell - lower..=cell + upper {
-        let offset = node - cell;
-        let distance = if offset <= 0 { place.below - offset as f64 } else { -(place.above + (offset - 1) as f64) };
-        let at = kernel.at(distance);
+        let at = kernel.at(place.distance(node));
         let wall = node.clamp(0, last);
         if node == wall {
             add(node, 1.0, at);

@@ -159,6 +159,13 @@ impl Place {
         Self { cell, below, above: 1.0 - below }
     }
 
+    /// The signed distance D from a node of the axis, in spacings.
+    #[inline(always)]
+    pub(super) fn distance(&self, node: i64) -> f64 {
+        let offset = (node - i64::from(self.cell)) as f64;
+        if offset <= 0.0 { self.below - offset } else { -(self.above + (offset - 1.0)) }
+    }
+
     /// The place, moved onto the edge of a support if only round-off separates them. Otherwise round-off would decide whether a node is
     /// active whose N and h|∇N| are round-off themselves, and nothing would hold such a node. `edge` is the distance from a node of the
     /// cell to the edges of supports in the cell, in spacings.

@@ -39,7 +39,7 @@ impl PolygonError {
                                edges that meet at the vertex they share and nowhere else (vertices are counted from 0)";
 
     /// The vertex to name for this error, if there is one.
-    pub fn vertex(&self) -> Option<usize> {
+    pub(crate) fn vertex(&self) -> Option<usize> {
         match self {
             Self::Dimension(_) | Self::TooFew(_) | Self::Flat => None,
             Self::Repeated(vertex, _) | Self::Meeting([vertex, _], _) => Some(*vertex),
@@ -101,11 +101,6 @@ impl<const D: usize> Polygon<D> {
             vertices.reverse();
         }
         Self { vertices }
-    }
-
-    /// Its vertices, counter-clockwise.
-    pub fn vertices(&self) -> &[Vector<f64, D>] {
-        &self.vertices
     }
 
     /// The ends of edge i.

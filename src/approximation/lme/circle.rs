@@ -79,15 +79,12 @@ impl LmeCircle {
         for k in 0..D {
             let closest = i64::from(places[k].cell) + i64::from(places[k].below > 0.5);
             first[k] = (closest - rings).max(0);
-            count[k] = ((closest + rings).min(grid.axis(k).last()) - first[k] + 1) as u64;
+            count[k] = ((closest + rings).min(i64::from(grid.cells[k])) - first[k] + 1) as u64;
         }
         out.clear();
         for at in indices(count) {
             let node: [i64; D] = std::array::from_fn(|k| first[k] + at[k] as i64);
-            let distance: [f64; D] = std::array::from_fn(|k| {
-                let offset = (node[k] - i64::from(places[k].cell)) as f64;
-                if offset <= 0.0 { places[k].below - offset } else { -(places[k].above + (offset - 1.0)) }
-            });
+            let distance: [f64; D] = std::array::from_fn(|k| places[k].distance(node[k]));
             if distance.iter().map(|d| d * d).sum::<f64>() < radius * radius {
                 out.push(node.map(|index| index as u32), 0.0, distance);
             }
@@ -129,15 +126,8 @@ impl<const D: usize> Dual<'_, D> {
                 ((self.exponent(lambda, distance) - log_z).exp(), Vector::<f64, D>::from_column_slice(distance))
             })
         };
-        let mut r: Vector<f64, D> = Vector::zeros();
-        for (n, distance) in values() {
-            r += distance * n;
-        }
-        let mut j: Tensor<f64, D> = Tensor::zeros();
-        for (n, distance) in values() {
-            let d = distance - r;
-            j += outer(&d, &d) * n;
-        }
+        let r: Vector<f64, D> = values().map(|(n, distance)| distance * n).sum();
+        let j = values().map(|(n, distance)| outer(&(distance - r), &(distance - r)) * n).sum();
         Moments { log_z, r, j }
     }
 

@@ -120,9 +120,9 @@ impl<const D: usize> Solid<D> for Surface<D> {
             let Some(normal) = sum.try_normalize(0.0) else { continue };
             let corners =
                 group.iter().flat_map(|&i| rows::clipped(mesh.corners(i).map(|corner| corner - x).to_vec(), &reach, 0));
-            let (low, high) = corners
-                .map(|corner| normal.dot(&corner))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+            let heights: Vec<f64> = corners.map(|corner| normal.dot(&corner)).collect();
+            let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             planes.push((-0.5 * (low + high), plane(normal)));
             departure = departure.max(0.5 * (high - low));
         }
